@@ -1,0 +1,1 @@
+"""The mathematics of semi-parametric Gaussian processes: arrays in, arrays out."""

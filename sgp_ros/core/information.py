@@ -1,0 +1,126 @@
+"""What is known of W: a triangular system `R w = z` with unit noise, which grows by rows.
+
+The posterior is N(R^-1 z, (R^T R)^-1). A row of zeros in R is a direction nothing has determined
+yet; until there is none, a singular value decomposition with scaled columns takes the place of
+the triangular solve.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+
+from sgp_ros.core.posterior import NULL_TOLERANCE
+from sgp_ros.core.rotations import absorb_row, absorbed_rows_numpy
+
+if TYPE_CHECKING:
+    from sgp_ros.core.prior import CoefficientPrior
+
+_RANK_TOLERANCE = 1e-11
+"""Least share of a column's norm that is new to the columns before it. Rounding leaves 1e-16 times
+the root of the number of rows; a real signal below 1e-11 could not be told from it."""
+
+
+class Information:
+    """Square-root information on p coefficients.
+
+    Args:
+        R: (p, p) upper triangular.
+        z: (p,).
+    """
+
+    def __init__(self, R: np.ndarray, z: np.ndarray) -> None:
+        self.R = R
+        self.z = z
+        self._solved: _Solved | None = None
+
+    @classmethod
+    def nothing(cls, p: int) -> Information:
+        """Return no information on p coefficients."""
+        return cls(np.zeros((p, p)), np.zeros(p))
+
+    @classmethod
+    def of_prior(cls, prior: CoefficientPrior) -> Information:
+        """Return the information that a prior holds."""
+        p = prior.size
+        return cls(*absorbed_rows_numpy(np.zeros((p, p)), np.zeros(p), prior.root, prior.target))
+
+    def copy(self) -> Information:
+        """Return an independent copy."""
+        return Information(self.R.copy(), self.z.copy())
+
+    def absorb(self, row: np.ndarray, value: float) -> None:
+        """Add the equation `row w = value` of unit noise; row (p,). O(p^2)."""
+        absorb_row(self.R, self.z, row.copy(), value)
+        self._solved = None
+
+    def scaled(self, factor: float) -> Information:
+        """Return this information as if its noise had had `1 / factor` times the deviation."""
+        return Information(factor * self.R, factor * self.z)
+
+    def with_rows(self, rows: np.ndarray, values: np.ndarray) -> Information:
+        """Return this information with equations `rows (r, p) w = values (r,)` added."""
+        return Information(*absorbed_rows_numpy(self.R, self.z, rows, values))
+
+    @property
+    def coefficients(self) -> np.ndarray:
+        """Posterior mean of W, (p,); undetermined directions at zero."""
+        return self._solution().w
+
+    @property
+    def is_identifiable(self) -> np.ndarray:
+        """Whether each coefficient is determined, (p,) of bool."""
+        return np.linalg.norm(self._solution().null, axis=1) < NULL_TOLERANCE  # type: ignore[no-any-return]  # array
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Posterior covariance over the determined directions, (p, p)."""
+        spread = self.spread(np.eye(len(self.z)))
+        return spread @ spread.T
+
+    def spread(self, rows: np.ndarray) -> np.ndarray:
+        """Return S (k, r) such that `rows W` has covariance `S S^T`, for rows (k, p)."""
+        solved = self._solution()
+        if solved.spread is not None:
+            return rows @ solved.spread
+        return linalg.solve_triangular(  # type: ignore[no-any-return]  # an array
+            self.R, rows.T, trans='T', check_finite=False
+        ).T
+
+    def is_determined(self, rows: np.ndarray) -> np.ndarray:
+        """Whether `rows W` leaves out every undetermined direction, (k,) for rows (k, p)."""
+        solved = self._solution()
+        if not solved.null.shape[1]:
+            return np.ones(len(rows), dtype=bool)
+        scaled = rows / solved.scale
+        outside = np.linalg.norm(scaled @ solved.null, axis=1)
+        return outside <= NULL_TOLERANCE * np.linalg.norm(scaled, axis=1)  # type: ignore[no-any-return]  # array
+
+    def _solution(self) -> _Solved:
+        if self._solved is None:
+            self._solved = _Solved(self.R, self.z)
+        return self._solved
+
+
+class _Solved:
+    """Solution of one state of the system; `spread` is None where R itself is invertible."""
+
+    def __init__(self, R: np.ndarray, z: np.ndarray) -> None:
+        p = len(z)
+        self.scale = np.sqrt((R * R).sum(axis=0))
+        self.scale[self.scale == 0.0] = 1.0
+        self.null = np.zeros((p, 0))
+        self.spread: np.ndarray | None = None
+        if not p:
+            self.spread, self.w = np.zeros((0, 0)), np.zeros(0)
+            return
+        if np.all(np.abs(np.diag(R)) > _RANK_TOLERANCE * self.scale):
+            self.w = linalg.solve_triangular(R, z, check_finite=False)
+            return
+        U, S, Vt = np.linalg.svd(R / self.scale)
+        rank = int((S > _RANK_TOLERANCE * max(S[0], 1e-300)).sum())
+        self.spread = Vt[:rank].T / S[:rank] / self.scale[:, None]
+        self.null = Vt[rank:].T
+        self.w = self.spread @ (U[:, :rank].T @ z)

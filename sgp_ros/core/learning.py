@@ -1,0 +1,162 @@
+"""Learning of hyper-parameters by maximum evidence (Wu and Movellan, section III.D)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import optimize
+
+from sgp_ros.core.kernels import SquaredExponential
+from sgp_ros.core.model import Model
+from sgp_ros.core.posterior import Posterior
+from sgp_ros.errors import NumericalError
+
+if TYPE_CHECKING:
+    from sgp_ros.core.kernels import Kernel
+    from sgp_ros.core.model import Observations
+    from sgp_ros.core.prior import CoefficientPrior
+
+RULES = ('paper', 'standardised')
+"""How length scales start: at the variance of each input, as printed in the paper, or at its
+standard deviation, which has the right unit and does not depend on the unit chosen."""
+
+_NOISE_FLOOR = 1e-8
+_RANGE = 1e4
+_RESTART_SPREAD = 1.5
+_REFUSED = 1e25
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LearnedModel:
+    """Result of a fit.
+
+    Attributes:
+        model: the hyper-parameters of the best start.
+        log_evidence: at these [nat].
+        evaluations: of evidence and gradient, over all starts.
+        refused: starts that ended without a positive definite covariance.
+    """
+
+    model: Model
+    log_evidence: float
+    evaluations: int
+    refused: int
+
+
+def initial_model(
+    data: Observations,
+    inputs: tuple[tuple[int, ...] | None, ...],
+    rule: str = 'standardised',
+) -> Model:
+    """Return the values from which learning starts.
+
+    `sigma_z` is the sample variance of the target, `sigma_v` a hundredth of it. With an
+    observation matrix the mean variance of the observations serves for every component of X.
+
+    Args:
+        data: observations, at least two.
+        inputs: per component of X the columns of U its Z sees; None for no Z.
+        rule: one of `RULES`.
+    """
+    if rule not in RULES:
+        raise ValueError(f'rule {rule!r} is none of {RULES}')
+    power = _variance_or_one(data.y)
+    spread = _variance_or_one(data.U)
+    if rule == 'standardised':
+        spread = np.sqrt(spread)
+    kernels: list[Kernel | None] = []
+    for component, columns in enumerate(inputs):
+        if columns is None:
+            kernels.append(None)
+            continue
+        variance = power[component] if data.G is None else power.mean()
+        lengths = tuple(float(spread[column]) for column in columns)
+        kernels.append(SquaredExponential(float(variance), lengths, columns))
+    return Model(tuple(kernels), tuple(float(x) / 100.0 for x in power))
+
+
+def learn(
+    data: Observations,
+    prior: CoefficientPrior,
+    start: Model,
+    restarts: int = 0,
+    rng: np.random.Generator | None = None,
+) -> LearnedModel:
+    """Maximise the evidence from `start` and from `restarts` random perturbations of it.
+
+    L-BFGS-B on the logarithms, with the analytic gradient, within a factor of 1e4 of the scale
+    of data: noise at least 1e-8 of the target's variance keeps the covariance factorable.
+
+    Raises:
+        NumericalError: not one start led to a positive definite covariance.
+        ValueError: restarts without a generator.
+    """
+    if restarts and rng is None:
+        raise ValueError('restarts need a random generator')
+    bounds = _bounds(data, start)
+    starts = [start.log_parameters]
+    for _ in range(restarts):
+        assert rng is not None  # noqa: S101 - checked above, for the type checker
+        starts.append(starts[0] + _RESTART_SPREAD * rng.standard_normal(len(starts[0])))
+    search = _Search(data, prior, start)
+    for theta in starts:
+        low, high = bounds.T
+        optimize.minimize(
+            search.objective, np.clip(theta, low, high), jac=True, method='L-BFGS-B', bounds=bounds
+        )
+    if search.best is None:
+        raise NumericalError(
+            f'no positive definite covariance in {len(starts)} starts of the fit',
+            'distinct inputs and a target that varies',
+            'check the recording for repeated or constant samples',
+        )
+    model = start.with_log_parameters(search.best)
+    return LearnedModel(model, -search.lowest, search.evaluations, search.refused)
+
+
+class _Search:
+    """The negative evidence as the optimiser sees it, remembering the best point."""
+
+    def __init__(self, data: Observations, prior: CoefficientPrior, start: Model) -> None:
+        self._data = data
+        self._prior = prior
+        self._start = start
+        self.best: np.ndarray | None = None
+        self.lowest = np.inf
+        self.evaluations = 0
+        self.refused = 0
+
+    def objective(self, theta: np.ndarray) -> tuple[float, np.ndarray]:
+        self.evaluations += 1
+        try:
+            model = self._start.with_log_parameters(theta)
+            posterior = Posterior(model, self._data, self._prior)
+        except NumericalError:
+            self.refused += 1
+            return _REFUSED, np.zeros_like(theta)
+        value = -posterior.log_evidence
+        if value < self.lowest:
+            self.lowest = value
+            self.best = theta.copy()
+        return value, -posterior.evidence_gradient()
+
+
+def _variance_or_one(x: np.ndarray) -> np.ndarray:
+    variance = x.var(axis=0)
+    return np.where(variance > 0.0, variance, 1.0)
+
+
+def _bounds(data: Observations, start: Model) -> np.ndarray:
+    power = _variance_or_one(data.y)
+    spread = np.sqrt(_variance_or_one(data.U))
+    rows: list[tuple[float, float]] = []
+    for component, kernel in enumerate(start.kernels):
+        if kernel is None:
+            continue
+        variance = power[component] if data.G is None else power.mean()
+        rows.append((variance / _RANGE**2, variance * _RANGE))
+        rows += [(spread[c] / _RANGE, spread[c] * _RANGE) for c in kernel.inputs]
+    rows += [(_NOISE_FLOOR * x, 1e2 * x) for x in power]
+    return np.log(np.array(rows))

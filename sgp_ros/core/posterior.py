@@ -1,0 +1,356 @@
+"""Joint inference of W and Z from a batch of observations, with the evidence and its gradient.
+
+With K the covariance of Z plus noise, K = L L^T, A = L^-1 F and b = L^-1 y, the posterior of W
+solves the least-squares problem `[A; root] W = [b; target]`. A thin SVD of that stack, its columns
+scaled, gives mean, spread and the directions that nothing determines, for any prior up to the flat
+one; the covariance `F sigma_w F^T` of equation (15) is never formed. Without an observation
+matrix the components of X are coupled only by W and each has its own n x n factor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+
+from sgp_ros.errors import NumericalError
+
+if TYPE_CHECKING:
+    from sgp_ros.core.kernels import Kernel
+    from sgp_ros.core.model import Model, Observations
+    from sgp_ros.core.prior import CoefficientPrior
+
+NULL_TOLERANCE = 1e-8
+"""Share of a regressor row that may point along undetermined directions before it counts."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prediction:
+    """Predicted X(q) at q queries.
+
+    Attributes:
+        mean: (q, k).
+        covariance: (q, k, k); the diagonal is infinite where an undetermined direction of W
+            enters.
+    """
+
+    mean: np.ndarray
+    covariance: np.ndarray
+
+    @property
+    def variance(self) -> np.ndarray:
+        """Variances of the components, (q, k)."""
+        return np.einsum('qkk->qk', self.covariance)
+
+    def observed(self, noise: np.ndarray, G: np.ndarray | None = None) -> Prediction:
+        """Return the prediction of Y = g X + V.
+
+        Args:
+            noise: (m,) variances of V.
+            G: (q, m, k) observation matrices; None for the identity.
+        """
+        if G is None:
+            return Prediction(self.mean, self.covariance + np.diag(noise))
+        mean = np.einsum('qmk,qk->qm', G, self.mean)
+        covariance = np.einsum('qmk,qkl,qnl->qmn', G, self.covariance, G) + np.diag(noise)
+        return Prediction(mean, covariance)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Block:
+    """Rows of observations that share one factor.
+
+    Attributes:
+        components: indices of the components of X that enter these rows.
+        gain: (N, len(components)) factor of each component in each row; None for ones.
+        L: (N, N) lower factor, or None where the covariance is `noise I`.
+        noise: variance on the diagonal, used without L.
+        A, b: whitened regressor (N, p) and observations (N,).
+    """
+
+    components: tuple[int, ...]
+    gain: np.ndarray | None
+    L: np.ndarray | None
+    noise: float
+    A: np.ndarray
+    b: np.ndarray
+
+    @property
+    def log_det(self) -> float:
+        if self.L is None:
+            return len(self.b) * float(np.log(self.noise))
+        return 2.0 * float(np.log(np.diag(self.L)).sum())
+
+    def unwhiten(self, x: np.ndarray) -> np.ndarray:
+        """Return L^-T x."""
+        if self.L is None:
+            return x / np.sqrt(self.noise)
+        return linalg.solve_triangular(self.L, x, lower=True, trans='T', check_finite=False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solution:
+    """Least-squares solution of the stacked whitened system.
+
+    Attributes:
+        w: (p,) posterior mean; the undetermined part is zero.
+        spread: (p, r) with posterior covariance `spread spread^T`.
+        null: (p, p - r) orthonormal directions of scaled coefficients that nothing determines.
+        scale: (p,) by which the columns were divided.
+        left: (N + prior rows, r) left singular vectors.
+        residual: (N + prior rows,) of the stacked system.
+        log_det: of the posterior precision over the determined directions.
+    """
+
+    w: np.ndarray
+    spread: np.ndarray
+    null: np.ndarray
+    scale: np.ndarray
+    left: np.ndarray
+    residual: np.ndarray
+    log_det: float
+
+
+class Posterior:
+    """The posterior of W and Z given observations, for fixed hyper-parameters.
+
+    Cost O(k n^3 / 3 + k n^2 p) to build, O(k n^2) per query with variance.
+
+    Raises:
+        NumericalError: a covariance is not positive definite in double precision.
+    """
+
+    def __init__(self, model: Model, data: Observations, prior: CoefficientPrior) -> None:
+        self.model = model
+        self.data = data
+        self.prior = prior
+        self._blocks = _build_blocks(model, data)
+        A = np.vstack([block.A for block in self._blocks] + [prior.root])
+        b = np.concatenate([block.b for block in self._blocks] + [prior.target])
+        self._solution = _solve(A, b, data, prior)
+
+    @property
+    def coefficients(self) -> np.ndarray:
+        """Posterior mean of W, (p,); undetermined directions stay at zero."""
+        return self._solution.w
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Posterior covariance of W over the determined directions, (p, p)."""
+        return self._solution.spread @ self._solution.spread.T
+
+    @property
+    def is_identifiable(self) -> np.ndarray:
+        """Whether the data or the prior determine each coefficient, (p,) of bool."""
+        norms = np.linalg.norm(self._solution.null, axis=1)
+        return norms < NULL_TOLERANCE  # type: ignore[no-any-return]  # an array of bool
+
+    @property
+    def log_evidence(self) -> float:
+        """Log density of y [nat], over the determined directions where the prior is flat.
+
+        `-1/2 (log|K| + log|P| - log|Lambda| + residual + (N - flat) log 2 pi)`: for a proper
+        prior exactly log N(y; E[Y], sigma_dd). The formula printed in the paper is read so.
+        """
+        count = sum(len(block.b) for block in self._blocks)
+        flat = self._solution.spread.shape[1] - len(self.prior.target)
+        log_det = sum(block.log_det for block in self._blocks)
+        log_det += self._solution.log_det - self.prior.log_det
+        quadratic = float(self._solution.residual @ self._solution.residual)
+        return -0.5 * (log_det + quadratic + (count - flat) * float(np.log(2.0 * np.pi)))
+
+    def evidence_gradient(self) -> np.ndarray:
+        """Return the gradient of `log_evidence` by `model.log_parameters`.
+
+        `1/2 tr((alpha alpha^T - C^-1) dK)` with `alpha = L^-T residual` and
+        `C^-1 = L^-T (I - left left^T) L^-1`. Cost O(n^3) per factor.
+        """
+        kernels = self.model.kernels
+        parts: list[np.ndarray | None] = [None] * len(kernels)
+        noise = np.zeros(len(self.model.noise))
+        start = 0
+        for block in self._blocks:
+            stop = start + len(block.b)
+            H = _curvature(
+                block, self._solution.residual[start:stop], self._solution.left[start:stop]
+            )
+            outputs = np.diag(H).reshape(len(self.data.U), -1).sum(axis=0)
+            first = block.components[0] if block.gain is None else 0
+            noise[first : first + len(outputs)] += 0.5 * outputs
+            for column, component in enumerate(block.components):
+                kernel = kernels[component]
+                if kernel is not None:
+                    folded = self._fold(H, block, column)
+                    weighted = folded * kernel.matrix(self.data.U)
+                    parts[component] = 0.5 * kernel.gradient(self.data.U, weighted)
+            start = stop
+        gradients = [part for part in parts if part is not None]
+        return np.concatenate([*gradients, noise * np.array(self.model.noise)])
+
+    def prior_scale_gradient(self) -> float:
+        """Return the derivative of `log_evidence` by the log of a factor on the prior's std."""
+        rows = len(self.prior.target)
+        if not rows:
+            return 0.0
+        residual = self._solution.residual[-rows:]
+        left = self._solution.left[-rows:]
+        return float(residual @ residual + (left * left).sum() - rows)
+
+    def predict(self, U: np.ndarray, F: np.ndarray) -> Prediction:
+        """Predict X at inputs U (q, d) with regressors F (q, k, p).
+
+        Mean `f w + v^T (b - A w)`, covariance `k** - v^T v + g P^-1 g^T` with `v = L^-1 k*` and
+        `g = f - v^T A`: equations (8)-(20) rearranged.
+        """
+        q, k, _ = F.shape
+        mean = F @ self._solution.w  # (q, k)
+        G = F.copy()
+        covariance = np.zeros((q, k, k))
+        start = 0
+        for block in self._blocks:
+            stop = start + len(block.b)
+            cross = [self._cross(block, column, U) for column in range(len(block.components))]
+            for column, component in enumerate(block.components):
+                v = cross[column]
+                if v is None:
+                    continue
+                kernel = self.model.kernels[component]
+                mean[:, component] += v.T @ self._solution.residual[start:stop]
+                G[:, component] -= v.T @ block.A
+                covariance[:, component, component] += _diagonal(kernel, q)
+                for other_column, other in enumerate(block.components):
+                    w = cross[other_column]
+                    if w is not None:
+                        covariance[:, component, other] -= np.einsum('nq,nq->q', v, w)
+            start = stop
+        spread = G @ self._solution.spread  # (q, k, r)
+        covariance += spread @ spread.transpose(0, 2, 1)
+        _mark_undetermined(covariance, G, self._solution)
+        return Prediction(mean, covariance)
+
+    def _cross(self, block: _Block, column: int, U: np.ndarray) -> np.ndarray | None:
+        kernel = self.model.kernels[block.components[column]]
+        if kernel is None or block.L is None:
+            return None
+        k = kernel.matrix(self.data.U, U)  # (n, q)
+        if block.gain is not None:
+            k = np.repeat(k, len(block.b) // len(k), axis=0) * block.gain[:, column, None]
+        return linalg.solve_triangular(block.L, k, lower=True, check_finite=False)
+
+    def _fold(self, H: np.ndarray, block: _Block, column: int) -> np.ndarray:
+        if block.gain is None:
+            return H
+        n = len(self.data.U)
+        weighted = H * np.outer(block.gain[:, column], block.gain[:, column])
+        return weighted.reshape(n, len(block.b) // n, n, -1).sum(axis=(1, 3))
+
+
+def _diagonal(kernel: Kernel | None, q: int) -> np.ndarray:
+    return np.zeros(q) if kernel is None else kernel.diagonal(q)
+
+
+def _build_blocks(model: Model, data: Observations) -> list[_Block]:
+    if data.G is None:
+        return [
+            _direct_block(j, kernel, noise, data)
+            for j, (kernel, noise) in enumerate(zip(model.kernels, model.noise, strict=True))
+        ]
+    n, m, k = data.G.shape
+    gain = data.G.reshape(n * m, k)
+    K = np.zeros((n * m, n * m))
+    for j, kernel in enumerate(model.kernels):
+        if kernel is not None:
+            stretched = np.repeat(np.repeat(kernel.matrix(data.U), m, axis=0), m, axis=1)
+            K += np.outer(gain[:, j], gain[:, j]) * stretched
+    K[np.diag_indices(n * m)] += np.tile(np.array(model.noise), n)
+    rows = np.einsum('nmk,nkp->nmp', data.G, data.F).reshape(n * m, -1)
+    return [_factored_block(tuple(range(k)), gain, K, rows, data.y.ravel())]
+
+
+def _direct_block(j: int, kernel: Kernel | None, noise: float, data: Observations) -> _Block:
+    if kernel is None:
+        root = np.sqrt(noise)
+        return _Block((j,), None, None, noise, data.F[:, j] / root, data.y[:, j] / root)
+    K = kernel.matrix(data.U)
+    K[np.diag_indices(len(K))] += noise
+    return _factored_block((j,), None, K, data.F[:, j], data.y[:, j])
+
+
+def _factored_block(
+    components: tuple[int, ...],
+    gain: np.ndarray | None,
+    K: np.ndarray,
+    rows: np.ndarray,
+    y: np.ndarray,
+) -> _Block:
+    try:
+        L = linalg.cholesky(K, lower=True, overwrite_a=True, check_finite=False)
+    except linalg.LinAlgError as error:
+        raise NumericalError(
+            f'the covariance of {len(K)} samples is not positive definite',
+            'a noise variance above the rounding error of the signal variance',
+            'raise the noise variance',
+        ) from error
+    stacked = np.column_stack([rows, y])
+    white = linalg.solve_triangular(L, stacked, lower=True, check_finite=False)
+    return _Block(components, gain, L, 0.0, white[:, :-1], white[:, -1])
+
+
+def column_scale(F: np.ndarray, root: np.ndarray) -> np.ndarray:
+    """Return a positive scale per column of the stacked rows of F (n, k, p) and root (r, p)."""
+    scale = np.sqrt((F * F).sum(axis=(0, 1)) + (root * root).sum(axis=0))
+    scale[scale == 0.0] = 1.0
+    return scale  # type: ignore[no-any-return]  # an array of floats
+
+
+def _solve(A: np.ndarray, b: np.ndarray, data: Observations, prior: CoefficientPrior) -> _Solution:
+    p = A.shape[1]
+    # The scale leaves out the hyper-parameters: the evidence over the determined directions
+    # would otherwise change with the scale. A second scaling balances the columns for the SVD.
+    scale = column_scale(data.F, prior.root)
+    norms = np.linalg.norm(A / scale, axis=0)
+    norms[norms == 0.0] = 1.0
+    U, S, Vt = np.linalg.svd(A / (scale * norms), full_matrices=False)
+    limit = max(A.shape) * np.finfo(float).eps * (S[0] if len(S) else 0.0)
+    rank = int((limit < S).sum())
+    U, S = U[:, :rank], S[:rank]
+    spread = Vt[:rank].T / S / (scale * norms)[:, None]
+    w = spread @ (U.T @ b)
+    null = _null_space(Vt, rank, norms)
+    if rank == p:
+        log_det = 2.0 * float(np.log(S).sum() + np.log(scale * norms).sum())
+    else:
+        log_det = 2.0 * float(np.log(linalg.svdvals(A / scale)[:rank]).sum()) if rank else 0.0
+    return _Solution(w, spread, null, scale, U, b - A @ w, log_det)
+
+
+def _null_space(Vt: np.ndarray, rank: int, norms: np.ndarray) -> np.ndarray:
+    p = Vt.shape[1]
+    if rank == p:
+        return np.zeros((p, 0))
+    basis = linalg.null_space(Vt[:rank]) if rank else np.eye(p)
+    return linalg.orth(basis / norms[:, None])  # type: ignore[no-any-return]  # an array
+
+
+def _curvature(block: _Block, residual: np.ndarray, left: np.ndarray) -> np.ndarray:
+    """Return `alpha alpha^T - C^-1` of a block, (N, N)."""
+    alpha = block.unwhiten(residual)
+    Q = block.unwhiten(left)
+    if block.L is None:
+        inverse = np.eye(len(alpha)) / block.noise
+    else:
+        inverse, _ = linalg.lapack.dpotri(block.L, lower=True)
+        lower = np.tril(inverse, -1)
+        inverse = lower + lower.T + np.diag(np.diag(inverse))
+    return np.outer(alpha, alpha) - inverse + Q @ Q.T
+
+
+def _mark_undetermined(covariance: np.ndarray, G: np.ndarray, solution: _Solution) -> None:
+    if not solution.null.shape[1]:
+        return
+    scaled = G / solution.scale
+    outside = np.linalg.norm(scaled @ solution.null, axis=2)
+    rows, columns = np.nonzero(outside > NULL_TOLERANCE * np.linalg.norm(scaled, axis=2))
+    covariance[rows, columns, columns] = np.inf

@@ -1,0 +1,282 @@
+"""Laws of learning one sample at a time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sgp_ros.core.factor import GrowingFactor
+from sgp_ros.core.information import Information
+from sgp_ros.core.kernels import SquaredExponential
+from sgp_ros.core.model import Model, Observations
+from sgp_ros.core.online import OnlineRegression
+from sgp_ros.core.posterior import Posterior
+from sgp_ros.core.prior import CoefficientPrior
+from sgp_ros.core.rotations import (
+    absorb_row,
+    absorbed_rows_numpy,
+    drop_row,
+    dropped_row_numpy,
+    solve_lower,
+)
+from sgp_ros.errors import NumericalError
+from test.core.worlds import random_problem
+
+PRIORS = [CoefficientPrior.flat(3), CoefficientPrior.from_std(np.ones(3), np.full(3, 2.0))]
+
+
+def _stream(model, data, prior, budget=1000, **options):
+    online = OnlineRegression(model, prior, budget, **options)
+    for u, f, y in zip(data.U, data.F, data.y, strict=True):
+        online.learn(online.predict(u, f), y)
+    return online
+
+
+@pytest.mark.parametrize('prior', PRIORS)
+@pytest.mark.parametrize('noise_like', [None, 'parametric'])
+def test_one_by_one_equals_batch(prior, noise_like):
+    """Learning sample by sample ends in the batch posterior; cond(K) is below 1e3."""
+    model, data = random_problem(0, n=25, noise_like=noise_like)
+    online, batch = _stream(model, data, prior), Posterior(model, data, prior)
+    rng = np.random.default_rng(1)
+    u, f = rng.normal(size=3), rng.normal(size=(2, 3))
+    one, all_at_once = online.predict(u, f), batch.predict(u[None], f[None])
+    np.testing.assert_allclose(one.mean, all_at_once.mean[0], atol=1e-10)
+    np.testing.assert_allclose(one.covariance, all_at_once.covariance[0], atol=1e-10)
+    np.testing.assert_allclose(online.information.coefficients, batch.coefficients, atol=1e-10)
+    np.testing.assert_allclose(online.information.covariance, batch.covariance, atol=1e-10)
+
+
+def test_chain_rule_of_predictions_is_the_evidence():
+    """The sum of one-step log predictive densities is log N(y; E[Y], sigma_dd)."""
+    model, data = random_problem(2, n=15)
+    prior = PRIORS[1]
+    online = OnlineRegression(model, prior, 100)
+    total = 0.0
+    for u, f, y in zip(data.U, data.F, data.y, strict=True):
+        prediction = online.predict(u, f)
+        covariance = prediction.covariance + np.diag(model.noise)
+        error = y - prediction.mean
+        _, log_det = np.linalg.slogdet(2 * np.pi * covariance)
+        total -= 0.5 * (log_det + error @ np.linalg.solve(covariance, error))
+        online.learn(prediction, y)
+    assert total == pytest.approx(Posterior(model, data, prior).log_evidence, abs=1e-9)
+
+
+@given(st.integers(0, 10_000), st.integers(2, 12), st.data())
+def test_dropping_equals_refactorisation(seed, n, data):
+    """Rotations leave the factor of the others and the conditional row of the dropped one."""
+    m = data.draw(st.integers(0, n - 1))
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(n, n))
+    L = np.linalg.cholesky(root @ root.T + np.eye(n))
+    A, b = rng.normal(size=(n, 2)), rng.normal(size=n)
+    expected = dropped_row_numpy(L, A, b, m)
+    drop_row(L, A, b, n, m)
+    for found, wanted in zip((L[: n - 1, : n - 1], A, b), expected, strict=True):
+        np.testing.assert_allclose(np.tril(found) if found is not A and found.ndim == 2 else found,
+                                   wanted, atol=1e-8)  # fmt: skip
+
+
+@given(st.integers(0, 10_000))
+def test_append_then_drop_is_the_identity(seed):
+    """A sample that comes and goes leaves no trace in the factor."""
+    rng = np.random.default_rng(seed)
+    factor = GrowingFactor(SquaredExponential(1.0, (1.0,), (0,)), 0.1, 2, 10)
+    factor.refactorise(rng.normal(size=(6, 1)), rng.normal(size=(6, 2)), rng.normal(size=6))
+    before = {name: array.copy() for name, array in factor.state().items()}
+    u = rng.normal(size=1)
+    factor.append(factor.solve(u), u, rng.normal(size=2), 0.3)
+    factor.drop(6)
+    for name, array in factor.state().items():
+        np.testing.assert_array_equal(array, before[name])
+
+
+def test_compiled_solve_equals_lapack():
+    """The forward substitution is that of the library."""
+    rng = np.random.default_rng(3)
+    L = np.tril(rng.normal(size=(8, 8))) + 5.0 * np.eye(8)
+    x = rng.normal(size=8)
+    expected = np.linalg.solve(L, x)
+    solve_lower(L, 8, x)
+    np.testing.assert_allclose(x, expected, rtol=1e-12)
+
+
+@given(st.integers(0, 10_000), st.integers(0, 6))
+def test_rows_one_by_one_equal_one_factorisation(seed, rows):
+    """Information grown by rotations is that of a single QR."""
+    rng = np.random.default_rng(seed)
+    A, b = rng.normal(size=(rows, 3)), rng.normal(size=rows)
+    R, z = np.zeros((3, 3)), np.zeros(3)
+    for row, value in zip(A, b, strict=True):
+        absorb_row(R, z, row.copy(), value)
+    S, t = absorbed_rows_numpy(np.zeros((3, 3)), np.zeros(3), A, b)
+    np.testing.assert_allclose(R.T @ R, S.T @ S, atol=1e-10)
+    np.testing.assert_allclose(R.T @ z, S.T @ t, atol=1e-10)
+    np.testing.assert_allclose(R.T @ R, A.T @ A, atol=1e-10)
+
+
+def test_dropped_samples_count_once():
+    """With memory, W's precision is that of the product of conditionals, sample by sample.
+
+    Samples leave oldest first, so sample i is conditioned on the `budget` samples after it, and
+    the last ones on each other: computed here without any rotation.
+    """
+    model, data = random_problem(4, n=14, k=1)
+    budget = 5
+    online = _stream(model, data, CoefficientPrior.flat(3), budget)
+    kernel, noise = model.kernels[0], model.noise[0]
+    K = kernel.matrix(data.U) + noise * np.eye(14)
+    F, y = data.F[:, 0], data.y[:, 0]
+    precision, information = np.zeros((3, 3)), np.zeros(3)
+    for i in range(14):
+        rest = np.arange(i + 1, min(i + 1 + budget, 14))
+        gain = np.linalg.solve(K[np.ix_(rest, rest)], K[rest, i])
+        spread = K[i, i] - gain @ K[rest, i]
+        row, value = F[i] - gain @ F[rest], y[i] - gain @ y[rest]
+        precision += np.outer(row, row) / spread
+        information += row * value / spread
+    np.testing.assert_allclose(np.linalg.inv(online.information.covariance), precision, rtol=1e-8)
+    np.testing.assert_allclose(
+        online.information.coefficients, np.linalg.solve(precision, information), rtol=1e-8
+    )
+
+
+def test_memory_without_process_equals_least_squares_on_everything():
+    """Where Z is zero nothing is lost by dropping: PR keeps all of the stream."""
+    model, data = random_problem(5, n=40, noise_like='parametric')
+    online = _stream(model, data, CoefficientPrior.flat(3), 4)
+    batch = Posterior(model, data, CoefficientPrior.flat(3))
+    np.testing.assert_allclose(online.information.coefficients, batch.coefficients, rtol=1e-10)
+
+
+def test_without_memory_only_the_buffer_counts():
+    """Forgetting is exact: the posterior is that of the last samples alone."""
+    model, data = random_problem(6, n=20)
+    online = _stream(model, data, PRIORS[1], 8, remember=False)
+    tail = Observations(data.U[-8:], data.F[-8:], data.y[-8:])
+    batch = Posterior(model, tail, PRIORS[1])
+    np.testing.assert_allclose(online.information.coefficients, batch.coefficients, atol=1e-9)
+    np.testing.assert_allclose(online.information.covariance, batch.covariance, atol=1e-9)
+
+
+def test_memory_is_calibrated_on_long_streams():
+    """Whitened errors of W over 200 streams with the true model have mean square 1.
+
+    The mean of 200 draws of chi2_3 / 3 has standard deviation sqrt(2 / 3 / 200) = 0.058;
+    four of these bound it. The approximation drops conditionals, so it may be a little wide.
+    """
+    kernel = SquaredExponential(1.0, (0.5,), (0,))
+    model = Model((kernel,), (0.1,))
+    squares = []
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        U = rng.uniform(-2, 2, size=(80, 1))
+        F = rng.normal(size=(80, 1, 3))
+        w = rng.normal(size=3)
+        cov = kernel.matrix(U) + 0.1 * np.eye(80)
+        y = F[:, 0] @ w + np.linalg.cholesky(cov) @ rng.normal(size=80)
+        online = _stream(model, Observations(U, F, y[:, None]), CoefficientPrior.flat(3), 20)
+        error = online.information.R @ (online.information.coefficients - w)
+        squares.append(error @ error / 3)
+    assert abs(np.mean(squares) - 1.0) < 4 * 0.058
+
+
+def test_predicting_changes_nothing():
+    """A prediction may be made any number of times."""
+    model, data = random_problem(7)
+    online = _stream(model, data, PRIORS[0])
+    before = online.state()
+    online.predict(data.U[0], data.F[0])
+    for name, array in online.state().items():
+        np.testing.assert_array_equal(array, before[name])
+
+
+def test_stop_save_restore_continue_equals_never_stopped():
+    """A restored state continues to the same bits."""
+    model, data = random_problem(8, n=20)
+    one = OnlineRegression(model, PRIORS[0], 6)
+    other = OnlineRegression(model, PRIORS[0], 6)
+    for i in range(20):
+        one.learn(one.predict(data.U[i], data.F[i]), data.y[i])
+        if i == 9:
+            other.restore(one.state())
+        if i > 9:
+            other.learn(other.predict(data.U[i], data.F[i]), data.y[i])
+    for name, array in other.state().items():
+        np.testing.assert_array_equal(array, one.state()[name])
+
+
+def test_changed_hyperparameters_equal_a_fresh_start():
+    """After a change, the buffer is explained by the new model alone."""
+    model, data = random_problem(9, n=15)
+    other = model.with_log_parameters(model.log_parameters + 0.4)
+    online = _stream(model, data, PRIORS[1])
+    online.change(model=other)
+    batch = Posterior(other, data, PRIORS[1])
+    np.testing.assert_allclose(online.information.coefficients, batch.coefficients, atol=1e-10)
+
+
+def test_stale_predictions_are_refused():
+    """Learning reuses the solve of the prediction, so it must belong to the present model."""
+    model, data = random_problem(10)
+    online = OnlineRegression(model, PRIORS[0], 10)
+    prediction = online.predict(data.U[0], data.F[0])
+    online.learn(prediction, data.y[0])
+    with pytest.raises(ValueError, match='before the last change'):
+        online.learn(prediction, data.y[0])
+
+
+def test_first_samples_leave_directions_undetermined():
+    """Under a flat prior, fewer equations than coefficients give an infinite variance."""
+    model, data = random_problem(11, k=1, p=3)
+    online = OnlineRegression(model, PRIORS[0], 10)
+    assert np.isinf(online.predict(data.U[0], data.F[0]).covariance[0, 0])
+    assert not online.information.is_identifiable.any()
+    for i in range(4):
+        online.learn(online.predict(data.U[i], data.F[i]), data.y[i])
+    assert np.isfinite(online.predict(data.U[5], data.F[5]).covariance[0, 0])
+    assert online.information.is_identifiable.all()
+
+
+def test_process_without_physics_has_no_coefficients():
+    """GP is the case p = 0."""
+    model, data = random_problem(12, p=0)
+    online = _stream(model, data, CoefficientPrior.flat(0), 6)
+    assert online.information.coefficients.shape == (0,)
+    assert np.isfinite(online.predict(data.U[0], data.F[0]).covariance).all()
+
+
+def test_a_lost_factor_raises_and_changes_nothing():
+    """Repeated inputs without noise are refused by append and by a change of model."""
+    model = Model((SquaredExponential(1.0, (1.0,), (0,)),), (1e-300,))
+    online = OnlineRegression(model, CoefficientPrior.flat(0), 5)
+    u, f = np.zeros(1), np.zeros((1, 0))
+    online.learn(online.predict(u, f), np.zeros(1))
+    with pytest.raises(NumericalError, match='repeats'):
+        online.learn(online.predict(u, f), np.zeros(1))
+    good = Model((SquaredExponential(1.0, (1.0,), (0,)),), (0.1,))
+    other = OnlineRegression(good, CoefficientPrior.flat(0), 5)
+    for _ in range(3):
+        other.learn(other.predict(u, f), np.zeros(1))
+    with pytest.raises(NumericalError, match='not positive definite'):
+        other.change(model=model)
+    assert other.model == good
+
+
+def test_a_smaller_budget_drops_the_oldest():
+    """A live change of the budget takes effect at once."""
+    model, data = random_problem(13, n=12)
+    online = _stream(model, data, PRIORS[0])
+    online.change(budget=5)
+    np.testing.assert_array_equal(online.buffer.U, data.U[-5:])
+
+
+def test_information_starts_from_the_prior():
+    """A prior alone gives its own mean and covariance."""
+    prior = CoefficientPrior.from_std(np.array([1.0, 2.0]), np.array([0.5, 3.0]))
+    information = Information.of_prior(prior)
+    np.testing.assert_allclose(information.coefficients, [1.0, 2.0])
+    np.testing.assert_allclose(information.covariance, np.diag([0.25, 9.0]), atol=1e-12)
