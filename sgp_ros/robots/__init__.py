@@ -1,0 +1,1 @@
+"""Physics as data: robots are tuples of named terms, linear in their coefficients."""

@@ -1,0 +1,257 @@
+"""What a robot is to the estimator: joints, and physics that is linear in its coefficients.
+
+`X(u) = f(u) W + Z(u)` (Wu and Movellan, equation 2). A `Term` contributes columns of `f`; a
+`Robot` is a tuple of terms. Its target says which side of the equation of motion is predicted:
+`acceleration` (forward model) or `effort` (inverse model). The other one is then an input.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+CHANNELS = ('position', 'velocity', 'acceleration', 'effort')
+"""The four quantities of a joint, in the order in which inputs are stacked."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """State, acceleration and effort of `k` joints at `n` times; each array is (n, k).
+
+    Attributes:
+        position: [rad] or [m].
+        velocity: [rad/s] or [m/s].
+        acceleration: [rad/s^2] or [m/s^2].
+        effort: [N m], [N], or the command unit that the joint states; 0 for a passive joint.
+    """
+
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    effort: np.ndarray
+
+    def stacked(self) -> np.ndarray:
+        """Return all four quantities side by side in the order of `CHANNELS`, (n, 4 k)."""
+        return np.hstack([self.position, self.velocity, self.acceleration, self.effort])
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A joint and its units.
+
+    Attributes:
+        name: as in `JointState.name`.
+        kind: `revolute` or `prismatic`.
+        is_actuated: whether an effort acts that is measured or commanded.
+        effort_unit: unit of that effort; empty for [N m] or [N] by kind.
+    """
+
+    name: str
+    kind: str = 'revolute'
+    is_actuated: bool = True
+    effort_unit: str = ''
+
+    def unit(self, channel: str) -> str:
+        """Return the unit of one of `CHANNELS`."""
+        length = 'rad' if self.kind == 'revolute' else 'm'
+        if channel == 'effort':
+            return self.effort_unit or ('N m' if self.kind == 'revolute' else 'N')
+        return {
+            'position': length, 'velocity': f'{length}/s', 'acceleration': f'{length}/s^2'
+        }[channel]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Coefficient:
+    """One element of W.
+
+    Attributes:
+        name: unique in the robot.
+        unit: of the coefficient.
+        joint: the joint it belongs to, None where it belongs to several.
+        prior_mean: mean of its prior [unit].
+        prior_std: standard deviation of its prior [unit]; infinite knows nothing.
+    """
+
+    name: str
+    unit: str
+    joint: str | None = None
+    prior_mean: float = 0.0
+    prior_std: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """One piece of physics: `m` columns of the regressor with their coefficients.
+
+    Attributes:
+        coefficients: m of them.
+        columns: from a `Motion` of n times to (n, k, m). Acceleration and effort may enter only
+            affinely: the filter relies on it.
+        source: where the equation comes from.
+    """
+
+    coefficients: tuple[Coefficient, ...]
+    columns: Callable[[Motion], np.ndarray]
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """Joints and the physics that is known of them.
+
+    Attributes:
+        name: of the robot.
+        joints: k of them; their order is the order of all arrays.
+        target: `acceleration` or `effort`, what f(u) W predicts.
+        terms: the physics.
+        residual_inputs: per joint, the names (`velocity:pole`) of what its Z sees.
+        description: one sentence with the source of the model.
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    target: str
+    terms: tuple[Term, ...]
+    residual_inputs: tuple[tuple[str, ...], ...]
+    description: str = ''
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, in order."""
+        return tuple(joint.name for joint in self.joints)
+
+    @property
+    def complement(self) -> str:
+        """The channel that is an input where `target` is the output."""
+        return 'effort' if self.target == 'acceleration' else 'acceleration'
+
+    @property
+    def coefficients(self) -> tuple[Coefficient, ...]:
+        """The elements of W in the order of the columns, p of them."""
+        return tuple(c for term in self.terms for c in term.coefficients)
+
+    def target_unit(self, joint: str) -> str:
+        """Return the unit of the target of `joint`."""
+        return self.joints[self.joint_names.index(joint)].unit(self.target)
+
+    def regressor(self, motion: Motion) -> np.ndarray:
+        """Return f(u) for every time of `motion`, (n, k, p)."""
+        blocks = [term.columns(motion) for term in self.terms]
+        if not blocks:
+            return np.zeros((*motion.position.shape, 0))
+        return np.concatenate(blocks, axis=2)
+
+    def residual_columns(self, spec: Sequence[str]) -> tuple[tuple[int, ...], ...]:
+        """Resolve what Z sees to columns of `Motion.stacked`, one tuple per joint.
+
+        Args:
+            spec: `('default',)` for the robot's own choice, `('all',)` for the state and the
+                other input, `('own',)` for position and velocity of the joint itself, or names
+                such as `velocity:pole`, which then hold for every joint.
+
+        Raises:
+            ConfigError: a name that is no input of this robot.
+        """
+        if tuple(spec) == ('default',):
+            named = self.residual_inputs
+        elif tuple(spec) == ('own',):
+            named = tuple((f'position:{j}', f'velocity:{j}') for j in self.joint_names)
+        elif tuple(spec) == ('all',):
+            named = (self._input_names(),) * len(self.joints)
+        else:
+            named = (tuple(spec),) * len(self.joints)
+        return tuple(tuple(self._column(name) for name in names) for names in named)
+
+    def input_name(self, column: int) -> str:
+        """Return the name of a column of `Motion.stacked`, such as `velocity:pole`."""
+        channel, joint = divmod(column, len(self.joints))
+        return f'{CHANNELS[channel]}:{self.joint_names[joint]}'
+
+    def renamed(self, names: Sequence[str]) -> Robot:
+        """Return this robot with other joint names, in the same order.
+
+        Raises:
+            ConfigError: another number of names than joints, or repeated names.
+        """
+        if len(names) != len(self.joints) or len(set(names)) != len(names):
+            raise ConfigError(
+                f'joints {list(names)} for robot {self.name}',
+                f'{len(self.joints)} different names in the order {list(self.joint_names)}',
+            )
+        new = dict(zip(self.joint_names, names, strict=True))
+        return replace(
+            self,
+            joints=tuple(replace(joint, name=new[joint.name]) for joint in self.joints),
+            terms=tuple(_renamed_term(term, new) for term in self.terms),
+            residual_inputs=tuple(
+                tuple(_renamed_input(name, new) for name in inputs)
+                for inputs in self.residual_inputs
+            ),
+        )
+
+    def with_prior(self, prior: Mapping[str, tuple[float, float]]) -> Robot:
+        """Return this robot with prior mean and standard deviation of some coefficients.
+
+        Args:
+            prior: coefficient name to (mean, std) in the coefficient's unit.
+
+        Raises:
+            ConfigError: a name that is no coefficient of this robot.
+        """
+        known = [c.name for c in self.coefficients]
+        unknown = sorted(set(prior) - set(known))
+        if unknown:
+            raise ConfigError(
+                f'unknown parameters {unknown} of robot {self.name}', f'some of {known}'
+            )
+        return replace(self, terms=tuple(_with_prior(term, prior) for term in self.terms))
+
+    def _input_names(self) -> tuple[str, ...]:
+        channels = ('position', 'velocity', self.complement)
+        return tuple(
+            f'{channel}:{joint.name}'
+            for channel in channels
+            for joint in self.joints
+            if channel != 'effort' or joint.is_actuated
+        )
+
+    def _column(self, name: str) -> int:
+        names = self._input_names()
+        if name not in names:
+            raise ConfigError(
+                f'residual input {name!r}', f'default, own, all, or some of {list(names)}'
+            )
+        channel, joint = name.split(':', 1)
+        return CHANNELS.index(channel) * len(self.joints) + self.joint_names.index(joint)
+
+
+def _renamed_term(term: Term, new: Mapping[str, str]) -> Term:
+    coefficients = tuple(
+        replace(c, joint=new.get(c.joint or '', c.joint)) for c in term.coefficients
+    )
+    return replace(term, coefficients=coefficients)
+
+
+def _renamed_input(name: str, new: Mapping[str, str]) -> str:
+    channel, joint = name.split(':', 1)
+    return f'{channel}:{new[joint]}'
+
+
+def _with_prior(term: Term, prior: Mapping[str, tuple[float, float]]) -> Term:
+    coefficients = tuple(
+        replace(c, prior_mean=prior[c.name][0], prior_std=prior[c.name][1])
+        if c.name in prior
+        else c
+        for c in term.coefficients
+    )
+    return replace(term, coefficients=coefficients)
