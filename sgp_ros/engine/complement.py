@@ -1,0 +1,72 @@
+"""The other side of the equation of motion: effort from acceleration, or the reverse.
+
+The model predicts its target for given complement signals c, affinely in the physics:
+`target = m(c) + e`, `e ~ N(0, S)`. Given the measured target, c is the generalised least-squares
+estimate with slope `B = dm/dc`: covariance `(B^T S^-1 B)^-1`. Where Z sees c, the estimate is
+iterated from the physics alone, never from the measured c.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from sgp_ros.core.online import OnlinePrediction
+
+_LEAST_RECIPROCAL_CONDITION = 1e-12
+
+
+def solve_complement(
+    target: np.ndarray,
+    slope: np.ndarray,
+    noise: np.ndarray,
+    start: np.ndarray,
+    predict: Callable[[np.ndarray], OnlinePrediction],
+    iterations: int,
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Estimate the complement signals that explain the measured target.
+
+    Args:
+        target: (k,) measured.
+        slope: (k, c) change of the mean per unit of each signal.
+        noise: (k,) variances of the observation.
+        start: (k,) mean of the target at c = 0 under the physics alone.
+        predict: from c (c,) to the prediction of the target.
+        iterations: of the prediction; one is exact where Z does not see c.
+
+    Returns:
+        Mean (c,) and covariance (c, c); None where the slope or the prediction leaves c
+        undetermined.
+    """
+    whitening = np.diag(1.0 / np.sqrt(noise))
+    solved = _least_squares(slope, target - start, whitening)
+    if solved is None:
+        return None
+    signal, covariance = solved
+    for _ in range(iterations):
+        prediction = predict(signal)
+        if not np.all(np.isfinite(np.diag(prediction.covariance))):
+            return None
+        total = prediction.covariance + np.diag(noise)
+        whitening = np.linalg.inv(np.linalg.cholesky(total))
+        solved = _least_squares(slope, target - prediction.mean, whitening)
+        if solved is None:
+            return None
+        correction, covariance = solved
+        signal = signal + correction
+    return signal, covariance
+
+
+def _least_squares(
+    slope: np.ndarray, residual: np.ndarray, whitening: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
+    white = whitening @ slope  # (k, c)
+    U, S, Vt = np.linalg.svd(white, full_matrices=False)
+    if len(S) < slope.shape[1] or not S[-1] > _LEAST_RECIPROCAL_CONDITION * S[0]:
+        return None
+    spread = Vt.T / S
+    return spread @ (U.T @ (whitening @ residual)), spread @ spread.T

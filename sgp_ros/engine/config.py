@@ -1,0 +1,355 @@
+"""Every setting of the engine, with its type, unit, range and default.
+
+A setting has a dotted name, as in a ROS 2 parameter file (`filter.window`). The node declares its
+parameters from `describe_settings`, the commands read the same names from the same file, and both
+end in one frozen `EngineConfig`. Hyper-parameters are settings too: `hyper.<joint>.noise_variance`
+and its two neighbours, where 0 means "estimate it from the data".
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any, cast
+
+from sgp_ros.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from sgp_ros.engine.samples import SettingValue
+    from sgp_ros.robots.robot import Robot
+
+KINDS = {
+    'bool': 'true or false',
+    'int': 'an integer',
+    'float': 'a number',
+    'str': 'a string',
+    'float_array': 'a list of numbers',
+    'str_array': 'a list of strings',
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What is known of one setting before it has a value.
+
+    Attributes:
+        name: dotted name, such as `filter.window`.
+        kind: a key of `KINDS`.
+        default: the value when none is given.
+        description: one sentence for `ros2 param describe`.
+        unit: SI unit, empty for none.
+        low, high: inclusive range of a number.
+        choices: the only values of a string, empty for any.
+        read_only: whether a running node refuses to change it.
+    """
+
+    name: str
+    kind: str
+    default: SettingValue
+    description: str
+    unit: str = ''
+    low: float = -math.inf
+    high: float = math.inf
+    choices: tuple[str, ...] = ()
+    read_only: bool = False
+
+    def problem(self, value: object) -> str | None:
+        """Say what is wrong with `value`, or None."""
+        prefix = f'{self.name} = {value!r}: expected {self._expected()}'
+        if not _has_kind(value, self.kind):
+            return prefix
+        numbers: Iterable[object] = value if isinstance(value, (list, tuple)) else (value,)
+        for number in numbers:
+            if isinstance(number, (int, float)) and not isinstance(number, bool):
+                if not math.isfinite(number) or not self.low <= number <= self.high:
+                    return prefix
+            elif self.choices and number not in self.choices:
+                return prefix
+        return None
+
+    def convert(self, value: object) -> SettingValue:
+        """Return `value` in the type the dataclass holds, once `problem` is None."""
+        if self.kind == 'float':
+            return float(cast('float', value))
+        if self.kind == 'float_array':
+            return tuple(float(number) for number in cast('Iterable[float]', value))
+        if self.kind == 'str_array':
+            return tuple(cast('Iterable[str]', value))
+        return cast('SettingValue', value)
+
+    def _expected(self) -> str:
+        text = KINDS[self.kind]
+        if self.choices:
+            text += ' out of ' + ', '.join(self.choices)
+        if math.isfinite(self.low) and math.isfinite(self.high):
+            text += f' from {self.low:g} to {self.high:g}'
+        elif math.isfinite(self.low):
+            text += f' of at least {self.low:g}'
+        return f'{text} [{self.unit}]' if self.unit else text
+
+
+def _has_kind(value: object, kind: str) -> bool:
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if kind == 'bool':
+        return isinstance(value, bool)
+    if kind == 'int':
+        return isinstance(value, int) and not isinstance(value, bool)
+    if kind == 'float':
+        return number
+    if kind == 'str':
+        return isinstance(value, str)
+    if not isinstance(value, (list, tuple)):
+        return False
+    return all(_has_kind(item, kind.removesuffix('_array')) for item in value)
+
+
+def _setting(
+    name: str,
+    kind: str,
+    default: SettingValue,
+    description: str,
+    **limits: Any,  # noqa: ANN401 - passed on to Setting, which types them
+) -> Any:  # noqa: ANN401 - a dataclass field stands for a value of its annotation
+    meta = {'setting': Setting(name, kind, default, description, **limits)}
+    return field(default=default, metadata=meta)
+
+
+@dataclass(frozen=True, slots=True)
+class JointHyperparameters:
+    """Hyper-parameters of the model of one joint; 0 means "from the data".
+
+    Attributes:
+        joint: the joint's name.
+        signal_variance: prior variance of Z [target unit squared].
+        lengthscales: one per input of Z [unit of the input]; `(0.0,)` for all automatic.
+        noise_variance: variance of V [target unit squared].
+    """
+
+    joint: str
+    signal_variance: float = 0.0
+    lengthscales: tuple[float, ...] = (0.0,)
+    noise_variance: float = 0.0
+
+    @property
+    def is_automatic(self) -> bool:
+        """Whether any of them is still to be estimated."""
+        return min(self.signal_variance, self.noise_variance, *self.lengthscales) <= 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class EngineConfig:
+    """All settings of the engine. Build it with `from_mapping`."""
+
+    reorder_window: float = _setting(
+        'reorder_window', 'float', 0.1, 'Samples are ordered by stamp within this time.',
+        unit='s', low=0.0, high=10.0,
+    )  # fmt: skip
+    max_gap: float = _setting(
+        'max_gap', 'float', 0.25, 'A longer pause between states restarts the filter.',
+        unit='s', low=1e-3, high=60.0,
+    )  # fmt: skip
+    command_timeout: float = _setting(
+        'command.timeout', 'float', 1.0, 'A command older than this pairs with no state.',
+        unit='s', low=1e-3, high=3600.0,
+    )  # fmt: skip
+    command_joints: tuple[str, ...] = _setting(
+        'command.joints', 'str_array', ('',),
+        "Joint order of a command array; [''] takes the robot's actuated joints.",
+        read_only=True,
+    )  # fmt: skip
+    effort_source: str = _setting(
+        'effort.source', 'str', 'auto',
+        'Where effort comes from; auto takes the measured one where the state carries it.',
+        choices=('auto', 'state', 'command'),
+    )  # fmt: skip
+    filter_window: float = _setting(
+        'filter.window', 'float', 0.1, 'Length of the differentiation window; half is the delay.',
+        unit='s', low=0.0, high=10.0,
+    )  # fmt: skip
+    filter_degree: int = _setting(
+        'filter.degree', 'int', 4, 'Degree of the polynomial that follows the motion in a window.',
+        low=2, high=8,
+    )  # fmt: skip
+    filter_hop: float = _setting(
+        'filter.hop', 'float', 0.05, 'Least time between two used windows; 0 uses every one.',
+        unit='s', low=0.0, high=10.0,
+    )  # fmt: skip
+    filter_velocity: str = _setting(
+        'filter.velocity', 'str', 'auto',
+        'Where velocity comes from; auto takes the measured one where the state carries it.',
+        choices=('auto', 'measured', 'position'),
+    )  # fmt: skip
+    model_method: str = _setting(
+        'model.method', 'str', 'SGP', 'SGP: physics and process; PR: physics only; GP: no physics.',
+        choices=('SGP', 'PR', 'GP'), read_only=True,
+    )  # fmt: skip
+    model_residual_inputs: tuple[str, ...] = _setting(
+        'model.residual_inputs', 'str_array', ('default',),
+        'What Z sees: default (the choice of the robot), all, own, or names like velocity:pole.',
+        read_only=True,
+    )  # fmt: skip
+    parameters_source: str = _setting(
+        'parameters.source', 'str', 'joint',
+        'Parameters reported: joint beside Z, or physics alone, where Z can imitate its columns.',
+        choices=('joint', 'physics'),
+    )  # fmt: skip
+    prior_scale: float = _setting(
+        'prior.scale', 'float', 1.0, 'Factor on the prior standard deviation of W.',
+        low=1e-9, high=1e12, read_only=True,
+    )  # fmt: skip
+    learning_enabled: bool = _setting(
+        'learning.enabled', 'bool', default=True, description='Learn from samples, not only score.'
+    )
+    learning_initial: int = _setting(
+        'learning.initial', 'int', 50, 'Samples gathered before the first model exists.',
+        low=4, high=100_000,
+    )  # fmt: skip
+    buffer_budget: int = _setting(
+        'buffer.budget', 'int', 300, 'Samples that the process Z is conditioned on.',
+        low=4, high=5000,
+    )  # fmt: skip
+    buffer_remember: bool = _setting(
+        'buffer.remember', 'bool', default=True,
+        description='Keep what dropped samples told about W.',
+    )  # fmt: skip
+    refit_enabled: bool = _setting(
+        'refit.enabled', 'bool', default=True, description='Refit the hyper-parameters.'
+    )
+    refit_period: int = _setting(
+        'refit.period', 'int', 200, 'Learned samples between two refits.', low=10, high=1_000_000
+    )
+    refit_restarts: int = _setting(
+        'refit.restarts', 'int', 1, 'Starts of the optimiser beside the present values.',
+        low=0, high=20,
+    )  # fmt: skip
+    seed: int = _setting(
+        'seed', 'int', 0, 'Seed of the restarts of the optimiser.', low=0, high=2**31 - 1
+    )
+    hyper: tuple[JointHyperparameters, ...] = ()
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, object], robot: Robot) -> EngineConfig:
+        """Build a configuration from dotted names; what is not named keeps its default.
+
+        Args:
+            values: setting name to value.
+            robot: whose joints name the hyper-parameters.
+
+        Raises:
+            ConfigError: unknown names, wrong types and values out of range, all in one error.
+        """
+        inputs = values.get('model.residual_inputs', ('default',))
+        problems = []
+        lengths: tuple[int, ...] = (0,) * len(robot.joint_names)
+        if _has_kind(inputs, 'str_array'):
+            try:
+                resolved = robot.residual_columns(tuple(cast('Iterable[str]', inputs)))
+                lengths = tuple(len(columns) for columns in resolved)
+            except ConfigError as error:
+                problems.append(str(error))
+        known = {setting.name: setting for setting in describe_settings(robot)}
+        for name, value in values.items():
+            if name not in known:
+                problems.append(f'{name}: unknown setting')
+                continue
+            problem = known[name].problem(value)
+            if problem:
+                problems.append(problem)
+        converted = {
+            name: known[name].convert(value)
+            for name, value in values.items()
+            if name in known and known[name].problem(value) is None
+        }
+        hyper = tuple(_joint_hyperparameters(joint, converted) for joint in robot.joint_names)
+        for joint, length in zip(hyper, lengths, strict=True):
+            given = joint.lengthscales
+            if given != (0.0,) and (len(given) != length or min(given) <= 0.0):
+                problems.append(
+                    f'hyper.{joint.joint}.lengthscales = {list(given)}: expected {length} positive '
+                    'numbers, or [0.0] to estimate them'
+                )
+        unknown = [
+            joint
+            for joint in cast('tuple[str, ...]', converted.get('command.joints', ('',)))
+            if joint and joint not in robot.joint_names
+        ]
+        if unknown:
+            problems.append(f'command.joints names {unknown}: the robot has {robot.joint_names}')
+        if problems:
+            raise ConfigError(
+                f'{len(problems)} wrong settings: ' + ' | '.join(problems),
+                '',
+                'see `sgp replay --help` and config/ for the settings',
+            )
+        return cls(
+            hyper=hyper,
+            **{  # type: ignore[arg-type]  # each value was checked against its setting
+                name: converted[setting.name]
+                for name, setting in _static_settings().items()
+                if setting.name in converted
+            },
+        )
+
+    def to_mapping(self) -> dict[str, SettingValue]:
+        """Return every setting by its dotted name; `from_mapping` takes it back."""
+        values = {s.name: getattr(self, name) for name, s in _static_settings().items()}
+        for joint in self.hyper:
+            prefix = f'hyper.{joint.joint}.'
+            values[prefix + 'signal_variance'] = joint.signal_variance
+            values[prefix + 'lengthscales'] = joint.lengthscales
+            values[prefix + 'noise_variance'] = joint.noise_variance
+        return values
+
+    def changed(self, changes: Mapping[str, object], robot: Robot) -> EngineConfig:
+        """Return this configuration with `changes`; nothing changes when one of them is wrong.
+
+        Raises:
+            ConfigError: as `from_mapping`, or a change of a read-only setting.
+        """
+        known = {setting.name: setting for setting in describe_settings(robot)}
+        present = self.to_mapping()
+        fixed = [
+            name
+            for name, value in changes.items()
+            if name in known and known[name].read_only
+            and known[name].problem(value) is None and known[name].convert(value) != present[name]
+        ]  # fmt: skip
+        if fixed:
+            raise ConfigError(
+                f'{", ".join(fixed)} cannot change while running', '', 'restart with the new value'
+            )
+        return self.from_mapping({**present, **changes}, robot)
+
+
+def _static_settings() -> dict[str, Setting]:
+    return {f.name: f.metadata['setting'] for f in fields(EngineConfig) if 'setting' in f.metadata}
+
+
+def _joint_hyperparameters(joint: str, values: Mapping[str, Any]) -> JointHyperparameters:
+    prefix = f'hyper.{joint}.'
+    return JointHyperparameters(
+        joint,
+        values.get(prefix + 'signal_variance', 0.0),
+        values.get(prefix + 'lengthscales', (0.0,)),
+        values.get(prefix + 'noise_variance', 0.0),
+    )
+
+
+def describe_settings(robot: Robot) -> tuple[Setting, ...]:
+    """Describe every setting that exists for `robot`, in a fixed order."""
+    dynamic = []
+    for joint in robot.joint_names:
+        prefix = f'hyper.{joint}.'
+        unit = robot.target_unit(joint)
+        dynamic += [
+            Setting(prefix + 'signal_variance', 'float', 0.0,
+                    'Prior variance of Z; 0 estimates it.', unit=f'({unit})^2', low=0.0, high=1e12),
+            Setting(prefix + 'lengthscales', 'float_array', (0.0,),
+                    'Length scale of Z per input; [0.0] estimates them.', low=0.0, high=1e12),
+            Setting(prefix + 'noise_variance', 'float', 0.0,
+                    'Variance of the noise; 0 estimates it.', unit=f'({unit})^2', low=0.0,
+                    high=1e12),
+        ]  # fmt: skip
+    return tuple(_static_settings().values()) + tuple(dynamic)

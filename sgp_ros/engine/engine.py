@@ -1,0 +1,296 @@
+"""The fold: events in, estimates out, one at a time and in the order of their stamps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.engine.estimator import Estimator
+from sgp_ros.engine.fitting import FitRequest, FitResult
+from sgp_ros.engine.intake import Intake
+from sgp_ros.engine.ordering import ReorderBuffer
+from sgp_ros.engine.results import Counts, Estimate, ParameterEstimate, Score, Step
+from sgp_ros.engine.samples import (
+    CommandSample,
+    Event,
+    JointSample,
+    Reset,
+    SettingsChange,
+)
+from sgp_ros.engine.snapshots import fill_from_snapshot, snapshot_config, take_snapshot
+from sgp_ros.errors import NumericalError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sgp_ros.core.model import Model
+    from sgp_ros.core.online import OnlineRegression
+    from sgp_ros.core.scores import RunningScore
+    from sgp_ros.engine.config import EngineConfig
+    from sgp_ros.engine.samples import SettingValue
+    from sgp_ros.robots.robot import Robot
+
+
+class Engine:
+    """Identifies one robot from a stream of events. No clock, no file, no thread.
+
+    Attributes:
+        robot: what is known of the robot.
+        config: settings in force.
+        counts: what became of every sample.
+        delay_s: half the length of the last filter window [s].
+        order, intake, estimator: the three stages of the fold.
+        fits, next_fit: fits asked for so far, and the learned count at which the next is due.
+    """
+
+    def __init__(self, robot: Robot, config: EngineConfig) -> None:
+        self.robot = robot
+        self.config = config
+        self.counts = Counts()
+        self.delay_s = 0.5 * config.filter_window
+        self.order = ReorderBuffer(round(config.reorder_window * 1e9))
+        self.intake = Intake(robot, config, self.counts)
+        self.estimator = Estimator(robot, config, self.counts)
+        self._fit_request: FitRequest | None = None
+        self.fits = 0
+        self.next_fit = 0
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether a model exists that predicts."""
+        return self.estimator.regression is not None
+
+    @property
+    def buffer_size(self) -> int:
+        """Number of samples that Z is conditioned on."""
+        regression = self.estimator.regression
+        return len(self.estimator.waiting) if regression is None else regression.size
+
+    def push(self, event: Event) -> Step:
+        """Take one event; count it as refused if it cannot be used.
+
+        Returns:
+            The events that took effect, in order (a record of these reproduces the run), and the
+            estimates they made possible.
+        """
+        self._count_arrival(event)
+        if self.intake.refuse_early(event):
+            return Step()
+        if self.order.is_late(event):
+            self._count_late(event)
+            return Step()
+        return self._take(self.order.push(event))
+
+    def flush(self) -> Step:
+        """Release what waits in the reorder window: the stream has ended."""
+        return self._take(self.order.flush())
+
+    def change(self, settings: Mapping[str, object]) -> SettingsChange:
+        """Change settings now, between two samples.
+
+        Returns:
+            The event to record.
+
+        Raises:
+            ConfigError: a wrong setting; nothing has changed.
+            NumericalError: no factor exists under new hyper-parameters; nothing has changed.
+        """
+        config = self.config.changed(settings, self.robot)
+        self._apply(config)
+        values = config.to_mapping()
+        return SettingsChange(self._now_ns, {name: values[name] for name in settings})
+
+    def reset(self) -> Reset:
+        """Forget everything that was learned and what waits for its order, keep the settings.
+
+        Returns:
+            The event to record.
+        """
+        now = self._now_ns
+        self.order = ReorderBuffer(self.order.window_ns)
+        self._forget()
+        return Reset(now)
+
+    def request_refit(self) -> bool:
+        """Ask for a fit of the hyper-parameters now; False while there is no model to fit."""
+        regression = self.estimator.regression
+        if regression is None or regression.size < self.config.learning_initial:
+            return False
+        self._fit_request = FitRequest(
+            self.fits,
+            regression.buffer,
+            regression.base.R.copy(),
+            regression.base.z.copy(),
+            regression.model,
+            self.config.refit_restarts,
+            self.config.seed,
+        )
+        self.fits += 1
+        return True
+
+    def take_fit_request(self) -> FitRequest | None:
+        """Return the fit that is due, once."""
+        request, self._fit_request = self._fit_request, None
+        return request
+
+    def accept_fit(self, fit: FitResult) -> SettingsChange | None:
+        """Put fitted hyper-parameters in force.
+
+        Returns:
+            The event to record; None where the fit failed, was no better than what was in force,
+            or gives no factor: it is then counted as refused.
+        """
+        if fit.model is not None and fit.log_evidence > fit.log_evidence_before:
+            try:
+                change = self.change(self._hyper_settings(fit.model))
+            except NumericalError:
+                pass
+            else:
+                self.counts.refits += 1
+                return change
+        self.counts.refits_refused += 1
+        return None
+
+    def hyper_settings(self) -> dict[str, SettingValue]:
+        """Return the hyper-parameters in force as settings, also those still automatic."""
+        regression = self.estimator.regression
+        return {} if regression is None else self._hyper_settings(regression.model)
+
+    def parameters(self) -> tuple[ParameterEstimate, ...]:
+        """Return the posterior of every coefficient, from the source that the settings name."""
+        if self.config.parameters_source == 'physics' and self.estimator.baseline is not None:
+            return self.physics_parameters()
+        return self._read_parameters(self.estimator.regression)
+
+    def physics_parameters(self) -> tuple[ParameterEstimate, ...]:
+        """Return the coefficients that the physics alone, without Z, fits to the same samples.
+
+        Where Z sees what a column of the physics is made of, the two share that part of the
+        motion and the joint posterior of W leaves the split to their priors. This one does not:
+        it is the best physical fit, biased by whatever physics is missing.
+        """
+        return self._read_parameters(self.estimator.baseline or self.estimator.regression)
+
+    def _read_parameters(self, model: OnlineRegression | None) -> tuple[ParameterEstimate, ...]:
+        if model is None or self.config.model_method == 'GP':
+            return ()
+        information = model.information
+        std = np.sqrt(np.diag(information.covariance))
+        known = information.is_identifiable
+        return tuple(
+            ParameterEstimate(c.name, c.joint, float(w), float(s) if k else None, c.unit, bool(k))
+            for c, w, s, k in zip(
+                self.robot.coefficients, information.coefficients, std, known, strict=True
+            )
+        )
+
+    def scores(self) -> dict[str, dict[str, Score]]:
+        """Return the scores of each joint's channels; a channel without samples is absent."""
+        found: dict[str, dict[str, Score]] = {}
+        for j, joint in enumerate(self.robot.joint_names):
+            channels = {c: _score(scores[j]) for c, scores in self.estimator.scores.items()}
+            found[joint] = {c: score for c, score in channels.items() if score is not None}
+        return found
+
+    def baseline_scores(self) -> dict[str, dict[str, Score]]:
+        """Return the scores of the physics alone on the same samples, target channel only."""
+        found: dict[str, dict[str, Score]] = {}
+        scores = self.estimator.baseline_scores
+        for joint, running in zip(self.robot.joint_names, scores, strict=True):
+            score = _score(running)
+            found[joint] = {} if score is None else {self.robot.target: score}
+        return found
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """Return the whole state as arrays without objects, for `numpy.savez`."""
+        return take_snapshot(self)
+
+    def restore(self, snapshot: Mapping[str, np.ndarray]) -> None:
+        """Continue exactly where `snapshot` was taken, with its settings.
+
+        Raises:
+            ConfigError: the snapshot is of another robot or another version.
+        """
+        config = snapshot_config(snapshot, self.robot)
+        fresh = Engine(self.robot, config)
+        fill_from_snapshot(fresh, snapshot)
+        self.__dict__.update(fresh.__dict__)
+
+    @property
+    def _now_ns(self) -> int:
+        return self.order.released_ns or 0
+
+    def _take(self, events: list[Event]) -> Step:
+        released: list[Event] = []
+        estimates: list[Estimate] = []
+        for event in events:
+            if isinstance(event, JointSample):
+                if event.stamp_ns == self.intake.last_state_ns:
+                    self.counts.refused['duplicate'] += 1
+                    continue
+                for equation in self.intake.take_state(event):
+                    self.delay_s = 0.5 * equation.span_s
+                    estimates.append(self.estimator.take(equation))
+                self._schedule_fit()
+            elif isinstance(event, CommandSample):
+                self.intake.take_command(event)
+            elif isinstance(event, SettingsChange):
+                self._apply(self.config.changed(event.settings, self.robot))
+            else:
+                self._forget()
+            released.append(event)
+        return Step(tuple(released), tuple(estimates))
+
+    def _forget(self) -> None:
+        self.estimator = Estimator(self.robot, self.config, self.counts)
+        self.intake = Intake(self.robot, self.config, self.counts)
+        self._fit_request = None
+        self.next_fit = self.counts.learned
+
+    def _schedule_fit(self) -> None:
+        if not self.is_ready or not self.config.refit_enabled:
+            return
+        if self.counts.learned >= self.next_fit and self.request_refit():
+            self.next_fit = self.counts.learned + self.config.refit_period
+
+    def _apply(self, config: EngineConfig) -> None:
+        self.estimator.configure(config)
+        filters = ('filter_window', 'filter_degree', 'filter_hop', 'filter_velocity')
+        if any(getattr(config, name) != getattr(self.config, name) for name in filters):
+            self.intake.configure(config)
+        else:
+            self.intake.configure_limits(config)
+        self.order.window_ns = round(config.reorder_window * 1e9)
+        self.config = config
+
+    def _hyper_settings(self, model: Model) -> dict[str, SettingValue]:
+        settings: dict[str, SettingValue] = {}
+        for joint, kernel, noise in zip(
+            self.robot.joint_names, model.kernels, model.noise, strict=True
+        ):
+            prefix = f'hyper.{joint}.'
+            settings[prefix + 'noise_variance'] = noise
+            if kernel is not None:
+                settings[prefix + 'signal_variance'] = kernel.variance
+                settings[prefix + 'lengthscales'] = kernel.lengthscales
+        return settings
+
+    def _count_arrival(self, event: Event) -> None:
+        if isinstance(event, JointSample):
+            self.counts.read += 1
+        elif isinstance(event, CommandSample):
+            self.counts.commands_read += 1
+
+    def _count_late(self, event: Event) -> None:
+        if isinstance(event, JointSample):
+            self.counts.refused['late'] += 1
+        elif isinstance(event, CommandSample):
+            self.counts.commands_refused['late'] += 1
+
+
+def _score(running: RunningScore) -> Score | None:
+    if running.n == 0 or not np.isfinite(running.nmse):
+        return None
+    return Score(running.nmse, running.nlpd, running.coverage95, running.n)
+

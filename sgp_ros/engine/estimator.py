@@ -1,0 +1,311 @@
+"""Predicts, scores, then learns each equation of motion, in this order."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.core.kernels import SquaredExponential
+from sgp_ros.core.learning import initial_model
+from sgp_ros.core.model import Model, Observations
+from sgp_ros.core.online import OnlinePrediction, OnlineRegression
+from sgp_ros.core.prior import CoefficientPrior
+from sgp_ros.core.scores import RunningScore
+from sgp_ros.engine.complement import solve_complement
+from sgp_ros.engine.results import Channel, Estimate
+from sgp_ros.errors import NumericalError
+
+if TYPE_CHECKING:
+    from sgp_ros.engine.config import EngineConfig, JointHyperparameters
+    from sgp_ros.engine.results import Counts
+    from sgp_ros.engine.windows import Equation
+    from sgp_ros.robots.robot import Robot
+
+_BASELINE_BUDGET = 1
+
+Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Input u (4 k,), regressor f (k, p) and target y (k,) of one equation."""
+
+
+class Estimator:
+    """The model of one robot while it learns.
+
+    Attributes:
+        regression: physics and process; None until enough samples started it.
+        baseline: physics alone on the same samples; None where the method has no process.
+        scores: of the model, channel name to one score per joint.
+        baseline_scores: of the baseline on the target, one per joint.
+        waiting: inputs, regressors and targets gathered before the first model.
+    """
+
+    def __init__(self, robot: Robot, config: EngineConfig, counts: Counts) -> None:
+        self._robot = robot
+        self._counts = counts
+        k = len(robot.joints)
+        columns = robot.residual_columns(config.model_residual_inputs)
+        self.inputs = (None,) * k if config.model_method == 'PR' else columns
+        self._prior = _prior(robot, config)
+        self._complement_columns = _complement_columns(robot)
+        self._sees_complement = config.model_method != 'PR' and any(
+            self._complement_columns & set(seen) for seen in columns
+        )
+        self._config = config
+        self.regression: OnlineRegression | None = None
+        self.baseline: OnlineRegression | None = None
+        self.waiting: list[Arrays] = []
+        self.forget_scores()
+        if not any(joint.is_automatic for joint in config.hyper):
+            self._start([])
+
+    def forget_scores(self) -> None:
+        """Begin all scores anew."""
+        k = len(self._robot.joints)
+        self.scores = {
+            channel: tuple(RunningScore() for _ in range(k))
+            for channel in ('acceleration', 'effort')
+        }
+        self.baseline_scores = tuple(RunningScore() for _ in range(k))
+
+    def configure(self, config: EngineConfig) -> None:
+        """Take new settings between two samples.
+
+        Raises:
+            NumericalError: the buffer has no factor under new hyper-parameters; nothing changed.
+        """
+        if self.regression is not None:
+            model = self._model(config, self.regression.model)
+            changed = model != self.regression.model
+            if changed or config.buffer_budget != self._config.buffer_budget or (
+                config.buffer_remember != self._config.buffer_remember
+            ):  # fmt: skip
+                self.regression.change(
+                    model, config.buffer_budget, remember=config.buffer_remember
+                )
+                self._refresh_baseline()
+        self._config = config
+
+    def _refresh_baseline(self) -> None:
+        """Give the physics alone the noise that its own errors show."""
+        scores = self.baseline_scores
+        if self.baseline is None or not all(score.squared_error > 0.0 for score in scores):
+            return
+        noise = tuple(score.squared_error / score.n for score in scores)
+        self.baseline.change(Model(self.baseline.model.kernels, noise))
+
+    def take(self, equation: Equation) -> Estimate:
+        """Predict an equation, score the prediction, then learn it."""
+        self._counts.estimated += 1
+        if self.regression is None:
+            estimate = self._unknown(equation)
+            if self._config.learning_enabled:
+                self.waiting.append(self._arrays(equation))
+                if len(self.waiting) >= self._config.learning_initial:
+                    self._start(self.waiting)
+                    self.waiting = []
+            return estimate
+        return self._predict_score_learn(self.regression, equation)
+
+    def _predict_score_learn(self, regression: OnlineRegression, equation: Equation) -> Estimate:
+        u, f, y = self._arrays(equation)
+        prediction = regression.predict(u, f)
+        noise = np.array(regression.model.noise)
+        target = Channel(y, prediction.mean, np.diag(prediction.covariance) + noise)
+        complement = self._complement(regression, equation, prediction)
+        is_scored = self._score(target, complement)
+        self._take_baseline(u, f, y, is_scored=is_scored)
+        is_learned = self._config.learning_enabled and self._learn(regression, prediction, y)
+        channels = {self._robot.target: target, self._robot.complement: complement}
+        return Estimate(
+            equation.stamp_ns,
+            self._robot.joint_names,
+            equation.motion.position[0],
+            equation.motion.velocity[0],
+            channels['acceleration'],
+            channels['effort'],
+            is_scored,
+            is_learned,
+        )
+
+    def _learn(
+        self, regression: OnlineRegression, prediction: OnlinePrediction, y: np.ndarray
+    ) -> bool:
+        try:
+            regression.learn(prediction, y)
+        except NumericalError:
+            self._counts.unlearnable += 1
+            return False
+        self._counts.learned += 1
+        return True
+
+    def _arrays(self, equation: Equation) -> Arrays:
+        """Return input (4 k,), regressor (k, p) and target (k,)."""
+        motion = equation.motion
+        u = motion.stacked()[0]
+        k = len(self._robot.joints)
+        start = {'acceleration': 2 * k, 'effort': 3 * k}
+        u[start[self._robot.target] : start[self._robot.target] + k] = 0.0
+        complement = self._measured(equation, self._robot.complement)
+        f = equation.regressor(complement[list(equation.complement_joints)])
+        if self._config.model_method == 'GP':
+            f = f[:, :0]
+        return u, f, self._measured(equation, self._robot.target)
+
+    @staticmethod
+    def _measured(equation: Equation, channel: str) -> np.ndarray:
+        values: np.ndarray = getattr(equation.motion, channel)[0]
+        return values
+
+    def _complement(
+        self, regression: OnlineRegression, equation: Equation, prediction: OnlinePrediction
+    ) -> Channel:
+        measured = self._measured(equation, self._robot.complement)
+        k = len(measured)
+        unknown = Channel(measured, np.full(k, np.nan), np.full(k, np.nan))
+        joints = list(equation.complement_joints)
+        if not joints or self._config.model_method == 'GP':
+            return unknown
+        w = regression.information.coefficients
+        zero = equation.state_rows
+        slope = (equation.slopes @ w).T  # (k, c)
+
+        def predict(signal: np.ndarray) -> OnlinePrediction:
+            f = equation.regressor(signal)
+            if not self._sees_complement:
+                return regression.with_regressor(prediction, f)
+            u = prediction.u.copy()
+            columns = sorted(self._complement_columns)
+            u[columns] = signal
+            return regression.predict(u, f)
+
+        solved = solve_complement(
+            self._measured(equation, self._robot.target),
+            slope,
+            np.array(regression.model.noise),
+            zero @ w,
+            predict,
+            2 if self._sees_complement else 1,
+        )
+        if solved is None:
+            return unknown
+        mean, variance = np.zeros(k), np.zeros(k)
+        mean[joints], variance[joints] = solved[0], np.diag(solved[1])
+        return Channel(measured, mean, variance)
+
+    def _score(self, target: Channel, complement: Channel) -> bool:
+        if not np.all(np.isfinite(target.variance)):
+            return False
+        self._counts.scored += 1
+        for channel, values in (
+            (self._robot.target, target), (self._robot.complement, complement)
+        ):  # fmt: skip
+            for j, score in enumerate(self.scores[channel]):
+                if values.variance[j] > 0.0 and math.isfinite(values.variance[j]):
+                    score.add(
+                        float(values.measured[j]),
+                        float(values.mean[j]),
+                        float(values.variance[j]),
+                    )
+        return True
+
+    def _take_baseline(
+        self, u: np.ndarray, f: np.ndarray, y: np.ndarray, *, is_scored: bool
+    ) -> None:
+        if self.baseline is None:
+            return
+        prediction = self.baseline.predict(u, f)
+        variance = np.diag(prediction.covariance) + np.array(self.baseline.model.noise)
+        if is_scored and np.all(np.isfinite(variance)):
+            for j, score in enumerate(self.baseline_scores):
+                score.add(float(y[j]), float(prediction.mean[j]), float(variance[j]))
+        if self._config.learning_enabled:
+            self.baseline.learn(prediction, y)
+
+    def make_regression(self, model: Model) -> OnlineRegression:
+        """Return an empty model with these hyper-parameters."""
+        config = self._config
+        return OnlineRegression(
+            model, self._prior, config.buffer_budget, remember=config.buffer_remember
+        )
+
+    def make_baseline(self, model: Model) -> OnlineRegression:
+        """Return an empty model of the physics alone."""
+        return OnlineRegression(model, self._prior, _BASELINE_BUDGET)
+
+    def _start(self, arrays: list[Arrays]) -> None:
+        """Make the first model from what was gathered, then learn that."""
+        model = self._first_model(arrays)
+        self.regression = self.make_regression(model)
+        if self._config.model_method == 'SGP':
+            plain = Model((None,) * len(model.kernels), model.noise)
+            self.baseline = self.make_baseline(plain)
+        for u, f, y in arrays:
+            self._learn(self.regression, self.regression.predict(u, f), y)
+            if self.baseline is not None:
+                self.baseline.learn(self.baseline.predict(u, f), y)
+
+    def _first_model(self, arrays: list[Arrays]) -> Model:
+        if not arrays:
+            return self._model(self._config, None)
+        U, F, y = (np.array(column) for column in zip(*arrays, strict=True))
+        return self._model(self._config, initial_model(Observations(U, F, y), self.inputs))
+
+    def _model(self, config: EngineConfig, present: Model | None) -> Model:
+        """Return the hyper-parameters of the settings, with `present` where they are automatic."""
+        kernels: list[SquaredExponential | None] = []
+        noise = []
+        for j, (joint, columns) in enumerate(zip(config.hyper, self.inputs, strict=True)):
+            known = None if present is None else present.kernels[j]
+            kernels.append(None if columns is None else _kernel(joint, columns, known))
+            fallback = 1.0 if present is None else present.noise[j]
+            noise.append(joint.noise_variance or fallback)
+        return Model(tuple(kernels), tuple(noise))
+
+    def _unknown(self, equation: Equation) -> Estimate:
+        def blank(channel: str) -> Channel:
+            measured = self._measured(equation, channel)
+            return Channel(
+                measured, np.full(len(measured), np.nan), np.full(len(measured), np.nan)
+            )
+
+        return Estimate(
+            equation.stamp_ns,
+            self._robot.joint_names,
+            equation.motion.position[0],
+            equation.motion.velocity[0],
+            blank('acceleration'),
+            blank('effort'),
+            is_scored=False,
+            is_learned=self._config.learning_enabled,
+        )
+
+
+def _kernel(
+    joint: JointHyperparameters, columns: tuple[int, ...], known: SquaredExponential | None
+) -> SquaredExponential:
+    variance = joint.signal_variance or (known.variance if known else 1.0)
+    lengths = joint.lengthscales
+    if lengths == (0.0,):
+        lengths = known.lengthscales if known else (1.0,) * len(columns)
+    return SquaredExponential(variance, lengths, columns)
+
+
+def _prior(robot: Robot, config: EngineConfig) -> CoefficientPrior:
+    if config.model_method == 'GP':
+        return CoefficientPrior.flat(0)
+    mean = np.array([c.prior_mean for c in robot.coefficients])
+    std = np.array([c.prior_std for c in robot.coefficients]) * config.prior_scale
+    return CoefficientPrior.from_std(mean, std)
+
+
+def _complement_columns(robot: Robot) -> set[int]:
+    k = len(robot.joints)
+    start = 2 * k if robot.complement == 'acceleration' else 3 * k
+    return {
+        start + j
+        for j, joint in enumerate(robot.joints)
+        if robot.complement == 'acceleration' or joint.is_actuated
+    }
+
+

@@ -1,0 +1,71 @@
+"""Puts events in the order of their stamps, within a window of time."""
+
+from __future__ import annotations
+
+import heapq
+
+from sgp_ros.engine.samples import CommandSample, Event, JointSample
+
+_RANKS = {CommandSample: 0, JointSample: 1}
+
+
+class ReorderBuffer:
+    """Holds events until nothing older is expected.
+
+    At equal stamps commands come first (a command holds from its own stamp on), then states, then
+    changes (in force after the state of the same stamp). Events of equal rank keep the order of
+    their arrival.
+
+    Attributes:
+        window_ns: an event leaves when the newest stamp is this far ahead [ns].
+        released_ns: stamp of the last event that left; None before the first.
+        newest_ns: newest stamp so far; None before the first.
+    """
+
+    def __init__(self, window_ns: int) -> None:
+        self.window_ns = window_ns
+        self.released_ns: int | None = None
+        self._heap: list[tuple[int, int, int, Event]] = []
+        self._arrivals = 0
+        self.newest_ns: int | None = None
+
+    def is_late(self, event: Event) -> bool:
+        """Whether something newer than `event` has already left."""
+        return self.released_ns is not None and event.stamp_ns < self.released_ns
+
+    def push(self, event: Event) -> list[Event]:
+        """Take an event that is not late and return those that leave, in order. O(log n)."""
+        self._hold(event)
+        newest = event.stamp_ns if self.newest_ns is None else self.newest_ns
+        self.newest_ns = max(newest, event.stamp_ns)
+        return self._release(self.newest_ns - self.window_ns)
+
+    def flush(self) -> list[Event]:
+        """Return everything that is held, in order."""
+        return [] if self.newest_ns is None else self._release(self.newest_ns)
+
+    @property
+    def pending(self) -> list[Event]:
+        """The events that are held, in the order of their arrival."""
+        return [entry[3] for entry in sorted(self._heap, key=lambda entry: entry[2])]
+
+    def resume(
+        self, released_ns: int | None, newest_ns: int | None, pending: list[Event]
+    ) -> None:
+        """Continue where another buffer stood; `pending` in the order of arrival."""
+        self.released_ns, self.newest_ns = released_ns, newest_ns
+        for event in pending:
+            self._hold(event)
+
+    def _hold(self, event: Event) -> None:
+        self._arrivals += 1
+        rank = _RANKS.get(type(event), 2)
+        heapq.heappush(self._heap, (event.stamp_ns, rank, self._arrivals, event))
+
+    def _release(self, until_ns: int) -> list[Event]:
+        released = []
+        while self._heap and self._heap[0][0] <= until_ns:
+            event = heapq.heappop(self._heap)[3]
+            self.released_ns = event.stamp_ns
+            released.append(event)
+        return released

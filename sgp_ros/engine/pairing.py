@@ -1,0 +1,62 @@
+"""Commands as a function of time: each holds until the next one."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+class CommandHistory:
+    """Zero-order hold over the commands of the recent past.
+
+    Attributes:
+        stamps_ns: times at which commands began [ns], increasing.
+        efforts: one (k,) per command.
+    """
+
+    def __init__(self) -> None:
+        self.stamps_ns: list[int] = []
+        self.efforts: list[np.ndarray] = []
+
+    def add(self, stamp_ns: int, effort: np.ndarray) -> None:
+        """Let `effort` (k,) hold from `stamp_ns` on, which is not before the last one."""
+        if self.stamps_ns and self.stamps_ns[-1] == stamp_ns:
+            self.efforts[-1] = effort
+            return
+        self.stamps_ns.append(stamp_ns)
+        self.efforts.append(effort)
+
+    def age_ns(self, stamp_ns: int) -> int | None:
+        """Return how old the command in force at `stamp_ns` is [ns]; None without one."""
+        index = bisect_right(self.stamps_ns, stamp_ns)
+        return None if index == 0 else stamp_ns - self.stamps_ns[index - 1]
+
+    def average(
+        self, first_ns: int, last_ns: int, cumulative: Callable[[np.ndarray], np.ndarray]
+    ) -> np.ndarray:
+        """Integrate the held commands against a kernel, exactly.
+
+        Args:
+            first_ns, last_ns: support of the kernel; a command is in force at `first_ns`.
+            cumulative: integral of the kernel from `first_ns` to times given in seconds after it.
+
+        Returns:
+            (k,) [unit of the commands].
+        """
+        start = bisect_right(self.stamps_ns, first_ns) - 1
+        stop = bisect_right(self.stamps_ns, last_ns)
+        changes = [first_ns, *self.stamps_ns[start + 1 : stop], last_ns]
+        seconds = np.array([stamp - first_ns for stamp in changes]) * 1e-9
+        shares = np.diff(cumulative(seconds))  # (pieces,)
+        return shares @ np.array(self.efforts[start:stop])  # type: ignore[no-any-return]  # array
+
+    def forget_before(self, stamp_ns: int) -> None:
+        """Drop commands that ended before `stamp_ns`."""
+        keep = max(bisect_right(self.stamps_ns, stamp_ns) - 1, 0)
+        del self.stamps_ns[:keep]
+        del self.efforts[:keep]

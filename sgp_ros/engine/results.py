@@ -1,0 +1,133 @@
+"""What the engine gives back: values only, read by nodes, commands and reports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from sgp_ros.engine.samples import Event
+
+REFUSALS = ('late', 'duplicate', 'nonfinite', 'unpaired', 'unknown_joint', 'gap')
+"""Reasons for which a state is refused; each refused state has exactly one."""
+
+COMMAND_REFUSALS = ('late', 'nonfinite', 'unknown_joint', 'wrong_length')
+"""Reasons for which a command is refused."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Channel:
+    """Measured and predicted values of one quantity, each (k,); NaN where there is none.
+
+    Attributes:
+        measured: filtered measurement [unit of the channel].
+        mean: predicted mean, made before the measurement was revealed.
+        variance: of that measurement under the prediction, noise included [unit squared].
+    """
+
+    measured: np.ndarray
+    mean: np.ndarray
+    variance: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimate:
+    """Prediction for one sample.
+
+    Attributes:
+        stamp_ns: header stamp of the sample at the centre of the window [ns].
+        names: joints, k of them.
+        position: (k,) filtered position at that time.
+        velocity: (k,) filtered velocity.
+        acceleration: measured and predicted accelerations.
+        effort: measured and predicted efforts.
+        is_scored: whether it entered the scores: a model existed and its variance was finite.
+        is_learned: whether the model then learned it.
+    """
+
+    stamp_ns: int
+    names: tuple[str, ...]
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: Channel
+    effort: Channel
+    is_scored: bool
+    is_learned: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterEstimate:
+    """Posterior of one coefficient; `std` is None exactly where it is not identifiable."""
+
+    name: str
+    joint: str | None
+    value: float
+    std: float | None
+    unit: str
+    is_identifiable: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """Prequential scores of one channel of one joint.
+
+    Attributes:
+        nmse: mean squared error over the variance of the measured target.
+        nlpd: mean negative log predictive density [nat].
+        coverage95: share of measurements inside the 95 % interval.
+        n: number of scored samples.
+    """
+
+    nmse: float
+    nlpd: float
+    coverage95: float
+    n: int
+
+
+@dataclass(slots=True)
+class Counts:
+    """How many states and commands came, and what became of them.
+
+    Attributes:
+        read, refused: states that came, and those refused by reason.
+        commands_read, commands_refused: the same for commands.
+        estimated: windows that gave an equation.
+        learned: equations that the model learned.
+        scored: equations whose prediction entered the scores.
+        unlearnable: equations that repeat others to rounding.
+        refits, refits_refused: fits of hyper-parameters put in force, and those refused.
+    """
+
+    read: int = 0
+    refused: dict[str, int] = field(default_factory=lambda: dict.fromkeys(REFUSALS, 0))
+    commands_read: int = 0
+    commands_refused: dict[str, int] = field(
+        default_factory=lambda: dict.fromkeys(COMMAND_REFUSALS, 0)
+    )
+    estimated: int = 0
+    learned: int = 0
+    scored: int = 0
+    unlearnable: int = 0
+    refits: int = 0
+    refits_refused: int = 0
+
+    @property
+    def used(self) -> int:
+        """States that took part in a window or wait for one."""
+        return self.read - sum(self.refused.values())
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What one `push` set free.
+
+    Attributes:
+        released: events in the order in which they took effect; a record of these reproduces
+            the run.
+        estimates: predictions that became possible.
+    """
+
+    released: tuple[Event, ...] = ()
+    estimates: tuple[Estimate, ...] = ()

@@ -1,0 +1,82 @@
+"""The stamped values that enter the engine.
+
+Live and replay differ only in who makes these values. A stamp is an integer number of nanoseconds;
+an array is float64 and read-only. Nothing here knows of messages, files or clocks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+SettingValue = bool | int | float | str | tuple[float, ...] | tuple[str, ...]
+
+
+def frozen_array(values: Iterable[float]) -> np.ndarray:
+    """Return a read-only float64 copy of `values`, shape (m,)."""
+    array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointSample:
+    """State of some joints at one time, in any order.
+
+    Attributes:
+        stamp_ns: time of the state (header stamp) [ns].
+        names: joint names, m of them.
+        position: (m,) [rad] or [m].
+        velocity: (m,) [rad/s] or [m/s]; None when the source has none. NaN marks a single
+            missing interface.
+        effort: (m,) [N m] or [N]; None when the source has none.
+    """
+
+    stamp_ns: int
+    names: tuple[str, ...]
+    position: np.ndarray
+    velocity: np.ndarray | None = None
+    effort: np.ndarray | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CommandSample:
+    """A command that holds until the next one.
+
+    Attributes:
+        stamp_ns: time from which it holds [ns]: the header stamp, or the time of receipt.
+        effort: (m,) commanded effort [N m], [N] or the unit the robot's description states.
+        names: the joints the numbers belong to; None for an array without names, whose order is
+            the setting `command.joints`.
+    """
+
+    stamp_ns: int
+    effort: np.ndarray
+    names: tuple[str, ...] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsChange:
+    """New values of settings, in force from the first sample after `stamp_ns`.
+
+    A live parameter change and the result of a hyper-parameter fit are both written like this, so
+    that a replay applies them between the same two samples.
+    """
+
+    stamp_ns: int
+    settings: Mapping[str, SettingValue]
+
+
+@dataclass(frozen=True, slots=True)
+class Reset:
+    """Forget everything that was learned, keep the settings."""
+
+    stamp_ns: int
+
+
+Event = JointSample | CommandSample | SettingsChange | Reset

@@ -1,0 +1,211 @@
+"""The whole state of an engine as arrays: what a stopped engine needs to go on as if it had not.
+
+Numbers that are learned are arrays; counts, scores and the samples in flight are one JSON text,
+in which Python writes every float so that it reads back to the same bits.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sgp_ros.core.kernels import SquaredExponential
+from sgp_ros.core.model import Model
+from sgp_ros.core.online import OnlineRegression
+from sgp_ros.core.scores import RunningScore
+from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.samples import (
+    CommandSample,
+    Event,
+    JointSample,
+    Reset,
+    SettingsChange,
+    frozen_array,
+)
+from sgp_ros.engine.windows import State
+from sgp_ros.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sgp_ros.engine.engine import Engine
+    from sgp_ros.engine.estimator import Estimator
+    from sgp_ros.robots.robot import Robot
+
+VERSION = 1
+
+
+def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
+    """Return the state of an engine, arrays without objects."""
+    estimator, intake, order = engine.estimator, engine.intake, engine.order
+    text = {
+        'version': VERSION,
+        'robot': engine.robot.name,
+        'coefficients': [c.name for c in engine.robot.coefficients],
+        'settings': engine.config.to_mapping(),
+        'counts': asdict(engine.counts),
+        'fits': engine.fits,
+        'next_fit': engine.next_fit,
+        'delay_s': engine.delay_s,
+        'released_ns': order.released_ns,
+        'newest_ns': order.newest_ns,
+        'pending': [_encode(event) for event in order.pending],
+        'commands': [
+            [stamp, effort.tolist()]
+            for stamp, effort in zip(
+                intake.commands.stamps_ns, intake.commands.efforts, strict=True
+            )
+        ],
+        'states': [_encode_state(state) for state in intake.windows.states],
+        'next_ns': intake.windows.next_ns,
+        'last_state_ns': intake.last_state_ns,
+        'scores': {c: [asdict(s) for s in scores] for c, scores in estimator.scores.items()},
+        'baseline_scores': [asdict(score) for score in estimator.baseline_scores],
+    }
+    arrays = {'json': np.array(json.dumps(text))}
+    for i, name in enumerate(('U', 'F', 'y')):
+        rows = [row[i] for row in estimator.waiting]
+        arrays[f'waiting_{name}'] = np.array(rows) if rows else np.zeros(0)
+    for name, regression in _regressions(estimator).items():
+        arrays[f'{name}_noise'] = np.array(regression.model.noise)
+        for key, array in regression.state().items():
+            arrays[f'{name}.{key}'] = array
+        for j, kernel in enumerate(regression.model.kernels):
+            if kernel is not None:
+                arrays[f'{name}_kernel{j}'] = np.array([kernel.variance, *kernel.lengthscales])
+    return arrays
+
+
+def snapshot_config(snapshot: Mapping[str, np.ndarray], robot: Robot) -> EngineConfig:
+    """Return the settings a snapshot was taken with.
+
+    Raises:
+        ConfigError: no snapshot, or one of another version or robot.
+    """
+    text = _text(snapshot)
+    if text.get('version') != VERSION:
+        raise ConfigError(f'a snapshot of version {text.get("version")!r}', f'version {VERSION}')
+    names = [c.name for c in robot.coefficients]
+    if text['coefficients'] != names:
+        raise ConfigError(
+            f'a snapshot of robot {text["robot"]} with parameters {text["coefficients"]}',
+            f'robot {robot.name} with parameters {names}',
+        )
+    return EngineConfig.from_mapping(text['settings'], robot)
+
+
+def fill_from_snapshot(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
+    """Bring a fresh engine, built with the settings of `snapshot`, to its state."""
+    text = _text(snapshot)
+    for name, value in text['counts'].items():
+        setattr(engine.counts, name, value)
+    engine.fits, engine.next_fit = text['fits'], text['next_fit']
+    engine.delay_s = text['delay_s']
+    intake = engine.intake
+    for stamp, effort in text['commands']:
+        intake.commands.add(stamp, np.array(effort))
+    intake.windows.states = [_decode_state(state) for state in text['states']]
+    intake.windows.next_ns = text['next_ns']
+    intake.last_state_ns = text['last_state_ns']
+    engine.order.resume(
+        text['released_ns'], text['newest_ns'], [_decode(event) for event in text['pending']]
+    )
+    estimator = engine.estimator
+    estimator.scores = {
+        channel: tuple(RunningScore(**score) for score in scores)
+        for channel, scores in text['scores'].items()
+    }
+    estimator.baseline_scores = tuple(RunningScore(**s) for s in text['baseline_scores'])
+    estimator.waiting = list(
+        zip(*(snapshot[f'waiting_{name}'] for name in ('U', 'F', 'y')), strict=True)
+    )
+    if 'model_noise' in snapshot:
+        estimator.regression = _read_regression('model', snapshot, engine)
+    if 'baseline_noise' in snapshot:
+        estimator.baseline = _read_regression('baseline', snapshot, engine)
+
+
+def _regressions(estimator: Estimator) -> dict[str, OnlineRegression]:
+    found = {'model': estimator.regression, 'baseline': estimator.baseline}
+    return {name: regression for name, regression in found.items() if regression is not None}
+
+
+def _read_regression(
+    name: str, snapshot: Mapping[str, np.ndarray], engine: Engine
+) -> OnlineRegression:
+    kernels: list[SquaredExponential | None] = []
+    for j, columns in enumerate(engine.estimator.inputs):
+        key = f'{name}_kernel{j}'
+        if key not in snapshot or columns is None:
+            kernels.append(None)
+            continue
+        variance, *lengthscales = (float(x) for x in snapshot[key])
+        kernels.append(SquaredExponential(variance, tuple(lengthscales), columns))
+    noise = tuple(float(x) for x in snapshot[f'{name}_noise'])
+    make = engine.estimator.make_regression if name == 'model' else engine.estimator.make_baseline
+    regression = make(Model(tuple(kernels), noise))
+    prefix = f'{name}.'
+    regression.restore(
+        {key.removeprefix(prefix): snapshot[key] for key in snapshot if key.startswith(prefix)}
+    )
+    return regression
+
+
+def _text(snapshot: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    if 'json' not in snapshot:
+        raise ConfigError(f'a file with {sorted(snapshot)}', 'a model saved by this package')
+    text: dict[str, Any] = json.loads(str(snapshot['json']))
+    return text
+
+
+def _listed(values: np.ndarray | None) -> list[float] | None:
+    return None if values is None else [float(value) for value in values]
+
+
+def _encode(event: Event) -> dict[str, Any]:
+    if isinstance(event, JointSample):
+        return {
+            'kind': 'state', 'stamp_ns': event.stamp_ns, 'names': event.names,
+            'position': _listed(event.position), 'velocity': _listed(event.velocity),
+            'effort': _listed(event.effort),
+        }  # fmt: skip
+    if isinstance(event, CommandSample):
+        return {
+            'kind': 'command', 'stamp_ns': event.stamp_ns, 'names': event.names,
+            'effort': _listed(event.effort),
+        }  # fmt: skip
+    if isinstance(event, SettingsChange):
+        return {'kind': 'change', 'stamp_ns': event.stamp_ns, 'settings': dict(event.settings)}
+    return {'kind': 'reset', 'stamp_ns': event.stamp_ns}
+
+
+def _decode(entry: dict[str, Any]) -> Event:
+    stamp = entry['stamp_ns']
+    if entry['kind'] == 'state':
+        velocity, effort = (
+            None if entry[name] is None else frozen_array(entry[name])
+            for name in ('velocity', 'effort')
+        )
+        names = tuple(entry['names'])
+        return JointSample(stamp, names, frozen_array(entry['position']), velocity, effort)
+    if entry['kind'] == 'command':
+        known = None if entry['names'] is None else tuple(entry['names'])
+        return CommandSample(stamp, frozen_array(entry['effort']), known)
+    if entry['kind'] == 'change':
+        return SettingsChange(stamp, entry['settings'])
+    return Reset(stamp)
+
+
+def _encode_state(state: State) -> list[Any]:
+    return [
+        state.stamp_ns, _listed(state.position), _listed(state.velocity), _listed(state.effort)
+    ]  # fmt: skip
+
+
+def _decode_state(entry: list[Any]) -> State:
+    position, velocity, effort = (None if x is None else np.array(x) for x in entry[1:])
+    assert position is not None  # noqa: S101 - written by `_encode_state`
+    return State(entry[0], position, velocity, effort)

@@ -1,0 +1,202 @@
+"""Turns paired states into filtered equations of motion, one window at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.engine.weak_form import WeakForm, polynomial_smoother
+from sgp_ros.robots.robot import Motion
+
+if TYPE_CHECKING:
+    from sgp_ros.engine.config import EngineConfig
+    from sgp_ros.engine.pairing import CommandHistory
+    from sgp_ros.robots.robot import Robot
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class State:
+    """One accepted state of the robot's k joints, in the robot's order.
+
+    Attributes:
+        stamp_ns: header stamp [ns].
+        position: (k,).
+        velocity: (k,) measured, or None.
+        effort: (k,) measured, or None where the command counts.
+    """
+
+    stamp_ns: int
+    position: np.ndarray
+    velocity: np.ndarray | None
+    effort: np.ndarray | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Equation:
+    """The equation of motion averaged over one window: `target = f W + Z(u)`.
+
+    Attributes:
+        stamp_ns: stamp of the state at its centre [ns].
+        span_s: length of the window [s].
+        motion: (1, k) state at the centre with filtered acceleration and effort.
+        state_rows: (k, p) part of f that the state alone determines.
+        slopes: (c, k, p) change of f per unit of each complement signal.
+        complement_joints: the c joints those signals belong to.
+    """
+
+    stamp_ns: int
+    span_s: float
+    motion: Motion
+    state_rows: np.ndarray
+    slopes: np.ndarray
+    complement_joints: tuple[int, ...]
+
+    def regressor(self, complement: np.ndarray) -> np.ndarray:
+        """Return f (k, p) for complement signals (c,)."""
+        return self.state_rows + np.tensordot(complement, self.slopes, axes=1)
+
+
+class WindowFilter:
+    """Collects states and yields an equation whenever a window is complete.
+
+    The window of a state holds every state within half of `filter.window`, and at least its two
+    neighbours. The delay is half a window.
+    """
+
+    def __init__(self, robot: Robot, config: EngineConfig) -> None:
+        self._robot = robot
+        self._half_ns = round(0.5e9 * config.filter_window)
+        self._hop_ns = round(0.999e9 * config.filter_hop)
+        self._degree = config.filter_degree
+        self._velocity = config.filter_velocity
+        self._complement_joints = tuple(
+            j
+            for j, joint in enumerate(robot.joints)
+            if robot.complement == 'acceleration' or joint.is_actuated
+        )
+        self.states: list[State] = []
+        self.next_ns: int | None = None
+        self._cached: tuple[np.ndarray, bool, _Weights] | None = None
+
+    def restart(self) -> None:
+        """Forget the states so far: what follows does not continue them."""
+        self.states = []
+        self.next_ns = None
+
+    def push(self, state: State, commands: CommandHistory) -> list[Equation]:
+        """Take the next state and return the equations that became complete."""
+        self.states.append(state)
+        if self.next_ns is None:
+            self.next_ns = state.stamp_ns + self._half_ns
+        equations = []
+        while (centre := self._ready_centre()) is not None:
+            equations.append(self._equation(centre, commands))
+            self.next_ns = self.states[centre].stamp_ns + max(self._hop_ns, 1)
+        self._forget(commands)
+        return equations
+
+    def _ready_centre(self) -> int | None:
+        newest = self.states[-1].stamp_ns
+        assert self.next_ns is not None  # noqa: S101 - set by push
+        for index in range(1, len(self.states) - 1):
+            stamp = self.states[index].stamp_ns
+            if stamp >= self.next_ns:
+                return index if newest >= stamp + self._half_ns else None
+        return None
+
+    def _forget(self, commands: CommandHistory) -> None:
+        assert self.next_ns is not None  # noqa: S101 - set by push
+        first = self.next_ns - self._half_ns
+        keep = sum(state.stamp_ns < first for state in self.states)
+        # One state before the window may still be the left neighbour of its centre.
+        del self.states[: max(keep - 1, 0)]
+        commands.forget_before(self.states[0].stamp_ns)
+
+    def _equation(self, centre: int, commands: CommandHistory) -> Equation:
+        stamp = self.states[centre].stamp_ns
+        window = [
+            state
+            for index, state in enumerate(self.states)
+            if abs(state.stamp_ns - stamp) <= self._half_ns or abs(index - centre) == 1
+        ]
+        at = next(i for i, state in enumerate(window) if state.stamp_ns == stamp)
+        measured = self._velocity != 'position' and all(s.velocity is not None for s in window)
+        weights = self._weights(
+            np.array([state.stamp_ns - stamp for state in window]), measured=measured
+        )
+        position = np.array([state.position for state in window])  # (m, k)
+        source = position
+        if measured:
+            source = np.array([state.velocity for state in window])
+        velocity = weights.slopes @ source if source is position else weights.values @ source
+        return self._assemble(
+            window,
+            at,
+            weights,
+            Motion(
+                weights.values @ position,
+                velocity,
+                (weights.form.weights @ source)[None],
+                self._effort(window, weights.form, commands)[None],
+            ),
+        )
+
+    def _effort(
+        self, window: list[State], form: WeakForm, commands: CommandHistory
+    ) -> np.ndarray:
+        if not any(joint.is_actuated for joint in self._robot.joints):
+            return np.zeros(len(self._robot.joints))
+        if all(state.effort is not None for state in window):
+            measured = np.array([state.effort for state in window])
+            return form.averaging @ measured  # type: ignore[no-any-return]  # an array
+        return commands.average(window[0].stamp_ns, window[-1].stamp_ns, form.cumulative)
+
+    def _assemble(
+        self, window: list[State], at: int, weights: _Weights, motion: Motion
+    ) -> Equation:
+        m, k = motion.position.shape
+        joints = self._complement_joints
+        probes = 1 + len(joints)
+        drive = np.zeros((m + probes, k))
+        drive[np.arange(m + 1, m + probes), joints] = 1.0
+        still = np.zeros_like(drive)
+        forward = self._robot.target == 'acceleration'
+        extended = Motion(
+            np.vstack([motion.position, np.repeat(motion.position[at][None], probes, axis=0)]),
+            np.vstack([motion.velocity, np.repeat(motion.velocity[at][None], probes, axis=0)]),
+            still if forward else drive,
+            drive if forward else still,
+        )
+        rows = self._robot.regressor(extended)  # (m + probes, k, p)
+        return Equation(
+            window[at].stamp_ns,
+            (window[-1].stamp_ns - window[0].stamp_ns) * 1e-9,
+            Motion(
+                motion.position[at][None],
+                motion.velocity[at][None],
+                motion.acceleration,
+                motion.effort,
+            ),
+            np.tensordot(weights.form.averaging, rows[:m], axes=1),
+            rows[m + 1 :] - rows[m],
+            joints,
+        )
+
+    def _weights(self, offsets_ns: np.ndarray, *, measured: bool) -> _Weights:
+        cached = self._cached
+        if cached and cached[1] == measured and np.array_equal(cached[0], offsets_ns):
+            return cached[2]
+        times = offsets_ns * 1e-9
+        form = WeakForm.from_velocities(times) if measured else WeakForm.from_positions(times)
+        weights = _Weights(form, *polynomial_smoother(times, self._degree))
+        self._cached = (offsets_ns, measured, weights)
+        return weights
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Weights:
+    form: WeakForm
+    values: np.ndarray
+    slopes: np.ndarray
