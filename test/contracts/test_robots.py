@@ -1,0 +1,105 @@
+"""What every registered robot promises."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sgp_ros.engine.config import EngineConfig, describe_settings
+from sgp_ros.robots.registry import ROBOTS
+from sgp_ros.robots.robot import Motion
+
+NAMES = sorted(ROBOTS)
+
+
+def _motion(robot, n, seed, **fixed):
+    rng = np.random.default_rng(seed)
+    shape = (n, len(robot.joints))
+    arrays = {
+        name: fixed.get(name, rng.normal(size=shape))
+        for name in ('position', 'velocity', 'acceleration', 'effort')
+    }
+    return Motion(**arrays)
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_regressor_has_a_column_per_coefficient(name):
+    """f(u) is (n, k, p), also for a single time."""
+    robot = ROBOTS[name]
+    for n in (1, 7):
+        rows = robot.regressor(_motion(robot, n, 0))
+        assert rows.shape == (n, len(robot.joints), len(robot.coefficients))
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_regressor_is_affine_in_acceleration_and_effort(name):
+    """The filter averages state columns apart from driven ones, which needs this."""
+    robot = ROBOTS[name]
+    one, other = _motion(robot, 5, 1), _motion(robot, 5, 2)
+    state = {'position': one.position, 'velocity': one.velocity}
+
+    def f(share):
+        acceleration = share * one.acceleration + (1 - share) * other.acceleration
+        effort = share * one.effort + (1 - share) * other.effort
+        return robot.regressor(Motion(**state, acceleration=acceleration, effort=effort))
+
+    np.testing.assert_allclose(f(0.3), 0.3 * f(1.0) + 0.7 * f(0.0), atol=1e-12)
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_target_is_no_input(name):
+    """The regressor of the target's equation does not read the target."""
+    robot = ROBOTS[name]
+    motion = _motion(robot, 5, 3)
+    other = _motion(robot, 5, 4)
+    arrays = {c: getattr(motion, c) for c in ('position', 'velocity', 'acceleration', 'effort')}
+    arrays[robot.target] = getattr(other, robot.target)
+    np.testing.assert_array_equal(robot.regressor(motion), robot.regressor(Motion(**arrays)))
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_names_are_unique_and_units_and_sources_given(name):
+    """A coefficient can be told apart, read and looked up."""
+    robot = ROBOTS[name]
+    names = [c.name for c in robot.coefficients]
+    assert len(set(names)) == len(names)
+    assert all(c.unit for c in robot.coefficients)
+    assert all(c.joint is None or c.joint in robot.joint_names for c in robot.coefficients)
+    assert all(term.source for term in robot.terms)
+    assert robot.description
+    assert robot.name == name
+
+
+@pytest.mark.parametrize('name', NAMES)
+@pytest.mark.parametrize('spec', [('default',), ('own',), ('all',)])
+def test_residual_inputs_resolve(name, spec):
+    """What Z sees are columns of the stacked motion, and names lead back to them."""
+    robot = ROBOTS[name]
+    for columns in robot.residual_columns(spec):
+        assert columns
+        for column in columns:
+            named = robot.input_name(column)
+            assert (column,) == robot.residual_columns((named,))[0]
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_renaming_joints_changes_names_alone(name):
+    """Columns, inputs and units follow the new names."""
+    robot = ROBOTS[name]
+    names = [f'joint_{i}' for i in range(len(robot.joints))]
+    renamed = robot.renamed(names)
+    motion = _motion(robot, 4, 5)
+    np.testing.assert_array_equal(renamed.regressor(motion), robot.regressor(motion))
+    assert renamed.residual_columns(('default',)) == robot.residual_columns(('default',))
+    assert {c.joint for c in renamed.coefficients} <= {*names, None}
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_settings_of_every_robot_round_trip(name):
+    """Defaults are valid, and the mapping of a configuration builds the same one."""
+    robot = ROBOTS[name]
+    config = EngineConfig.from_mapping({}, robot)
+    assert EngineConfig.from_mapping(config.to_mapping(), robot) == config
+    described = {setting.name for setting in describe_settings(robot)}
+    assert described == set(config.to_mapping())
+    assert all(setting.description for setting in describe_settings(robot))
