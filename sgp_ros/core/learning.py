@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,6 +26,8 @@ _NOISE_FLOOR = 1e-8
 _RANGE = 1e4
 _RESTART_SPREAD = 1.5
 _REFUSED = 1e25
+_SCREENED_LENGTHS = (0.3, 1.0, 3.0)
+_SCREENED_NOISE = (0.1, 1.0, 10.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,6 +77,31 @@ def initial_model(
         lengths = tuple(float(spread[column]) for column in columns)
         kernels.append(SquaredExponential(float(variance), lengths, columns))
     return Model(tuple(kernels), tuple(float(x) / 100.0 for x in power))
+
+
+def screened(data: Observations, prior: CoefficientPrior, start: Model) -> Model:
+    """Return the best of a few variations of `start`: other length scales, other noise.
+
+    The evidence has several maxima (a long length scale with much noise, a short one with little),
+    and a first step of the optimiser from far away can end in a poor one. Nine evaluations.
+    """
+    best, highest = start, -np.inf
+    for length in _SCREENED_LENGTHS:
+        for noise in _SCREENED_NOISE:
+            kernels = tuple(
+                None if k is None else replace(
+                    k, lengthscales=tuple(length * x for x in k.lengthscales)
+                )
+                for k in start.kernels
+            )  # fmt: skip
+            candidate = Model(kernels, tuple(noise * x for x in start.noise))
+            try:
+                evidence = Posterior(candidate, data, prior).log_evidence
+            except NumericalError:
+                continue
+            if evidence > highest:
+                best, highest = candidate, evidence
+    return best
 
 
 def learn(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.core.learning import initial_model, learn
+from sgp_ros.core.learning import initial_model, learn, screened
 from sgp_ros.core.posterior import Posterior
 from sgp_ros.core.prior import CoefficientPrior
 from sgp_ros.errors import NumericalError
@@ -70,7 +70,8 @@ def fit(request: FitRequest) -> FitResult:
     candidates = [(request.model, 0)]
     if request.restarts:
         inputs = tuple(None if k is None else k.inputs for k in request.model.kernels)
-        candidates.append((initial_model(request.data, inputs), request.restarts - 1))
+        fresh = screened(request.data, prior, initial_model(request.data, inputs))
+        candidates.append((fresh, request.restarts - 1))
     best, lowest, evaluations = None, -math.inf, 0
     rng = np.random.default_rng((request.seed, request.number))
     for start, restarts in candidates:

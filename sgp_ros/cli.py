@@ -1,0 +1,230 @@
+"""The `sgp` command: each sub-command is a thin layer over one function of the package.
+
+Results go to stdout, remarks and progress to stderr. What a user can cause ends in one line on
+stderr and exit status 2.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+# One BLAS thread, set before NumPy loads: live and replay then round alike, and the small
+# matrices here are slower with more.
+for _name in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS'):
+    os.environ.setdefault(_name, '1')
+
+from sgp_ros import __version__  # noqa: E402 - the environment above comes first
+from sgp_ros.errors import SgpError  # noqa: E402 - the environment above comes first
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    Result = Mapping[str, Any]
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status: 0, or 2 on bad input."""
+    parser = _parser()
+    arguments = parser.parse_args(argv)
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        result = arguments.run(arguments)
+    except (SgpError, OSError) as error:
+        text = ' '.join(str(error).split())
+        sys.stderr.write(f'sgp {arguments.command}: {text}\n')
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        sys.stderr.write(f'sgp {arguments.command}: interrupted\n')
+        return INTERRUPTED
+    if arguments.json:
+        sys.stdout.write(json.dumps(result, allow_nan=False) + '\n')
+    return 0
+
+
+def _interrupt(_signal: int, _frame: object) -> None:
+    raise KeyboardInterrupt
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='sgp', description='Identify a robot with semi-parametric Gaussian processes.'
+    )
+    parser.add_argument('--version', action='version', version=f'sgp {__version__}')
+    commands = parser.add_subparsers(dest='command', required=True, metavar='COMMAND')
+    _add_demo(commands)
+    _add_simulate(commands)
+    _add_replay(commands)
+    _add_import(commands)
+    return parser
+
+
+def _add(
+    commands: Any,  # noqa: ANN401 - argparse keeps the type of its sub-parsers private
+    name: str,
+    run: Callable[[argparse.Namespace], Result],
+    summary: str,
+    example: str,
+) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name, help=summary, description=summary, epilog=f'example: {example}'
+    )
+    parser.set_defaults(run=run)
+    parser.add_argument(
+        '--out', metavar='DIR', type=Path, default=Path('out') / name,
+        help='folder of the results (default: %(default)s)',
+    )  # fmt: skip
+    parser.add_argument(
+        '--json', action='store_true', help='print the result as JSON in the last line of stdout'
+    )
+    return parser
+
+
+def _add_demo(commands: Any) -> None:  # noqa: ANN401 - as in `_add`
+    parser = _add(
+        commands, 'demo', _demo,
+        'Identify a simulated reaction wheel live over DDS, then prove that a replay agrees.',
+        'sgp demo --duration 20 --out out/demo',
+    )  # fmt: skip
+    parser.add_argument('--duration', type=float, default=20.0, metavar='S', help='length [s]')
+    parser.add_argument('--seed', type=int, default=0, metavar='N', help='seed of the simulation')
+
+
+def _add_simulate(commands: Any) -> None:  # noqa: ANN401 - as in `_add`
+    parser = _add(
+        commands, 'simulate', _simulate,
+        'Write a recording of a simulated robot and the truth about it.',
+        'sgp simulate reaction_wheel --duration 30 --effect coulomb_friction:joint=pole,level=0.01',
+    )  # fmt: skip
+    parser.add_argument('robot', metavar='ROBOT', help='a built-in robot')
+    parser.add_argument('--duration', type=float, default=20.0, metavar='S', help='length [s]')
+    parser.add_argument('--rate', type=float, default=None, metavar='HZ', help='sampling rate')
+    parser.add_argument('--seed', type=int, default=0, metavar='N', help='seed')
+    parser.add_argument('--controller', default=None, metavar='NAME', help='what drives it')
+    parser.add_argument(
+        '--effect', action='append', default=[], metavar='NAME:joint=J,k=v',
+        help='physics to add; may be repeated',
+    )  # fmt: skip
+    parser.add_argument(
+        '--physical', action='append', default=[], metavar='NAME=VALUE',
+        help='another value of a physical parameter; may be repeated',
+    )  # fmt: skip
+
+
+def _add_replay(commands: Any) -> None:  # noqa: ANN401 - as in `_add`
+    parser = _add(
+        commands, 'replay', _replay,
+        'Run a recording through the online engine and report what it learned.',
+        'sgp replay robot.mcap --robot linear_axis --out out/replay',
+    )  # fmt: skip
+    parser.add_argument(
+        'bag', metavar='BAG', help='.mcap file, rosbag2 directory or ROS 1 .bag'
+    )
+    parser.add_argument(
+        '--robot', required=True, metavar='ROBOT', help='a built-in robot or a robot YAML'
+    )
+    parser.add_argument(
+        '--params', metavar='YAML', help="ROS 2 parameter file (default: the robot's own)"
+    )
+    parser.add_argument('--joint-states', metavar='TOPIC', help='topic of the states')
+    parser.add_argument('--command', metavar='TOPIC', dest='command_topic',
+                        help='topic of the commands')  # fmt: skip
+    parser.add_argument('--model', metavar='NPZ', help='continue from a saved model')
+    parser.add_argument('--frozen', action='store_true', help='predict and score, do not learn')
+    parser.add_argument('--truth', metavar='JSON', help='truth.json to compare with')
+
+
+def _add_import(commands: Any) -> None:  # noqa: ANN401 - as in `_add`
+    parser = _add(
+        commands, 'import', _import,
+        'Turn a CSV, NPZ or MAT recording into MCAP.',
+        'sgp import emps_id.csv --map config/import/emps.yaml --out out/import',
+    )  # fmt: skip
+    parser.add_argument('file', metavar='FILE', help='.csv, .npz or .mat')
+    parser.add_argument('--map', required=True, metavar='YAML', help='columns and units')
+
+
+def _demo(arguments: argparse.Namespace) -> Result:
+    from sgp_ros.experiments.demo import run_demo  # noqa: PLC0415 - loads only what is run
+
+    return run_demo(arguments.duration, arguments.seed, arguments.out, Progress('demo'))
+
+
+def _simulate(arguments: argparse.Namespace) -> Result:
+    from sgp_ros.experiments.simulation import run_simulation  # noqa: PLC0415 - as in `_demo`
+
+    return run_simulation(
+        arguments.robot,
+        arguments.out,
+        Progress('simulate'),
+        duration_s=arguments.duration,
+        rate_hz=arguments.rate,
+        seed=arguments.seed,
+        controller=arguments.controller,
+        effects=arguments.effect,
+        physical=arguments.physical,
+    )
+
+
+def _replay(arguments: argparse.Namespace) -> Result:
+    from sgp_ros.experiments.replay import ReplayOptions, run_replay  # noqa: PLC0415 - as in `_demo`
+
+    options = ReplayOptions(
+        joint_states=arguments.joint_states,
+        command=arguments.command_topic,
+        model=arguments.model,
+        is_learning=not arguments.frozen,
+        truth=arguments.truth,
+    )
+    return run_replay(
+        arguments.bag,
+        arguments.robot,
+        arguments.params,
+        arguments.out,
+        options,
+        progress=Progress('replay'),
+    )
+
+
+def _import(arguments: argparse.Namespace) -> Result:
+    from sgp_ros.recordings.tables import import_table  # noqa: PLC0415 - as in `_demo`
+
+    return import_table(arguments.file, arguments.map, arguments.out)
+
+
+class Progress:
+    """A progress bar on stderr, where that is a terminal.
+
+    Args:
+        name: of the command, in front of the bar.
+    """
+
+    _WIDTH = 40
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._shown = -1
+
+    def __call__(self, share: float) -> None:
+        """Show that `share` of the work, 0 to 1, is done."""
+        percent = int(100.0 * min(max(share, 0.0), 1.0))
+        if percent == self._shown or not sys.stderr.isatty():
+            return
+        self._shown = percent
+        filled = self._WIDTH * percent // 100
+        bar = '#' * filled + '.' * (self._WIDTH - filled)
+        end = '\n' if percent == 100 else ''  # noqa: PLR2004 - per cent
+        sys.stderr.write(f'\rsgp {self._name} [{bar}] {percent:3d} %{end}')
+        sys.stderr.flush()
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,83 @@
+"""What every registered kernel promises."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sgp_ros.core.kernels import KERNELS
+
+NAMES = sorted(KERNELS)
+
+
+def _kernel(name, seed):
+    rng = np.random.default_rng(seed)
+    lengths = tuple(float(x) for x in rng.uniform(0.3, 3.0, size=2))
+    return KERNELS[name](float(rng.uniform(0.2, 5.0)), lengths, (0, 2))
+
+
+@pytest.mark.parametrize('name', NAMES)
+@given(seed=st.integers(0, 10_000))
+def test_matrix_is_symmetric_and_positive_semidefinite(name, seed):
+    """Eigenvalues are not below rounding, n eps times the largest."""
+    U = np.random.default_rng(seed).normal(size=(9, 3))
+    K = _kernel(name, seed).matrix(U)
+    np.testing.assert_allclose(K, K.T, atol=1e-15)
+    values = np.linalg.eigvalsh(K)
+    assert values[0] > -9 * np.finfo(float).eps * values[-1]
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_vector_matrix_and_diagonal_agree(name):
+    """Three ways to the same covariances."""
+    kernel = _kernel(name, 1)
+    U = np.random.default_rng(1).normal(size=(6, 3))
+    K = kernel.matrix(U)
+    np.testing.assert_allclose(np.diag(K), kernel.diagonal(6))
+    np.testing.assert_allclose(kernel.matrix(U, U[2:4]), K[:, 2:4], atol=1e-14)
+    S = kernel.scale(U)
+    np.testing.assert_allclose(kernel.vector(S, S[3]), K[:, 3], atol=1e-14)
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_kernel_sees_only_its_inputs(name):
+    """Other columns of U do not matter."""
+    kernel = _kernel(name, 2)
+    U = np.random.default_rng(2).normal(size=(5, 3))
+    other = U.copy()
+    other[:, 1] += 7.0
+    np.testing.assert_array_equal(kernel.matrix(U), kernel.matrix(other))
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_gradient_contracts_the_derivative_of_the_matrix(name):
+    """Against central differences of sum(H * K)."""
+    kernel = _kernel(name, 3)
+    rng = np.random.default_rng(3)
+    U, H = rng.normal(size=(7, 3)), rng.normal(size=(7, 7))
+    H = H + H.T
+    theta = kernel.log_parameters
+    gradient = kernel.gradient(U, H * kernel.matrix(U))
+    for i in range(len(theta)):
+        step = 1e-6 * np.eye(len(theta))[i]
+        high = (H * kernel.with_log_parameters(theta + step).matrix(U)).sum()
+        low = (H * kernel.with_log_parameters(theta - step).matrix(U)).sum()
+        assert gradient[i] == pytest.approx((high - low) / 2e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_parameters_round_trip(name):
+    """Logarithms lead back to the same kernel, up to rounding of exp and log."""
+    kernel = _kernel(name, 4)
+    again = kernel.with_log_parameters(kernel.log_parameters)
+    np.testing.assert_allclose(again.log_parameters, kernel.log_parameters, rtol=1e-14)
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_what_is_no_kernel_is_refused(name):
+    """Lengths that do not match the inputs, or are not positive, are a caller's mistake."""
+    for variance, lengths, inputs in ((1.0, (1.0,), (0, 1)), (0.0, (1.0,), (0,)), (1.0, (), ())):
+        with pytest.raises(ValueError, match='length scales'):
+            KERNELS[name](variance, lengths, inputs)
