@@ -1,0 +1,1 @@
+"""Simulated robots with a known truth, effects that can be added, sensors and controllers."""

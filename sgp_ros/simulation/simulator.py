@@ -1,0 +1,61 @@
+"""A simulated robot as a value: everything that is needed to run it, with defaults."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from sgp_ros.simulation.controllers import ControllerChoice
+    from sgp_ros.simulation.effects import ChosenEffect
+    from sgp_ros.simulation.mechanism import Mechanism, SimulatedJoint
+    from sgp_ros.simulation.sensors import Sensors
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Simulator:
+    """A robot that can be simulated.
+
+    Attributes:
+        name: of the robot.
+        joints: k of them; their order is the order of all arrays.
+        command_joints: names of the m joints that are commanded.
+        command_unit: unit of the commands.
+        mechanism: the equation of motion with its nominal physical parameters.
+        controllers: by name; the first one is the default.
+        sensors: the usual ones.
+        torque_noise: (k,) density of the white force on each joint [N m s^0.5 or N s^0.5]: over a
+            time h its mean has the standard deviation `density / sqrt(h)`.
+        rate_hz: the usual rate of sampling and control.
+        same_physics: effects that only change a physical parameter, as
+            `{(effect, joint): (parameter of the effect, physical parameter)}`.
+        description: one sentence.
+    """
+
+    name: str
+    joints: tuple[SimulatedJoint, ...]
+    command_joints: tuple[str, ...]
+    command_unit: str
+    mechanism: Mechanism
+    controllers: Mapping[str, ControllerChoice]
+    sensors: Sensors
+    torque_noise: tuple[float, ...]
+    rate_hz: float = 100.0
+    same_physics: Mapping[tuple[str, str], tuple[str, str]] = field(default_factory=dict)
+    description: str = ''
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, in order."""
+        return tuple(joint.name for joint in self.joints)
+
+    def absorbed(self, mechanism: Mechanism, effects: Iterable[ChosenEffect]) -> Mechanism:
+        """Return the mechanism whose parameters hold those effects that are the same physics."""
+        for effect in effects:
+            names = self.same_physics.get((effect.name, effect.joint))
+            if names is not None:
+                value = getattr(mechanism, names[1]) + float(effect.parameters[names[0]])
+                mechanism = replace(mechanism, **{names[1]: value})
+        return mechanism
