@@ -18,17 +18,17 @@ from pathlib import Path
 for _name in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS'):
     os.environ.setdefault(_name, '1')
 
-import numpy as np  # noqa: E402 - one BLAS thread, set above
+import numpy as np
 
-from benchmarks.environment import environment  # noqa: E402 - as above
-from sgp_ros.engine.config import EngineConfig  # noqa: E402 - as above
-from sgp_ros.engine.engine import Engine  # noqa: E402 - as above
-from sgp_ros.engine.replay import replay  # noqa: E402 - as above
-from sgp_ros.engine.samples import CommandSample, JointSample  # noqa: E402 - as above
-from sgp_ros.robots.registry import load_robot  # noqa: E402 - as above
-from sgp_ros.robots.robot import Motion  # noqa: E402 - as above
-from sgp_ros.simulation.assembly import make_simulation  # noqa: E402 - as above
-from sgp_ros.simulation.recording import simulate  # noqa: E402 - as above
+from benchmarks.environment import environment
+from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.replay import replay
+from sgp_ros.engine.samples import CommandSample, JointSample
+from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.robot import Motion
+from sgp_ros.simulation.assembly import make_simulation
+from sgp_ros.simulation.recording import simulate
 
 RESULT = Path(__file__).parent / 'results' / 'filter.json'
 DURATION_S = 20.0

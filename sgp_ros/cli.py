@@ -68,7 +68,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add(
-    commands: Any,  # noqa: ANN401 - argparse keeps the type of its sub-parsers private
+    commands: Any,
     name: str,
     run: Callable[[argparse.Namespace], Result],
     summary: str,
@@ -88,7 +88,7 @@ def _add(
     return parser
 
 
-def _add_demo(commands: Any) -> None:  # noqa: ANN401 - as in `_add`
+def _add_demo(commands: Any) -> None:
     parser = _add(
         commands, 'demo', _demo,
         'Identify a simulated reaction wheel live over DDS, then prove that a replay agrees.',
@@ -98,11 +98,11 @@ def _add_demo(commands: Any) -> None:  # noqa: ANN401 - as in `_add`
     parser.add_argument('--seed', type=int, default=0, metavar='N', help='seed of the simulation')
 
 
-def _add_simulate(commands: Any) -> None:  # noqa: ANN401 - as in `_add`
+def _add_simulate(commands: Any) -> None:
     parser = _add(
         commands, 'simulate', _simulate,
         'Write a recording of a simulated robot and the truth about it.',
-        'sgp simulate reaction_wheel --duration 30 --effect coulomb_friction:joint=pole,level=0.01',
+        'sgp simulate reaction_wheel --effect coulomb_friction:joint=pole,level=0.01',
     )  # fmt: skip
     parser.add_argument('robot', metavar='ROBOT', help='a built-in robot')
     parser.add_argument('--duration', type=float, default=20.0, metavar='S', help='length [s]')
@@ -119,15 +119,13 @@ def _add_simulate(commands: Any) -> None:  # noqa: ANN401 - as in `_add`
     )  # fmt: skip
 
 
-def _add_replay(commands: Any) -> None:  # noqa: ANN401 - as in `_add`
+def _add_replay(commands: Any) -> None:
     parser = _add(
         commands, 'replay', _replay,
         'Run a recording through the online engine and report what it learned.',
         'sgp replay robot.mcap --robot linear_axis --out out/replay',
     )  # fmt: skip
-    parser.add_argument(
-        'bag', metavar='BAG', help='.mcap file, rosbag2 directory or ROS 1 .bag'
-    )
+    parser.add_argument('bag', metavar='BAG', help='.mcap file, rosbag2 directory or ROS 1 .bag')
     parser.add_argument(
         '--robot', required=True, metavar='ROBOT', help='a built-in robot or a robot YAML'
     )
@@ -142,7 +140,7 @@ def _add_replay(commands: Any) -> None:  # noqa: ANN401 - as in `_add`
     parser.add_argument('--truth', metavar='JSON', help='truth.json to compare with')
 
 
-def _add_import(commands: Any) -> None:  # noqa: ANN401 - as in `_add`
+def _add_import(commands: Any) -> None:
     parser = _add(
         commands, 'import', _import,
         'Turn a CSV, NPZ or MAT recording into MCAP.',
@@ -153,13 +151,13 @@ def _add_import(commands: Any) -> None:  # noqa: ANN401 - as in `_add`
 
 
 def _demo(arguments: argparse.Namespace) -> Result:
-    from sgp_ros.experiments.demo import run_demo  # noqa: PLC0415 - loads only what is run
+    from sgp_ros.experiments.demo import run_demo
 
     return run_demo(arguments.duration, arguments.seed, arguments.out, Progress('demo'))
 
 
 def _simulate(arguments: argparse.Namespace) -> Result:
-    from sgp_ros.experiments.simulation import run_simulation  # noqa: PLC0415 - as in `_demo`
+    from sgp_ros.experiments.simulation import run_simulation
 
     return run_simulation(
         arguments.robot,
@@ -175,7 +173,7 @@ def _simulate(arguments: argparse.Namespace) -> Result:
 
 
 def _replay(arguments: argparse.Namespace) -> Result:
-    from sgp_ros.experiments.replay import ReplayOptions, run_replay  # noqa: PLC0415 - as in `_demo`
+    from sgp_ros.experiments.replay import ReplayOptions, run_replay
 
     options = ReplayOptions(
         joint_states=arguments.joint_states,
@@ -195,7 +193,7 @@ def _replay(arguments: argparse.Namespace) -> Result:
 
 
 def _import(arguments: argparse.Namespace) -> Result:
-    from sgp_ros.recordings.tables import import_table  # noqa: PLC0415 - as in `_demo`
+    from sgp_ros.recordings.tables import import_table
 
     return import_table(arguments.file, arguments.map, arguments.out)
 
@@ -221,7 +219,7 @@ class Progress:
         self._shown = percent
         filled = self._WIDTH * percent // 100
         bar = '#' * filled + '.' * (self._WIDTH - filled)
-        end = '\n' if percent == 100 else ''  # noqa: PLR2004 - per cent
+        end = '\n' if percent == 100 else ''
         sys.stderr.write(f'\rsgp {self._name} [{bar}] {percent:3d} %{end}')
         sys.stderr.flush()
 

@@ -72,7 +72,7 @@ class Information:
     @property
     def is_identifiable(self) -> np.ndarray:
         """Whether each coefficient is determined, (p,) of bool."""
-        return np.linalg.norm(self._solution().null, axis=1) < NULL_TOLERANCE  # type: ignore[no-any-return]  # array
+        return np.linalg.norm(self._solution().null, axis=1) < NULL_TOLERANCE
 
     @property
     def covariance(self) -> np.ndarray:
@@ -85,9 +85,7 @@ class Information:
         solved = self._solution()
         if solved.spread is not None:
             return rows @ solved.spread
-        return linalg.solve_triangular(  # type: ignore[no-any-return]  # an array
-            self.R, rows.T, trans='T', check_finite=False
-        ).T
+        return linalg.solve_triangular(self.R, rows.T, trans='T', check_finite=False).T
 
     def is_determined(self, rows: np.ndarray) -> np.ndarray:
         """Whether `rows W` leaves out every undetermined direction, (k,) for rows (k, p)."""
@@ -96,7 +94,7 @@ class Information:
             return np.ones(len(rows), dtype=bool)
         scaled = rows / solved.scale
         outside = np.linalg.norm(scaled @ solved.null, axis=1)
-        return outside <= NULL_TOLERANCE * np.linalg.norm(scaled, axis=1)  # type: ignore[no-any-return]  # array
+        return outside <= NULL_TOLERANCE * np.linalg.norm(scaled, axis=1)
 
     def _solution(self) -> _Solved:
         if self._solved is None:
@@ -120,7 +118,7 @@ class _Solved:
             self.w = linalg.solve_triangular(R, z, check_finite=False)
             return
         U, S, Vt = np.linalg.svd(R / self.scale)
-        rank = int((S > _RANK_TOLERANCE * max(S[0], 1e-300)).sum())
+        rank = int((_RANK_TOLERANCE * max(S[0], 1e-300) < S).sum())
         self.spread = Vt[:rank].T / S[:rank] / self.scale[:, None]
         self.null = Vt[rank:].T
         self.w = self.spread @ (U[:, :rank].T @ z)

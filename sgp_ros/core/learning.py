@@ -125,7 +125,7 @@ def learn(
     bounds = _bounds(data, start)
     starts = [start.log_parameters]
     for _ in range(restarts):
-        assert rng is not None  # noqa: S101 - checked above, for the type checker
+        assert rng is not None
         starts.append(starts[0] + _RESTART_SPREAD * rng.standard_normal(len(starts[0])))
     search = _Search(data, prior, start)
     for theta in starts:

@@ -57,7 +57,7 @@ class FittedMethod:
     def model(self) -> Model:
         """Hyper-parameters of the stage that holds Z, or of PR."""
         stage = self.process or self.physics
-        assert stage is not None  # noqa: S101 - every method has at least one stage
+        assert stage is not None
         return stage.model
 
     @property
@@ -72,7 +72,7 @@ class FittedMethod:
         takes the parameters of the first for known.
         """
         if self.process is None:
-            assert self.physics is not None  # noqa: S101 - every method has at least one stage
+            assert self.physics is not None
             return self.physics.predict(U, F)
         prediction = self.process.predict(U, F[:, :, :0])
         if self.physics is None:

@@ -106,7 +106,7 @@ class OnlineRegression:
         return self._predict(u, f, tuple(factor.solve(u) for factor in self._factors))
 
     def with_regressor(self, prediction: OnlinePrediction, f: np.ndarray) -> OnlinePrediction:
-        """Predict for another regressor f (k, p) at an input that Z cannot tell apart. O(k n p)."""
+        """Predict for another regressor f (k, p) at an input that Z sees as the same. O(k n p)."""
         return self._predict(prediction.u, f, prediction.solves)
 
     def _predict(
@@ -168,8 +168,7 @@ class OnlineRegression:
         if model is not None:
             ratios = np.sqrt(np.array(self._model.noise) / np.array(model.noise))
             self._kept = tuple(
-                kept.scaled(float(ratio))
-                for kept, ratio in zip(self._kept, ratios, strict=True)
+                kept.scaled(float(ratio)) for kept, ratio in zip(self._kept, ratios, strict=True)
             )
             self._model = model
         self._budget = budget or self._budget

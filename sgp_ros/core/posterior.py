@@ -145,7 +145,7 @@ class Posterior:
     def is_identifiable(self) -> np.ndarray:
         """Whether the data or the prior determine each coefficient, (p,) of bool."""
         norms = np.linalg.norm(self._solution.null, axis=1)
-        return norms < NULL_TOLERANCE  # type: ignore[no-any-return]  # an array of bool
+        return norms < NULL_TOLERANCE
 
     @property
     def log_evidence(self) -> float:
@@ -302,7 +302,7 @@ def column_scale(F: np.ndarray, root: np.ndarray) -> np.ndarray:
     """Return a positive scale per column of the stacked rows of F (n, k, p) and root (r, p)."""
     scale = np.sqrt((F * F).sum(axis=(0, 1)) + (root * root).sum(axis=0))
     scale[scale == 0.0] = 1.0
-    return scale  # type: ignore[no-any-return]  # an array of floats
+    return scale
 
 
 def _solve(A: np.ndarray, b: np.ndarray, data: Observations, prior: CoefficientPrior) -> _Solution:
@@ -331,7 +331,7 @@ def _null_space(Vt: np.ndarray, rank: int, norms: np.ndarray) -> np.ndarray:
     if rank == p:
         return np.zeros((p, 0))
     basis = linalg.null_space(Vt[:rank]) if rank else np.eye(p)
-    return linalg.orth(basis / norms[:, None])  # type: ignore[no-any-return]  # an array
+    return linalg.orth(basis / norms[:, None])
 
 
 def _curvature(block: _Block, residual: np.ndarray, left: np.ndarray) -> np.ndarray:

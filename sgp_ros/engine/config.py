@@ -110,8 +110,8 @@ def _setting(
     kind: str,
     default: SettingValue,
     description: str,
-    **limits: Any,  # noqa: ANN401 - passed on to Setting, which types them
-) -> Any:  # noqa: ANN401 - a dataclass field stands for a value of its annotation
+    **limits: Any,
+) -> Any:
     meta = {'setting': Setting(name, kind, default, description, **limits)}
     return field(default=default, metadata=meta)
 
@@ -182,7 +182,7 @@ class EngineConfig:
         choices=('auto', 'measured', 'position'),
     )  # fmt: skip
     model_method: str = _setting(
-        'model.method', 'str', 'SGP', 'SGP: physics and process; PR: physics only; GP: no physics.',
+        'model.method', 'str', 'SGP', 'SGP: physics and process; PR: physics; GP: process.',
         choices=('SGP', 'PR', 'GP'), read_only=True,
     )  # fmt: skip
     model_residual_inputs: tuple[str, ...] = _setting(
@@ -267,8 +267,8 @@ class EngineConfig:
             given = joint.lengthscales
             if given != (0.0,) and (len(given) != length or min(given) <= 0.0):
                 problems.append(
-                    f'hyper.{joint.joint}.lengthscales = {list(given)}: expected {length} positive '
-                    'numbers, or [0.0] to estimate them'
+                    f'hyper.{joint.joint}.lengthscales = {list(given)}: expected {length} '
+                    'positive numbers, or [0.0] to estimate them'
                 )
         unknown = [
             joint
@@ -345,7 +345,8 @@ def describe_settings(robot: Robot) -> tuple[Setting, ...]:
         unit = robot.target_unit(joint)
         dynamic += [
             Setting(prefix + 'signal_variance', 'float', 0.0,
-                    'Prior variance of Z; 0 estimates it.', unit=f'({unit})^2', low=0.0, high=1e12),
+                    'Prior variance of Z; 0 estimates it.', unit=f'({unit})^2', low=0.0,
+                    high=1e12),
             Setting(prefix + 'lengthscales', 'float_array', (0.0,),
                     'Length scale of Z per input; [0.0] estimates them.', low=0.0, high=1e12),
             Setting(prefix + 'noise_variance', 'float', 0.0,

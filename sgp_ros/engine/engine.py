@@ -293,4 +293,3 @@ def _score(running: RunningScore) -> Score | None:
     if running.n == 0 or not np.isfinite(running.nmse):
         return None
     return Score(running.nmse, running.nlpd, running.coverage95, running.n)
-

@@ -307,5 +307,3 @@ def _complement_columns(robot: Robot) -> set[int]:
         for j, joint in enumerate(robot.joints)
         if robot.complement == 'acceleration' or joint.is_actuated
     }
-
-

@@ -24,7 +24,7 @@ class FitRequest:
     Attributes:
         number: how many were asked for before.
         data: the buffer.
-        base_R, base_z: what prior and dropped samples tell of W, (p, p) and (p,).
+        base_root, base_target: what prior and dropped samples tell of W, (p, p) and (p,).
         model: hyper-parameters in force, the warm start.
         restarts: starts beside it: the values from the data, then random ones.
         seed: of the random ones.
@@ -32,8 +32,8 @@ class FitRequest:
 
     number: int
     data: Observations
-    base_R: np.ndarray
-    base_z: np.ndarray
+    base_root: np.ndarray
+    base_target: np.ndarray
     model: Model
     restarts: int
     seed: int
@@ -60,9 +60,9 @@ class FitResult:
 
 def fit(request: FitRequest) -> FitResult:
     """Maximise the evidence of the buffered samples given the dropped ones. O(k n^3) a step."""
-    known = np.any(request.base_R != 0.0, axis=1)
+    known = np.any(request.base_root != 0.0, axis=1)
     # The constant of the prior's determinant cancels in every comparison on one snapshot.
-    prior = CoefficientPrior(request.base_R[known], request.base_z[known], 0.0)
+    prior = CoefficientPrior(request.base_root[known], request.base_target[known], 0.0)
     try:
         before = Posterior(request.model, request.data, prior).log_evidence
     except NumericalError:

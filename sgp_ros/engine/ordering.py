@@ -49,9 +49,7 @@ class ReorderBuffer:
         """The events that are held, in the order of their arrival."""
         return [entry[3] for entry in sorted(self._heap, key=lambda entry: entry[2])]
 
-    def resume(
-        self, released_ns: int | None, newest_ns: int | None, pending: list[Event]
-    ) -> None:
+    def resume(self, released_ns: int | None, newest_ns: int | None, pending: list[Event]) -> None:
         """Continue where another buffer stood; `pending` in the order of arrival."""
         self.released_ns, self.newest_ns = released_ns, newest_ns
         for event in pending:

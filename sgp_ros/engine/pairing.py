@@ -42,7 +42,8 @@ class CommandHistory:
         """Integrate the held commands against a kernel, exactly.
 
         Args:
-            first_ns, last_ns: support of the kernel; a command is in force at `first_ns`.
+            first_ns: start of the kernel's support, where a command is in force [ns].
+            last_ns: its end [ns].
             cumulative: integral of the kernel from `first_ns` to times given in seconds after it.
 
         Returns:
@@ -53,7 +54,7 @@ class CommandHistory:
         changes = [first_ns, *self.stamps_ns[start + 1 : stop], last_ns]
         seconds = np.array([stamp - first_ns for stamp in changes]) * 1e-9
         shares = np.diff(cumulative(seconds))  # (pieces,)
-        return shares @ np.array(self.efforts[start:stop])  # type: ignore[no-any-return]  # array
+        return shares @ np.array(self.efforts[start:stop])
 
     def forget_before(self, stamp_ns: int) -> None:
         """Drop commands that ended before `stamp_ns`."""

@@ -41,7 +41,8 @@ def replay(
 def is_record(events: Iterable[Event]) -> bool:
     """Whether a stream holds changes of hyper-parameters, as the record of a live run does."""
     return any(
-        isinstance(event, SettingsChange) and any(name.startswith('hyper.') for name in event.settings)
+        isinstance(event, SettingsChange)
+        and any(name.startswith('hyper.') for name in event.settings)
         for event in events
     )
 

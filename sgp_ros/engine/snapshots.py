@@ -14,7 +14,6 @@ import numpy as np
 
 from sgp_ros.core.kernels import SquaredExponential
 from sgp_ros.core.model import Model
-from sgp_ros.core.online import OnlineRegression
 from sgp_ros.core.scores import RunningScore
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import (
@@ -31,6 +30,7 @@ from sgp_ros.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from sgp_ros.core.online import OnlineRegression
     from sgp_ros.engine.engine import Engine
     from sgp_ros.engine.estimator import Estimator
     from sgp_ros.robots.robot import Robot
@@ -207,5 +207,5 @@ def _encode_state(state: State) -> list[Any]:
 
 def _decode_state(entry: list[Any]) -> State:
     position, velocity, effort = (None if x is None else np.array(x) for x in entry[1:])
-    assert position is not None  # noqa: S101 - written by `_encode_state`
+    assert position is not None
     return State(entry[0], position, velocity, effort)

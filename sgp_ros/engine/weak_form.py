@@ -70,7 +70,7 @@ class WeakForm:
         index = np.clip(np.searchsorted(offsets, since, side='right') - 1, 0, len(steps) - 1)
         inside = since - offsets[index]
         slope = (self.right[index] - self.left[index]) / steps[index]
-        return areas[index] + inside * (self.left[index] + 0.5 * slope * inside)  # type: ignore[no-any-return]  # array
+        return areas[index] + inside * (self.left[index] + 0.5 * slope * inside)
 
 
 def polynomial_smoother(times: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]:

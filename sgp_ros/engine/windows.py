@@ -99,7 +99,7 @@ class WindowFilter:
 
     def _ready_centre(self) -> int | None:
         newest = self.states[-1].stamp_ns
-        assert self.next_ns is not None  # noqa: S101 - set by push
+        assert self.next_ns is not None
         for index in range(1, len(self.states) - 1):
             stamp = self.states[index].stamp_ns
             if stamp >= self.next_ns:
@@ -107,7 +107,7 @@ class WindowFilter:
         return None
 
     def _forget(self, commands: CommandHistory) -> None:
-        assert self.next_ns is not None  # noqa: S101 - set by push
+        assert self.next_ns is not None
         first = self.next_ns - self._half_ns
         keep = sum(state.stamp_ns < first for state in self.states)
         # One state before the window may still be the left neighbour of its centre.
@@ -143,14 +143,12 @@ class WindowFilter:
             ),
         )
 
-    def _effort(
-        self, window: list[State], form: WeakForm, commands: CommandHistory
-    ) -> np.ndarray:
+    def _effort(self, window: list[State], form: WeakForm, commands: CommandHistory) -> np.ndarray:
         if not any(joint.is_actuated for joint in self._robot.joints):
             return np.zeros(len(self._robot.joints))
         if all(state.effort is not None for state in window):
             measured = np.array([state.effort for state in window])
-            return form.averaging @ measured  # type: ignore[no-any-return]  # an array
+            return form.averaging @ measured
         return commands.average(window[0].stamp_ns, window[-1].stamp_ns, form.cumulative)
 
     def _assemble(

@@ -22,7 +22,7 @@ START_NS = 1_700_000_000_000_000_000
 """Stamp of the first sample: a fixed one, since a recording is a function of its seed."""
 
 
-def run_simulation(  # noqa: PLR0913 - the options of the command
+def run_simulation(
     robot: str,
     out: Path,
     progress: Callable[[float], None],

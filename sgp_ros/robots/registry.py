@@ -15,15 +15,17 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.robots.linear_axis import LINEAR_AXIS
 from sgp_ros.robots.reaction_wheel import REACTION_WHEEL, REACTION_WHEEL_6
-from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.toy_pendulum import TOY_PENDULUM
+
+if TYPE_CHECKING:
+    from sgp_ros.robots.robot import Robot
 
 ROBOTS: dict[str, Robot] = {
     robot.name: robot for robot in (REACTION_WHEEL, REACTION_WHEEL_6, TOY_PENDULUM, LINEAR_AXIS)
@@ -78,7 +80,7 @@ def _build(document: object, path: Path) -> Robot:
     return robot.with_prior(prior)
 
 
-def _read_parameters(entries: Any, problems: list[str]) -> dict[str, tuple[float, float]]:  # noqa: ANN401 - YAML
+def _read_parameters(entries: Any, problems: list[str]) -> dict[str, tuple[float, float]]:
     if not isinstance(entries, dict):
         problems.append(f'parameters is {entries!r}, not a mapping from names')
         return {}
@@ -89,7 +91,9 @@ def _read_parameters(entries: Any, problems: list[str]) -> dict[str, tuple[float
             continue
         value, std = entry['value'], entry.get('std')
         std = math.inf if std is None else std
-        numbers = all(isinstance(x, (int, float)) and not isinstance(x, bool) for x in (value, std))
+        numbers = all(
+            isinstance(x, (int, float)) and not isinstance(x, bool) for x in (value, std)
+        )
         if not numbers or not math.isfinite(value) or math.isnan(std) or std <= 0:
             problems.append(f'parameter {name}: {entry!r} has no finite value or no positive std')
             continue

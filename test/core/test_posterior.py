@@ -92,7 +92,9 @@ def test_posterior_agrees_with_scikit_learn_for_a_plain_process():
     rng = np.random.default_rng(0)
     U, y = rng.normal(size=(30, 2)), rng.normal(size=(30, 1))
     model = Model((SquaredExponential(1.7, (0.6, 1.3), (0, 1)),), (0.2,))
-    posterior = Posterior(model, Observations(U, np.zeros((30, 1, 0)), y), CoefficientPrior.flat(0))
+    posterior = Posterior(
+        model, Observations(U, np.zeros((30, 1, 0)), y), CoefficientPrior.flat(0)
+    )
     kernel = ConstantKernel(1.7) * RBF([0.6, 1.3]) + WhiteKernel(0.2)
     reference = GaussianProcessRegressor(kernel, alpha=1e-300, optimizer=None).fit(U, y[:, 0])
     queries = rng.normal(size=(7, 2))

@@ -14,7 +14,9 @@ def kernel(u, v, variance, lengthscales):
 def kappa(u, v, kernels):
     """Diagonal matrix of covariances of Z."""
     values = [
-        0.0 if k is None else kernel(u[list(k.inputs)], v[list(k.inputs)], k.variance, k.lengthscales)
+        0.0
+        if k is None
+        else kernel(u[list(k.inputs)], v[list(k.inputs)], k.variance, k.lengthscales)
         for k in kernels
     ]
     return np.diag(values)

@@ -18,7 +18,9 @@ def random_problem(seed, n=12, k=2, p=3, d=3, gain=None, noise_like=None):
     y = rng.normal(size=(n, m))
     kernels = tuple(
         SquaredExponential(
-            float(rng.uniform(0.5, 2.0)), tuple(rng.uniform(0.5, 2.0, size=2)), (j % d, (j + 1) % d)
+            float(rng.uniform(0.5, 2.0)),
+            tuple(rng.uniform(0.5, 2.0, size=2)),
+            (j % d, (j + 1) % d),
         )
         for j in range(k)
     )

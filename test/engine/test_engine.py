@@ -71,7 +71,8 @@ def test_inverse_and_forward_models_tell_the_same_machine():
         for s, x in zip(t, q, strict=True)
     ]
     commands = [
-        CommandSample(START_NS + round(s * 1e9), frozen_array([x])) for s, x in zip(t, m, strict=True)
+        CommandSample(START_NS + round(s * 1e9), frozen_array([x]))
+        for s, x in zip(t, m, strict=True)
     ]
     mixed = [event for pair in zip(commands, events, strict=True) for event in pair]
     engine, _ = _run(mixed, INVERSE_PENDULUM, model__method='PR')
@@ -266,7 +267,9 @@ def test_measured_effort_is_used_where_the_state_carries_it():
     """With `auto`, a state's own effort pairs it; with `command` it does not count."""
     t, q, _, m = motion(300, 100.0, 2)
     events = [
-        JointSample(START_NS + round(s * 1e9), ('hinge',), frozen_array([x]), None, frozen_array([e]))
+        JointSample(
+            START_NS + round(s * 1e9), ('hinge',), frozen_array([x]), None, frozen_array([e])
+        )
         for s, x, e in zip(t, q, m, strict=True)
     ]
     engine, _ = _run(events)
@@ -339,7 +342,7 @@ def test_fit_requests_cross_process_borders():
         engine.push(event)
     assert engine.request_refit()
     request = engine.take_fit_request()
-    copied = pickle.loads(pickle.dumps(request))  # noqa: S301 - our own bytes, in one test
+    copied = pickle.loads(pickle.dumps(request))
     assert fit(copied).log_evidence == fit(request).log_evidence
     assert engine.take_fit_request() is None
 

@@ -1,0 +1,73 @@
+"""Install `sgp_ros` with pip or colcon (ament_python)."""
+
+from glob import glob
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = 'sgp_ros'
+VERSION = '0.1.0'
+
+
+def shared_files():
+    """Return the files under `share/sgp_ros`, folder by folder."""
+    folders = {'': ['package.xml']}
+    for pattern in ('launch/*.py', 'config/**/*.yaml', 'config/**/*.xml', 'bags/*'):
+        for name in sorted(glob(pattern, recursive=True)):
+            folders.setdefault(str(Path(name).parent), []).append(name)
+    return [(f'share/{NAME}/{folder}'.rstrip('/'), names) for folder, names in folders.items()]
+
+
+setup(
+    name=NAME,
+    version=VERSION,
+    description='Online robot identification with semi-parametric Gaussian processes',
+    long_description=Path('README.md').read_text(encoding='utf-8'),
+    long_description_content_type='text/markdown',
+    license='Apache-2.0',
+    maintainer='The sgp_ros maintainers',
+    maintainer_email='maintainers@sgp-ros.example',
+    python_requires='>=3.10',
+    packages=find_packages(include=[NAME, f'{NAME}.*']),
+    package_data={NAME: ['py.typed', 'report/templates/*']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
+        *shared_files(),
+    ],
+    install_requires=[
+        'numpy>=1.26',
+        'scipy>=1.11',
+        'numba>=0.59',
+        'pyyaml>=6',
+        'jinja2>=3',
+        'matplotlib>=3.6',
+        'mcap>=1.2',
+        'rosbags>=0.10',
+        'typing_extensions>=4.10',
+    ],
+    extras_require={
+        # rclpy from PyPI for machines without ROS; apt users have it already.
+        'wheels': ['ros-rclpy[fastrtps]==7.1.6', 'ros-jazzy-common-interfaces==5.3.6'],
+        'test': [
+            'pytest>=8',
+            'pytest-cov>=5',
+            'hypothesis>=6.100',
+            'scikit-learn>=1.4',
+            'mpmath>=1.3',
+            # colcon-core 0.21 refuses setuptools 80 and later.
+            'colcon-core==0.21.0',
+            'colcon-ros==0.5.0',
+            'colcon-common-extensions==0.3.0',
+            'setuptools>=68,<80',
+        ],
+        'lint': ['ruff==0.17.5', 'mypy==2.4.1', 'types-PyYAML'],
+    },
+    entry_points={
+        'console_scripts': [
+            'sgp = sgp_ros.cli:main',
+            'sgp_node = sgp_ros.ros.sgp_node:main',
+            'reaction_wheel = sgp_ros.ros.reaction_wheel:main',
+        ]
+    },
+    zip_safe=False,
+)
