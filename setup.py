@@ -41,8 +41,9 @@ setup(
         'pyyaml>=6',
         'jinja2>=3',
         'matplotlib>=3.6',
-        'mcap>=1.2',
-        'rosbags>=0.10',
+        'mcap>=1.6',
+        'rosbags>=0.11',
+        'zstandard>=0.22',
         'typing_extensions>=4.10',
     ],
     extras_require={

@@ -195,7 +195,9 @@ def _replay(arguments: argparse.Namespace) -> Result:
 def _import(arguments: argparse.Namespace) -> Result:
     from sgp_ros.recordings.tables import import_table
 
-    return import_table(arguments.file, arguments.map, arguments.out)
+    summary = import_table(arguments.file, arguments.map, arguments.out)
+    print(f'{summary.samples} states of {", ".join(summary.joints)} in {summary.path}')
+    return summary.to_mapping()
 
 
 class Progress:

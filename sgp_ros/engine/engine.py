@@ -217,6 +217,15 @@ class Engine:
         fill_from_snapshot(fresh, snapshot)
         self.__dict__.update(fresh.__dict__)
 
+    def begin_stream(self) -> None:
+        """Keep what was learned; forget stream, counts and scores: another recording follows."""
+        self.counts = Counts()
+        self.order = ReorderBuffer(self.order.window_ns)
+        self.intake = Intake(self.robot, self.config, self.counts)
+        self.estimator.begin_stream(self.counts)
+        self._fit_request = None
+        self.next_fit = self.config.refit_period
+
     @property
     def _now_ns(self) -> int:
         return self.order.released_ns or 0

@@ -68,6 +68,11 @@ class Estimator:
         }
         self.baseline_scores = tuple(RunningScore() for _ in range(k))
 
+    def begin_stream(self, counts: Counts) -> None:
+        """Keep the models; count and score anew."""
+        self._counts = counts
+        self.forget_scores()
+
     def configure(self, config: EngineConfig) -> None:
         """Take new settings between two samples.
 

@@ -431,3 +431,17 @@ def test_changes_of_settings_are_events():
     assert [e.is_learned for e in estimates].index(False) > 0
     assert not estimates[-1].is_learned
     assert engine.config.learning_enabled is False
+
+
+def test_another_recording_continues_what_was_learned():
+    """A stream with earlier stamps is not late, scores count anew, parameters stay."""
+    engine, _ = _run(pendulum_events(300))
+    parameters = engine.parameters()
+    engine.begin_stream()
+    assert engine.parameters() == parameters
+    engine.change({'learning.enabled': False})
+    replay(engine, pendulum_events(200, seed=5), lambda step: None)
+    assert engine.counts.refused['late'] == 0
+    assert engine.counts.read == 200
+    assert engine.scores()['hinge']['acceleration'].n == engine.counts.scored
+    assert engine.parameters() == parameters

@@ -1,0 +1,292 @@
+"""`sgp replay`: a recording through the online engine, with everything it tells."""
+
+from __future__ import annotations
+
+import json
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import yaml
+
+from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.replay import replay
+from sgp_ros.engine.samples import CommandSample, JointSample, SettingsChange
+from sgp_ros.errors import ConfigError, RecordingError
+from sgp_ros.experiments.parameter_file import find_shipped, load_parameters
+from sgp_ros.experiments.predictions import write_predictions
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.recordings.writer import RecordingWriter
+from sgp_ros.report.files import write_text
+from sgp_ros.report.history import History
+from sgp_ros.report.html import write_report
+from sgp_ros.report.metrics import Timing, collect_metrics
+from sgp_ros.robots.registry import ROBOTS, load_robot
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from sgp_ros.engine.results import Step
+    from sgp_ros.engine.samples import Event
+    from sgp_ros.recordings.reader import Recording
+    from sgp_ros.robots.robot import Robot
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayOptions:
+    """Choices of a replay.
+
+    Attributes:
+        joint_states: topic of the states; None chooses it.
+        command: topic of the commands; None chooses it, `none` takes no commands.
+        model: saved model to continue from; None starts anew.
+        is_learning: whether to learn, or only to predict and score.
+        truth: `truth.json` of a simulation to compare the parameters with.
+    """
+
+    joint_states: str | None = None
+    command: str | None = None
+    model: str | None = None
+    is_learning: bool = True
+    truth: str | None = None
+
+
+def run_replay(  # noqa: PLR0913 - the arguments of the command
+    bag: str,
+    robot_name: str,
+    params: str | None,
+    out: Path,
+    options: ReplayOptions,
+    *,
+    progress: Callable[[float], None],
+) -> dict[str, Any]:
+    """Replay a recording and write predictions, metrics, report, model and identified robot.
+
+    Args:
+        bag: the recording.
+        robot_name: built-in name or robot YAML.
+        params: ROS 2 parameter file; None takes the shipped one of the robot, if there is one.
+        out: folder of the results.
+        options: see `ReplayOptions`.
+        progress: called with the share that is done.
+
+    Raises:
+        ConfigError: a wrong robot, parameter file, model or truth.
+        RecordingError: nothing in the recording can be used.
+    """
+    robot = load_robot(robot_name)
+    truth = load_truth(options.truth) if options.truth else None
+    recording = open_recording(bag)
+    engine = _make_engine(robot, robot_name, params, options)
+    remarks = list(recording.remarks)
+    history, timing = History(), Timing()
+    out.mkdir(parents=True, exist_ok=True)
+    with ExitStack() as stack:
+        writer = stack.enter_context(RecordingWriter(out / 'predictions.mcap'))
+
+        def keep(step: Step) -> None:
+            history.take(engine, step)
+            write_predictions(writer, step.estimates)
+
+        run_events(engine, recording, options, keep, timing, progress)
+        _check_use(engine, recording, options)
+    remarks += [f'{count} messages could not be read: {reason}'
+                for reason, count in recording.unreadable.items()]  # fmt: skip
+    metrics = collect_metrics(engine, Path(bag).name, timing=timing, remarks=remarks)
+    write_text(out / 'metrics.json', json.dumps(metrics, indent=1, allow_nan=False) + '\n')
+    write_text(out / 'robot_identified.yaml', identified_robot(engine))
+    save_model(out / 'model.npz', engine.snapshot())
+    write_report(out, engine, history, metrics, truth=truth)
+    print_summary(metrics, truth)
+    print(f'report: {out / "report.html"}')
+    return metrics
+
+
+def run_events(  # noqa: PLR0913 - the parts of a run
+    engine: Engine,
+    recording: Recording,
+    options: ReplayOptions,
+    on_step: Callable[[Step], None],
+    timing: Timing,
+    progress: Callable[[float], None],
+) -> None:
+    """Push every event of a recording, timing each push; obey the changes of a live record."""
+    obey = any(
+        isinstance(event, SettingsChange)
+        for event in recording.events(options.joint_states, options.command)
+    )
+    total = sum(topic.count or 0 for topic in recording.topics)
+    stamps: list[int] = []
+    began = time.perf_counter()
+    replay(
+        _Timed(engine, timing),  # type: ignore[arg-type] # stands for the engine it wraps
+        _counted(recording.events(options.joint_states, options.command), total, stamps, progress),
+        on_step,
+        obey_record=obey,
+    )
+    timing.wall_s = time.perf_counter() - began
+    if stamps:
+        timing.recorded_s = (max(stamps) - min(stamps)) * 1e-9
+    progress(1.0)
+
+
+class _Timed:
+    """An engine whose pushes are timed."""
+
+    def __init__(self, engine: Engine, timing: Timing) -> None:
+        self._engine = engine
+        self._timing = timing
+        self.flush = engine.flush
+        self.take_fit_request = engine.take_fit_request
+        self.accept_fit = engine.accept_fit
+
+    def push(self, event: Event) -> Step:
+        began = time.perf_counter()
+        step = self._engine.push(event)
+        self._timing.push_s.append(time.perf_counter() - began)
+        return step
+
+
+def _counted(
+    events: Iterator[Event], total: int, stamps: list[int], progress: Callable[[float], None]
+) -> Iterator[Event]:
+    for i, event in enumerate(events):
+        stamps.append(event.stamp_ns)
+        if total and i % 100 == 0:
+            progress(min(i / total, 0.99))
+        yield event
+
+
+def load_model(path: str) -> Mapping[str, np.ndarray]:
+    """Return the arrays of a saved model; objects are refused.
+
+    Raises:
+        ConfigError: no such file, or none of this kind.
+    """
+    if not Path(path).is_file():
+        raise ConfigError(f'no model file {path}', 'a model.npz of `sgp replay` or ~/save')
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return dict(file)
+    except (ValueError, OSError, EOFError) as error:
+        raise ConfigError(f'{path} is no saved model ({error})', 'a model.npz') from error
+
+
+def load_truth(path: str) -> dict[str, float]:
+    """Return the true coefficients of a `truth.json` by name.
+
+    Raises:
+        ConfigError: no such file or no coefficients in it.
+    """
+    try:
+        document = json.loads(Path(path).read_text(encoding='utf-8'))
+        return {name: float(c['value']) for name, c in document['coefficients'].items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise ConfigError(
+            f'{path} holds no coefficients ({error})', 'a truth.json of `sgp simulate`'
+        ) from error
+
+
+def save_model(path: Path, snapshot: Mapping[str, np.ndarray]) -> None:
+    """Write a snapshot under a temporary name, then rename it."""
+    growing = path.with_name(f'{path.name}.part')
+    with growing.open('wb') as file:
+        np.savez(file, allow_pickle=False, **snapshot)
+    growing.replace(path)
+
+
+def identified_robot(engine: Engine) -> str:
+    """Return the identified robot as a robot YAML, the prior for the next run."""
+    robot = engine.robot
+    base = next(name for name, r in ROBOTS.items() if len(r.coefficients) == len(robot.coefficients)
+                and name == robot.name)  # fmt: skip
+    document = {
+        'schema': 1,
+        'robot': base,
+        'joints': list(robot.joint_names),
+        'parameters': {
+            p.name: {'value': p.value, 'std': p.std, 'unit': p.unit} for p in engine.parameters()
+        },
+    }
+    return yaml.safe_dump(document, sort_keys=False)
+
+
+def print_summary(metrics: Mapping[str, Any], truth: Mapping[str, float] | None) -> None:
+    """Print scores per joint and parameters with their intervals."""
+    samples = metrics['samples']
+    refused = {reason: n for reason, n in samples['refused'].items() if n}
+    print(f'{samples["read"]} states read, {samples["used"]} used, refused: {refused or "none"}')
+    for joint, channels in metrics['joints'].items():
+        for channel, score in channels.items():
+            alone = metrics['physics_alone'].get(joint, {}).get(channel)
+            beside = f', physics alone {alone["nmse"]:.3g}' if alone else ''
+            print(
+                f'{joint:12s} {channel:12s} nMSE {score["nmse"]:.3g}{beside}; '
+                f'{100 * score["coverage95"]:.1f} % inside the 95 % interval'
+            )
+    for parameter in metrics['parameters']:
+        print(_parameter_line(parameter, truth))
+
+
+def _parameter_line(parameter: Mapping[str, Any], truth: Mapping[str, float] | None) -> str:
+    name, std = parameter['name'], parameter['std']
+    if std is None:
+        return f'{name:12s} not determined by this motion'
+    text = f'{name:12s} {parameter["value"]:11.5g} +- {1.96 * std:<9.3g} {parameter["unit"]}'
+    if truth and name in truth:
+        text += f'   true {truth[name]:.5g}'
+    return text
+
+
+def _make_engine(
+    robot: Robot, robot_name: str, params: str | None, options: ReplayOptions
+) -> Engine:
+    shipped = find_shipped(f'{robot.name}.yaml') if params is None else None
+    source = params or shipped
+    settings = load_parameters(source) if source else {}
+    config = EngineConfig.from_mapping(settings, robot)
+    engine = Engine(robot, config)
+    if options.model:
+        engine.restore(load_model(options.model))
+        engine.begin_stream()
+    if not options.is_learning:
+        engine.change({'learning.enabled': False})
+    return engine
+
+
+def _check_use(engine: Engine, recording: Recording, options: ReplayOptions) -> None:
+    """Raise where not one state could be used, saying why."""
+    counts = engine.counts
+    if counts.used > 0:
+        return
+    reasons = {reason: n for reason, n in counts.refused.items() if n}
+    found = f'{recording.path}: none of {counts.read} states can be used, refused: {reasons}'
+    if reasons.get('unknown_joint'):
+        seen: Sequence[str] = next(
+            (
+                event.names
+                for event in recording.events(options.joint_states, options.command)
+                if isinstance(event, JointSample)
+            ),
+            (),
+        )
+        raise RecordingError(
+            f'{found}; its joints are {list(seen)}',
+            f'joints {list(engine.robot.joint_names)} of robot {engine.robot.name}',
+            'rename them with `joints:` in a robot YAML',
+        )
+    if reasons.get('unpaired'):
+        has_commands = any(
+            isinstance(event, CommandSample)
+            for event in recording.events(options.joint_states, options.command)
+        )
+        raise RecordingError(
+            found,
+            'a command before each state (command.timeout) or effort in the states',
+            'raise command.timeout' if has_commands else 'name the topic with --command',
+        )
+    raise RecordingError(found, 'finite positions with increasing stamps')

@@ -1,0 +1,217 @@
+"""Turn a table of numbers into the events of the engine, by means of a map.
+
+A row becomes one state, and one command where the map names commands. Times are written as they
+are, also where they do not grow: the engine refuses and counts such samples. See `table_map` for
+the map.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
+from sgp_ros.errors import ConfigError, RecordingError
+from sgp_ros.recordings.messages import JOINT_STATE
+from sgp_ros.recordings.table_check import check_map
+from sgp_ros.recordings.table_files import load_columns
+from sgp_ros.recordings.table_map import Quantity, TableMap, TimeBase, read_map
+from sgp_ros.recordings.writer import RecordingWriter
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from sgp_ros.recordings.table_files import Columns
+
+_LATEST_NS = 2**31 * 10**9
+"""First stamp that a ROS message cannot hold [ns]."""
+
+
+@dataclass(frozen=True, slots=True)
+class ImportSummary:
+    """What `import_table` wrote.
+
+    Attributes:
+        path: of the recording.
+        joints: names of the joints.
+        samples: number of states.
+        commands: number of commands.
+        start_ns: least stamp [ns].
+        end_ns: greatest stamp [ns].
+    """
+
+    path: Path
+    joints: tuple[str, ...]
+    samples: int
+    commands: int
+    start_ns: int
+    end_ns: int
+
+    def to_mapping(self) -> dict[str, object]:
+        """Return the summary as JSON holds it."""
+        return {**asdict(self), 'path': str(self.path), 'joints': list(self.joints)}
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table in SI, n rows.
+
+    Attributes:
+        stamps_ns: n stamps [ns].
+        joints: joint names, m of them.
+        channels: `position`, `velocity`, `effort` to (n, m), NaN for a joint without; a channel
+            that no joint has is absent.
+        commands: (n, c) commands, None without.
+        command_joints: their joints, c of them.
+        command_type: message type of the commands.
+    """
+
+    stamps_ns: tuple[int, ...]
+    joints: tuple[str, ...]
+    channels: Mapping[str, np.ndarray]
+    commands: np.ndarray | None
+    command_joints: tuple[str, ...]
+    command_type: str
+
+    def events(self) -> Iterator[JointSample | CommandSample]:
+        """Yield the rows in order, the command of a row before its state."""
+        names = self.command_joints if self.command_type == JOINT_STATE else None
+        for row, stamp_ns in enumerate(self.stamps_ns):
+            if self.commands is not None:
+                yield CommandSample(stamp_ns, frozen_array(self.commands[row]), names)
+            values = {name: frozen_array(array[row]) for name, array in self.channels.items()}
+            yield JointSample(stamp_ns, self.joints, **values)
+
+
+def read_table(path: str | Path, content: Mapping[str, object]) -> Table:
+    """Read a table.
+
+    Args:
+        path: CSV, NPZ or MAT file.
+        content: the map, see `table_map`.
+
+    Raises:
+        ConfigError: what is wrong with the map, all in one error.
+        RecordingError: the file cannot be read, or holds something that is no number or time.
+    """
+    path = Path(path)
+    columns = load_columns(path)
+    table_map = check_map(content, columns)
+    quantities = {
+        f'{joint}.{channel}': quantity
+        for joint, parts in table_map.joints.items()
+        for channel, quantity in parts.items()
+    }
+    quantities |= {f'command {joint}': q for joint, q in table_map.commands.items()}
+    values = {place: _values(path, columns, quantity) for place, quantity in quantities.items()}
+    lengths = {place: len(array) for place, array in values.items()}
+    n = next(iter(lengths.values()))
+    stamps_ns = _stamps(path, columns, table_map.time, n)
+    lengths['time'] = len(stamps_ns)
+    if set(lengths.values()) != {n}:
+        raise ConfigError(f'{path}: columns of different length {lengths}', 'one length')
+    return _assemble(table_map, values, stamps_ns)
+
+
+def import_table(path: str | Path, map_path: str | Path, out: str | Path) -> ImportSummary:
+    """Write a table as an MCAP recording.
+
+    Args:
+        path: CSV, NPZ or MAT file.
+        map_path: YAML map, see `table_map`.
+        out: `.mcap` file to write, or the folder to write `<name of the table>.mcap` into, which
+            is made; an existing file is replaced.
+
+    Raises:
+        ConfigError: what is wrong with the map.
+        RecordingError: the table cannot be read.
+    """
+    table = read_table(path, read_map(map_path))
+    out = Path(out)
+    out_path = out if out.suffix == '.mcap' else out / f'{Path(path).stem}.mcap'
+    out_path.parent.mkdir(parents=True, exist_ok=True)
+    with RecordingWriter(out_path, command_type=table.command_type) as writer:
+        for event in table.events():
+            writer.write_event(event)
+    n = len(table.stamps_ns)
+    return ImportSummary(
+        out_path,
+        table.joints,
+        n,
+        n if table.commands is not None else 0,
+        min(table.stamps_ns),
+        max(table.stamps_ns),
+    )
+
+
+def _assemble(
+    table_map: TableMap, values: Mapping[str, np.ndarray], stamps_ns: tuple[int, ...]
+) -> Table:
+    missing = np.full(len(stamps_ns), np.nan)
+    channels = {}
+    for channel in ('position', 'velocity', 'effort'):
+        if any(channel in parts for parts in table_map.joints.values()):
+            stack = [values.get(f'{joint}.{channel}', missing) for joint in table_map.joints]
+            channels[channel] = np.stack(stack, axis=1)  # (n, m)
+    commands = None
+    if table_map.commands:
+        stack = [values[f'command {joint}'] for joint in table_map.commands]
+        commands = np.stack(stack, axis=1)  # (n, c)
+    return Table(
+        stamps_ns,
+        tuple(table_map.joints),
+        channels,
+        commands,
+        tuple(table_map.commands),
+        table_map.command_type,
+    )
+
+
+def _values(path: Path, columns: Columns, quantity: Quantity) -> np.ndarray:
+    """Return one quantity in SI, (n,)."""
+    column = _vector(columns, quantity)
+    if column.dtype.kind != 'U':
+        return column.astype(np.float64) * quantity.factor + quantity.offset
+    try:
+        numbers = np.where(column == '', 'nan', column).astype(np.float64)
+    except ValueError as error:
+        raise RecordingError(
+            f'{path}, column {quantity.column}: {error}', 'numbers, or nothing for a missing one'
+        ) from error
+    return numbers * quantity.factor + quantity.offset
+
+
+def _stamps(path: Path, columns: Columns, time: TimeBase, n: int) -> tuple[int, ...]:
+    """Return the stamps [ns]; integers and decimal texts are converted without rounding."""
+    if time.quantity is None:
+        period_ns = 10**9 / Decimal(str(time.rate_hz))
+        return tuple(time.start_ns + round(row * period_ns) for row in range(n))
+    unit_ns = Decimal(str(time.quantity.factor))
+    stamps = []
+    for row, value in enumerate(_vector(columns, time.quantity).tolist(), start=1):
+        stamp_ns = _stamp(value, unit_ns, time.start_ns)
+        if stamp_ns is None or not 0 <= stamp_ns < _LATEST_NS:
+            raise RecordingError(
+                f'{path}, column {time.quantity.column}, row {row}: time {value!r}',
+                'a finite time from 0 s to 2^31 s since the epoch',
+                'clean the table, or set time.unit and time.start in the map',
+            )
+        stamps.append(stamp_ns)
+    return tuple(stamps)
+
+
+def _stamp(value: float | str, unit_ns: Decimal, start_ns: int) -> int | None:
+    try:
+        stamp = Decimal(str(value)) * unit_ns + start_ns
+        return round(stamp) if stamp.is_finite() else None
+    except InvalidOperation:
+        return None
+
+
+def _vector(columns: Columns, quantity: Quantity) -> np.ndarray:
+    array = columns[quantity.column]
+    return array[:, quantity.index or 0] if array.ndim == 2 else array

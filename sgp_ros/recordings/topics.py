@@ -1,0 +1,125 @@
+"""Choose the topics of a recording that the engine is fed from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from sgp_ros.errors import RecordingError
+from sgp_ros.recordings.messages import CONVERTERS, FLOAT64, FLOAT64_ARRAY, JOINT_STATE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+CHANGES_TOPIC = '/sgp/changes'
+"""Where a record keeps the changes of settings."""
+
+NO_COMMAND = 'none'
+"""Option value: take no command topic, the effort comes in the joint states."""
+
+_OWN_OUTPUTS = ('predicted_joint_states', 'prediction', 'prediction_variance')
+_COMMAND_NAMES = ('command', 'commands')
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """One topic of a recording.
+
+    Attributes:
+        name: full name, such as `/joint_states`.
+        type: message type without its `msg` part, such as `sensor_msgs/JointState`.
+        count: number of messages.
+        encoding: how the messages are serialised, `cdr` (ROS 2) or `ros1`.
+    """
+
+    name: str
+    type: str
+    count: int
+    encoding: str = 'cdr'
+
+    @property
+    def last_name(self) -> str:
+        """What follows the last slash."""
+        return self.name.rsplit('/', 1)[-1]
+
+
+def choose_joint_states(topics: Sequence[Topic], wanted: str | None) -> Topic:
+    """Return the topic of the joint states.
+
+    Args:
+        topics: all topics of the recording.
+        wanted: its name; None chooses the only one, or the one called `joint_states`. What
+            `sgp_ros` itself publishes and topics called `command(s)` are never chosen.
+
+    Raises:
+        RecordingError: there is none, or several are equally likely.
+    """
+    if wanted is not None:
+        return _named(topics, wanted, (JOINT_STATE,), '--joint-states')
+    candidates = [
+        topic
+        for topic in topics
+        if topic.type == JOINT_STATE and topic.last_name not in _OWN_OUTPUTS + _COMMAND_NAMES
+    ]
+    if not candidates:
+        raise RecordingError(
+            f'no {JOINT_STATE} topic among {_listing(topics)}',
+            'the measured joint states',
+            'record /joint_states too, or name the topic with --joint-states TOPIC',
+        )
+    likely = [topic for topic in candidates if topic.last_name == 'joint_states']
+    return _only(candidates, likely, '/joint_states', '--joint-states')
+
+
+def choose_command(topics: Sequence[Topic], states: Topic, wanted: str | None) -> Topic | None:
+    """Return the topic of the commands, None where the effort comes in the joint states.
+
+    Args:
+        topics: all topics of the recording.
+        states: the topic of the joint states.
+        wanted: its name, or `none`. None chooses the one called `command` or `commands`, else the
+            only array or number topic.
+
+    Raises:
+        RecordingError: the named one does not exist, or several are equally likely.
+    """
+    if wanted == NO_COMMAND:
+        return None
+    if wanted is not None:
+        return _named(topics, wanted, tuple(CONVERTERS), '--command')
+    candidates = [
+        topic
+        for topic in topics
+        if topic.type in CONVERTERS and topic != states and topic.last_name not in _OWN_OUTPUTS
+    ]
+    likely = [topic for topic in candidates if topic.last_name in _COMMAND_NAMES]
+    if likely:
+        return _only(likely, likely, '/command', '--command')
+    plain = [topic for topic in candidates if topic.type in {FLOAT64_ARRAY, FLOAT64}]
+    return plain[0] if len(plain) == 1 else None
+
+
+def _only(candidates: list[Topic], likely: list[Topic], preferred: str, option: str) -> Topic:
+    for group in (candidates, likely, [t for t in likely if t.name == preferred]):
+        if len(group) == 1:
+            return group[0]
+    raise RecordingError(
+        f'several candidates {_listing(likely or candidates)}',
+        'one topic',
+        f'name it with {option} TOPIC',
+    )
+
+
+def _named(topics: Sequence[Topic], name: str, types: tuple[str, ...], option: str) -> Topic:
+    found = [topic for topic in topics if topic.name.lstrip('/') == name.lstrip('/')]
+    if not found:
+        raise RecordingError(f'no topic {name} ({option})', f'one of {_listing(topics)}')
+    if found[0].type not in types:
+        raise RecordingError(
+            f'topic {name} ({option}) of type {found[0].type}', ' or '.join(types)
+        )
+    return found[0]
+
+
+def _listing(topics: Sequence[Topic]) -> str:
+    return ', '.join(f'{topic.name} ({topic.type})' for topic in topics) or 'no topics at all'

@@ -1,0 +1,176 @@
+"""Write events and results as an MCAP file that any ROS 2 tool opens.
+
+The log time of an event is its stamp, so that a type without a header keeps it, and a recording
+reads back in the order of stamps. A result of a command appears under its name only when it is
+complete; a live record grows under its final name, and what was written before the last `flush`
+survives a crash.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mcap.writer import Writer
+
+from sgp_ros.engine.samples import CommandSample, JointSample
+from sgp_ros.recordings.changes import change_to_text
+from sgp_ros.recordings.messages import (
+    CONVERTERS,
+    FLOAT64_ARRAY,
+    JOINT_STATE,
+    TRAJECTORY,
+    Message,
+)
+from sgp_ros.recordings.outgoing import (
+    DIAGNOSTICS,
+    TEXT,
+    Status,
+    TrajectoryPoint,
+    command_message,
+    diagnostics_message,
+    joint_state_message,
+    text_message,
+    trajectory_message,
+)
+from sgp_ros.recordings.topics import CHANGES_TOPIC
+from sgp_ros.recordings.typestore import definition, full_type, serialize
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from types import TracebackType
+
+    from typing_extensions import Self
+
+    from sgp_ros.engine.samples import Event
+
+__all__ = ['RecordingWriter', 'Status']
+
+
+class RecordingWriter:
+    """An MCAP file that is being written; a context manager.
+
+    Args:
+        path: of the file; an existing one is replaced.
+        joint_states_topic: where `write_event` puts states.
+        command_topic: where it puts commands.
+        command_type: type of the commands, a key of `CONVERTERS`. Those with joint names need
+            commands with names, the others need commands without.
+        changes_topic: where it puts changes of settings and resets.
+        is_live: write under the final name from the start, for the record of a running node.
+            Else the file gets its name in `close`, and an error leaves nothing behind.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        joint_states_topic: str = '/joint_states',
+        command_topic: str = '/command',
+        command_type: str = FLOAT64_ARRAY,
+        changes_topic: str = CHANGES_TOPIC,
+        *,
+        is_live: bool = False,
+    ) -> None:
+        if command_type not in CONVERTERS:
+            msg = f'command type {command_type!r}: expected one of {sorted(CONVERTERS)}'
+            raise ValueError(msg)
+        self.path = Path(path)
+        self._joint_states_topic = joint_states_topic
+        self._command_topic = command_topic
+        self._command_type = command_type
+        self._changes_topic = changes_topic
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[tuple[str, str], int] = {}
+        self._growing = self.path if is_live else self.path.with_name(self.path.name + '.part')
+        self._file = self._growing.open('wb')
+        self._writer = Writer(self._file)
+        self._writer.start(profile='ros2', library='sgp_ros')
+
+    def write_event(self, event: Event) -> None:
+        """Write one event with its stamp as log time.
+
+        Raises:
+            ValueError: a command that the command type cannot hold.
+        """
+        if isinstance(event, JointSample):
+            self.write_joint_state(self._joint_states_topic, event)
+        elif isinstance(event, CommandSample):
+            message = command_message(self._command_type, event)
+            self._write(self._command_topic, self._command_type, event.stamp_ns, message)
+        else:
+            message = text_message(change_to_text(event))
+            self._write(self._changes_topic, TEXT, event.stamp_ns, message)
+
+    def write_joint_state(self, topic: str, sample: JointSample) -> None:
+        """Write a JointState; what the sample lacks stays empty."""
+        self._write(topic, JOINT_STATE, sample.stamp_ns, joint_state_message(sample))
+
+    def write_trajectory_point(
+        self,
+        topic: str,
+        stamp_ns: int,
+        names: Sequence[str],
+        positions: Iterable[float] = (),
+        velocities: Iterable[float] = (),
+        accelerations: Iterable[float] = (),
+        effort: Iterable[float] = (),
+    ) -> None:
+        """Write a JointTrajectory of one point at its stamp.
+
+        Args:
+            topic: where to.
+            stamp_ns: header stamp and log time [ns].
+            names: joints, m of them.
+            positions: (m,) [rad] or [m], or empty; the others likewise.
+            velocities: (m,) [rad/s] or [m/s].
+            accelerations: (m,) [rad/s^2] or [m/s^2].
+            effort: (m,) [N m] or [N].
+        """
+        point = TrajectoryPoint(positions, velocities, accelerations, effort)
+        self._write(topic, TRAJECTORY, stamp_ns, trajectory_message(stamp_ns, names, point))
+
+    def write_diagnostics(self, topic: str, stamp_ns: int, entries: Iterable[Status]) -> None:
+        """Write a DiagnosticArray with one status per entry, at `stamp_ns` [ns]."""
+        self._write(topic, DIAGNOSTICS, stamp_ns, diagnostics_message(stamp_ns, entries))
+
+    def flush(self) -> None:
+        """Make everything written so far readable even if the process dies now."""
+        self._writer.flush()  # type: ignore[no-untyped-call] # mcap leaves it without types
+
+    def close(self) -> None:
+        """Complete the file; a second call does nothing."""
+        if self._file.closed:
+            return
+        self._writer.finish()  # type: ignore[no-untyped-call] # mcap leaves it without types
+        self._file.close()
+        if self._growing != self.path:
+            self._growing.replace(self.path)
+
+    def __enter__(self) -> Self:
+        """Return the writer itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Complete the file; after an error only a live record is kept."""
+        if kind is None or self._growing == self.path:
+            self.close()
+        else:
+            self._file.close()
+            self._growing.unlink(missing_ok=True)
+
+    def _write(self, topic: str, kind: str, stamp_ns: int, message: Message) -> None:
+        channel = self._channels.get((topic, kind)) or self._register(topic, kind)
+        self._writer.add_message(channel, stamp_ns, serialize(kind, message), stamp_ns)
+
+    def _register(self, topic: str, kind: str) -> int:
+        if kind not in self._schemas:
+            text = definition(kind).encode()
+            self._schemas[kind] = self._writer.register_schema(full_type(kind), 'ros2msg', text)
+        channel = self._writer.register_channel(topic, 'cdr', self._schemas[kind])
+        self._channels[topic, kind] = channel
+        return channel

@@ -1,0 +1,188 @@
+"""One self-contained page about a run, opening with the finding in a sentence."""
+
+from __future__ import annotations
+
+import base64
+from typing import TYPE_CHECKING, Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from sgp_ros.core.scores import INTERVAL_95
+from sgp_ros.report.figures import draw_all, png
+from sgp_ros.report.files import write_bytes, write_text
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from sgp_ros.engine.engine import Engine
+    from sgp_ros.report.history import History
+
+MEANINGS = {
+    'late': 'older than a state that was already used',
+    'duplicate': 'a stamp that was already used',
+    'nonfinite': 'NaN or infinite where a number is needed',
+    'unpaired': 'no command at or before it, or one that is too old, and no measured effort',
+    'unknown_joint': 'a joint of the robot is not in the message',
+    'gap': 'the first state after a pause longer than max_gap',
+}
+
+
+def write_report(  # noqa: PLR0913 - what the page is made of
+    out: Path,
+    engine: Engine,
+    history: History,
+    metrics: Mapping[str, Any],
+    *,
+    truth: Mapping[str, float] | None = None,
+    checks: Sequence[str] = (),
+) -> list[Path]:
+    """Write `report.html` and the figures as PNG into `out`; return their paths.
+
+    Args:
+        out: folder.
+        engine: after the run.
+        history: of the run.
+        metrics: as `collect_metrics` gives them.
+        truth: true values of parameters by name, where known.
+        checks: sentences to stand below the verdict.
+    """
+    figures = {name: png(figure) for name, figure in draw_all(engine, history, truth).items()}
+    paths = []
+    for name, content in figures.items():
+        paths.append(out / f'{name}.png')
+        write_bytes(paths[-1], content)
+    page = render(engine, metrics, figures, truth or {}, checks)
+    paths.append(out / 'report.html')
+    write_text(paths[-1], page)
+    return paths
+
+
+def render(
+    engine: Engine,
+    metrics: Mapping[str, Any],
+    figures: Mapping[str, bytes],
+    truth: Mapping[str, float],
+    checks: Sequence[str],
+) -> str:
+    """Return the page as HTML; every text in it is escaped."""
+    environment = Environment(
+        loader=PackageLoader('sgp_ros.report'), autoescape=True, undefined=StrictUndefined
+    )
+    samples = metrics['samples']
+    timing = metrics['timing']
+    return environment.get_template('report.html').render(
+        title=f'{metrics["robot"]} identified from {metrics["recording"]}',
+        subtitle=engine.robot.description,
+        verdict=verdict(metrics),
+        checks=list(checks),
+        predictions=_images(figures, ('acceleration_', 'effort_')),
+        scores=_scores(metrics),
+        parameters=[_parameter_row(p, metrics, truth) for p in metrics['parameters']],
+        parameter_note=_parameter_note(metrics),
+        parameter_figures=_images(figures, ('parameters',)),
+        has_truth=bool(truth),
+        calibration=_images(figures, ('calibration',)),
+        counts=(
+            f'{samples["read"]} states read, {samples["used"]} used; '
+            f'{metrics["commands"]["read"]} commands read, '
+            f'{sum(metrics["commands"]["refused"].values())} refused. '
+            f'The filter averages over a window; predictions stand {metrics["delay_s"]:.3g} s '
+            'behind the newest state.'
+        ),
+        refusals=[
+            {'reason': reason, 'count': count, 'meaning': MEANINGS[reason]}
+            for reason, count in samples['refused'].items()
+            if count
+        ],
+        remarks=metrics['remarks'],
+        timing=(
+            f'One push took {timing["push_ms"]["p50"]:.3g} ms (median), '
+            f'{timing["push_ms"]["p99"]:.3g} ms (99 %); the run was '
+            f'{timing["realtime_factor"]:.3g} times faster than the robot.'
+        ),
+        settings=sorted(metrics['settings'].items()),
+        versions=list(metrics['versions'].items()),
+    )
+
+
+def verdict(metrics: Mapping[str, Any]) -> str:
+    """Say in a sentence or two how well the model predicts."""
+    parts = []
+    for joint, channels in metrics['joints'].items():
+        for channel, score in channels.items():
+            parts.append(
+                f'{channel} of {joint} to {100 * score["nmse"] ** 0.5:.2g} % of its spread '
+                f'(nMSE {score["nmse"]:.2g}), with {100 * score["coverage95"]:.1f} % of the '
+                'measurements inside the 95 % interval'
+            )
+    if not parts:
+        return 'Nothing could be predicted from this recording.'
+    return 'The model predicts ' + '; '.join(parts) + '.'
+
+
+def _scores(metrics: Mapping[str, Any]) -> list[dict[str, str]]:
+    rows = []
+    for joint, channels in metrics['joints'].items():
+        for channel, score in channels.items():
+            alone = metrics['physics_alone'].get(joint, {}).get(channel)
+            rows.append({
+                'joint': joint,
+                'channel': channel,
+                'nmse': f'{score["nmse"]:.3g}',
+                'baseline': f'{alone["nmse"]:.3g}' if alone else '',
+                'coverage': f'{100 * score["coverage95"]:.1f} %',
+                'nlpd': f'{score["nlpd"]:.3g}',
+                'n': str(score['n']),
+            })
+    return rows
+
+
+def _parameter_row(
+    parameter: Mapping[str, Any], metrics: Mapping[str, Any], truth: Mapping[str, float]
+) -> dict[str, Any]:
+    name, value, std = parameter['name'], parameter['value'], parameter['std']
+    alone = {p['name']: p['value'] for p in metrics['physics_parameters']}
+    row = {
+        'name': name,
+        'joint': parameter['joint'] or '',
+        'unit': parameter['unit'],
+        'known': parameter['identifiable'],
+        'value': f'{value:.5g}' if parameter['identifiable'] else '',
+        'interval': 'not determined by this motion',
+        'physics': f'{alone[name]:.5g}' if name in alone else '',
+        'truth': f'{truth[name]:.5g}' if name in truth else '',
+        'inside': '',
+        'missed': False,
+    }
+    if std is not None:
+        half = INTERVAL_95 * std
+        row['interval'] = f'{value - half:.5g} to {value + half:.5g}'
+        if name in truth:
+            row['missed'] = abs(value - truth[name]) > half
+            row['inside'] = 'outside' if row['missed'] else 'inside'
+    return row
+
+
+def _parameter_note(metrics: Mapping[str, Any]) -> str:
+    if metrics['settings']['parameters.source'] == 'physics':
+        return (
+            'The values are those of the physics alone: the process Z sees what the columns are '
+            'made of and could imitate them. Their intervals take the model for complete.'
+        )
+    return (
+        'The values are the joint posterior of W beside the process Z. The last column is a fit '
+        'of the physics without Z to the same samples: where the two differ by more than the '
+        'interval, physics is missing or Z can imitate a column.'
+    )
+
+
+def _images(figures: Mapping[str, bytes], prefixes: tuple[str, ...]) -> list[dict[str, str]]:
+    return [
+        {
+            'alt': name.replace('_', ' of ', 1),
+            'data': 'data:image/png;base64,' + base64.b64encode(content).decode(),
+        }
+        for name, content in figures.items()
+        if name.startswith(prefixes)
+    ]

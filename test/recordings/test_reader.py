@@ -1,0 +1,293 @@
+"""Every kind of recording gives the same events; a broken one says in one line what is wrong."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mcap.writer import Writer as McapWriter
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+from rosbags.rosbag2 import Writer as Ros2Writer
+from rosbags.typesys import Stores, get_typestore
+
+from sgp_ros.engine.samples import CommandSample, JointSample
+from sgp_ros.errors import RecordingError
+from sgp_ros.recordings.reader import open_recording
+from test.recordings import worlds
+
+EVENTS = worlds.swing(30)
+EXPECTED = [worlds.exact(event) for event in EVENTS]
+
+
+def _directory(path, plugin, compression=CompressionMode.NONE):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    writer = Ros2Writer(path, version=9, storage_plugin=plugin)
+    if compression != CompressionMode.NONE:
+        writer.set_compression(compression, CompressionFormat.ZSTD)
+    with writer:
+        connections = {}
+        for event in EVENTS:
+            topic, kind, data = worlds.message_of(event)
+            if topic not in connections:
+                full = kind.replace('/', '/msg/')
+                connections[topic] = writer.add_connection(topic, full, typestore=store)
+            writer.write(connections[topic], event.stamp_ns, data)
+    return path
+
+
+def _ros1(path):
+    store = get_typestore(Stores.ROS1_NOETIC)
+    with Ros1Writer(path) as writer:
+        connections = {}
+        for event in EVENTS:
+            topic, kind, data = worlds.message_of(event)
+            full = kind.replace('/', '/msg/')
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, full, typestore=store)
+            message = get_typestore(Stores.ROS2_JAZZY).deserialize_cdr(data, full)
+            if isinstance(event, JointSample):
+                header = store.types['std_msgs/msg/Header'](
+                    seq=0, stamp=message.header.stamp, frame_id=''
+                )
+                message = store.types[full](
+                    header, message.name, message.position, message.velocity, message.effort
+                )
+            writer.write(connections[topic], event.stamp_ns, store.serialize_ros1(message, full))
+    return path
+
+
+def _split(path, parts=11):
+    path.mkdir()
+    size = -(-len(EVENTS) // parts)
+    for part in range(parts):
+        worlds.write(path / f'bag_{part}.mcap', EVENTS[part * size : (part + 1) * size])
+    return path
+
+
+def _split_sqlite(path):
+    whole = _directory(path, StoragePlugin.SQLITE3)
+    (whole / 'metadata.yaml').unlink()
+    first, second = whole / f'{path.name}.db3', whole / f'{path.name}_1.db3'
+    shutil.copy(first, second)
+    middle = (EVENTS[20].stamp_ns,)
+    for file, query in (
+        (first, 'DELETE FROM messages WHERE timestamp >= ?'),
+        (second, 'DELETE FROM messages WHERE timestamp < ?'),
+    ):
+        base = sqlite3.connect(file)
+        base.execute(query, middle)
+        base.commit()
+        base.close()
+    return whole
+
+
+def _without_metadata(path):
+    (path / 'metadata.yaml').unlink()
+    return path
+
+
+BAGS = {
+    'bare mcap': lambda p: worlds.write(p / 'x.mcap', EVENTS),
+    'mcap of another ending': lambda p: worlds.write(p / 'x.record', EVENTS),
+    'unchunked mcap': lambda p: worlds.write_chunks(p / 'x.mcap', [EVENTS], unchunked=True),
+    'many chunks': lambda p: worlds.write_chunks(p / 'x.mcap', [EVENTS[:7], EVENTS[7:]]),
+    'mcap directory': lambda p: _directory(p / 'x', StoragePlugin.MCAP),
+    'no metadata': lambda p: _without_metadata(_directory(p / 'x', StoragePlugin.MCAP)),
+    'split, no metadata': lambda p: _split(p / 'x'),
+    'sqlite directory': lambda p: _directory(p / 'x', StoragePlugin.SQLITE3),
+    'sqlite split, no metadata': lambda p: _split_sqlite(p / 'x'),
+    'bare sqlite': lambda p: _directory(p / 'x', StoragePlugin.SQLITE3) / 'x.db3',
+    'compressed messages': lambda p: _directory(
+        p / 'x', StoragePlugin.SQLITE3, CompressionMode.MESSAGE
+    ),
+    'compressed files': lambda p: _directory(p / 'x', StoragePlugin.SQLITE3, CompressionMode.FILE),
+    'ROS 1': lambda p: _ros1(p / 'x.bag'),
+}
+
+
+@pytest.mark.parametrize('kind', BAGS)
+def test_every_kind_of_bag_gives_the_same_events(kind, tmp_path):
+    recording = open_recording(BAGS[kind](tmp_path))
+    assert worlds.everything(recording) == EXPECTED
+    assert [(topic.name, topic.count) for topic in recording.topics] == [
+        ('/command', 30),
+        ('/joint_states', 30),
+    ]
+    assert recording.remarks == ()
+
+
+def test_reading_twice_gives_the_same(tmp_path):
+    recording = open_recording(worlds.write(tmp_path / 'x.mcap', EVENTS))
+    assert worlds.everything(recording) == worlds.everything(recording)
+
+
+@given(
+    chunks=st.lists(st.lists(st.integers(1, 6), min_size=1, max_size=5), min_size=1, max_size=5),
+    unchunked=st.booleans(),
+)
+def test_events_come_by_log_time_and_ties_by_place(tmp_path_factory, chunks, unchunked):
+    """Recorders write chunks whose times overlap."""
+    numbers = iter(range(100))
+    events = [
+        [CommandSample(stamp, worlds.array([next(numbers)])) for stamp in chunk]
+        for chunk in chunks
+    ]
+    events[0].append(JointSample(9, ('pole',), worlds.array([0.0])))
+    path = tmp_path_factory.mktemp('bag') / 'x.mcap'
+    recording = open_recording(worlds.write_chunks(path, events, unchunked=unchunked))
+    flat = [event for chunk in events for event in chunk]
+    in_order = sorted(flat, key=lambda event: event.stamp_ns)
+    assert worlds.everything(recording) == [worlds.exact(event) for event in in_order]
+
+
+@given(keep=st.floats(0.0, 1.0))
+def test_truncated_file_gives_all_complete_chunks(tmp_path_factory, keep):
+    path = tmp_path_factory.mktemp('bag') / 'x.mcap'
+    chunks = [EVENTS[place : place + 6] for place in range(0, 60, 6)]
+    whole = worlds.write_chunks(path, chunks).read_bytes()
+    path.write_bytes(whole[: int(keep * len(whole))])
+    try:
+        recording = open_recording(path)
+        found = worlds.everything(recording)
+    except RecordingError:
+        return
+    assert found == EXPECTED[: len(found)]
+    assert len(found) % 6 == 0
+    if len(found) < 60:
+        last = EVENTS[len(found) - 1].stamp_ns
+        text = f'recovered {len(found)} messages, up to {last // 10**9}.{last % 10**9:09d} s'
+        assert text in recording.remarks[0]
+
+
+def test_file_that_lacks_only_its_index_is_whole(tmp_path):
+    path = worlds.write_chunks(tmp_path / 'x.mcap', [EVENTS])
+    path.write_bytes(path.read_bytes()[:-500])
+    recording = open_recording(path)
+    assert worlds.everything(recording) == EXPECTED
+    assert recording.remarks == ()
+
+
+def test_file_with_garbage_after_a_crash_gives_its_complete_chunks(tmp_path):
+    path = worlds.write_chunks(tmp_path / 'x.mcap', [EVENTS[:40], EVENTS[40:]])
+    whole = path.read_bytes()
+    for tail in (bytes(5000), b'\x05' * 5000, whole[-300:-40]):
+        path.write_bytes(whole[: len(whole) * 3 // 5] + tail)
+        found = worlds.everything(open_recording(path))
+        assert found == EXPECTED[:40]
+
+
+@pytest.mark.parametrize('keep', [0.0, 0.01, 0.3])
+def test_split_recording_survives_a_truncated_last_file(tmp_path, keep):
+    directory = _split(tmp_path / 'x')
+    last = directory / 'bag_9.mcap'
+    (directory / 'bag_10.mcap').unlink()
+    last.write_bytes(last.read_bytes()[: int(keep * last.stat().st_size)])
+    recording = open_recording(directory)
+    found = worlds.everything(recording)
+    assert found == EXPECTED[: len(found)]
+    assert len(found) >= 54
+    assert 'bag_9.mcap' in recording.remarks[0]
+
+
+def test_missing_part_of_a_split_recording_is_remarked(tmp_path):
+    directory = _directory(tmp_path / 'x', StoragePlugin.MCAP)
+    metadata = directory / 'metadata.yaml'
+    metadata.write_text(metadata.read_text().replace('  - x.mcap', '  - x.mcap\n  - y.mcap'))
+    recording = open_recording(directory)
+    assert 'y.mcap' in recording.remarks[0]
+    assert worlds.everything(recording) == EXPECTED
+
+
+def test_foreign_messages_do_not_matter(tmp_path):
+    """Other topics may hold what nothing here can decode."""
+    path = tmp_path / 'x.mcap'
+    with path.open('wb') as stream:
+        writer = McapWriter(stream)
+        writer.start(profile='')
+        strange = writer.register_schema('acme/msg/Strange', 'jsonschema', b'{')
+        other = writer.register_channel('/strange', 'json', strange)
+        bare = writer.register_channel('/bare', '', 0)
+        topic, _, data = worlds.message_of(EVENTS[1])
+        schema = writer.register_schema('sensor_msgs/msg/JointState', '', b'')
+        states = writer.register_channel(topic, 'cdr', schema)
+        for channel, content in ((other, b'{}'), (bare, b''), (states, data)):
+            writer.add_message(channel, EVENTS[1].stamp_ns, content, 0)
+        writer.finish()
+    assert worlds.everything(open_recording(path)) == EXPECTED[1:2]
+
+
+def test_unreadable_messages_are_counted_and_skipped(tmp_path):
+    path = tmp_path / 'x.mcap'
+    long = JointSample(1, ('a', 'b'), worlds.array([1.0]))
+    worlds.write(path, [long, long, EVENTS[1]])
+    recording = open_recording(path)
+    assert worlds.everything(recording) == EXPECTED[1:2]
+    assert list(recording.unreadable.items()) == [('/joint_states: position of length 1', 2)]
+
+
+def test_recorded_changes_can_be_left_out(tmp_path):
+    events = [EVENTS[1], worlds.Reset(EVENTS[1].stamp_ns + 1)]
+    recording = open_recording(worlds.write(tmp_path / 'x.mcap', events))
+    assert len(worlds.everything(recording)) == 2
+    assert worlds.everything(recording, changes='') == EXPECTED[1:2]
+
+
+def test_damaged_chunk_of_an_indexed_file_is_an_error(tmp_path):
+    path = worlds.write(tmp_path / 'x.mcap', worlds.swing(500))
+    content = bytearray(path.read_bytes())
+    content[600:700] = bytes(100)
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match='damaged data at byte'):
+        worlds.everything(open_recording(path))
+
+
+def _cut(path, size):
+    path.write_bytes(path.read_bytes()[:size])
+    return path
+
+
+def _file(path, content):
+    path.write_bytes(content)
+    return path
+
+
+@pytest.mark.parametrize(
+    ('make', 'reason'),
+    [
+        (lambda p: p / 'nothing.mcap', 'no recording at'),
+        (lambda p: p, 'without .mcap'),
+        (lambda p: _file(p / 'x.mcap', b''), 'is empty'),
+        (lambda p: _file(p / 'x.mcap', b'hello, world'), 'is no recording'),
+        (lambda p: worlds.write(p / 'x.mcap', []), 'holds no message'),
+        (lambda p: _cut(worlds.write(p / 'x.mcap', EVENTS), 60), 'holds no message'),
+        (lambda p: _file(p / 'x.db3', b'SQLite format 3\0' + bytes(200)), 'cannot be read'),
+        (lambda p: _cut(_ros1(p / 'x.bag'), 4500), 'cannot be read'),
+        (lambda p: worlds.write(p / 'x.mcap', EVENTS[:1]), 'no sensor_msgs/JointState topic'),
+    ],
+)
+def test_what_is_no_recording_says_so_in_one_line(make, reason, tmp_path):
+    with pytest.raises(RecordingError, match=reason) as caught:
+        open_recording(make(tmp_path)).events()
+    assert '\n' not in str(caught.value)
+    assert caught.value.expected
+
+
+@pytest.mark.parametrize('case', ['case_01', 'case_15', 'case_69'])
+def test_recorded_robot_keeps_every_event_when_written_again(case, tmp_path):
+    recording = open_recording(worlds.PRACTICE / case / 'real.mcap')
+    events = list(recording.events())
+    assert len(events) == sum(topic.count for topic in recording.topics)
+    again = open_recording(worlds.write(tmp_path / 'x.mcap', events))
+    in_order = sorted(events, key=lambda event: event.stamp_ns)
+    assert worlds.everything(again) == [worlds.exact(event) for event in in_order]
+
+
+def test_recorded_arm_is_read_from_its_directory():
+    recording = open_recording(worlds.DATA / 'tiago' / 'mcap_tiago_dynamic')
+    events = list(recording.events())
+    assert len(events) == 8022
+    assert events[0].names[0] == 'torso_lift_joint'

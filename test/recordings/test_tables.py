@@ -1,0 +1,274 @@
+"""Tables become recordings in SI units, and a wrong map is told everything at once."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.io import savemat
+
+from sgp_ros.errors import ConfigError, RecordingError
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.recordings.table_map import read_map
+from sgp_ros.recordings.tables import import_table, read_table
+from test.recordings import worlds
+
+MAP = {
+    'time': {'column': 't', 'unit': 's'},
+    'joints': {'axis': {'position': {'column': 'q', 'unit': 'm'}}},
+}
+
+
+def _map(**position):
+    return {**MAP, 'joints': {'axis': {'position': {'column': 'q', 'unit': 'm', **position}}}}
+
+
+def _csv(path, text):
+    path = path / 'x.csv'
+    path.write_text(text)
+    return path
+
+
+READY = {
+    'emps/emps_id.csv': ('emps', ('axis',), 24841),
+    'panda/panda_exciting.npz': ('panda', tuple(f'panda_joint{i}' for i in range(1, 8)), 20544),
+    'tiago/tiago_dynamic.npz': (
+        'tiago', ('torso_lift_joint', *(f'arm_{i}_joint' for i in range(1, 8))), 8022,
+    ),
+    'dfki_simple_pendulum/energy_shaping.csv': ('dfki_simple_pendulum', ('pendulum',), 4000),
+    'dfki_double_pendulum/design_C.0__20220914__sys_id__trajectory_00.npz': (
+        'dfki_double_pendulum', ('shoulder', 'elbow'), 4993,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('file', READY)
+def test_ready_map_imports_its_recording(file, tmp_path):
+    name, joints, n = READY[file]
+    out = tmp_path / 'x.mcap'
+    summary = import_table(worlds.DATA / file, worlds.MAPS / f'{name}.yaml', out)
+    assert (summary.path, summary.joints, summary.samples) == (out, joints, n)
+    assert summary.start_ns < summary.end_ns
+    table = read_table(worlds.DATA / file, read_map(worlds.MAPS / f'{name}.yaml'))
+    written = [worlds.exact(event) for event in table.events()]
+    assert sorted(worlds.everything(open_recording(out))) == sorted(written)
+
+
+def test_every_ready_map_is_tested_here():
+    assert {path.stem for path in worlds.MAPS.glob('*.yaml')} == {m for m, _, _ in READY.values()}
+
+
+def test_folder_gets_a_recording_named_after_the_table(tmp_path):
+    table = _csv(tmp_path, 't,q\n1,0\n')
+    (tmp_path / 'map.yaml').write_text(json.dumps(MAP))
+    summary = import_table(table, tmp_path / 'map.yaml', tmp_path / 'out' / 'import')
+    assert summary.path == tmp_path / 'out' / 'import' / 'x.mcap'
+    assert json.loads(json.dumps(summary.to_mapping())) == summary.to_mapping()
+    assert len(worlds.everything(open_recording(summary.path))) == 1
+
+
+def test_imported_numbers_are_those_of_the_table():
+    path = worlds.DATA / 'panda' / 'panda_exciting.npz'
+    table = read_table(path, read_map(worlds.MAPS / 'panda.yaml'))
+    with np.load(path) as content:
+        np.testing.assert_array_equal(table.channels['position'], content['q'])
+        np.testing.assert_array_equal(table.channels['velocity'], content['dq'])
+        np.testing.assert_array_equal(table.channels['effort'], content['tau'])
+        assert abs(table.stamps_ns[5] - content['t'][5] * 1e9) <= 0.5
+
+
+@pytest.mark.parametrize('mark', [',', ';', '\t', ' '])
+def test_delimiter_is_found_in_the_header(mark, tmp_path):
+    text = 't,q\n0.5,1.25\n\n1.0,\n'.replace(',', mark) if mark != ' ' else 't q\n0.5 1.25\n1 nan'
+    table = read_table(_csv(tmp_path, text), MAP)
+    assert table.stamps_ns == (500_000_000, 1_000_000_000)
+    np.testing.assert_array_equal(table.channels['position'], [[1.25], [math.nan]])
+
+
+def test_decimal_comma_goes_with_semicolons(tmp_path):
+    table = read_table(_csv(tmp_path, 't;q\n0,5;1,25\n'), MAP)
+    assert (table.stamps_ns[0], table.channels['position'][0, 0]) == (500_000_000, 1.25)
+
+
+@pytest.mark.parametrize(
+    ('unit', 'channel', 'si'),
+    [
+        ('mm', 'position', 2e-3),
+        ('deg', 'position', math.radians(2.0)),
+        ('rev', 'position', 4.0 * math.pi),
+        ('rpm', 'velocity', 2.0 * math.pi / 30.0),
+        ('mm/s', 'velocity', 2e-3),
+        ('mN m', 'effort', 2e-3),
+        ('kN', 'effort', 2e3),
+    ],
+)
+def test_units_lead_to_si(unit, channel, si, tmp_path):
+    joint = {'position': {'column': 'q', 'unit': 'm'}, channel: {'column': 'q', 'unit': unit}}
+    table = read_table(_csv(tmp_path, 't,q\n0,2\n'), {**MAP, 'joints': {'a': joint}})
+    assert table.channels[channel][0, 0] == pytest.approx(si, rel=1e-15)
+
+
+def test_scale_and_offset_apply_after_the_unit(tmp_path):
+    content = _map(unit='counts', scale='1e-3', offset=-0.5)
+    table = read_table(_csv(tmp_path, 't,q\n0,2000\n'), content)
+    assert table.channels['position'][0, 0] == 1.5
+
+
+@given(stamp_ns=st.integers(0, 2**31 * 10**9 - 1))
+def test_decimal_text_and_integers_of_time_are_not_rounded(tmp_path_factory, stamp_ns):
+    """A float cannot hold a present-day epoch to the nanosecond."""
+    folder = tmp_path_factory.mktemp('table')
+    text = f't,q\n{stamp_ns // 10**9}.{stamp_ns % 10**9:09d},0\n'
+    assert read_table(_csv(folder, text), MAP).stamps_ns == (stamp_ns,)
+    np.savez(folder / 'x.npz', t=np.array([stamp_ns]), q=np.zeros(1))
+    content = {**MAP, 'time': {'column': 't', 'unit': 'ns'}}
+    assert read_table(folder / 'x.npz', content).stamps_ns == (stamp_ns,)
+
+
+def test_rate_replaces_a_time_column(tmp_path):
+    content = {**MAP, 'time': {'rate': 300.0, 'start': 1700000000}}
+    table = read_table(_csv(tmp_path, 'q\n1\n2\n3\n4\n'), content)
+    start = 1_700_000_000 * 10**9
+    assert [stamp - start for stamp in table.stamps_ns] == [0, 3_333_333, 6_666_667, 10_000_000]
+
+
+def test_time_that_does_not_grow_is_written_as_it_is(tmp_path):
+    """The engine counts such samples; a repaired table would hide them."""
+    table = read_table(_csv(tmp_path, 't,q\n2,0\n1,0\n1,0\n'), MAP)
+    assert table.stamps_ns == (2 * 10**9, 10**9, 10**9)
+
+
+@pytest.mark.parametrize('time', ['nan', '', 'inf', '-1', 'soon', '1e30'])
+def test_row_without_a_possible_time_is_refused(time, tmp_path):
+    with pytest.raises(RecordingError, match='column t, row 2'):
+        read_table(_csv(tmp_path, f't,q\n0,0\n{time},0\n'), MAP)
+
+
+def test_channel_that_one_joint_lacks_is_nan_there(tmp_path):
+    joints = {
+        'a': {'position': {'column': 'q', 'unit': 'rad'}},
+        'b': {
+            'position': {'column': 'q', 'unit': 'rad'},
+            'velocity': {'column': 'q', 'unit': 'rad/s'},
+        },
+    }
+    table = read_table(_csv(tmp_path, 't,q\n0,2\n'), {**MAP, 'joints': joints})
+    np.testing.assert_array_equal(table.channels['velocity'], [[math.nan, 2.0]])
+    assert set(table.channels) == {'position', 'velocity'}
+
+
+@pytest.mark.parametrize('kind', ['std_msgs/Float64MultiArray', 'sensor_msgs/JointState'])
+def test_commands_are_written_before_the_state_of_their_row(kind, tmp_path):
+    path = _csv(tmp_path, 't,q,u\n1,0,3\n2,0,4\n')
+    (tmp_path / 'map.yaml').write_text(
+        'time: {column: t, unit: s}\n'
+        'joints: {axis: {position: {column: q, unit: m}}}\n'
+        'commands: {axis: {column: u, unit: V, scale: 10}}\n'
+        f'command_type: {kind}\n'
+    )
+    summary = import_table(path, tmp_path / 'map.yaml', tmp_path / 'x.mcap')
+    events = list(open_recording(summary.path).events())
+    assert summary.commands == 2
+    assert [event.stamp_ns // 10**9 for event in events] == [1, 1, 2, 2]
+    assert events[0].effort.tolist() == [30.0]
+    assert events[0].names == (('axis',) if kind == 'sensor_msgs/JointState' else None)
+
+
+def test_mat_structures_and_matrices_are_reached_by_name_and_index(tmp_path):
+    matrix = np.array([[1.0, 2.0], [3.0, 4.0]])
+    savemat(tmp_path / 'x.mat', {'log': {'t': np.array([[0.0], [1.0]]), 'q': matrix}, 'note': 'x'})
+    content = {**_map(column='log.q', index=1), 'time': {'column': 'log.t', 'unit': 's'}}
+    table = read_table(tmp_path / 'x.mat', content)
+    assert table.channels['position'].tolist() == [[2.0], [4.0]]
+
+
+def test_objects_in_npz_are_never_unpickled(tmp_path):
+    np.savez(tmp_path / 'x.npz', t=np.zeros(1), q=np.array([{}]))
+    with pytest.raises(ConfigError, match=r'q.*not in the table'):
+        read_table(tmp_path / 'x.npz', MAP)
+
+
+@pytest.mark.parametrize(
+    ('name', 'content', 'reason'),
+    [
+        ('x.csv', b'', 'no row'),
+        ('x.csv', b't,q\n', 'no row'),
+        ('x.csv', b't,q\n1,2,3\n', 'line 2 has 3 values'),
+        ('x.csv', b't,q\n1,two\n', 'column q'),
+        ('x.csv', b'\xff\xfe\x00', 'no text'),
+        ('x.npz', b'hello', 'cannot be read'),
+        ('x.mat', b'MATLAB 7.3 MAT-file'.ljust(124) + b'\x00\x02IM', '7.3'),
+        ('x.mat', b'hello', 'cannot be read'),
+        ('x.xls', b'hello', "ending '.xls'"),
+    ],
+)
+def test_table_that_cannot_be_read_says_why(name, content, reason, tmp_path):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(RecordingError, match=reason):
+        read_table(tmp_path / name, MAP)
+    with pytest.raises(RecordingError, match='no table'):
+        read_table(tmp_path / 'nothing.csv', MAP)
+
+
+def test_everything_wrong_with_a_map_is_in_one_error(tmp_path):
+    content = {
+        'time': {'column': 'time', 'unit': 'h', 'scale': 1.0, 'start': 'now'},
+        'joints': {
+            'a': {'position': {'column': 'q', 'unit': 'furlong'}, 'jerk': {}},
+            'b': {'velocity': {'column': 'q', 'unit': 'counts/s'}},
+            'c': {'position': {'column': 'q', 'unit': 'rad', 'index': 3, 'scale': 'big'}},
+            'd': 7,
+        },
+        'commands': {'a': {'column': 'q', 'unit': 'V'}},
+        'command_type': 'std_msgs/String',
+        'jonits': {},
+    }
+    with pytest.raises(ConfigError) as caught:
+        read_table(_csv(tmp_path, 't,q\n0,0\n'), content)
+    for part in (
+        "'time': not in the table", "time.unit 'h'", "time: unknown key 'scale'", "start 'now'",
+        "'furlong'", "joints.a: unknown key 'jerk'", 'joints.b: no position',
+        'joints.b.velocity: unit counts/s needs a scale', 'index 3', "scale 'big'",
+        'joints.d: expected a mapping', 'commands.a: unit V needs a scale', "'std_msgs/String'",
+        "unknown key 'jonits'", 'the table has t [1], q [1]',
+    ):  # fmt: skip
+        assert part in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ('array', 'index', 'reason'),
+    [
+        (np.zeros((3, 2)), None, 'has 2 columns, expected an index'),
+        (np.zeros((3, 2)), 2, 'index 2'),
+        (np.zeros((3, 2, 2)), None, '3 dimensions'),
+        (np.zeros(4), None, 'different length'),
+        (np.array([1j, 2j, 3j]), None, 'no numbers'),
+        (np.zeros((3, 2)), 'x', "index 'x'"),
+    ],
+)
+def test_array_of_another_shape_is_refused(array, index, reason, tmp_path):
+    np.savez(tmp_path / 'x.npz', t=np.arange(3), q=array)
+    content = _map() if index is None else _map(index=index)
+    with pytest.raises(ConfigError, match=reason):
+        read_table(tmp_path / 'x.npz', content)
+
+
+@pytest.mark.parametrize(
+    ('text', 'reason'), [(None, 'no map'), ('[1, 2]', 'no mapping'), ('a: [', 'not YAML')]
+)
+def test_map_file_must_be_a_yaml_mapping(text, reason, tmp_path):
+    path = tmp_path / 'map.yaml'
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(ConfigError, match=reason):
+        read_map(path)
+
+
+def test_rate_must_be_positive_and_alone(tmp_path):
+    content = {**MAP, 'time': {'rate': 0.0, 'column': 't'}}
+    with pytest.raises(ConfigError, match=r"unknown key 'column'.*time.rate 0.0"):
+        read_table(_csv(tmp_path, 't,q\n0,0\n'), content)
