@@ -28,25 +28,25 @@ def write_predictions(writer: RecordingWriter, estimates: Iterable[Estimate]) ->
             estimate.names,
             estimate.position,
             estimate.velocity,
-            _known(estimate.acceleration.mean),
-            _known(estimate.effort.mean),
+            known(estimate.acceleration.mean),
+            known(estimate.effort.mean),
         )
         writer.write_trajectory_point(
             VARIANCE,
             estimate.stamp_ns,
             estimate.names,
-            accelerations=_known(estimate.acceleration.variance),
-            effort=_known(estimate.effort.variance),
+            accelerations=known(estimate.acceleration.variance),
+            effort=known(estimate.effort.variance),
         )
         overlay = JointSample(
             estimate.stamp_ns,
             estimate.names,
             estimate.position,
             estimate.velocity,
-            _known(estimate.effort.mean),
+            known(estimate.effort.mean),
         )
         writer.write_joint_state(OVERLAY, overlay)
 
 
-def _known(values: np.ndarray) -> np.ndarray:
+def known(values: np.ndarray) -> np.ndarray:
     return values[:0] if np.all(np.isnan(values)) else values

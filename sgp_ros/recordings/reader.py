@@ -97,6 +97,20 @@ class Recording:
         chosen[states.name] = states, joint_sample
         return self._convert(chosen)
 
+    def messages(self, name: str) -> Iterator[tuple[int, Message]]:
+        """Yield log time [ns] and message of one topic, in the order of log time.
+
+        Raises:
+            RecordingError: no such topic.
+        """
+        topics = [topic for topic in self.topics if topic.name == name]
+        if not topics:
+            found = [topic.name for topic in self.topics]
+            raise RecordingError(f'{self.path} has topics {found}', f'topic {name}')
+        decode = decoder(topics[0].type, topics[0].encoding)
+        for log_ns, _, data in self._source.messages(topics):
+            yield log_ns, decode(data)
+
     def _convert(
         self, chosen: dict[str, tuple[Topic, Callable[[Message, int], Event]]]
     ) -> Iterator[Event]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _LOWEST_RATE_HZ, _HIGHEST_RATE_HZ = 0.1, 1e5
 
 
-def make_simulation(  # noqa: PLR0913 - each has a default that suits the robot
+def make_simulation(
     robot: str | Simulator,
     *,
     seed: int = 0,

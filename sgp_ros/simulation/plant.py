@@ -155,5 +155,5 @@ class Plant:
 
     @staticmethod
     def _level(action: Action, moment: Moment, direction: int) -> float:
-        assert action.dry_level is not None  # noqa: S101 - only such actions are in _dry
+        assert action.dry_level is not None
         return action.dry_level(moment, direction)

@@ -1,0 +1,1 @@
+"""Nodes: messages in, messages out, no computation of their own."""

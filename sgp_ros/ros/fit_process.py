@@ -1,0 +1,124 @@
+"""Fits hyper-parameters in another process, so that no message waits for a fit.
+
+One worker serves one request at a time. It starts when the node does, because its imports take
+longer than most fits; it is killed when the node ends, and ends by itself when the node vanishes.
+This module imports nothing of ROS: the worker loads it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+from dataclasses import dataclass
+from multiprocessing import resource_tracker
+from typing import TYPE_CHECKING
+
+from sgp_ros.engine.fitting import FitRequest, FitResult, fit
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+    from multiprocessing.context import SpawnProcess
+
+_NICENESS = 10
+_READY = 'ready'
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerLost:
+    """The worker died.
+
+    Attributes:
+        exit_code: of the process; negative is the number of a signal.
+        had_request: whether a fit was lost with it.
+    """
+
+    exit_code: int | None
+    had_request: bool
+
+
+class FitProcess:
+    """A worker process that fits."""
+
+    def __init__(self) -> None:
+        self._process: SpawnProcess | None = None
+        self._connection: Connection | None = None
+        self._waiting: FitRequest | None = None
+        self._is_ready = False
+        self.is_free = True
+        self._start()
+
+    def submit(self, request: FitRequest) -> None:
+        """Hand out a request; only while `is_free`."""
+        if not self.is_free:
+            msg = 'submit while a fit is running'
+            raise ValueError(msg)
+        if self._process is None:
+            self._start()
+        self.is_free = False
+        self._waiting = request
+        self._send_waiting()
+
+    def poll(self) -> FitResult | WorkerLost | None:
+        """Return what has come from the worker since the last call; never waits."""
+        if self._connection is None:
+            return None
+        try:
+            if not self._connection.poll():
+                return None
+            answer = self._connection.recv()
+        except (EOFError, OSError):
+            return self._lose()
+        if isinstance(answer, FitResult):
+            self.is_free = True
+            return answer
+        self._is_ready = True
+        self._send_waiting()
+        return None
+
+    def close(self) -> None:
+        """Kill the worker at once."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.join()
+        if self._connection is not None:
+            self._connection.close()
+        self._process = self._connection = None
+        self._is_ready = False
+
+    def _start(self) -> None:
+        context = multiprocessing.get_context('spawn')
+        self._connection, theirs = context.Pipe()
+        self._process = context.Process(target=_serve, args=(theirs,), daemon=True)
+        # Ctrl-C in a terminal reaches the whole process group; the worker inherits this mask. The
+        # tracker that multiprocessing starts beside it would lift the mask, so it comes first.
+        resource_tracker.ensure_running()
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        self._process.start()
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        theirs.close()
+
+    def _send_waiting(self) -> None:
+        """Send the request once the worker listens, so that a large one does not block here."""
+        if self._is_ready and self._waiting is not None and self._connection is not None:
+            request, self._waiting = self._waiting, None
+            with contextlib.suppress(OSError):  # `poll` finds the end of the connection
+                self._connection.send(request)
+
+    def _lose(self) -> WorkerLost:
+        process, had_request = self._process, not self.is_free
+        self.close()
+        self._waiting = None
+        self.is_free = True
+        return WorkerLost(None if process is None else process.exitcode, had_request)
+
+
+def _serve(connection: Connection) -> None:
+    os.nice(_NICENESS)
+    try:
+        connection.send(_READY)
+        while True:
+            connection.send(fit(connection.recv()))
+    except (EOFError, OSError):
+        return  # the node is gone

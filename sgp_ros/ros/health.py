@@ -1,0 +1,170 @@
+"""Turns what the engine counts into the statuses of /diagnostics."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.recordings.writer import Status
+from sgp_ros.ros.verdict import OK, WARN, Arrivals, judge
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from sgp_ros.engine.engine import Engine
+    from sgp_ros.engine.results import Counts, Estimate
+    from sgp_ros.errors import MessageError
+
+_DURATIONS = 2000
+_MEMORY = 100
+_DRIFTED = 4.0
+
+
+class Health:
+    """What happened since the node started, as far as the engine does not know it.
+
+    Attributes:
+        seen_joints: names in the last joint states.
+        last_fit: one sentence on the last fit of hyper-parameters.
+        record_problem: why the record stopped; empty while all is well.
+    """
+
+    def __init__(self) -> None:
+        self.seen_joints: tuple[str, ...] = ()
+        self.last_fit = 'none yet'
+        self.record_problem = ''
+        self._durations_s: deque[float] = deque(maxlen=_DURATIONS)
+        self._unreadable = 0
+        self._unreadable_reason = ''
+        self._surprise: np.ndarray | None = None
+        self._before: dict[str, int] = {}
+
+    def note_push(self, duration_s: float) -> None:
+        """Note how long the engine took for one event [s]."""
+        self._durations_s.append(duration_s)
+
+    def note_unreadable(self, error: MessageError) -> None:
+        """Note a message that is no sample."""
+        self._unreadable += 1
+        self._unreadable_reason = str(error)
+
+    def note_estimates(self, estimates: Iterable[Estimate], target: str) -> None:
+        """Follow the squared error over its predicted variance: 1 while the model holds."""
+        for estimate in estimates:
+            if estimate.is_scored:
+                channel = getattr(estimate, target)
+                ratio = (channel.measured - channel.mean) ** 2 / channel.variance
+                before = ratio if self._surprise is None else self._surprise
+                self._surprise = before + (ratio - before) / _MEMORY
+
+    def statuses(
+        self, engine: Engine, node: str, elapsed_s: float, sources: Mapping[str, tuple[str, int]]
+    ) -> list[Status]:
+        """Return the statuses since the last call.
+
+        Args:
+            engine: whose counts and scores are told.
+            node: name of the node, the prefix of every status.
+            elapsed_s: since the last call [s].
+            sources: full topic name and number of publishers of joint_states and command.
+        """
+        arrivals = self._arrivals(engine, sources)
+        level, message = judge(arrivals)
+        parts = [('samples', level, message, self._samples(engine.counts, arrivals, elapsed_s))]
+        parts.append(('timing', OK, 'time the engine takes per message', self._timing()))
+        parts.append(self._model(engine))
+        parts += [self._fit(engine, j, name) for j, name in enumerate(engine.robot.joint_names)]
+        if self.record_problem:
+            parts.append(('record', WARN + 1, self.record_problem, {}))
+        return [
+            Status(f'{node}: {name}', level, message, engine.robot.name, values)
+            for name, level, message, values in parts
+        ]
+
+    def _arrivals(self, engine: Engine, sources: Mapping[str, tuple[str, int]]) -> Arrivals:
+        now = _flat(engine.counts, self._unreadable)
+        new = {name: max(n - self._before.get(name, 0), 0) for name, n in now.items()}
+        self._before = now
+        return Arrivals(
+            joint_states=sources['joint_states'][0],
+            command=sources['command'][0],
+            robot_joints=engine.robot.joint_names,
+            publishers=sources['joint_states'][1],
+            command_publishers=sources['command'][1],
+            seen_joints=self.seen_joints,
+            read=new['read'],
+            estimated=new['estimated'],
+            refused=_under('refused.', new),
+            commands_read=new['commands_read'],
+            commands_refused=_under('commands_refused.', new),
+            unreadable=new['unreadable'],
+            unreadable_reason=self._unreadable_reason,
+        )
+
+    def _samples(self, counts: Counts, arrivals: Arrivals, elapsed_s: float) -> dict[str, str]:
+        rate = arrivals.read / elapsed_s if elapsed_s > 0.0 else 0.0
+        totals = {name: str(n) for name, n in _flat(counts, self._unreadable).items()}
+        return {'rate_hz': f'{rate:.2f}', 'used': str(counts.used), **totals}
+
+    def _timing(self) -> dict[str, str]:
+        if not self._durations_s:
+            return {}
+        ms = 1e3 * np.array(self._durations_s)
+        p50, p99 = np.percentile(ms, (50, 99))
+        return {
+            'push_ms_p50': f'{p50:.4f}',
+            'push_ms_p99': f'{p99:.4f}',
+            'push_ms_max': f'{ms.max():.4f}',
+        }
+
+    def _model(self, engine: Engine) -> tuple[str, int, str, dict[str, str]]:
+        config, counts = engine.config, engine.counts
+        message = 'predicts and learns'
+        if not engine.is_ready:
+            message = f'gathers the first {config.learning_initial} samples'
+        elif not config.learning_enabled:
+            message = 'predicts, does not learn'
+        values = {
+            'ready': str(int(engine.is_ready)),
+            'learning': str(int(config.learning_enabled)),
+            'buffer': str(engine.buffer_size),
+            'budget': str(config.buffer_budget),
+            'delay_s': f'{engine.delay_s:.6f}',
+            'refits': str(counts.refits),
+            'refits_refused': str(counts.refits_refused),
+            'last_refit': self.last_fit,
+        }
+        return 'model', OK, message, values
+
+    def _fit(self, engine: Engine, j: int, joint: str) -> tuple[str, int, str, dict[str, str]]:
+        scores = engine.scores()[joint]
+        values = {
+            f'{channel}.{name}': f'{getattr(score, name):.6g}'
+            for channel, score in scores.items()
+            for name in ('nmse', 'nlpd', 'coverage95', 'n')
+        }
+        target = scores.get(engine.robot.target)
+        if target is None or self._surprise is None:
+            return f'fit {joint}', OK, 'nothing scored yet', values
+        drift = float(self._surprise[j])
+        values['drift'] = f'{drift:.4f}'
+        message = f'nMSE {target.nmse:.3g}, coverage {100 * target.coverage95:.1f} %'
+        if drift > _DRIFTED:
+            message += f'; recent squared errors are {drift:.1f} times what the model expects'
+        return f'fit {joint}', WARN if drift > _DRIFTED else OK, message, values
+
+
+def _flat(counts: Counts, unreadable: int) -> dict[str, int]:
+    names = ('read', 'estimated', 'learned', 'scored', 'unlearnable', 'commands_read')
+    return {
+        **{name: getattr(counts, name) for name in names},
+        **{f'refused.{reason}': n for reason, n in counts.refused.items()},
+        **{f'commands_refused.{reason}': n for reason, n in counts.commands_refused.items()},
+        'unreadable': unreadable,
+    }
+
+
+def _under(prefix: str, counts: Mapping[str, int]) -> dict[str, int]:
+    return {n.removeprefix(prefix): count for n, count in counts.items() if n.startswith(prefix)}

@@ -1,0 +1,28 @@
+"""Executable `reaction_wheel`: a simulated reaction wheel on the ROS graph."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+from sgp_ros.ros.node_main import run
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rclpy.node import Node
+
+
+def main() -> None:
+    """Run the node until SIGINT or SIGTERM."""
+    sys.exit(run(_load))
+
+
+def _load() -> Callable[[], Node]:
+    from sgp_ros.ros.simulated_robot import SimulatedRobotNode
+
+    return SimulatedRobotNode
+
+
+if __name__ == '__main__':
+    main()

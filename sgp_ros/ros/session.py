@@ -1,0 +1,131 @@
+"""One run of an engine with its record and its fits: all that the node does beside messages."""
+
+from __future__ import annotations
+
+import time
+from functools import partial
+from typing import TYPE_CHECKING
+
+from sgp_ros.engine.fitting import FitResult
+from sgp_ros.engine.samples import JointSample
+from sgp_ros.ros.fit_process import FitProcess, WorkerLost
+from sgp_ros.ros.health import Health
+from sgp_ros.ros.outputs import Outputs, outputs
+from sgp_ros.ros.record import Record
+from sgp_ros.ros.storage import save_model
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
+
+    from sgp_ros.engine.engine import Engine
+    from sgp_ros.engine.results import Step
+    from sgp_ros.engine.samples import Event, SettingValue
+
+
+class Session:
+    """Feeds an engine, records it, and has its hyper-parameters fitted elsewhere.
+
+    Args:
+        engine: identifies the robot.
+        record: takes what the engine took and gave; None for no record.
+    """
+
+    def __init__(self, engine: Engine, record: Record | None = None) -> None:
+        self.engine = engine
+        self.health = Health()
+        self._record = record
+        self._fits = FitProcess()
+
+    def take(self, event: Event) -> list[Outputs]:
+        """Push an event; return what is to be published."""
+        if isinstance(event, JointSample):
+            self.health.seen_joints = event.names
+        started = time.perf_counter()
+        step = self.engine.push(event)
+        self.health.note_push(time.perf_counter() - started)
+        found = self._settle(step)
+        self._hand_out_fit()
+        return found
+
+    def change(self, settings: Mapping[str, SettingValue]) -> None:
+        """Change settings between two samples.
+
+        Raises:
+            ConfigError: a wrong setting; nothing has changed.
+            NumericalError: impossible hyper-parameters; nothing has changed.
+        """
+        self._write_event(self.engine.change(settings))
+
+    def reset(self) -> None:
+        """Forget everything that was learned."""
+        self._write_event(self.engine.reset())
+
+    def refit(self) -> bool:
+        """Ask for a fit now; False while there is no model to fit."""
+        asked = self.engine.request_refit()
+        self._hand_out_fit()
+        return asked
+
+    def poll_fit(self) -> str:
+        """Put a finished fit in force; return a warning for the log, or nothing."""
+        answer = self._fits.poll()
+        if isinstance(answer, FitResult):
+            change = self.engine.accept_fit(answer)
+            if change is None:
+                self.health.last_fit = 'refused: no better than what is in force'
+            else:
+                self._write_event(change)
+                gain = answer.log_evidence - answer.log_evidence_before
+                self.health.last_fit = f'log evidence rose by {gain:.3g} nat'
+        elif isinstance(answer, WorkerLost):
+            self.health.last_fit = f'lost: the worker ended with code {answer.exit_code}'
+            return f'fit {self.health.last_fit}; another starts with the next fit'
+        self._hand_out_fit()
+        return ''
+
+    def save(self, path: Path, settings: Mapping[str, SettingValue]) -> None:
+        """Save model and settings.
+
+        Raises:
+            OSError: the files cannot be written.
+        """
+        save_model(path, self.engine.snapshot(), settings)
+
+    def flush_record(self) -> None:
+        """Make the record so far survive a crash."""
+        self._write(lambda record: record.flush())
+
+    def close(self) -> None:
+        """End the stream: release what waits, complete the record, kill the worker."""
+        self._fits.close()
+        self._settle(self.engine.flush())
+        self._write(lambda record: record.close())
+        self._record = None
+
+    def _settle(self, step: Step) -> list[Outputs]:
+        for event in step.released:
+            self._write_event(event)
+        self.health.note_estimates(step.estimates, self.engine.robot.target)
+        found = [o for o in map(outputs, step.estimates) if o is not None]
+        for output in found:
+            self._write(partial(Record.write_outputs, outputs=output))
+        return found
+
+    def _write_event(self, event: Event) -> None:
+        self._write(lambda record: record.write_event(event, self.engine))
+
+    def _write(self, action: Callable[[Record], None]) -> None:
+        """Write to the record; a full disk ends the record, not the node."""
+        if self._record is not None:
+            try:
+                action(self._record)
+            except OSError as error:
+                self.health.record_problem = f'the record stopped: {error}'
+                self._record = None
+
+    def _hand_out_fit(self) -> None:
+        if self._fits.is_free:
+            request = self.engine.take_fit_request()
+            if request is not None:
+                self._fits.submit(request)

@@ -1,0 +1,28 @@
+"""Executable `sgp_node`: identifies a robot online."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+from sgp_ros.ros.node_main import run
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rclpy.node import Node
+
+
+def main() -> None:
+    """Run the node until SIGINT or SIGTERM."""
+    sys.exit(run(_load))
+
+
+def _load() -> Callable[[], Node]:
+    from sgp_ros.ros.identification import SgpNode
+
+    return SgpNode
+
+
+if __name__ == '__main__':
+    main()

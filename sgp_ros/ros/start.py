@@ -1,0 +1,55 @@
+"""Builds the session of a node from its parameters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sgp_ros.engine.config import EngineConfig, Setting, describe_settings
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.snapshots import snapshot_config
+from sgp_ros.robots.registry import load_robot
+from sgp_ros.ros.node_settings import MODEL_PATH, NODE_SETTINGS, ROBOT
+from sgp_ros.ros.parameters import declare
+from sgp_ros.ros.storage import load_model
+from sgp_ros.ros.warm_up import warm_up
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+    from sgp_ros.engine.samples import SettingValue
+
+
+def build_engine(node: Node) -> tuple[Engine, dict[str, SettingValue]]:
+    """Declare all parameters and return the engine, with the settings of the node.
+
+    A saved model brings its own settings as the defaults of the parameters; what the user gives
+    wins, where it may change at all.
+
+    Raises:
+        ConfigError: no such robot or model, or wrong parameters, all listed in one error.
+    """
+    first = declare(node, (ROBOT, MODEL_PATH))
+    robot = load_robot(str(first['robot']))
+    snapshot = load_model(Path(str(first['model.path']))) if first['model.path'] else None
+    settings = describe_settings(robot)
+    if snapshot is not None:
+        settings = _with_defaults(settings, snapshot_config(snapshot, robot))
+    given = declare(node, (*NODE_SETTINGS, *settings))
+    names = {setting.name for setting in settings}
+    config = EngineConfig.from_mapping({n: v for n, v in given.items() if n in names}, robot)
+    warm_up(robot)
+    engine = Engine(robot, config)
+    if snapshot is not None:
+        engine.restore(snapshot)
+        present = engine.config.to_mapping()
+        wanted = {n: v for n, v in config.to_mapping().items() if v != present[n]}
+        if wanted:
+            engine.change(wanted)
+    return engine, {**first, **{n: v for n, v in given.items() if n not in names}}
+
+
+def _with_defaults(settings: tuple[Setting, ...], config: EngineConfig) -> tuple[Setting, ...]:
+    values = config.to_mapping()
+    return tuple(replace(setting, default=values[setting.name]) for setting in settings)

@@ -1,0 +1,126 @@
+"""Says in one sentence whether what arrives can be used, and what to do when it cannot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+OK, WARN, ERROR = 0, 1, 2
+"""Levels of a DiagnosticStatus."""
+
+_FEW = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Arrivals:
+    """What came between two diagnostics, and from where.
+
+    Attributes:
+        joint_states, command: full topic names.
+        publishers: of joint states.
+        command_publishers: of commands.
+        robot_joints: joints that the robot wants.
+        seen_joints: joints that the last joint states named.
+        read, estimated: states that came, and equations they gave.
+        refused: states refused, by reason.
+        commands_read, commands_refused: the same for commands.
+        unreadable: messages that were no samples.
+        unreadable_reason: of the last of these.
+    """
+
+    joint_states: str
+    command: str
+    robot_joints: tuple[str, ...]
+    publishers: int = 0
+    command_publishers: int = 0
+    seen_joints: tuple[str, ...] = ()
+    read: int = 0
+    estimated: int = 0
+    refused: Mapping[str, int] = field(default_factory=dict)
+    commands_read: int = 0
+    commands_refused: Mapping[str, int] = field(default_factory=dict)
+    unreadable: int = 0
+    unreadable_reason: str = ''
+
+
+def judge(arrivals: Arrivals) -> tuple[int, str]:
+    """Return level and sentence."""
+    if arrivals.read == 0:
+        return _nothing(arrivals)
+    return _most_refused(arrivals) or _some_lost(arrivals) or (OK, 'every joint state is used')
+
+
+def _most_refused(arrivals: Arrivals) -> tuple[int, str] | None:
+    reason, count = _most(arrivals.refused)
+    if 2 * count > arrivals.read:
+        remedy = _state_remedy(reason, arrivals)
+        return ERROR, f'{count} of {arrivals.read} joint states refused as {reason}: {remedy}'
+    reason, commands = _most(arrivals.commands_refused)
+    if 2 * commands > arrivals.commands_read:
+        remedy = _command_remedy(reason, arrivals)
+        return ERROR, f'{commands} of {arrivals.commands_read} commands refused as {remedy}'
+    return None
+
+
+def _some_lost(arrivals: Arrivals) -> tuple[int, str] | None:
+    if arrivals.unreadable:
+        return WARN, f'{arrivals.unreadable} messages unreadable: {arrivals.unreadable_reason}'
+    refused = {**arrivals.refused, **_prefixed(arrivals.commands_refused)}
+    if any(refused.values()):
+        text = ', '.join(f'{n} {name}' for name, n in refused.items() if n)
+        return WARN, f'refused: {text}'
+    if arrivals.read >= _FEW and arrivals.estimated == 0:
+        return WARN, (
+            f'{arrivals.read} joint states gave no equation: too few lie in one filter.window, '
+            'lengthen it'
+        )
+    return None
+
+
+def _nothing(arrivals: Arrivals) -> tuple[int, str]:
+    if arrivals.unreadable:
+        return ERROR, f'no joint states could be read: {arrivals.unreadable_reason}'
+    if arrivals.publishers == 0:
+        remedy = 'start the robot, or remap with --ros-args -r joint_states:=/its/topic'
+        return WARN, f'nobody publishes {arrivals.joint_states}; {remedy}'
+    return WARN, (
+        f'no message on {arrivals.joint_states} from {arrivals.publishers} publishers; look for '
+        'an incompatible reliability or a stopped robot'
+    )
+
+
+def _state_remedy(reason: str, arrivals: Arrivals) -> str:
+    names, wanted = list(arrivals.seen_joints), list(arrivals.robot_joints)
+    return {
+        'unknown_joint': (
+            f'they name {names}, the robot has {wanted}; give parameter robot a YAML file with '
+            'these joint names'
+        ),
+        'unpaired': (
+            f'no command on {arrivals.command} ({arrivals.command_publishers} publishers) within '
+            'command.timeout before them; check topic and command.type, or the clocks of the two'
+        ),
+        'late': 'their stamps run backwards; call ~/reset if the clock was set back',
+        'duplicate': 'stamps repeat; several publishers, or a source without own stamps',
+        'nonfinite': 'positions or velocities are not finite; check the sensors',
+        'gap': 'pauses are longer than max_gap; raise it or the rate',
+    }.get(reason, 'see the documentation')
+
+
+def _command_remedy(reason: str, arrivals: Arrivals) -> str:
+    return {
+        'wrong_length': 'wrong_length: one number per joint of command.joints is wanted',
+        'unknown_joint': f'unknown_joint: the robot has {list(arrivals.robot_joints)}',
+        'late': 'late: older than reorder_window when they came; check the clocks',
+    }.get(reason, reason)
+
+
+def _most(counts: Mapping[str, int]) -> tuple[str, int]:
+    return max(counts.items(), key=lambda item: item[1], default=('', 0))
+
+
+def _prefixed(counts: Mapping[str, int]) -> dict[str, int]:
+    return {f'{name} command': n for name, n in counts.items()}
