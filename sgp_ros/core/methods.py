@@ -16,7 +16,8 @@ import numpy as np
 
 from sgp_ros.core.learning import initial_model, learn, screened
 from sgp_ros.core.model import Observations
-from sgp_ros.core.posterior import Posterior, Prediction
+from sgp_ros.core.posterior import Posterior
+from sgp_ros.core.prediction import Prediction
 from sgp_ros.core.prior import CoefficientPrior
 
 if TYPE_CHECKING:

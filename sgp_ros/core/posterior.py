@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
-from sgp_ros.errors import NumericalError
+from sgp_ros.core.blocks import Block, build_blocks
+from sgp_ros.core.prediction import Prediction
 
 if TYPE_CHECKING:
     from sgp_ros.core.kernels import Kernel
@@ -24,70 +25,6 @@ if TYPE_CHECKING:
 
 NULL_TOLERANCE = 1e-8
 """Share of a regressor row that may point along undetermined directions before it counts."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Prediction:
-    """Predicted X(q) at q queries.
-
-    Attributes:
-        mean: (q, k).
-        covariance: (q, k, k); the diagonal is infinite where an undetermined direction of W
-            enters.
-    """
-
-    mean: np.ndarray
-    covariance: np.ndarray
-
-    @property
-    def variance(self) -> np.ndarray:
-        """Variances of the components, (q, k)."""
-        return np.einsum('qkk->qk', self.covariance)
-
-    def observed(self, noise: np.ndarray, G: np.ndarray | None = None) -> Prediction:
-        """Return the prediction of Y = g X + V.
-
-        Args:
-            noise: (m,) variances of V.
-            G: (q, m, k) observation matrices; None for the identity.
-        """
-        if G is None:
-            return Prediction(self.mean, self.covariance + np.diag(noise))
-        mean = np.einsum('qmk,qk->qm', G, self.mean)
-        covariance = np.einsum('qmk,qkl,qnl->qmn', G, self.covariance, G) + np.diag(noise)
-        return Prediction(mean, covariance)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Block:
-    """Rows of observations that share one factor.
-
-    Attributes:
-        components: indices of the components of X that enter these rows.
-        gain: (N, len(components)) factor of each component in each row; None for ones.
-        L: (N, N) lower factor, or None where the covariance is `noise I`.
-        noise: variance on the diagonal, used without L.
-        A, b: whitened regressor (N, p) and observations (N,).
-    """
-
-    components: tuple[int, ...]
-    gain: np.ndarray | None
-    L: np.ndarray | None
-    noise: float
-    A: np.ndarray
-    b: np.ndarray
-
-    @property
-    def log_det(self) -> float:
-        if self.L is None:
-            return len(self.b) * float(np.log(self.noise))
-        return 2.0 * float(np.log(np.diag(self.L)).sum())
-
-    def unwhiten(self, x: np.ndarray) -> np.ndarray:
-        """Return L^-T x."""
-        if self.L is None:
-            return x / np.sqrt(self.noise)
-        return linalg.solve_triangular(self.L, x, lower=True, trans='T', check_finite=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,7 +63,7 @@ class Posterior:
         self.model = model
         self.data = data
         self.prior = prior
-        self._blocks = _build_blocks(model, data)
+        self._blocks = build_blocks(model, data)
         A = np.vstack([block.A for block in self._blocks] + [prior.root])
         b = np.concatenate([block.b for block in self._blocks] + [prior.target])
         self._solution = _solve(A, b, data, prior)
@@ -230,7 +167,7 @@ class Posterior:
         _mark_undetermined(covariance, G, self._solution)
         return Prediction(mean, covariance)
 
-    def _cross(self, block: _Block, column: int, U: np.ndarray) -> np.ndarray | None:
+    def _cross(self, block: Block, column: int, U: np.ndarray) -> np.ndarray | None:
         kernel = self.model.kernels[block.components[column]]
         if kernel is None or block.L is None:
             return None
@@ -239,7 +176,7 @@ class Posterior:
             k = np.repeat(k, len(block.b) // len(k), axis=0) * block.gain[:, column, None]
         return linalg.solve_triangular(block.L, k, lower=True, check_finite=False)
 
-    def _fold(self, H: np.ndarray, block: _Block, column: int) -> np.ndarray:
+    def _fold(self, H: np.ndarray, block: Block, column: int) -> np.ndarray:
         if block.gain is None:
             return H
         n = len(self.data.U)
@@ -249,53 +186,6 @@ class Posterior:
 
 def _diagonal(kernel: Kernel | None, q: int) -> np.ndarray:
     return np.zeros(q) if kernel is None else kernel.diagonal(q)
-
-
-def _build_blocks(model: Model, data: Observations) -> list[_Block]:
-    if data.G is None:
-        return [
-            _direct_block(j, kernel, noise, data)
-            for j, (kernel, noise) in enumerate(zip(model.kernels, model.noise, strict=True))
-        ]
-    n, m, k = data.G.shape
-    gain = data.G.reshape(n * m, k)
-    K = np.zeros((n * m, n * m))
-    for j, kernel in enumerate(model.kernels):
-        if kernel is not None:
-            stretched = np.repeat(np.repeat(kernel.matrix(data.U), m, axis=0), m, axis=1)
-            K += np.outer(gain[:, j], gain[:, j]) * stretched
-    K[np.diag_indices(n * m)] += np.tile(np.array(model.noise), n)
-    rows = np.einsum('nmk,nkp->nmp', data.G, data.F).reshape(n * m, -1)
-    return [_factored_block(tuple(range(k)), gain, K, rows, data.y.ravel())]
-
-
-def _direct_block(j: int, kernel: Kernel | None, noise: float, data: Observations) -> _Block:
-    if kernel is None:
-        root = np.sqrt(noise)
-        return _Block((j,), None, None, noise, data.F[:, j] / root, data.y[:, j] / root)
-    K = kernel.matrix(data.U)
-    K[np.diag_indices(len(K))] += noise
-    return _factored_block((j,), None, K, data.F[:, j], data.y[:, j])
-
-
-def _factored_block(
-    components: tuple[int, ...],
-    gain: np.ndarray | None,
-    K: np.ndarray,
-    rows: np.ndarray,
-    y: np.ndarray,
-) -> _Block:
-    try:
-        L = linalg.cholesky(K, lower=True, overwrite_a=True, check_finite=False)
-    except linalg.LinAlgError as error:
-        raise NumericalError(
-            f'the covariance of {len(K)} samples is not positive definite',
-            'a noise variance above the rounding error of the signal variance',
-            'raise the noise variance',
-        ) from error
-    stacked = np.column_stack([rows, y])
-    white = linalg.solve_triangular(L, stacked, lower=True, check_finite=False)
-    return _Block(components, gain, L, 0.0, white[:, :-1], white[:, -1])
 
 
 def column_scale(F: np.ndarray, root: np.ndarray) -> np.ndarray:
@@ -334,7 +224,7 @@ def _null_space(Vt: np.ndarray, rank: int, norms: np.ndarray) -> np.ndarray:
     return linalg.orth(basis / norms[:, None])
 
 
-def _curvature(block: _Block, residual: np.ndarray, left: np.ndarray) -> np.ndarray:
+def _curvature(block: Block, residual: np.ndarray, left: np.ndarray) -> np.ndarray:
     """Return `alpha alpha^T - C^-1` of a block, (N, N)."""
     alpha = block.unwhiten(residual)
     Q = block.unwhiten(left)

@@ -8,101 +8,17 @@ and its two neighbours, where 0 means "estimate it from the data".
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
+from sgp_ros.engine.setting import Setting
 from sgp_ros.errors import ConfigError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from sgp_ros.engine.samples import SettingValue
     from sgp_ros.robots.robot import Robot
-
-KINDS = {
-    'bool': 'true or false',
-    'int': 'an integer',
-    'float': 'a number',
-    'str': 'a string',
-    'float_array': 'a list of numbers',
-    'str_array': 'a list of strings',
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """What is known of one setting before it has a value.
-
-    Attributes:
-        name: dotted name, such as `filter.window`.
-        kind: a key of `KINDS`.
-        default: the value when none is given.
-        description: one sentence for `ros2 param describe`.
-        unit: SI unit, empty for none.
-        low, high: inclusive range of a number.
-        choices: the only values of a string, empty for any.
-        read_only: whether a running node refuses to change it.
-    """
-
-    name: str
-    kind: str
-    default: SettingValue
-    description: str
-    unit: str = ''
-    low: float = -math.inf
-    high: float = math.inf
-    choices: tuple[str, ...] = ()
-    read_only: bool = False
-
-    def problem(self, value: object) -> str | None:
-        """Say what is wrong with `value`, or None."""
-        prefix = f'{self.name} = {value!r}: expected {self._expected()}'
-        if not _has_kind(value, self.kind):
-            return prefix
-        numbers: Iterable[object] = value if isinstance(value, (list, tuple)) else (value,)
-        for number in numbers:
-            if isinstance(number, (int, float)) and not isinstance(number, bool):
-                if not math.isfinite(number) or not self.low <= number <= self.high:
-                    return prefix
-            elif self.choices and number not in self.choices:
-                return prefix
-        return None
-
-    def convert(self, value: object) -> SettingValue:
-        """Return `value` in the type the dataclass holds, once `problem` is None."""
-        if self.kind == 'float':
-            return float(cast('float', value))
-        if self.kind == 'float_array':
-            return tuple(float(number) for number in cast('Iterable[float]', value))
-        if self.kind == 'str_array':
-            return tuple(cast('Iterable[str]', value))
-        return cast('SettingValue', value)
-
-    def _expected(self) -> str:
-        text = KINDS[self.kind]
-        if self.choices:
-            text += ' out of ' + ', '.join(self.choices)
-        if math.isfinite(self.low) and math.isfinite(self.high):
-            text += f' from {self.low:g} to {self.high:g}'
-        elif math.isfinite(self.low):
-            text += f' of at least {self.low:g}'
-        return f'{text} [{self.unit}]' if self.unit else text
-
-
-def _has_kind(value: object, kind: str) -> bool:
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if kind == 'bool':
-        return isinstance(value, bool)
-    if kind == 'int':
-        return isinstance(value, int) and not isinstance(value, bool)
-    if kind == 'float':
-        return number
-    if kind == 'str':
-        return isinstance(value, str)
-    if not isinstance(value, (list, tuple)):
-        return False
-    return all(_has_kind(item, kind.removesuffix('_array')) for item in value)
 
 
 def _setting(
@@ -240,48 +156,21 @@ class EngineConfig:
         Raises:
             ConfigError: unknown names, wrong types and values out of range, all in one error.
         """
-        inputs = values.get('model.residual_inputs', ('default',))
-        problems = []
-        lengths: tuple[int, ...] = (0,) * len(robot.joint_names)
-        if _has_kind(inputs, 'str_array'):
-            try:
-                resolved = robot.residual_columns(tuple(cast('Iterable[str]', inputs)))
-                lengths = tuple(len(columns) for columns in resolved)
-            except ConfigError as error:
-                problems.append(str(error))
         known = {setting.name: setting for setting in describe_settings(robot)}
+        problems, converted = [], {}
         for name, value in values.items():
-            if name not in known:
-                problems.append(f'{name}: unknown setting')
-                continue
-            problem = known[name].problem(value)
+            problem = known[name].problem(value) if name in known else f'{name}: unknown setting'
             if problem:
                 problems.append(problem)
-        converted = {
-            name: known[name].convert(value)
-            for name, value in values.items()
-            if name in known and known[name].problem(value) is None
-        }
+            else:
+                converted[name] = known[name].convert(value)
         hyper = tuple(_joint_hyperparameters(joint, converted) for joint in robot.joint_names)
-        for joint, length in zip(hyper, lengths, strict=True):
-            given = joint.lengthscales
-            if given != (0.0,) and (len(given) != length or min(given) <= 0.0):
-                problems.append(
-                    f'hyper.{joint.joint}.lengthscales = {list(given)}: expected {length} '
-                    'positive numbers, or [0.0] to estimate them'
-                )
-        unknown = [
-            joint
-            for joint in cast('tuple[str, ...]', converted.get('command.joints', ('',)))
-            if joint and joint not in robot.joint_names
-        ]
-        if unknown:
-            problems.append(f'command.joints names {unknown}: the robot has {robot.joint_names}')
+        problems += _structural_problems(robot, converted, hyper)
         if problems:
             raise ConfigError(
                 f'{len(problems)} wrong settings: ' + ' | '.join(problems),
                 '',
-                'see `sgp replay --help` and config/ for the settings',
+                'see `ros2 param describe` or the documentation of the settings',
             )
         return cls(
             hyper=hyper,
@@ -335,6 +224,32 @@ def _joint_hyperparameters(joint: str, values: Mapping[str, Any]) -> JointHyperp
         values.get(prefix + 'lengthscales', (0.0,)),
         values.get(prefix + 'noise_variance', 0.0),
     )
+
+
+def _structural_problems(
+    robot: Robot, values: Mapping[str, Any], hyper: tuple[JointHyperparameters, ...]
+) -> list[str]:
+    """Say what does not fit the robot: inputs, lengths and joint names."""
+    problems = []
+    unknown = [
+        joint
+        for joint in values.get('command.joints', ('',))
+        if joint and joint not in robot.joint_names
+    ]
+    if unknown:
+        problems.append(f'command.joints names {unknown}: the robot has {robot.joint_names}')
+    try:
+        columns = robot.residual_columns(values.get('model.residual_inputs', ('default',)))
+    except ConfigError as error:
+        return [*problems, str(error)]
+    for joint, seen in zip(hyper, columns, strict=True):
+        given = joint.lengthscales
+        if given != (0.0,) and (len(given) != len(seen) or min(given) <= 0.0):
+            problems.append(
+                f'hyper.{joint.joint}.lengthscales = {list(given)}: expected {len(seen)} '
+                'positive numbers, or [0.0] to estimate them'
+            )
+    return problems
 
 
 def describe_settings(robot: Robot) -> tuple[Setting, ...]:

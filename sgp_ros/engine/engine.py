@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from sgp_ros.engine.estimator import Estimator
 from sgp_ros.engine.fitting import FitRequest, FitResult
 from sgp_ros.engine.intake import Intake
 from sgp_ros.engine.ordering import ReorderBuffer
+from sgp_ros.engine.readout import read_parameters, read_scores
 from sgp_ros.engine.results import Counts, Estimate, ParameterEstimate, Score, Step
 from sgp_ros.engine.samples import (
     CommandSample,
@@ -24,9 +23,9 @@ from sgp_ros.errors import NumericalError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import numpy as np
+
     from sgp_ros.core.model import Model
-    from sgp_ros.core.online import OnlineRegression
-    from sgp_ros.core.scores import RunningScore
     from sgp_ros.engine.config import EngineConfig
     from sgp_ros.engine.samples import SettingValue
     from sgp_ros.robots.robot import Robot
@@ -161,7 +160,7 @@ class Engine:
         """Return the posterior of every coefficient, from the source that the settings name."""
         if self.config.parameters_source == 'physics' and self.estimator.baseline is not None:
             return self.physics_parameters()
-        return self._read_parameters(self.estimator.regression)
+        return read_parameters(self.robot, self.config, self.estimator.regression)
 
     def physics_parameters(self) -> tuple[ParameterEstimate, ...]:
         """Return the coefficients that the physics alone, without Z, fits to the same samples.
@@ -170,37 +169,16 @@ class Engine:
         motion and the joint posterior of W leaves the split to their priors. This one does not:
         it is the best physical fit, biased by whatever physics is missing.
         """
-        return self._read_parameters(self.estimator.baseline or self.estimator.regression)
-
-    def _read_parameters(self, model: OnlineRegression | None) -> tuple[ParameterEstimate, ...]:
-        if model is None or self.config.model_method == 'GP':
-            return ()
-        information = model.information
-        std = np.sqrt(np.diag(information.covariance))
-        known = information.is_identifiable
-        return tuple(
-            ParameterEstimate(c.name, c.joint, float(w), float(s) if k else None, c.unit, bool(k))
-            for c, w, s, k in zip(
-                self.robot.coefficients, information.coefficients, std, known, strict=True
-            )
-        )
+        model = self.estimator.baseline or self.estimator.regression
+        return read_parameters(self.robot, self.config, model)
 
     def scores(self) -> dict[str, dict[str, Score]]:
         """Return the scores of each joint's channels; a channel without samples is absent."""
-        found: dict[str, dict[str, Score]] = {}
-        for j, joint in enumerate(self.robot.joint_names):
-            channels = {c: _score(scores[j]) for c, scores in self.estimator.scores.items()}
-            found[joint] = {c: score for c, score in channels.items() if score is not None}
-        return found
+        return read_scores(self.robot, self.estimator.scores)
 
     def baseline_scores(self) -> dict[str, dict[str, Score]]:
         """Return the scores of the physics alone on the same samples, target channel only."""
-        found: dict[str, dict[str, Score]] = {}
-        scores = self.estimator.baseline_scores
-        for joint, running in zip(self.robot.joint_names, scores, strict=True):
-            score = _score(running)
-            found[joint] = {} if score is None else {self.robot.target: score}
-        return found
+        return read_scores(self.robot, {self.robot.target: self.estimator.baseline_scores})
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """Return the whole state as arrays without objects, for `numpy.savez`."""
@@ -296,9 +274,3 @@ class Engine:
             self.counts.refused['late'] += 1
         elif isinstance(event, CommandSample):
             self.counts.commands_refused['late'] += 1
-
-
-def _score(running: RunningScore) -> Score | None:
-    if running.n == 0 or not np.isfinite(running.nmse):
-        return None
-    return Score(running.nmse, running.nlpd, running.coverage95, running.n)

@@ -7,18 +7,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.core.kernels import SquaredExponential
 from sgp_ros.core.learning import initial_model
 from sgp_ros.core.model import Model, Observations
 from sgp_ros.core.online import OnlinePrediction, OnlineRegression
-from sgp_ros.core.prior import CoefficientPrior
 from sgp_ros.core.scores import RunningScore
 from sgp_ros.engine.complement import solve_complement
+from sgp_ros.engine.prior_knowledge import (
+    complement_columns,
+    model_of_settings,
+    prior_of_robot,
+)
 from sgp_ros.engine.results import Channel, Estimate
 from sgp_ros.errors import NumericalError
 
 if TYPE_CHECKING:
-    from sgp_ros.engine.config import EngineConfig, JointHyperparameters
+    from sgp_ros.engine.config import EngineConfig
     from sgp_ros.engine.results import Counts
     from sgp_ros.engine.windows import Equation
     from sgp_ros.robots.robot import Robot
@@ -46,8 +49,8 @@ class Estimator:
         k = len(robot.joints)
         columns = robot.residual_columns(config.model_residual_inputs)
         self.inputs = (None,) * k if config.model_method == 'PR' else columns
-        self._prior = _prior(robot, config)
-        self._complement_columns = _complement_columns(robot)
+        self._prior = prior_of_robot(robot, config)
+        self._complement_columns = complement_columns(robot)
         self._sees_complement = config.model_method != 'PR' and any(
             self._complement_columns & set(seen) for seen in columns
         )
@@ -80,7 +83,7 @@ class Estimator:
             NumericalError: the buffer has no factor under new hyper-parameters; nothing changed.
         """
         if self.regression is not None:
-            model = self._model(config, self.regression.model)
+            model = model_of_settings(config, self.inputs, self.regression.model)
             changed = model != self.regression.model
             if changed or config.buffer_budget != self._config.buffer_budget or (
                 config.buffer_remember != self._config.buffer_remember
@@ -252,20 +255,10 @@ class Estimator:
 
     def _first_model(self, arrays: list[Arrays]) -> Model:
         if not arrays:
-            return self._model(self._config, None)
+            return model_of_settings(self._config, self.inputs, None)
         U, F, y = (np.array(column) for column in zip(*arrays, strict=True))
-        return self._model(self._config, initial_model(Observations(U, F, y), self.inputs))
-
-    def _model(self, config: EngineConfig, present: Model | None) -> Model:
-        """Return the hyper-parameters of the settings, with `present` where they are automatic."""
-        kernels: list[SquaredExponential | None] = []
-        noise = []
-        for j, (joint, columns) in enumerate(zip(config.hyper, self.inputs, strict=True)):
-            known = None if present is None else present.kernels[j]
-            kernels.append(None if columns is None else _kernel(joint, columns, known))
-            fallback = 1.0 if present is None else present.noise[j]
-            noise.append(joint.noise_variance or fallback)
-        return Model(tuple(kernels), tuple(noise))
+        start = initial_model(Observations(U, F, y), self.inputs)
+        return model_of_settings(self._config, self.inputs, start)
 
     def _unknown(self, equation: Equation) -> Estimate:
         def blank(channel: str) -> Channel:
@@ -284,31 +277,3 @@ class Estimator:
             is_scored=False,
             is_learned=self._config.learning_enabled,
         )
-
-
-def _kernel(
-    joint: JointHyperparameters, columns: tuple[int, ...], known: SquaredExponential | None
-) -> SquaredExponential:
-    variance = joint.signal_variance or (known.variance if known else 1.0)
-    lengths = joint.lengthscales
-    if lengths == (0.0,):
-        lengths = known.lengthscales if known else (1.0,) * len(columns)
-    return SquaredExponential(variance, lengths, columns)
-
-
-def _prior(robot: Robot, config: EngineConfig) -> CoefficientPrior:
-    if config.model_method == 'GP':
-        return CoefficientPrior.flat(0)
-    mean = np.array([c.prior_mean for c in robot.coefficients])
-    std = np.array([c.prior_std for c in robot.coefficients]) * config.prior_scale
-    return CoefficientPrior.from_std(mean, std)
-
-
-def _complement_columns(robot: Robot) -> set[int]:
-    k = len(robot.joints)
-    start = 2 * k if robot.complement == 'acceleration' else 3 * k
-    return {
-        start + j
-        for j, joint in enumerate(robot.joints)
-        if robot.complement == 'acceleration' or joint.is_actuated
-    }

@@ -163,7 +163,7 @@ def compare(bag: Path, estimates: Sequence[Estimate]) -> Comparison:
     return comparison
 
 
-def _numbers(message: Any, topic: str) -> tuple[np.ndarray, ...]:  # noqa: ANN401 - ROS message
+def _numbers(message: Any, topic: str) -> tuple[np.ndarray, ...]:
     point = message.points[0]
     predicted = (np.asarray(point.accelerations), np.asarray(point.effort))
     if topic == VARIANCE:
@@ -180,9 +180,7 @@ def _hold(comparison: Comparison, one: np.ndarray, other: np.ndarray, where: str
     comparison.first = comparison.first or f'(first {where}: {one} and {other})'
 
 
-def _run_live(
-    duration_s: float, seed: int, bag: Path, progress: Callable[[float], None]
-) -> None:
+def _run_live(duration_s: float, seed: int, bag: Path, progress: Callable[[float], None]) -> None:
     bag.unlink(missing_ok=True)
     with tempfile.TemporaryDirectory() as logs, graph_environment(Path(logs)) as environment:
         processes = LiveProcesses(environment)

@@ -49,4 +49,5 @@ def write_predictions(writer: RecordingWriter, estimates: Iterable[Estimate]) ->
 
 
 def known(values: np.ndarray) -> np.ndarray:
+    """Return the values (k,), or none where all are NaN."""
     return values[:0] if np.all(np.isnan(values)) else values

@@ -25,7 +25,7 @@ from sgp_ros.report.files import write_text
 from sgp_ros.report.history import History
 from sgp_ros.report.html import write_report
 from sgp_ros.report.metrics import Timing, collect_metrics
-from sgp_ros.robots.registry import ROBOTS, load_robot
+from sgp_ros.robots.registry import load_robot
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -55,7 +55,7 @@ class ReplayOptions:
     truth: str | None = None
 
 
-def run_replay(  # noqa: PLR0913 - the arguments of the command
+def run_replay(
     bag: str,
     robot_name: str,
     params: str | None,
@@ -81,7 +81,7 @@ def run_replay(  # noqa: PLR0913 - the arguments of the command
     robot = load_robot(robot_name)
     truth = load_truth(options.truth) if options.truth else None
     recording = open_recording(bag)
-    engine = _make_engine(robot, robot_name, params, options)
+    engine = _make_engine(robot, params, options)
     remarks = list(recording.remarks)
     history, timing = History(), Timing()
     out.mkdir(parents=True, exist_ok=True)
@@ -106,7 +106,7 @@ def run_replay(  # noqa: PLR0913 - the arguments of the command
     return metrics
 
 
-def run_events(  # noqa: PLR0913 - the parts of a run
+def run_events(
     engine: Engine,
     recording: Recording,
     options: ReplayOptions,
@@ -202,11 +202,9 @@ def save_model(path: Path, snapshot: Mapping[str, np.ndarray]) -> None:
 def identified_robot(engine: Engine) -> str:
     """Return the identified robot as a robot YAML, the prior for the next run."""
     robot = engine.robot
-    base = next(name for name, r in ROBOTS.items() if len(r.coefficients) == len(robot.coefficients)
-                and name == robot.name)  # fmt: skip
     document = {
         'schema': 1,
-        'robot': base,
+        'robot': robot.name,
         'joints': list(robot.joint_names),
         'parameters': {
             p.name: {'value': p.value, 'std': p.std, 'unit': p.unit} for p in engine.parameters()
@@ -242,9 +240,7 @@ def _parameter_line(parameter: Mapping[str, Any], truth: Mapping[str, float] | N
     return text
 
 
-def _make_engine(
-    robot: Robot, robot_name: str, params: str | None, options: ReplayOptions
-) -> Engine:
+def _make_engine(robot: Robot, params: str | None, options: ReplayOptions) -> Engine:
     shipped = find_shipped(f'{robot.name}.yaml') if params is None else None
     source = params or shipped
     settings = load_parameters(source) if source else {}

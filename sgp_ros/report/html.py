@@ -28,7 +28,7 @@ MEANINGS = {
 }
 
 
-def write_report(  # noqa: PLR0913 - what the page is made of
+def write_report(
     out: Path,
     engine: Engine,
     history: History,
@@ -126,15 +126,17 @@ def _scores(metrics: Mapping[str, Any]) -> list[dict[str, str]]:
     for joint, channels in metrics['joints'].items():
         for channel, score in channels.items():
             alone = metrics['physics_alone'].get(joint, {}).get(channel)
-            rows.append({
-                'joint': joint,
-                'channel': channel,
-                'nmse': f'{score["nmse"]:.3g}',
-                'baseline': f'{alone["nmse"]:.3g}' if alone else '',
-                'coverage': f'{100 * score["coverage95"]:.1f} %',
-                'nlpd': f'{score["nlpd"]:.3g}',
-                'n': str(score['n']),
-            })
+            rows.append(
+                {
+                    'joint': joint,
+                    'channel': channel,
+                    'nmse': f'{score["nmse"]:.3g}',
+                    'baseline': f'{alone["nmse"]:.3g}' if alone else '',
+                    'coverage': f'{100 * score["coverage95"]:.1f} %',
+                    'nlpd': f'{score["nlpd"]:.3g}',
+                    'n': str(score['n']),
+                }
+            )
     return rows
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import platform
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from sgp_ros.engine.results import ParameterEstimate, Score
 
 SCHEMA = 1
-_PACKAGES = ('numpy', 'scipy', 'numba', 'rclpy')
+_PACKAGES = ('numpy', 'scipy', 'numba')
 
 
 @dataclass(slots=True)
@@ -37,7 +38,7 @@ class Timing:
     recorded_s: float = 0.0
 
 
-def collect_metrics(  # noqa: PLR0913 - what a run consists of
+def collect_metrics(
     engine: Engine,
     recording: str,
     *,
@@ -85,11 +86,9 @@ def collect_metrics(  # noqa: PLR0913 - what a run consists of
 def versions() -> dict[str, str]:
     """Return the versions that the numbers depend on."""
     found = {'sgp_ros': __version__, 'python': platform.python_version()}
-    for name in _PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
+    found |= {name: version(name) for name in _PACKAGES}
+    with suppress(PackageNotFoundError):
+        found['rclpy'] = version('rclpy')
     return found
 
 

@@ -1,0 +1,59 @@
+"""What robot and settings say before any sample: prior of W, hyper-parameters, inputs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.core.kernels import SquaredExponential
+from sgp_ros.core.model import Model
+from sgp_ros.core.prior import CoefficientPrior
+
+if TYPE_CHECKING:
+    from sgp_ros.engine.config import EngineConfig, JointHyperparameters
+    from sgp_ros.robots.robot import Robot
+
+
+def model_of_settings(
+    config: EngineConfig, inputs: tuple[tuple[int, ...] | None, ...], present: Model | None
+) -> Model:
+    """Return the hyper-parameters of the settings, with `present` where they are automatic."""
+    kernels: list[SquaredExponential | None] = []
+    noise = []
+    for j, (joint, columns) in enumerate(zip(config.hyper, inputs, strict=True)):
+        known = None if present is None else present.kernels[j]
+        kernels.append(None if columns is None else _kernel(joint, columns, known))
+        fallback = 1.0 if present is None else present.noise[j]
+        noise.append(joint.noise_variance or fallback)
+    return Model(tuple(kernels), tuple(noise))
+
+
+def _kernel(
+    joint: JointHyperparameters, columns: tuple[int, ...], known: SquaredExponential | None
+) -> SquaredExponential:
+    variance = joint.signal_variance or (known.variance if known else 1.0)
+    lengths = joint.lengthscales
+    if lengths == (0.0,):
+        lengths = known.lengthscales if known else (1.0,) * len(columns)
+    return SquaredExponential(variance, lengths, columns)
+
+
+def prior_of_robot(robot: Robot, config: EngineConfig) -> CoefficientPrior:
+    """Return the prior of W that robot and settings state."""
+    if config.model_method == 'GP':
+        return CoefficientPrior.flat(0)
+    mean = np.array([c.prior_mean for c in robot.coefficients])
+    std = np.array([c.prior_std for c in robot.coefficients]) * config.prior_scale
+    return CoefficientPrior.from_std(mean, std)
+
+
+def complement_columns(robot: Robot) -> set[int]:
+    """Return the columns of `Motion.stacked` that hold the complement signals."""
+    k = len(robot.joints)
+    start = 2 * k if robot.complement == 'acceleration' else 3 * k
+    return {
+        start + j
+        for j, joint in enumerate(robot.joints)
+        if robot.complement == 'acceleration' or joint.is_actuated
+    }

@@ -1,0 +1,141 @@
+"""The table of permitted imports, and what no module may do."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / 'sgp_ros'
+MODULES = sorted(PACKAGE.rglob('*.py'))
+
+NUMERIC = {'numpy', 'scipy'}
+MESSAGES = {
+    'builtin_interfaces', 'diagnostic_msgs', 'rcl_interfaces', 'rclpy', 'sensor_msgs', 'std_msgs',
+    'std_srvs', 'trajectory_msgs',
+}  # fmt: skip
+LAYERS = {
+    'errors': set(),
+    'core': NUMERIC | {'numba', 'errors'},
+    'robots': {'numpy', 'pinocchio', 'yaml', 'errors'},
+    'simulation': NUMERIC | {'errors'},
+    'engine': {'numpy', 'core', 'robots', 'errors'},
+    'recordings': {
+        'numpy', 'scipy', 'yaml', 'rosbags', 'mcap', 'zstandard', 'engine.samples', 'errors',
+    },
+    'report': {'numpy', 'matplotlib', 'jinja2', 'core', 'robots', 'engine', 'errors'},
+    'ros': MESSAGES | {
+        'numpy', 'yaml', 'engine', 'robots', 'simulation', 'diagnosis', 'recordings', 'errors',
+    },
+    'experiments': {
+        'numpy', 'yaml', 'core', 'robots', 'simulation', 'engine', 'recordings', 'report',
+        'errors',
+    },
+    'cli': {
+        'core', 'robots', 'simulation', 'engine', 'recordings', 'report', 'experiments', 'errors',
+    },
+}  # fmt: skip
+"""Layer to what it may import beside the standard library, itself and the package's version."""
+
+PURE = ('core', 'engine', 'robots', 'simulation')
+IMPURE_MODULES = {'asyncio', 'logging', 'os', 'random', 'subprocess', 'threading', 'time'}
+FORBIDDEN = {'pickle', 'marshal', 'shelve', 'dill'}
+LONGEST_MODULE, LONGEST_FUNCTION = 300, 50
+
+
+def _layer(path):
+    parts = path.relative_to(PACKAGE).with_suffix('').parts
+    return parts[0]
+
+
+def _imports(tree):
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield alias.name, node
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f'relative import in line {node.lineno}'
+            yield node.module, node
+
+
+def _tree(path):
+    return ast.parse(path.read_text(encoding='utf-8'))
+
+
+@pytest.mark.parametrize('path', MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_imports_follow_the_table(path):
+    """Dependencies point down; imports are absolute."""
+    layer = _layer(path)
+    if layer == '__init__':
+        return
+    permitted = LAYERS[layer]
+    for name, node in _imports(_tree(path)):
+        parts = name.split('.')
+        if parts[0] == 'sgp_ros':
+            if len(parts) == 1 or parts[1] == layer:
+                continue
+            target, fine = parts[1], '.'.join(parts[1:])
+            known = target in permitted or any(
+                fine == p or fine.startswith(f'{p}.') for p in permitted
+            )
+        else:
+            known = parts[0] in sys.stdlib_module_names or parts[0] in permitted
+            known = known or (parts[0] == 'typing_extensions')
+        assert known, f'{layer} imports {name} in line {node.lineno}'
+
+
+@pytest.mark.parametrize('path', MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_no_module_unpickles_or_evaluates(path):
+    """Model and robot files are data."""
+    tree = _tree(path)
+    assert not {name.split('.')[0] for name, _ in _imports(tree)} & FORBIDDEN
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            called = node.func
+            name = called.id if isinstance(called, ast.Name) else getattr(called, 'attr', '')
+            assert name not in {'eval', 'exec', 'unsafe_load', 'full_load'}, node.lineno
+            if name == 'load' and getattr(getattr(called, 'value', None), 'id', '') == 'np':
+                given = {k.arg: getattr(k.value, 'value', None) for k in node.keywords}
+                assert given.get('allow_pickle') is False, node.lineno
+
+
+@pytest.mark.parametrize(
+    'path', [p for p in MODULES if _layer(p) in PURE], ids=lambda p: str(p.relative_to(PACKAGE))
+)
+def test_the_fold_is_pure(path):
+    """No clock, thread, environment, print or unseeded generator below the recordings."""
+    tree = _tree(path)
+    assert not {name.split('.')[0] for name, _ in _imports(tree)} & IMPURE_MODULES
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            assert node.func.id not in {'print', 'open', 'input'}, node.lineno
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            if node.func.attr == 'default_rng':
+                assert node.args, f'generator without a seed in line {node.lineno}'
+            assert not (
+                isinstance(node.func.value, ast.Attribute)
+                and node.func.value.attr == 'random'
+                and node.func.attr in {'rand', 'randn', 'normal', 'uniform', 'seed'}
+            ), node.lineno
+
+
+@pytest.mark.parametrize('path', MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_modules_and_functions_stay_short(path):
+    """Past this length a reader loses the thread; `__init__` files hold a docstring alone."""
+    text = path.read_text(encoding='utf-8')
+    assert text.count('\n') <= LONGEST_MODULE
+    for node in ast.walk(_tree(path)):
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            docstring = ast.get_docstring(node) or ''
+            body = node.end_lineno - node.lineno - docstring.count('\n')
+            assert body <= LONGEST_FUNCTION, node.name
+
+
+@pytest.mark.parametrize('path', MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_every_module_says_what_it_is_for(path):
+    """The docstring's first line is one sentence."""
+    docstring = ast.get_docstring(_tree(path))
+    assert docstring, path
+    assert docstring.split('\n\n')[0].rstrip().endswith(('.', '?')), docstring

@@ -1,0 +1,98 @@
+"""The package as it is installed."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import sgp_ros
+from sgp_ros.experiments.parameter_file import find_shipped
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_versions_agree():
+    """package.xml, setup.py, the package and the changelog name one version."""
+    manifest = ET.parse(ROOT / 'package.xml').getroot()
+    setup = (ROOT / 'setup.py').read_text()
+    assert manifest.findtext('version') == sgp_ros.__version__
+    assert f"VERSION = '{sgp_ros.__version__}'" in setup
+    changelog = (ROOT / 'CHANGELOG.rst').read_text()
+    assert re.search(rf'^{re.escape(sgp_ros.__version__)} ', changelog, re.MULTILINE)
+
+
+def test_entry_points_exist():
+    """Every console script leads to a function."""
+    setup = (ROOT / 'setup.py').read_text()
+    scripts = re.findall(r"'(\w+) = ([\w.]+):(\w+)'", setup)
+    assert {name for name, _, _ in scripts} == {'sgp', 'sgp_node', 'reaction_wheel'}
+    for _, module, function in scripts:
+        assert callable(getattr(import_module(module), function))
+
+
+def test_shipped_files_are_found_from_the_source_tree():
+    """`make demo` runs from an editable install, where no share folder exists."""
+    assert find_shipped('quick_discovery.xml') is not None
+    assert find_shipped('nothing.yaml') is None
+
+
+@pytest.fixture(scope='module')
+def workspace(tmp_path_factory):
+    """A colcon workspace that holds a copy of the sources, built."""
+    folder = tmp_path_factory.mktemp('workspace')
+    source = folder / 'src' / 'sgp_ros'
+    ignored = shutil.ignore_patterns(
+        '.*', 'out', 'build', 'install', 'log', '*.egg-info', '__pycache__'
+    )
+    shutil.copytree(ROOT, source, ignore=ignored)
+    colcon = shutil.which('colcon', path=f'{Path(sys.executable).parent}:{os.environ["PATH"]}')
+    assert colcon, 'colcon comes with the test extra'
+    done = subprocess.run(
+        [colcon, 'build', '--event-handlers', 'console_direct+'],
+        cwd=folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+def test_colcon_build_installs_what_a_workspace_needs(workspace):
+    """Index entry, manifest, launch and configuration files are in share, executables in lib."""
+    prefix = workspace / 'install' / 'sgp_ros'
+    share = prefix / 'share' / 'sgp_ros'
+    assert (prefix / 'share/ament_index/resource_index/packages/sgp_ros').is_file()
+    assert (share / 'package.xml').is_file()
+    for folder in ('launch', 'config'):
+        for path in (ROOT / folder).rglob('*'):
+            if path.suffix in {'.py', '.yaml', '.xml'}:
+                assert (share / path.relative_to(ROOT)).is_file(), path
+    for name in ('sgp', 'sgp_node', 'reaction_wheel'):
+        assert (prefix / 'lib' / 'sgp_ros' / name).is_file()
+
+
+def test_an_executable_built_by_colcon_runs(workspace):
+    """The installed `sgp` imports the installed package and finds the installed configuration."""
+    prefix = workspace / 'install' / 'sgp_ros'
+    site = next((prefix / 'lib').glob('python3*/site-packages'))
+    environment = dict(os.environ, PYTHONPATH=str(site))
+    command = [prefix / 'lib' / 'sgp_ros' / 'sgp', 'simulate', 'reaction_wheel', '--duration', '1']
+    done = subprocess.run(
+        command, cwd=workspace, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert (workspace / 'out' / 'simulate' / 'reaction_wheel.mcap').is_file()
+    text = (
+        'import sgp_ros.experiments.parameter_file as p; print(p.find_shipped("linear_axis.yaml"))'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', text], cwd=workspace, env=environment, capture_output=True,
+        text=True, check=False,
+    )  # fmt: skip
+    assert Path(done.stdout.strip()).is_relative_to(prefix), done.stdout + done.stderr
