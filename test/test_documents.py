@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.util
+import json
 import re
 from pathlib import Path
 
@@ -31,3 +33,33 @@ def test_commands_in_documents_exist(path):
             assert name in {'demo', 'simulate', 'replay', 'import'}, name
         for name in re.findall(r'^\s*(?:\$ )?make (\w+)', block, re.MULTILINE):
             assert name in targets, name
+
+
+def test_the_page_of_settings_is_that_of_the_code():
+    """Mend with `python docs/generate_settings.py`."""
+    path = ROOT / 'docs' / 'generate_settings.py'
+    spec = importlib.util.spec_from_file_location('generate_settings', path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.TARGET.read_text(encoding='utf-8') == module.text()
+
+
+def test_numbers_in_the_filter_page_are_the_measured_ones():
+    """The table is that of the committed result."""
+    result = json.loads((ROOT / 'benchmarks/results/filter.json').read_text(encoding='utf-8'))
+    text = (ROOT / 'docs/filter.md').read_text(encoding='utf-8')
+    for row in result['median_relative_error'].values():
+        assert ' | '.join(f'{100 * x:.2f}' for x in row) in text
+
+
+def test_numbers_in_the_emps_page_are_the_measured_ones():
+    """Values, intervals and errors are those of the committed result."""
+    result = json.loads((ROOT / 'benchmarks/results/emps.json').read_text(encoding='utf-8'))
+    text = (ROOT / 'docs/emps.md').read_text(encoding='utf-8')
+    for parameter in result['parameters'].values():
+        assert f'{parameter["value"]:.3f} | ± {1.96 * parameter["std"]:.3f}' in text
+    for record in ('identification_record', 'validation_record_frozen'):
+        errors = result[record]
+        assert (
+            f'{errors["inverse_nmse_physics"]:.5f} | {errors["inverse_nmse_with_z"]:.5f}' in text
+        )

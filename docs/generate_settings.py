@@ -1,0 +1,50 @@
+"""Write docs/settings.md from the descriptions in the code: `python docs/generate_settings.py`."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from sgp_ros.engine.config import describe_settings
+from sgp_ros.robots.registry import ROBOTS
+
+TARGET = Path(__file__).parent / 'settings.md'
+HEAD = """# Settings
+
+Generated from the code by `python docs/generate_settings.py`. Every line is a ROS parameter of `sgp_node` and a
+key of the files in `config/`, which the commands read too. A read-only one is set at the start; any
+other takes effect before the next sample. A set that is invalid is refused and changes nothing.
+
+| setting | default | range | unit | what it does |
+|---|---|---|---|---|
+"""
+
+
+def _range(setting):
+    if setting.choices:
+        return ', '.join(setting.choices)
+    if math.isfinite(setting.low) or math.isfinite(setting.high):
+        return f'{setting.low:g} to {setting.high:g}'
+    return ''
+
+
+def _line(setting, name):
+    default = setting.default
+    shown = list(default) if isinstance(default, tuple) else default
+    note = ' (read-only)' if setting.read_only else ''
+    text = setting.description + note
+    return f'| `{name}` | `{shown}` | {_range(setting)} | {setting.unit} | {text} |'
+
+
+def text():
+    """Return the page."""
+    lines = []
+    for setting in describe_settings(ROBOTS['linear_axis']):
+        name = setting.name.replace('hyper.axis.', 'hyper.<joint>.')
+        unit = setting.unit.replace('(N)^2', 'target squared')
+        lines.append(_line(setting, name).replace(setting.unit or '\0', unit or '\0'))
+    return HEAD + '\n'.join(lines) + '\n'
+
+
+if __name__ == '__main__':
+    TARGET.write_text(text(), encoding='utf-8')

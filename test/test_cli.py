@@ -1,0 +1,266 @@
+"""The command line: results, and one line with status 2 for bad input."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sgp_ros.cli import Progress, main
+from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.recordings.writer import RecordingWriter
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope='module')
+def wheel(tmp_path_factory):
+    """A simulated recording of 12 s and its truth."""
+    folder = tmp_path_factory.mktemp('wheel')
+    assert main(['simulate', 'reaction_wheel', '--duration', '12', '--out', str(folder)]) == 0
+    return folder
+
+
+def _refused(arguments, capsys):
+    """Run a command that must fail; return its one line."""
+    assert main([str(a) for a in arguments]) == 2
+    captured = capsys.readouterr()
+    lines = captured.err.strip().splitlines()
+    assert len(lines) == 1, lines
+    assert 'Traceback' not in captured.err
+    return lines[0]
+
+
+def _replay(bag, tmp_path, *options, robot='reaction_wheel'):
+    return ['replay', bag, '--robot', robot, '--out', tmp_path / 'out', *options]
+
+
+def test_a_simulated_recording_is_identified(wheel, tmp_path, capsys):
+    """The ten coefficients are found within five standard deviations, and printed with truth."""
+    arguments = _replay(wheel / 'reaction_wheel.mcap', tmp_path, '--truth', wheel / 'truth.json')
+    assert main([str(a) for a in [*arguments, '--json']]) == 0
+    captured = capsys.readouterr()
+    metrics = json.loads(captured.out.strip().splitlines()[-1])
+    truth = json.loads((wheel / 'truth.json').read_text())['coefficients']
+    for parameter in metrics['parameters']:
+        error = abs(parameter['value'] - truth[parameter['name']]['value'])
+        assert error < 5 * parameter['std'], parameter
+    assert 'true' in captured.out
+    page = (tmp_path / 'out' / 'report.html').read_text()
+    assert 'true value' in page
+
+
+def test_simulation_is_a_function_of_its_seed(wheel, tmp_path):
+    """The same seed writes the same events; another seed others."""
+    for seed, name in ((0, 'same'), (1, 'other')):
+        command = ['simulate', 'reaction_wheel', '--duration', '12', '--seed', str(seed)]
+        assert main([*command, '--out', str(tmp_path / name)]) == 0
+
+    def positions(folder):
+        recording = open_recording(folder / 'reaction_wheel.mcap')
+        return [e.position for e in recording.events() if isinstance(e, JointSample)]
+
+    np.testing.assert_array_equal(positions(wheel), positions(tmp_path / 'same'))
+    assert not np.array_equal(positions(wheel), positions(tmp_path / 'other'))
+
+
+def test_left_out_effects_reach_the_recording_and_the_truth(tmp_path):
+    """--effect and --physical change the machine and are told in truth.json."""
+    command = ['simulate', 'reaction_wheel', '--duration', '2', '--out', str(tmp_path)]
+    effect = 'coulomb_friction:joint=pole,level=0.02'
+    assert main([*command, '--effect', effect, '--physical', 'pole_viscosity=0']) == 0
+    truth = json.loads((tmp_path / 'truth.json').read_text())
+    assert any(e.get('effect', e.get('name')) == 'coulomb_friction' for e in truth['effects'])
+
+
+@pytest.mark.parametrize('robot', ['toy_pendulum', 'linear_axis'])
+def test_every_simulated_robot_replays(robot, tmp_path):
+    """Simulate, then identify with the robot of the same name."""
+    assert main(['simulate', robot, '--duration', '15', '--out', str(tmp_path)]) == 0
+    bag = tmp_path / f'{robot}.mcap'
+    assert main([str(a) for a in _replay(bag, tmp_path, robot=robot)]) == 0
+    metrics = json.loads((tmp_path / 'out' / 'metrics.json').read_text())
+    assert metrics['estimates']['scored'] > 0
+
+
+def test_a_missing_file_is_refused(tmp_path, capsys):
+    """Found, and what was expected."""
+    line = _refused(_replay(tmp_path / 'nothing.mcap', tmp_path), capsys)
+    assert 'nothing.mcap' in line
+    assert '.mcap file' in line
+
+
+def test_an_empty_bag_is_refused(tmp_path, capsys):
+    """A recording without messages says so."""
+    with RecordingWriter(tmp_path / 'empty.mcap'):
+        pass
+    assert 'no message' in _refused(_replay(tmp_path / 'empty.mcap', tmp_path), capsys)
+
+
+def test_a_bag_without_joint_states_is_refused(tmp_path, capsys):
+    """The line lists the topics that are there."""
+    with RecordingWriter(tmp_path / 'commands.mcap') as writer:
+        writer.write_event(CommandSample(1, frozen_array([1.0])))
+    line = _refused(_replay(tmp_path / 'commands.mcap', tmp_path), capsys)
+    assert 'JointState' in line
+    assert '/command' in line
+
+
+def test_a_file_that_is_no_bag_is_refused(tmp_path, capsys):
+    """Any other content."""
+    (tmp_path / 'text.mcap').write_text('hello')
+    _refused(_replay(tmp_path / 'text.mcap', tmp_path), capsys)
+
+
+def test_an_unknown_joint_is_refused_with_both_lists(wheel, tmp_path, capsys):
+    """The recording's joints, the robot's, and how to rename."""
+    line = _refused(_replay(wheel / 'reaction_wheel.mcap', tmp_path, robot='linear_axis'), capsys)
+    for part in ('pole', 'axis', 'joints:'):
+        assert part in line
+
+
+@pytest.mark.parametrize(
+    ('text', 'parts'),
+    [
+        ('/**:\n  ros__parameters:\n    filter.windw: 1.0', ['filter.windw']),
+        ('/**:\n  ros__parameters:\n    filter: {window: far, degree: 99}',
+         ['filter.window', 'filter.degree', '2 wrong']),
+        ('/**:\n  parameters:\n    a: 1', ['ros__parameters']),
+        ('[1]', ['list']),
+        ('a: [', ['not YAML']),
+    ],
+)  # fmt: skip
+def test_a_wrong_parameter_file_is_refused(text, parts, wheel, tmp_path, capsys):
+    """All problems at once, in one line."""
+    path = tmp_path / 'params.yaml'
+    path.write_text(text)
+    line = _refused(_replay(wheel / 'reaction_wheel.mcap', tmp_path, '--params', path), capsys)
+    for part in parts:
+        assert part in line
+
+
+def test_other_bad_input_is_refused(wheel, tmp_path, capsys):
+    """Robots, models, truths, maps, effects, durations that do not exist or do not fit."""
+    bag = wheel / 'reaction_wheel.mcap'
+    (tmp_path / 'no.npz').write_bytes(b'PK nothing')
+    cases = [
+        _replay(bag, tmp_path, robot='unicycle'),
+        _replay(bag, tmp_path, '--params', tmp_path / 'nothing.yaml'),
+        _replay(bag, tmp_path, '--model', tmp_path / 'nothing.npz'),
+        _replay(bag, tmp_path, '--model', tmp_path / 'no.npz'),
+        _replay(bag, tmp_path, '--truth', tmp_path / 'nothing.json'),
+        _replay(bag, tmp_path, '--joint-states', '/nowhere'),
+        _replay(bag, tmp_path, '--command', '/nowhere'),
+        ['simulate', 'unicycle', '--out', tmp_path],
+        ['simulate', 'reaction_wheel', '--effect', 'gremlins:joint=pole', '--out', tmp_path],
+        ['simulate', 'reaction_wheel', '--duration', '-1', '--out', tmp_path],
+        ['import', tmp_path / 'nothing.csv', '--map', ROOT / 'config/import/emps.yaml'],
+        ['demo', '--duration', '0', '--out', tmp_path],
+    ]
+    for arguments in cases:
+        _refused(arguments, capsys)
+
+
+def test_a_recording_without_its_commands_says_what_to_do(wheel, tmp_path, capsys):
+    """All states are unpaired: name the topic."""
+    arguments = _replay(wheel / 'reaction_wheel.mcap', tmp_path, '--command', 'none')
+    assert '--command' in _refused(arguments, capsys)
+
+
+def test_a_truncated_recording_is_used_as_far_as_it_goes(wheel, tmp_path):
+    """What the writer completed is read, and the report says how much."""
+    whole = (wheel / 'reaction_wheel.mcap').read_bytes()
+    (tmp_path / 'cut.mcap').write_bytes(whole[: int(0.9 * len(whole))])
+    with RecordingWriter(tmp_path / 'long.mcap') as writer:
+        for i in range(3000):
+            stamp = 10**18 + i * 10_000_000
+            writer.write_event(CommandSample(stamp, frozen_array([np.sin(0.05 * i)])))
+            names = ('pole', 'wheel')
+            position = frozen_array([np.pi + 0.1 * np.sin(0.03 * i), 0.2 * np.sin(0.05 * i)])
+            writer.write_event(JointSample(stamp, names, position))
+            if i % 500 == 0:
+                writer.flush()
+    whole = (tmp_path / 'long.mcap').read_bytes()
+    (tmp_path / 'cut.mcap').write_bytes(whole[: int(0.8 * len(whole))])
+    assert main([str(a) for a in _replay(tmp_path / 'cut.mcap', tmp_path)]) == 0
+    metrics = json.loads((tmp_path / 'out' / 'metrics.json').read_text())
+    assert 500 <= metrics['samples']['used'] < 3000
+    assert 'recovered' in ' '.join(metrics['remarks'])
+
+
+def test_strange_states_are_counted_and_survived(tmp_path):
+    """NaN, infinite, repeated, backward and zero stamps, changing order: read = used + refused."""
+    rng = np.random.default_rng(0)
+    with RecordingWriter(tmp_path / 'strange.mcap') as writer:
+        for i in range(2000):
+            stamp = 10**18 + i * 10_000_000
+            kind = rng.integers(0, 40)
+            position = [np.pi + 0.3 * np.sin(0.03 * i), 0.2 * np.sin(0.07 * i)]
+            names = ('pole', 'wheel')
+            if kind == 0:
+                position[0] = np.nan
+            elif kind == 1:
+                position[1] = np.inf
+            elif kind == 2:
+                names = ('pole', 'elbow')
+            elif kind == 3:
+                stamp = 10**18 + max(i - 50, 0) * 10_000_000
+            if kind > 20:
+                names, position = names[::-1], position[::-1]
+            command = [1.0, 2.0] if kind == 4 else [np.sin(0.07 * i)]
+            writer.write_event(CommandSample(10**18 + i * 10_000_000, frozen_array(command)))
+            writer.write_event(JointSample(stamp, names, frozen_array(position)))
+    assert main([str(a) for a in _replay(tmp_path / 'strange.mcap', tmp_path)]) == 0
+    metrics = json.loads((tmp_path / 'out' / 'metrics.json').read_text())
+    samples = metrics['samples']
+    assert samples['read'] == 2000 == samples['used'] + sum(samples['refused'].values())
+    for reason in ('nonfinite', 'unknown_joint', 'duplicate'):
+        assert samples['refused'][reason] > 0
+    assert metrics['commands']['refused']['wrong_length'] > 0
+
+
+def test_results_replace_older_ones_and_leave_no_parts(wheel, tmp_path):
+    """A second run into the same folder is fine."""
+    arguments = [str(a) for a in _replay(wheel / 'reaction_wheel.mcap', tmp_path)]
+    assert main(arguments) == 0
+    first = (tmp_path / 'out' / 'robot_identified.yaml').read_text()
+    assert main(arguments) == 0
+    assert (tmp_path / 'out' / 'robot_identified.yaml').read_text() == first
+    assert not list((tmp_path / 'out').glob('*.part'))
+
+
+def test_help_shows_an_example(capsys):
+    """Every command has one."""
+    for command in ('demo', 'simulate', 'replay', 'import'):
+        with pytest.raises(SystemExit) as caught:
+            main([command, '--help'])
+        assert caught.value.code == 0
+        assert f'example: sgp {command}' in capsys.readouterr().out
+
+
+def test_progress_is_silent_where_nobody_watches(capsys):
+    """No bar in a log file."""
+    Progress('test')(0.5)
+    assert capsys.readouterr().err == ''
+
+
+def test_split_directories_replay_like_one_file(wheel, tmp_path):
+    """A rosbag2 folder of several files is one recording."""
+    folder = tmp_path / 'split'
+    folder.mkdir()
+    events = list(open_recording(wheel / 'reaction_wheel.mcap').events())
+    for part in range(3):
+        with RecordingWriter(folder / f'split_{part}.mcap') as writer:
+            for event in events[part * 800 : (part + 1) * 800]:
+                writer.write_event(event)
+    one, other = tmp_path / 'one', tmp_path / 'other'
+    for bag, out in ((wheel / 'reaction_wheel.mcap', one), (folder, other)):
+        shutil.rmtree(out, ignore_errors=True)
+        arguments = ['replay', str(bag), '--robot', 'reaction_wheel', '--out', str(out)]
+        assert main(arguments) == 0
+    first, second = (json.loads((out / 'metrics.json').read_text()) for out in (one, other))
+    assert first['parameters'] == second['parameters']
