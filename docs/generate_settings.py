@@ -11,9 +11,10 @@ from sgp_ros.robots.registry import ROBOTS
 TARGET = Path(__file__).parent / 'settings.md'
 HEAD = """# Settings
 
-Generated from the code by `python docs/generate_settings.py`. Every line is a ROS parameter of `sgp_node` and a
-key of the files in `config/`, which the commands read too. A read-only one is set at the start; any
-other takes effect before the next sample. A set that is invalid is refused and changes nothing.
+Generated from the code by `python docs/generate_settings.py`. Every line is a ROS parameter of
+`sgp_node` and a key of the files in `config/`, which the commands read too. A read-only one is set
+at the start; any other takes effect before the next sample. A set that is invalid is refused and
+changes nothing.
 
 | setting | default | range | unit | what it does |
 |---|---|---|---|---|

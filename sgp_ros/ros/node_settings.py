@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sgp_ros.engine.config import Setting
+from sgp_ros.engine.setting import Setting
 from sgp_ros.recordings.messages import CONVERTERS, FLOAT64_ARRAY
 
 NO_COMMAND = 'none'

@@ -71,10 +71,11 @@ def outputs(estimate: Estimate) -> Outputs | None:
 
 def parameter_statuses(engine: Engine) -> list[Status]:
     """Return one status per identified coefficient, its numbers plain enough to be plotted."""
-    return [_parameter_status(p, engine.robot.name) for p in engine.parameters()]
+    return [parameter_status(p, engine.robot.name) for p in engine.parameters()]
 
 
-def _parameter_status(parameter: ParameterEstimate, robot: str) -> Status:
+def parameter_status(parameter: ParameterEstimate, robot: str) -> Status:
+    """Return the status of one coefficient of `robot`; no `std` where it is not identifiable."""
     values = {'value': repr(parameter.value)}
     if parameter.std is None:
         message = 'not determined by the motion so far'

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
 
-    from sgp_ros.engine.config import Setting
     from sgp_ros.engine.samples import SettingValue
+    from sgp_ros.engine.setting import Setting
 
 _TYPES = {
     'bool': Parameter.Type.BOOL,

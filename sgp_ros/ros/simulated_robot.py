@@ -17,8 +17,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from sgp_ros.engine.config import Setting
 from sgp_ros.engine.samples import JointSample
+from sgp_ros.engine.setting import Setting
 from sgp_ros.errors import MessageError
 from sgp_ros.recordings.messages import CONVERTERS, FLOAT64_ARRAY, JOINT_STATE
 from sgp_ros.ros.parameters import declare

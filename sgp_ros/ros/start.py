@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sgp_ros.engine.config import EngineConfig, Setting, describe_settings
+from sgp_ros.engine.config import EngineConfig, describe_settings
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.snapshots import snapshot_config
 from sgp_ros.robots.registry import load_robot
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
     from sgp_ros.engine.samples import SettingValue
+    from sgp_ros.engine.setting import Setting
 
 
 def build_engine(node: Node) -> tuple[Engine, dict[str, SettingValue]]:

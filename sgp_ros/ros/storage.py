@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import zipfile
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import yaml
@@ -35,7 +35,8 @@ def save_model(
     path.parent.mkdir(parents=True, exist_ok=True)
     text = yaml.safe_dump(_parameter_file(settings), sort_keys=False)
     _replace(path.with_suffix('.yaml'), lambda file: file.write(text.encode()))
-    _replace(path, lambda file: np.savez(file, allow_pickle=False, **snapshot))
+    arrays: dict[str, Any] = dict(snapshot)
+    _replace(path, lambda file: np.savez(file, **arrays))
 
 
 def load_model(path: Path) -> dict[str, np.ndarray]:
