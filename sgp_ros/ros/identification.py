@@ -120,7 +120,7 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
             self.create_subscription(
                 kind,
                 topic,
-                lambda message: self._take(convert, message),
+                lambda message: self._hear(convert, message),
                 quality,
                 qos_overriding_options=overrides,
             )
@@ -147,7 +147,9 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
         ):
             self.create_timer(period_s, action, clock=self._steady)
 
-    def _take(self, convert: Callable[[Any, int], Event], message: Any) -> None:
+    def _hear(self, convert: Callable[[Any, int], Event], message: Any) -> None:
+        # The middleware's own time of receipt is out of reach: the wheels' EventsExecutor fails
+        # on callbacks that ask for it.
         try:
             event = convert(message, self.get_clock().now().nanoseconds)
         except MessageError as error:

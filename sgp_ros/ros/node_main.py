@@ -7,6 +7,7 @@ is chosen by environment variables before NumPy is imported; so nodes are import
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -23,7 +24,8 @@ if TYPE_CHECKING:
 THREAD_LIMITS = ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS')
 """Environment variables that hold the number of threads of a linear algebra library."""
 
-_TURN_S = 0.5
+_TURN_S = 0.2
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 def run(load: Callable[[], Callable[[], Node]]) -> int:
@@ -47,31 +49,47 @@ def run(load: Callable[[], Callable[[], Node]]) -> int:
 def _start(load: Callable[[], Callable[[], Node]]) -> int:
     import rclpy
     from rclpy.exceptions import ParameterException
-    from rclpy.executors import ExternalShutdownException
+    from rclpy.signals import SignalHandlerOptions
+
+    make = load()
+    try:
+        # The handlers of rclpy would end the context under a callback that is publishing.
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        node = make()
+    except (SgpError, ParameterException, OSError, RuntimeError) as error:
+        print(' '.join(str(error).split()), file=sys.stderr)
+        rclpy.try_shutdown()
+        return 2
+    _spin(node)
+    return 0
+
+
+def _spin(node: Node) -> None:
+    """Serve callbacks until a signal comes, then let the node finish."""
+    import rclpy
     from rclpy.task import Future
 
-    make, node = load(), None
+    is_told_to_stop = False
+
+    def stop(_number: int, _frame: object) -> None:
+        nonlocal is_told_to_stop
+        is_told_to_stop = True
+
+    for number in _SIGNALS:
+        signal.signal(number, stop)
+    executor = _executor()
+    executor.add_node(node)
+    # What was imported stays: searching it for garbage would hold up messages for 50 ms at a time.
+    gc.collect()
+    gc.freeze()
+    never: Future[None] = Future()
     try:
-        rclpy.init()
-        node = make()
-        executor = _executor()
-        executor.add_node(node)
-        never: Future[None] = Future()
-        while rclpy.ok():
+        while rclpy.ok() and not is_told_to_stop:
             # A finite time: without one the wheels' EventsExecutor never wakes up.
             executor.spin_until_future_complete(never, timeout_sec=_TURN_S)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except (SgpError, ParameterException, OSError) as error:
-        print(' '.join(str(error).split()), file=sys.stderr)
-        return 2
     finally:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_IGN)
-        if node is not None:
-            node.destroy_node()
+        node.destroy_node()
         rclpy.try_shutdown()
-    return 0
 
 
 def _executor() -> Executor:

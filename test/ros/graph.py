@@ -1,0 +1,167 @@
+"""Real nodes in processes of their own, and a client that watches them over DDS."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter_client import AsyncParameterClient
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rclpy.qos import QoSProfile
+
+DEADLINE_S = 30.0
+_TURN_S = 0.02
+
+
+class NodeProcess:
+    """A node that runs in a process group of its own."""
+
+    def __init__(self, module: str, arguments: list[str], errors: Path) -> None:
+        self.errors = errors
+        with errors.open('wb') as file:
+            self.process = subprocess.Popen(
+                [sys.executable, '-m', f'sgp_ros.ros.{module}', *arguments],
+                stdout=subprocess.DEVNULL,
+                stderr=file,
+                start_new_session=True,
+            )
+
+    @property
+    def is_running(self) -> bool:
+        return self.process.poll() is None
+
+    @property
+    def stderr(self) -> str:
+        return self.errors.read_text()
+
+    def children(self, containing: str = '') -> list[int]:
+        """Return the child processes whose command line contains a text."""
+        path = Path(f'/proc/{self.process.pid}/task/{self.process.pid}/children')
+        found = [int(pid) for pid in path.read_text().split()] if path.exists() else []
+        return [pid for pid in found if containing in command_line(pid)]
+
+    def stop(self, number: int = signal.SIGINT, *, whole_group: bool = False) -> int:
+        """Send a signal and return the exit status, within 10 s."""
+        send = os.killpg if whole_group else os.kill
+        started = time.monotonic()
+        send(self.process.pid, number)
+        status = self.process.wait(timeout=10.0)
+        print(f'ended {time.monotonic() - started:.2f} s after {signal.Signals(number).name}')
+        return status
+
+    def wait(self) -> int:
+        """Return the exit status of a node that ends by itself."""
+        return self.process.wait(timeout=DEADLINE_S)
+
+
+class Graph:
+    """A client of the nodes under test, and the processes it started."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.client = rclpy.create_node('client')
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self.client)
+        self._processes: list[NodeProcess] = []
+        self._statuses: dict[str, dict[str, str]] = {}
+        self._messages: dict[str, str] = {}
+        self.client.create_subscription(DiagnosticArray, '/diagnostics', self._note, 10)
+
+    def start(self, module: str, *, file: Path | None = None, **settings: Any) -> NodeProcess:
+        """Start a node; `__` in the name of a setting stands for a dot."""
+        arguments = ['--ros-args']
+        if file is not None:
+            arguments += ['--params-file', str(file)]
+        for name, value in settings.items():
+            text = str(value).lower() if isinstance(value, bool) else str(value)
+            arguments += ['-p', f'{name.replace("__", ".")}:={text}']
+        errors = self.folder / f'stderr{len(self._processes)}.txt'
+        self._processes.append(NodeProcess(module, arguments, errors))
+        return self._processes[-1]
+
+    def wait_until(self, condition: Callable[[], Any], what: str) -> Any:
+        """Let messages pass until `condition` holds, and return what it returned."""
+        end = time.monotonic() + DEADLINE_S
+        while time.monotonic() < end:
+            found = condition()
+            if found:
+                return found
+            self.turn()
+        errors = ' | '.join(process.stderr[-2000:] for process in self._processes)
+        message = f'waited {DEADLINE_S} s for {what}; statuses {self._statuses}; stderr: {errors}'
+        raise AssertionError(message)
+
+    def turn(self, timeout_s: float = _TURN_S) -> None:
+        """Let a message pass."""
+        self._executor.spin_once(timeout_sec=timeout_s)
+
+    def collect(self, kind: type, topic: str, quality: QoSProfile | int = 1000) -> list[Any]:
+        """Return a list that grows with the messages of a topic."""
+        found: list[Any] = []
+        self.client.create_subscription(kind, topic, found.append, quality)
+        return found
+
+    def call(self, kind: type, name: str, request: Any = None) -> Any:
+        """Call a service."""
+        client = self.client.create_client(kind, name)
+        self.wait_until(client.service_is_ready, f'service {name}')
+        future = client.call_async(kind.Request() if request is None else request)
+        self.wait_until(future.done, f'an answer of {name}')
+        self.client.destroy_client(client)
+        return future.result()
+
+    def parameters(self, node: str = 'sgp_node') -> AsyncParameterClient:
+        """Return a client of the parameters of a node."""
+        client = AsyncParameterClient(self.client, node)
+        self.wait_until(client.services_are_ready, f'parameters of {node}')
+        return client
+
+    def answer(self, future: Any) -> Any:
+        """Return the result of a call."""
+        self.wait_until(future.done, 'an answer')
+        return future.result()
+
+    def status(self, name: str) -> dict[str, str]:
+        """Return the values of the last status with this name, empty before the first."""
+        return self._statuses.get(f'sgp_node: {name}', {})
+
+    def message(self, name: str) -> str:
+        """Return the sentence of the last status with this name."""
+        return self._messages.get(f'sgp_node: {name}', '')
+
+    def count(self, key: str, status: str = 'samples') -> int:
+        """Return a number of a status, 0 before the first."""
+        return int(self.status(status).get(key, '0'))
+
+    def close(self) -> None:
+        """Kill what still runs and leave the graph."""
+        for process in self._processes:
+            if process.is_running:
+                os.killpg(process.process.pid, signal.SIGKILL)
+                process.process.wait()
+        self._executor.shutdown()
+        self.client.destroy_node()
+
+    def _note(self, array: DiagnosticArray) -> None:
+        for status in array.status:
+            self._statuses[status.name] = {entry.key: entry.value for entry in status.values}
+            self._messages[status.name] = status.message
+
+
+def command_line(pid: int) -> str:
+    """Return the command line of a process, empty once it is gone."""
+    try:
+        return Path(f'/proc/{pid}/cmdline').read_bytes().replace(b'\0', b' ').decode()
+    except OSError:
+        return ''

@@ -1,0 +1,167 @@
+"""A run without a graph: record, fits in a process, saved models."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import yaml
+
+from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.fitting import FitResult, fit
+from sgp_ros.engine.samples import CommandSample, JointSample, SettingsChange
+from sgp_ros.errors import ConfigError
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.robots.registry import load_robot
+from sgp_ros.ros.fit_process import FitProcess, WorkerLost
+from sgp_ros.ros.record import Record, Topics
+from sgp_ros.ros.session import Session
+from sgp_ros.ros.storage import load_model, save_model
+from sgp_ros.simulation.assembly import make_simulation
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from sgp_ros.engine.samples import Event
+
+START_NS = 1_700_000_000_000_000_000
+DEADLINE_S = 30.0
+SETTINGS = {
+    'filter.hop': 0.0, 'learning.initial': 20, 'reorder_window': 0.0, 'refit.enabled': False,
+    'buffer.budget': 40,
+}  # fmt: skip
+TOPICS = Topics('/joint_states', '/command', '/n/prediction', '/n/variance', '/n/predicted')
+
+
+def _engine() -> Engine:
+    robot = load_robot('reaction_wheel')
+    return Engine(robot, EngineConfig.from_mapping(SETTINGS, robot))
+
+
+def _events(count: int) -> list[Event]:
+    simulation = make_simulation('reaction_wheel', seed=2, start_ns=START_NS)
+    events: list[Event] = []
+    for _ in range(count):
+        sample = simulation.step()
+        events.append(CommandSample(sample.stamp_ns, sample.command, ('wheel',)))
+        events.append(JointSample(sample.stamp_ns, simulation.joint_names, sample.position))
+    return events
+
+
+def _await(fits: FitProcess) -> FitResult | WorkerLost:
+    end = time.monotonic() + DEADLINE_S
+    while time.monotonic() < end:
+        answer = fits.poll()
+        if answer is not None:
+            return answer
+    raise AssertionError('no answer of the worker')
+
+
+@pytest.fixture
+def fits() -> Iterator[FitProcess]:
+    process = FitProcess()
+    yield process
+    process.close()
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Iterator[Session]:
+    record = Record(tmp_path / 'run.mcap', TOPICS, 'sensor_msgs/JointState')
+    found = Session(_engine(), record)
+    yield found
+    found.close()
+
+
+def test_a_fit_in_a_process_equals_a_fit_in_place(fits: FitProcess) -> None:
+    engine = _engine()
+    for event in _events(120):
+        engine.push(event)
+    assert engine.request_refit()
+    request = engine.take_fit_request()
+    assert request is not None
+    fits.submit(request)
+    assert not fits.is_free
+    answer = _await(fits)
+    assert isinstance(answer, FitResult)
+    expected = fit(request)
+    assert fits.is_free
+    assert answer.number == expected.number
+    assert answer.model is not None
+    assert expected.model is not None
+    # The worker runs on one thread of linear algebra only where its environment says so.
+    np.testing.assert_allclose(answer.log_evidence, expected.log_evidence, rtol=1e-6)
+
+
+def test_a_killed_worker_is_told_and_replaced(fits: FitProcess) -> None:
+    process = fits._process
+    assert process is not None
+    assert process.pid is not None
+    os.kill(process.pid, signal.SIGKILL)
+    assert _await(fits) == WorkerLost(-signal.SIGKILL, had_request=False)
+    test_a_fit_in_a_process_equals_a_fit_in_place(fits)
+
+
+def test_closing_kills_the_worker_at_once(fits: FitProcess) -> None:
+    process = fits._process
+    assert process is not None
+    fits.close()
+    assert process.exitcode == -signal.SIGKILL
+
+
+def test_the_record_opens_with_the_settings_in_force(session: Session, tmp_path: Path) -> None:
+    session.change({'buffer.budget': 30})
+    for event in _events(60):
+        session.take(event)
+    session.change({'buffer.budget': 25})
+    session.close()
+    events = list(open_recording(tmp_path / 'run.mcap').events())
+    opening = events[0]
+    assert isinstance(opening, SettingsChange)
+    assert opening.stamp_ns == START_NS - 1
+    assert opening.settings['buffer.budget'] == 30
+    assert opening.settings['filter.hop'] == 0.0
+    changes = [e for e in events if isinstance(e, SettingsChange)]
+    assert [dict(c.settings) for c in changes[1:]] == [{'buffer.budget': 25}]
+
+
+@pytest.mark.filterwarnings('ignore::pytest.PytestUnraisableExceptionWarning')
+def test_a_full_disk_ends_the_record_but_not_the_session() -> None:
+    session = Session(_engine(), Record(Path('/dev/full'), TOPICS, 'sensor_msgs/JointState'))
+    for event in _events(60):
+        session.take(event)
+    session.flush_record()
+    assert 'No space left' in session.health.record_problem
+    assert session.engine.is_ready
+    session.close()
+
+
+def test_a_saved_model_loads_to_the_same_arrays(tmp_path: Path) -> None:
+    engine = _engine()
+    for event in _events(60):
+        engine.push(event)
+    path = tmp_path / 'a' / 'model.npz'
+    save_model(path, engine.snapshot(), {'robot': 'reaction_wheel', **engine.config.to_mapping()})
+    loaded = load_model(path)
+    for name, array in engine.snapshot().items():
+        np.testing.assert_array_equal(loaded[name], array)
+    document = yaml.safe_load(path.with_suffix('.yaml').read_text())
+    parameters = document['/**']['ros__parameters']
+    assert parameters['robot'] == 'reaction_wheel'
+    assert parameters['buffer']['budget'] == 40
+    assert sorted(p.name for p in path.parent.iterdir()) == ['model.npz', 'model.yaml']
+
+
+@pytest.mark.parametrize('content', [None, b'', b'no archive', b'PK\x03\x04 cut off'])
+def test_what_is_no_model_is_refused_in_one_line(tmp_path: Path, content: bytes | None) -> None:
+    path = tmp_path / 'model.npz'
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(ConfigError, match=r'model\.npz') as caught:
+        load_model(path)
+    assert '\n' not in str(caught.value)

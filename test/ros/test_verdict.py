@@ -1,0 +1,65 @@
+"""What the node says about what arrives."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from sgp_ros.engine.results import COMMAND_REFUSALS, REFUSALS
+from sgp_ros.ros.verdict import ERROR, OK, WARN, Arrivals, judge
+
+
+def _arrivals(**known: Any) -> Arrivals:
+    return Arrivals('/arm/joint_states', '/arm/command', ('pole', 'wheel'), **known)
+
+
+def test_all_is_well_when_every_state_is_used() -> None:
+    assert judge(_arrivals(read=100, estimated=20)) == (OK, 'every joint state is used')
+
+
+@pytest.mark.parametrize(
+    ('known', 'level', 'words'),
+    [
+        ({}, WARN, ['nobody publishes /arm/joint_states', 'remap']),
+        ({'publishers': 2}, WARN, ['no message on /arm/joint_states from 2']),
+        ({'unreadable': 3, 'unreadable_reason': 'no names'}, ERROR, ['no names']),
+        (
+            {'read': 9, 'refused': {'unknown_joint': 9}, 'seen_joints': ('elbow',)},
+            ERROR,
+            ["['elbow']", "['pole', 'wheel']", 'YAML'],
+        ),
+        (
+            {'read': 9, 'refused': {'unpaired': 9}},
+            ERROR,
+            ['no command on /arm/command (0 publishers)', 'command.type'],
+        ),
+        ({'read': 9, 'refused': {'late': 8}}, ERROR, ['backwards', '~/reset']),
+        (
+            {'read': 9, 'commands_read': 9, 'commands_refused': {'wrong_length': 9}},
+            ERROR,
+            ['9 of 9 commands', 'command.joints'],
+        ),
+        ({'read': 9, 'refused': {'gap': 1, 'late': 2}}, WARN, ['1 gap, 2 late']),
+        ({'read': 9, 'unreadable': 1, 'unreadable_reason': 'x'}, WARN, ['1 messages unreadable']),
+        ({'read': 100, 'estimated': 0}, WARN, ['filter.window']),
+    ],
+)
+def test_the_sentence_says_what_was_found_and_what_to_do(
+    known: dict[str, Any], level: int, words: list[str]
+) -> None:
+    found, sentence = judge(_arrivals(**known))
+    assert found == level
+    assert [word for word in words if word not in sentence] == []
+
+
+@pytest.mark.parametrize('reason', REFUSALS)
+def test_every_reason_for_which_states_are_refused_has_a_remedy(reason: str) -> None:
+    _, sentence = judge(_arrivals(read=1, refused={reason: 1}))
+    assert 'see the documentation' not in sentence
+
+
+@pytest.mark.parametrize('reason', COMMAND_REFUSALS)
+def test_every_reason_for_which_commands_are_refused_is_named(reason: str) -> None:
+    _, sentence = judge(_arrivals(read=1, commands_read=1, commands_refused={reason: 1}))
+    assert reason in sentence
