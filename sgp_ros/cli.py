@@ -64,6 +64,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_simulate(commands)
     _add_replay(commands)
     _add_import(commands)
+    _add_reproduce(commands)
     return parser
 
 
@@ -148,6 +149,31 @@ def _add_import(commands: Any) -> None:
     )  # fmt: skip
     parser.add_argument('file', metavar='FILE', help='.csv, .npz or .mat')
     parser.add_argument('--map', required=True, metavar='YAML', help='columns and units')
+
+
+def _add_reproduce(commands: Any) -> None:
+    parser = _add(
+        commands, 'reproduce', _reproduce,
+        'Run the experiments of the paper, with every method through one interface.',
+        'sgp reproduce toy --seeds 20 --out out/reproduce',
+    )  # fmt: skip
+    parser.add_argument('experiment', metavar='NAME', nargs='?', default='all',
+                        help='toy, reaction-wheel, arm or all (default)')  # fmt: skip
+    parser.add_argument('--seeds', type=int, default=None, metavar='N',
+                        help='worlds per experiment (default: 20)')  # fmt: skip
+    parser.add_argument('--quick', action='store_true', help='few seeds, under two minutes')
+
+
+def _reproduce(arguments: argparse.Namespace) -> Result:
+    from sgp_ros.experiments.reproduction.command import run_reproduction
+
+    return run_reproduction(
+        arguments.experiment,
+        arguments.seeds,
+        arguments.out,
+        Progress('reproduce'),
+        is_quick=arguments.quick,
+    )
 
 
 def _demo(arguments: argparse.Namespace) -> Result:

@@ -1,0 +1,1 @@
+"""The experiments of Wu and Movellan, with every method through one interface."""

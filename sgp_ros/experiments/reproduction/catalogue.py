@@ -1,0 +1,77 @@
+"""The experiments by name, with their regions in the order of the paper."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from sgp_ros.experiments.reproduction import reaction_wheel, toy
+from sgp_ros.experiments.reproduction.protocol import Outcome, World, run_method
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from sgp_ros.core.prior import CoefficientPrior
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """One experiment.
+
+    Attributes:
+        name: key in results.json.
+        group: `toy`, `reaction-wheel` or `arm`: what the command is asked for.
+        title: one line for the table.
+        make: from a seed to a world.
+        prior: from a world to the prior of W; None for the flat one.
+        seeds: how many seeds it runs by default.
+        quick_seeds: how many with `--quick`.
+    """
+
+    name: str
+    group: str
+    title: str
+    make: Callable[[int], World]
+    prior: Callable[[World], CoefficientPrior] | None = None
+    seeds: int = 20
+    quick_seeds: int = 2
+
+
+def _few(seed: int) -> World:
+    return toy.make_world(seed, dense=40)
+
+
+def _concealed(seed: int) -> World:
+    return reaction_wheel.make_world(seed, 'reaction_wheel', reaction_wheel.CONCEALED)
+
+
+EXPERIMENTS: dict[str, Experiment] = {
+    experiment.name: experiment
+    for experiment in (
+        Experiment('toy', 'toy', 'Toy pendulum, section IV.A', toy.make_world, quick_seeds=5),
+        Experiment('toy_40', 'toy', 'Toy pendulum with 40 samples', _few, quick_seeds=5),
+        Experiment(
+            'reaction_wheel', 'reaction-wheel',
+            'Simulated reaction wheel without viscous friction in the model, section IV.B',
+            reaction_wheel.make_world,
+        ),
+        Experiment(
+            'reaction_wheel_encoder', 'reaction-wheel',
+            'The same from 12-bit encoders through the filter of the package',
+            reaction_wheel.make_encoder_world,
+        ),
+        Experiment(
+            'reaction_wheel_concealed', 'reaction-wheel',
+            'Ten coefficients and an effect that is none of them, in simulation, for section IV.C',
+            _concealed,
+        ),
+    )
+}  # fmt: skip
+
+
+def run_seed(name: str, seed: int, method: str) -> Outcome:
+    """Run one method on one seed of an experiment; a function that another process can call."""
+    experiment = EXPERIMENTS[name]
+    world = experiment.make(seed)
+    prior = None if experiment.prior is None else experiment.prior(world)
+    return run_method(method, world, prior)
