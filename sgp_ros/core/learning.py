@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -89,8 +89,8 @@ def screened(data: Observations, prior: CoefficientPrior, start: Model) -> Model
     for length in _SCREENED_LENGTHS:
         for noise in _SCREENED_NOISE:
             kernels = tuple(
-                None if k is None else replace(
-                    k, lengthscales=tuple(length * x for x in k.lengthscales)
+                None if k is None else k.with_lengthscales(
+                    tuple(length * x for x in k.lengthscales)
                 )
                 for k in start.kernels
             )  # fmt: skip
@@ -183,7 +183,8 @@ def _bounds(data: Observations, start: Model) -> np.ndarray:
         if kernel is None:
             continue
         variance = power[component] if data.G is None else power.mean()
-        rows.append((variance / _RANGE**2, variance * _RANGE))
+        heights = len(kernel.log_parameters) - len(kernel.inputs)
+        rows += [(variance / _RANGE**2, variance * _RANGE)] * heights
         rows += [(spread[c] / _RANGE, spread[c] * _RANGE) for c in kernel.inputs]
     rows += [(_NOISE_FLOOR * x, 1e2 * x) for x in power]
     return np.log(np.array(rows))

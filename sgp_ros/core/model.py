@@ -67,7 +67,7 @@ class Model:
             if kernel is None:
                 kernels.append(None)
                 continue
-            stop = start + 1 + len(kernel.inputs)
+            stop = start + len(kernel.log_parameters)
             kernels.append(kernel.with_log_parameters(theta[start:stop]))
             start = stop
         return Model(tuple(kernels), tuple(float(x) for x in np.exp(theta[start:])))

@@ -120,8 +120,7 @@ class Posterior:
                 kernel = kernels[component]
                 if kernel is not None:
                     folded = self._fold(H, block, column)
-                    weighted = folded * kernel.matrix(self.data.U)
-                    parts[component] = 0.5 * kernel.gradient(self.data.U, weighted)
+                    parts[component] = 0.5 * kernel.gradient(self.data.U, folded)
             start = stop
         gradients = [part for part in parts if part is not None]
         return np.concatenate([*gradients, noise * np.array(self.model.noise)])

@@ -8,7 +8,7 @@ removal costs least is dropped, as long as that costs less than `MARGIN`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -87,12 +87,5 @@ def _fit(data: Observations, prior: CoefficientPrior, start: Model) -> tuple[Mod
 
 def _without(model: Model, kernel: Kernel, index: int) -> Model:
     """Return the model whose kernel lacks one input; without the last one there is no Z."""
-    keep = [i for i in range(len(kernel.inputs)) if i != index]
-    if not keep:
-        return Model((None,), model.noise)
-    shorter = replace(
-        kernel,
-        lengthscales=tuple(kernel.lengthscales[i] for i in keep),
-        inputs=tuple(kernel.inputs[i] for i in keep),
-    )
+    shorter = kernel.without(index) if len(kernel.inputs) > 1 else None
     return Model((shorter,), model.noise)

@@ -11,6 +11,7 @@ from sgp_ros.core.model import Model
 from sgp_ros.core.prior import CoefficientPrior
 
 if TYPE_CHECKING:
+    from sgp_ros.core.kernels import Kernel
     from sgp_ros.engine.config import EngineConfig, JointHyperparameters
     from sgp_ros.robots.robot import Robot
 
@@ -30,7 +31,7 @@ def model_of_settings(
 
 
 def _kernel(
-    joint: JointHyperparameters, columns: tuple[int, ...], known: SquaredExponential | None
+    joint: JointHyperparameters, columns: tuple[int, ...], known: Kernel | None
 ) -> SquaredExponential:
     variance = joint.signal_variance or (known.variance if known else 1.0)
     lengths = joint.lengthscales

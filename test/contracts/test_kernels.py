@@ -15,6 +15,9 @@ NAMES = sorted(KERNELS)
 def _kernel(name, seed):
     rng = np.random.default_rng(seed)
     lengths = tuple(float(x) for x in rng.uniform(0.3, 3.0, size=2))
+    if name == 'additive_squared_exponential':
+        variances = tuple(float(x) for x in rng.uniform(0.2, 5.0, size=2))
+        return KERNELS[name](variances, lengths, (0, 2))
     return KERNELS[name](float(rng.uniform(0.2, 5.0)), lengths, (0, 2))
 
 
@@ -59,7 +62,7 @@ def test_gradient_contracts_the_derivative_of_the_matrix(name):
     U, H = rng.normal(size=(7, 3)), rng.normal(size=(7, 7))
     H = H + H.T
     theta = kernel.log_parameters
-    gradient = kernel.gradient(U, H * kernel.matrix(U))
+    gradient = kernel.gradient(U, H)
     for i in range(len(theta)):
         step = 1e-6 * np.eye(len(theta))[i]
         high = (H * kernel.with_log_parameters(theta + step).matrix(U)).sum()
@@ -78,6 +81,24 @@ def test_parameters_round_trip(name):
 @pytest.mark.parametrize('name', NAMES)
 def test_what_is_no_kernel_is_refused(name):
     """Lengths that do not match the inputs, or are not positive, are a caller's mistake."""
-    for variance, lengths, inputs in ((1.0, (1.0,), (0, 1)), (0.0, (1.0,), (0,)), (1.0, (), ())):
+    variance = _kernel(name, 5).log_parameters[0]
+    first = (variance,) if name.startswith('additive') else variance
+    none = (0.0,) if name.startswith('additive') else 0.0
+    for height, lengths, inputs in (
+        (first, (1.0,), (0, 1)),
+        (none, (1.0,), (0,)),
+        (first, (), ()),
+    ):
         with pytest.raises(ValueError, match='length scales'):
-            KERNELS[name](variance, lengths, inputs)
+            KERNELS[name](height, lengths, inputs)
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_inputs_can_be_left_out_and_length_scales_changed(name):
+    """Without an input, the kernel is that of the others."""
+    kernel = _kernel(name, 6)
+    shorter = kernel.without(0)
+    assert shorter.inputs == kernel.inputs[1:]
+    assert shorter.lengthscales == kernel.lengthscales[1:]
+    assert kernel.with_lengthscales((1.0, 2.0)).lengthscales == (1.0, 2.0)
+    assert kernel.variance == pytest.approx(kernel.diagonal(1)[0])

@@ -81,13 +81,20 @@ class Outcome:
 
 
 def run_method(name: str, world: World, prior: CoefficientPrior | None = None) -> Outcome:
-    """Fit one method out of `METHOD_NAMES` to a world and score it on every region.
-
-    nMSE is against the noise-free truth; NLPD, coverage and PIT are against measured targets.
-    """
+    """Fit one method out of `METHOD_NAMES` to a world and score it on every region."""
     train = thinned(world.train, world.size)
     prior = prior or CoefficientPrior.flat(train.F.shape[2])
     fitted, inputs = _fit(name, world, train, prior)
+    return score(fitted, world, inputs)
+
+
+def score(
+    fitted: FittedMethod, world: World, inputs: tuple[tuple[int, ...] | None, ...]
+) -> Outcome:
+    """Score a fitted method on every region of a world.
+
+    nMSE is against the noise-free truth; NLPD, coverage and PIT are against measured targets.
+    """
     scores: dict[str, dict[str, dict[str, float]]] = {}
     transforms, means = {}, {}
     for region, test in world.tests.items():

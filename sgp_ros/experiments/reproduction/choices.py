@@ -1,0 +1,123 @@
+"""Which choices matter: one at a time changed from the defaults, on the same worlds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.core.kernels import AdditiveSquaredExponential, SquaredExponential
+from sgp_ros.core.learning import initial_model, learn, screened
+from sgp_ros.core.methods import FittedMethod
+from sgp_ros.core.model import Model
+from sgp_ros.core.posterior import Posterior
+from sgp_ros.core.prior import CoefficientPrior
+from sgp_ros.core.selection import select_inputs
+from sgp_ros.experiments.reproduction.protocol import Outcome, score, thinned
+
+if TYPE_CHECKING:
+    from sgp_ros.core.model import Observations
+    from sgp_ros.experiments.reproduction.protocol import World
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One way to set up SGP.
+
+    Attributes:
+        inputs: `chosen` by evidence, `all`, or `velocities` and command for the wheel.
+        is_additive: a sum of kernels of one input each instead of one of all.
+        rule: starting values, `standardised` (and screened) or `paper`.
+        prior_factor: standard deviation of W in units of sqrt(var y / mean square of its column);
+            infinite for the flat prior.
+        is_standardised: inputs divided by their standard deviation before the fit.
+        is_shared: one kernel and noise for all outputs, as the paper's formula reads.
+    """
+
+    inputs: str = 'chosen'
+    is_additive: bool = False
+    rule: str = 'standardised'
+    prior_factor: float = np.inf
+    is_standardised: bool = False
+    is_shared: bool = False
+
+
+DEFAULT = Choice()
+CHOICES: dict[str, Choice] = {
+    'default: inputs by evidence, flat prior': DEFAULT,
+    'inputs: all, one kernel (paper)': replace(DEFAULT, inputs='all'),
+    'inputs: all, additive': replace(DEFAULT, inputs='all', is_additive=True),
+    'inputs: by evidence, additive': replace(DEFAULT, is_additive=True),
+    'sigma_w: 1e4 times the scale of y': replace(DEFAULT, prior_factor=1e4),
+    'sigma_w: the scale of y': replace(DEFAULT, prior_factor=1.0),
+    'sigma_w: a hundredth of it': replace(DEFAULT, prior_factor=0.01),
+    'start: length scale = variance (paper)': replace(DEFAULT, rule='paper'),
+    'inputs divided by their deviation': replace(DEFAULT, is_standardised=True),
+    'one kernel and noise for all outputs': replace(DEFAULT, is_shared=True),
+}
+
+
+def run_choice(world: World, choice: Choice) -> Outcome:
+    """Fit SGP with one choice and score it on every region."""
+    train = thinned(world.train, world.size)
+    scale = train.U.std(axis=0) if choice.is_standardised else np.ones(train.U.shape[1])
+    scale = np.where(scale > 0.0, scale, 1.0)
+    power = np.sqrt(train.y.var(axis=0)) if choice.is_shared else np.ones(train.y.shape[1])
+    scaled = _scaled(train, scale, power)
+    prior = _prior(scaled, choice.prior_factor)
+    inputs = _inputs(world, scaled, prior, choice)
+    start = initial_model(scaled, inputs, choice.rule)
+    if choice.is_additive:
+        start = Model(tuple(_additive(k) for k in start.kernels), start.noise)
+    if choice.rule != 'paper':
+        start = screened(scaled, prior, start)
+    learned = learn(scaled, prior, start)
+    model = _shared(learned.model) if choice.is_shared else learned.model
+    fitted = FittedMethod(Posterior(model, scaled, prior), None, learned.log_evidence)
+    tests = {
+        region: replace(
+            test, data=_scaled(test.data, scale, power), truth=test.truth / power
+        )
+        for region, test in world.tests.items()
+    }  # fmt: skip
+    return score(fitted, replace(world, tests=tests), inputs)
+
+
+def _scaled(data: Observations, scale: np.ndarray, power: np.ndarray) -> Observations:
+    return replace(data, U=data.U / scale, F=data.F / power[:, None], y=data.y / power)
+
+
+def _prior(data: Observations, factor: float) -> CoefficientPrior:
+    squares = (data.F**2).mean(axis=(0, 1))
+    std = factor * np.sqrt(data.y.var() / np.where(squares > 0.0, squares, 1.0))
+    return CoefficientPrior.from_std(np.zeros(len(std)), std)
+
+
+def _inputs(
+    world: World, data: Observations, prior: CoefficientPrior, choice: Choice
+) -> tuple[tuple[int, ...] | None, ...]:
+    if choice.inputs == 'all':
+        return world.candidates
+    return tuple(
+        select_inputs(data, prior, j, columns).inputs for j, columns in enumerate(world.candidates)
+    )
+
+
+def _additive(kernel: object) -> AdditiveSquaredExponential | None:
+    if not isinstance(kernel, SquaredExponential):
+        return None
+    share = kernel.variance / len(kernel.inputs)
+    return AdditiveSquaredExponential(
+        (share,) * len(kernel.inputs), kernel.lengthscales, kernel.inputs
+    )
+
+
+def _shared(model: Model) -> Model:
+    """Return the geometric mean of the outputs' hyper-parameters for all of them."""
+    kernels = [k for k in model.kernels if k is not None]
+    if len(kernels) != len(model.kernels) or len({k.inputs for k in kernels}) > 1:
+        return model
+    theta = np.mean([k.log_parameters for k in kernels], axis=0)
+    noise = float(np.exp(np.mean(np.log(model.noise))))
+    return Model(tuple(k.with_log_parameters(theta) for k in kernels), (noise,) * len(model.noise))
