@@ -23,14 +23,15 @@ LAYERS = {
     'simulation': NUMERIC | {'errors'},
     'engine': {'numpy', 'core', 'robots', 'errors'},
     'recordings': {
-        'numpy', 'scipy', 'yaml', 'rosbags', 'mcap', 'zstandard', 'engine.samples', 'errors',
+        'numpy', 'scipy', 'yaml', 'rosbags', 'mcap', 'zstandard', 'engine.samples',
+        'engine.results', 'errors',
     },
     'report': {'numpy', 'matplotlib', 'jinja2', 'core', 'robots', 'engine', 'errors'},
     'ros': MESSAGES | {
         'numpy', 'yaml', 'engine', 'robots', 'simulation', 'diagnosis', 'recordings', 'errors',
     },
     'experiments': {
-        'numpy', 'yaml', 'core', 'robots', 'simulation', 'engine', 'recordings', 'report',
+        'numpy', 'matplotlib', 'yaml', 'core', 'robots', 'simulation', 'engine', 'recordings', 'report',
         'errors',
     },
     'cli': {

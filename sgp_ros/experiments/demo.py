@@ -15,8 +15,8 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.experiments.live_processes import LiveProcesses, graph_environment
-from sgp_ros.experiments.predictions import PREDICTION, VARIANCE, known
 from sgp_ros.experiments.replay import ReplayOptions, print_summary, run_events
+from sgp_ros.recordings.predictions import Point, PredictionTopics, outputs
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.report.files import write_text
 from sgp_ros.report.history import History
@@ -142,33 +142,31 @@ class Comparison:
 
 def compare(bag: Path, estimates: Sequence[Estimate]) -> Comparison:
     """Hold the predictions in a record against replayed estimates, bit for bit."""
-    made = [e for e in estimates if len(known(e.acceleration.mean)) or len(known(e.effort.mean))]
+    made = [found for found in map(outputs, estimates) if found is not None]
     comparison = Comparison(replayed=2 * len(made))
-    expected: dict[str, list[tuple[np.ndarray, ...]]] = {
-        PREDICTION: [
-            (e.position, e.velocity, known(e.acceleration.mean), known(e.effort.mean))
-            for e in made
-        ],
-        VARIANCE: [
-            (known(e.acceleration.variance), known(e.effort.variance)) for e in made
-        ],
-    }  # fmt: skip
+    topics = PredictionTopics()
     recording = open_recording(bag)
-    for topic, wanted in expected.items():
-        points = [(stamp, _numbers(m, topic)) for stamp, m in recording.messages(topic)]
-        comparison.live += len(points)
-        for i, (stamp_ns, arrays) in enumerate(points[: len(wanted)]):
-            for one, other in zip(arrays, wanted[i], strict=True):
-                _hold(comparison, one, other, f'at {topic} number {i}, stamp {stamp_ns}')
+    for topic, points in (
+        (topics.prediction, [found.prediction for found in made]),
+        (topics.prediction_variance, [found.variance for found in made]),
+    ):
+        messages = list(recording.messages(topic))
+        comparison.live += len(messages)
+        for i, ((stamp_ns, message), point) in enumerate(zip(messages, points, strict=False)):
+            where = f'at {topic} number {i}, stamp {stamp_ns}'
+            for one, other in zip(_live(message), _replayed(point), strict=True):
+                _hold(comparison, one, other, where)
     return comparison
 
 
-def _numbers(message: Any, topic: str) -> tuple[np.ndarray, ...]:
+def _live(message: Any) -> tuple[np.ndarray, ...]:
     point = message.points[0]
-    predicted = (np.asarray(point.accelerations), np.asarray(point.effort))
-    if topic == VARIANCE:
-        return predicted
-    return (np.asarray(point.positions), np.asarray(point.velocities), *predicted)
+    fields = (point.positions, point.velocities, point.accelerations, point.effort)
+    return tuple(np.asarray(values, dtype=np.float64) for values in fields)
+
+
+def _replayed(point: Point) -> tuple[np.ndarray, ...]:
+    return (point.positions, point.velocities, point.accelerations, point.effort)
 
 
 def _hold(comparison: Comparison, one: np.ndarray, other: np.ndarray, where: str) -> None:

@@ -18,7 +18,7 @@ from sgp_ros.engine.replay import replay
 from sgp_ros.engine.samples import CommandSample, JointSample, SettingsChange
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.experiments.parameter_file import find_shipped, load_parameters
-from sgp_ros.experiments.predictions import write_predictions
+from sgp_ros.recordings.predictions import PredictionTopics, outputs, write_outputs
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.writer import RecordingWriter
 from sgp_ros.report.files import write_text
@@ -90,7 +90,10 @@ def run_replay(
 
         def keep(step: Step) -> None:
             history.take(engine, step)
-            write_predictions(writer, step.estimates)
+            for estimate in step.estimates:
+                found = outputs(estimate)
+                if found is not None:
+                    write_outputs(writer, PredictionTopics(), found)
 
         run_events(engine, recording, options, keep, timing, progress)
         _check_use(engine, recording, options)

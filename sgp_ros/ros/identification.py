@@ -32,8 +32,9 @@ from sgp_ros.recordings.messages import (
     TRAJECTORY,
     joint_sample,
 )
+from sgp_ros.recordings.predictions import PredictionTopics
 from sgp_ros.ros.node_settings import NO_COMMAND
-from sgp_ros.ros.outputs import parameter_statuses
+from sgp_ros.ros.parameter_status import parameter_statuses
 from sgp_ros.ros.parameters import from_ros, to_ros
 from sgp_ros.ros.publications import diagnostics, joint_state, trajectory
 from sgp_ros.ros.record import Record, Topics
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from sgp_ros.engine.samples import Event
-    from sgp_ros.ros.outputs import Outputs
+    from sgp_ros.recordings.predictions import Outputs
 
 COMMAND_MESSAGES: dict[str, type] = {
     FLOAT64_ARRAY: Float64MultiArray,
@@ -104,7 +105,8 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
         if not path:
             return None
         outputs = (self._prediction, self._variance, self._overlay)
-        topics = Topics(self._joint_states, self._command, *(o.topic_name for o in outputs))
+        predictions = PredictionTopics(*(o.topic_name for o in outputs))
+        topics = Topics(self._joint_states, self._command, predictions)
         return Record(Path(path), topics, str(self._settings['command.type']))
 
     def _subscribe(self) -> None:

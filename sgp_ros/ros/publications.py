@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from sgp_ros.engine.samples import JointSample
+    from sgp_ros.recordings.predictions import Point
     from sgp_ros.recordings.writer import Status
-    from sgp_ros.ros.outputs import Point
 
 
 def header(stamp_ns: int) -> Header:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from sgp_ros.engine.config import describe_settings
 from sgp_ros.engine.samples import Reset, SettingsChange
 from sgp_ros.recordings.messages import FLOAT64_ARRAY
+from sgp_ros.recordings.predictions import write_outputs
 from sgp_ros.recordings.writer import RecordingWriter
 from sgp_ros.ros.node_settings import NO_COMMAND
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     from sgp_ros.engine.engine import Engine
     from sgp_ros.engine.samples import Event, SettingValue
-    from sgp_ros.ros.outputs import Outputs, Point
+    from sgp_ros.recordings.predictions import Outputs, PredictionTopics
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,9 +29,7 @@ class Topics:
 
     joint_states: str
     command: str
-    prediction: str
-    prediction_variance: str
-    predicted_joint_states: str
+    predictions: PredictionTopics
 
 
 class Record:
@@ -70,9 +69,7 @@ class Record:
 
     def write_outputs(self, outputs: Outputs) -> None:
         """Write what was published of one estimate."""
-        self._write_point(self._topics.prediction, outputs, outputs.prediction)
-        self._write_point(self._topics.prediction_variance, outputs, outputs.variance)
-        self._writer.write_joint_state(self._topics.predicted_joint_states, outputs.joint_state)
+        write_outputs(self._writer, self._topics.predictions, outputs)
 
     def flush(self) -> None:
         """Make everything written so far readable even if the process dies now."""
@@ -81,17 +78,6 @@ class Record:
     def close(self) -> None:
         """Complete the file."""
         self._writer.close()
-
-    def _write_point(self, topic: str, outputs: Outputs, point: Point) -> None:
-        self._writer.write_trajectory_point(
-            topic,
-            outputs.stamp_ns,
-            outputs.names,
-            point.positions,
-            point.velocities,
-            point.accelerations,
-            point.effort,
-        )
 
 
 def _changeable(engine: Engine) -> dict[str, SettingValue]:

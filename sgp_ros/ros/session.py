@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from sgp_ros.engine.fitting import FitResult
 from sgp_ros.engine.samples import JointSample
+from sgp_ros.recordings.predictions import Outputs, outputs
 from sgp_ros.ros.fit_process import FitProcess, WorkerLost
 from sgp_ros.ros.health import Health
-from sgp_ros.ros.outputs import Outputs, outputs
 from sgp_ros.ros.record import Record
 from sgp_ros.ros.storage import save_model
 

@@ -10,9 +10,9 @@ from threadpoolctl import threadpool_limits
 from sgp_ros.engine.config import EngineConfig, describe_settings
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
+from sgp_ros.recordings.predictions import outputs
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
-from sgp_ros.ros.outputs import outputs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -12,9 +12,10 @@ from trajectory_msgs.msg import JointTrajectory
 
 from sgp_ros.engine.results import Channel, Estimate, ParameterEstimate
 from sgp_ros.recordings.messages import CONVERTERS, joint_sample
+from sgp_ros.recordings.predictions import outputs
 from sgp_ros.recordings.writer import Status
 from sgp_ros.ros.identification import COMMAND_MESSAGES
-from sgp_ros.ros.outputs import outputs, parameter_status
+from sgp_ros.ros.parameter_status import parameter_status
 from sgp_ros.ros.publications import diagnostics, joint_state, trajectory
 
 if TYPE_CHECKING:

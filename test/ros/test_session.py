@@ -17,6 +17,7 @@ from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitResult, fit
 from sgp_ros.engine.samples import CommandSample, JointSample, SettingsChange
 from sgp_ros.errors import ConfigError
+from sgp_ros.recordings.predictions import PredictionTopics
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.ros.fit_process import FitProcess, WorkerLost
@@ -36,7 +37,9 @@ SETTINGS = {
     'filter.hop': 0.0, 'learning.initial': 20, 'reorder_window': 0.0, 'refit.enabled': False,
     'buffer.budget': 40,
 }  # fmt: skip
-TOPICS = Topics('/joint_states', '/command', '/n/prediction', '/n/variance', '/n/predicted')
+TOPICS = Topics(
+    '/joint_states', '/command', PredictionTopics('/n/prediction', '/n/variance', '/n/predicted')
+)
 
 
 def _engine() -> Engine:

@@ -1,6 +1,6 @@
-"""What the node publishes of one estimate, before it is a message of any library.
+"""What is published and recorded of one estimate, before it is a message of any library.
 
-The same values go to the topics and into the record, so the two cannot differ.
+The same values go to the topics, into a record and into the result of a replay.
 """
 
 from __future__ import annotations
@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sgp_ros.engine.samples import JointSample
-from sgp_ros.recordings.writer import Status
 
 if TYPE_CHECKING:
-    from sgp_ros.engine.engine import Engine
-    from sgp_ros.engine.results import Estimate, ParameterEstimate
+    from sgp_ros.engine.results import Estimate
+    from sgp_ros.recordings.writer import RecordingWriter
 
 _NONE = np.zeros(0)
 
@@ -69,21 +68,28 @@ def outputs(estimate: Estimate) -> Outputs | None:
     )
 
 
-def parameter_statuses(engine: Engine) -> list[Status]:
-    """Return one status per identified coefficient, its numbers plain enough to be plotted."""
-    return [parameter_status(p, engine.robot.name) for p in engine.parameters()]
+@dataclass(frozen=True, slots=True)
+class PredictionTopics:
+    """Names of the topics that predictions are written to."""
+
+    prediction: str = '/sgp_node/prediction'
+    prediction_variance: str = '/sgp_node/prediction_variance'
+    predicted_joint_states: str = '/sgp_node/predicted_joint_states'
 
 
-def parameter_status(parameter: ParameterEstimate, robot: str) -> Status:
-    """Return the status of one coefficient of `robot`; no `std` where it is not identifiable."""
-    values = {'value': repr(parameter.value)}
-    if parameter.std is None:
-        message = 'not determined by the motion so far'
-    else:
-        values['std'] = repr(parameter.std)
-        message = f'{parameter.value:.6g} +- {1.96 * parameter.std:.2g} {parameter.unit} (95 %)'
-    values['unit'] = parameter.unit
-    values['identifiable'] = str(int(parameter.is_identifiable))
-    if parameter.joint is not None:
-        values['joint'] = parameter.joint
-    return Status(parameter.name, 0, message, robot, values)
+def write_outputs(writer: RecordingWriter, topics: PredictionTopics, found: Outputs) -> None:
+    """Write what is published of one estimate into a recording."""
+    for topic, point in (
+        (topics.prediction, found.prediction),
+        (topics.prediction_variance, found.variance),
+    ):
+        writer.write_trajectory_point(
+            topic,
+            found.stamp_ns,
+            found.names,
+            point.positions,
+            point.velocities,
+            point.accelerations,
+            point.effort,
+        )
+    writer.write_joint_state(topics.predicted_joint_states, found.joint_state)
