@@ -31,8 +31,8 @@ LAYERS = {
         'numpy', 'yaml', 'engine', 'robots', 'simulation', 'diagnosis', 'recordings', 'errors',
     },
     'experiments': {
-        'numpy', 'matplotlib', 'yaml', 'core', 'robots', 'simulation', 'engine', 'recordings', 'report',
-        'errors',
+        'numpy', 'matplotlib', 'yaml', 'core', 'robots', 'simulation', 'engine', 'recordings',
+        'report', 'errors',
     },
     'cli': {
         'core', 'robots', 'simulation', 'engine', 'recordings', 'report', 'experiments', 'errors',

@@ -14,8 +14,8 @@ import yaml
 
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
-from sgp_ros.engine.replay import replay
-from sgp_ros.engine.samples import CommandSample, JointSample, SettingsChange
+from sgp_ros.engine.replay import is_record, replay
+from sgp_ros.engine.samples import CommandSample, JointSample
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.experiments.parameter_file import find_shipped, load_parameters
 from sgp_ros.recordings.predictions import PredictionTopics, outputs, write_outputs
@@ -118,10 +118,7 @@ def run_events(
     progress: Callable[[float], None],
 ) -> None:
     """Push every event of a recording, timing each push; obey the changes of a live record."""
-    obey = any(
-        isinstance(event, SettingsChange)
-        for event in recording.events(options.joint_states, options.command)
-    )
+    obey = is_record(recording.events(options.joint_states, options.command))
     total = sum(topic.count or 0 for topic in recording.topics)
     stamps: list[int] = []
     began = time.perf_counter()

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sgp_ros.experiments.reproduction import reaction_wheel, toy
+from sgp_ros.experiments.reproduction.choices import CHOICES, run_choice
 from sgp_ros.experiments.reproduction.protocol import Outcome, World, run_method
 
 if TYPE_CHECKING:
@@ -69,9 +70,16 @@ EXPERIMENTS: dict[str, Experiment] = {
 }  # fmt: skip
 
 
+CHOICE_SEEDS, QUICK_CHOICE_SEEDS = 5, 1
+COMPARED = ('toy', 'reaction_wheel')
+"""Experiments on which the choices are compared."""
+
+
 def run_seed(name: str, seed: int, method: str) -> Outcome:
-    """Run one method on one seed of an experiment; a function that another process can call."""
+    """Run one method or choice on one seed; a function that another process can call."""
     experiment = EXPERIMENTS[name]
     world = experiment.make(seed)
+    if method in CHOICES:
+        return run_choice(world, CHOICES[method])
     prior = None if experiment.prior is None else experiment.prior(world)
     return run_method(method, world, prior)
