@@ -55,6 +55,7 @@ setup(
             'hypothesis>=6.100',
             'scikit-learn>=1.4',
             'mpmath>=1.3',
+            'threadpoolctl>=3',
             # colcon-core 0.21 refuses setuptools 80 and later.
             'colcon-core==0.21.0',
             'colcon-ros==0.5.0',

@@ -97,6 +97,7 @@ class Engine:
         """
         config = self.config.changed(settings, self.robot)
         self._apply(config)
+        self.order.seal()
         values = config.to_mapping()
         return SettingsChange(self._now_ns, {name: values[name] for name in settings})
 

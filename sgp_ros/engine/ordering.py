@@ -7,6 +7,7 @@ import heapq
 from sgp_ros.engine.samples import CommandSample, Event, JointSample
 
 _RANKS = {CommandSample: 0, JointSample: 1}
+_LAST_RANK = 2
 
 
 class ReorderBuffer:
@@ -19,19 +20,27 @@ class ReorderBuffer:
     Attributes:
         window_ns: an event leaves when the newest stamp is this far ahead [ns].
         released_ns: stamp of the last event that left; None before the first.
+        released_rank: its place among events of equal stamp.
         newest_ns: newest stamp so far; None before the first.
     """
 
     def __init__(self, window_ns: int) -> None:
         self.window_ns = window_ns
         self.released_ns: int | None = None
+        self.released_rank = 0
         self._heap: list[tuple[int, int, int, Event]] = []
         self._arrivals = 0
         self.newest_ns: int | None = None
 
     def is_late(self, event: Event) -> bool:
-        """Whether something newer than `event` has already left."""
-        return self.released_ns is not None and event.stamp_ns < self.released_ns
+        """Whether something that belongs after `event` has already left."""
+        if self.released_ns is None:
+            return False
+        return (event.stamp_ns, _rank(event)) < (self.released_ns, self.released_rank)
+
+    def seal(self) -> None:
+        """Let nothing more of the last stamp in: a change was made after it."""
+        self.released_rank = _LAST_RANK
 
     def push(self, event: Event) -> list[Event]:
         """Take an event that is not late and return those that leave, in order. O(log n)."""
@@ -49,21 +58,36 @@ class ReorderBuffer:
         """The events that are held, in the order of their arrival."""
         return [entry[3] for entry in sorted(self._heap, key=lambda entry: entry[2])]
 
-    def resume(self, released_ns: int | None, newest_ns: int | None, pending: list[Event]) -> None:
-        """Continue where another buffer stood; `pending` in the order of arrival."""
-        self.released_ns, self.newest_ns = released_ns, newest_ns
+    def resume(
+        self,
+        released: tuple[int, int] | None,
+        newest_ns: int | None,
+        pending: list[Event],
+    ) -> None:
+        """Continue where another buffer stood.
+
+        Args:
+            released: stamp [ns] and rank of the last event that left.
+            newest_ns: newest stamp so far [ns].
+            pending: the held events in the order of arrival.
+        """
+        if released is not None:
+            self.released_ns, self.released_rank = released
+        self.newest_ns = newest_ns
         for event in pending:
             self._hold(event)
 
     def _hold(self, event: Event) -> None:
         self._arrivals += 1
-        rank = _RANKS.get(type(event), 2)
-        heapq.heappush(self._heap, (event.stamp_ns, rank, self._arrivals, event))
+        heapq.heappush(self._heap, (event.stamp_ns, _rank(event), self._arrivals, event))
 
     def _release(self, until_ns: int) -> list[Event]:
         released = []
         while self._heap and self._heap[0][0] <= until_ns:
-            event = heapq.heappop(self._heap)[3]
-            self.released_ns = event.stamp_ns
+            self.released_ns, self.released_rank, _, event = heapq.heappop(self._heap)
             released.append(event)
         return released
+
+
+def _rank(event: Event) -> int:
+    return _RANKS.get(type(event), _LAST_RANK)

@@ -50,7 +50,9 @@ def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
         'fits': engine.fits,
         'next_fit': engine.next_fit,
         'delay_s': engine.delay_s,
-        'released_ns': order.released_ns,
+        'released': None
+        if order.released_ns is None
+        else [order.released_ns, order.released_rank],
         'newest_ns': order.newest_ns,
         'pending': [_encode(event) for event in order.pending],
         'commands': [
@@ -110,8 +112,11 @@ def fill_from_snapshot(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> No
     intake.windows.states = [_decode_state(state) for state in text['states']]
     intake.windows.next_ns = text['next_ns']
     intake.last_state_ns = text['last_state_ns']
+    released = text['released']
     engine.order.resume(
-        text['released_ns'], text['newest_ns'], [_decode(event) for event in text['pending']]
+        None if released is None else (released[0], released[1]),
+        text['newest_ns'],
+        [_decode(event) for event in text['pending']],
     )
     estimator = engine.estimator
     estimator.scores = {

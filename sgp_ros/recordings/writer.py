@@ -8,9 +8,11 @@ survives a crash.
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 from mcap.writer import Writer
 
 from sgp_ros.engine.samples import CommandSample, JointSample
@@ -85,6 +87,7 @@ class RecordingWriter:
         self._file = self._growing.open('wb')
         self._writer = Writer(self._file)
         self._writer.start(profile='ros2', library='sgp_ros')
+        _prepare(command_type)
 
     def write_event(self, event: Event) -> None:
         """Write one event with its stamp as log time.
@@ -141,8 +144,10 @@ class RecordingWriter:
         """Complete the file; a second call does nothing."""
         if self._file.closed:
             return
-        self._writer.finish()  # type: ignore[no-untyped-call] # mcap leaves it without types
-        self._file.close()
+        try:
+            self._writer.finish()  # type: ignore[no-untyped-call] # mcap leaves it without types
+        finally:
+            self._file.close()
         if self._growing != self.path:
             self._growing.replace(self.path)
 
@@ -174,3 +179,23 @@ class RecordingWriter:
         channel = self._writer.register_channel(topic, 'cdr', self._schemas[kind])
         self._channels[topic, kind] = channel
         return channel
+
+
+@cache
+def _prepare(command_type: str) -> None:
+    """Serialise one message of each kind: the first of a kind costs a tenth of a second.
+
+    A node that did so while it runs would stamp the commands that wait meanwhile too late.
+    """
+    names = ('joint',) if command_type in {JOINT_STATE, TRAJECTORY} else None
+    command = CommandSample(0, np.zeros(1), names)
+    state = JointSample(0, ('joint',), np.zeros(1))
+    for kind, message in (
+        (JOINT_STATE, joint_state_message(state)),
+        (command_type, command_message(command_type, command)),
+        (TRAJECTORY, trajectory_message(0, ('joint',), TrajectoryPoint())),
+        (TEXT, text_message('')),
+        (DIAGNOSTICS, diagnostics_message(0, ())),
+    ):
+        serialize(kind, message)
+        definition(kind)

@@ -445,3 +445,35 @@ def test_another_recording_continues_what_was_learned():
     assert engine.counts.read == 200
     assert engine.scores()['hinge']['acceleration'].n == engine.counts.scored
     assert engine.parameters() == parameters
+
+
+def test_a_command_that_comes_after_the_state_of_its_stamp_left_is_late():
+    """Accepting it would pair differently live than in a replay, which sorts it first."""
+    events = pendulum_events(100)
+    state = events[81]
+    assert isinstance(state, JointSample)
+    command = events.pop(80)
+    later = next(i for i, e in enumerate(events) if e.stamp_ns > state.stamp_ns + 110_000_000)
+    events.insert(later + 1, command)
+    engine = Engine(PENDULUM, config(refit__enabled=False))
+    record, estimates = [], []
+    for event in events:
+        step = engine.push(event)
+        record.extend(step.released)
+        estimates.extend(step.estimates)
+    assert engine.counts.commands_refused['late'] == 1
+    again = Engine(PENDULUM, config(refit__enabled=False))
+    repeated = [e for event in record for e in again.push(event).estimates]
+    repeated += again.flush().estimates
+    _same(estimates, repeated[: len(estimates)])
+
+
+def test_nothing_of_a_stamp_enters_after_a_change_at_it():
+    """A replay applies the change after every event of that stamp."""
+    events = pendulum_events(100)
+    engine = Engine(PENDULUM, config(reorder_window=0.0))
+    for event in events[:100]:
+        engine.push(event)
+    engine.change({'learning.enabled': False})
+    engine.push(CommandSample(events[99].stamp_ns, frozen_array([1.0])))
+    assert engine.counts.commands_refused['late'] == 1
