@@ -4,8 +4,16 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+OLDEST := .venv-oldest
+NUMERIC := test/core test/contracts test/robots test/engine test/simulation
 
-.PHONY: demo test lint format coverage bench docs venv clean
+# rclpy of .venv and a ROS that was sourced before do not mix: forget the other one.
+ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
+unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
+endif
+
+.PHONY: demo test lint format coverage oldest bench reproduce docs venv clean
 
 demo: venv
 	$(BIN)/sgp demo
@@ -22,37 +30,58 @@ format: $(VENV)/.lint
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
+# Layers whose branches the tests must enter; the pattern keeps those that exist.
+MEASURED := $(patsubst sgp_ros/%/__init__.py,--cov=sgp_ros.%,\
+    $(wildcard $(patsubst %,sgp_ros/%/__init__.py,core engine diagnosis)))
 coverage: $(VENV)/.test
-	$(BIN)/python -m pytest test/core test/engine test/contracts test/robots \
-	    --cov=sgp_ros.core --cov=sgp_ros.engine --cov-branch --cov-fail-under=95
+	$(BIN)/python -m pytest $(NUMERIC) $(wildcard test/diagnosis) \
+	    $(MEASURED) --cov-branch --cov-fail-under=95 --cov-report=term:skip-covered
+
+oldest: $(OLDEST)/.made
+	$(OLDEST)/bin/python -c 'import numpy, scipy; print("numpy", numpy.__version__, "scipy", scipy.__version__)'
+	$(OLDEST)/bin/python -m pytest -q $(NUMERIC)
 
 bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.filter
+
+reproduce: venv
+	$(BIN)/sgp reproduce
 
 docs: $(VENV)/.test
 	$(BIN)/python -m pytest test/test_documents.py
 
 venv: $(VENV)/.package
 
-$(BIN)/python:
+# Each stamp says that the step before it ended well.
+$(VENV)/.made:
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 13))' || \
-	    { echo "found `$(PYTHON) --version`, expected Python 3.10 to 3.13; call make PYTHON=python3.11" >&2; exit 2; }
+	    { echo "found `$(PYTHON) --version 2>&1`, expected Python 3.10 to 3.13; call make PYTHON=python3.11" >&2; exit 2; }
 	@$(PYTHON) -c 'import venv, ensurepip' || \
 	    { echo "this Python has no venv module; on Debian: apt install python3-venv" >&2; exit 2; }
-	$(PYTHON) -m venv $(VENV)
+	$(PYTHON) -m venv --clear $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=23' 'setuptools>=68,<80'
+	@touch $@
 
-$(VENV)/.package: setup.py | $(BIN)/python
+$(VENV)/.package: setup.py | $(VENV)/.made
 	$(BIN)/python -m pip install --quiet --editable '.[wheels]'
 	@touch $@
 
-$(VENV)/.test: setup.py | $(BIN)/python
+$(VENV)/.test: setup.py | $(VENV)/.made
 	$(BIN)/python -m pip install --quiet --editable '.[wheels,test]'
 	@touch $(VENV)/.package $@
 
-$(VENV)/.lint: setup.py | $(BIN)/python
+$(VENV)/.lint: setup.py | $(VENV)/.made
 	$(BIN)/python -m pip install --quiet --editable '.[wheels,test,lint]'
 	@touch $(VENV)/.package $(VENV)/.test $@
 
+# The numeric layers alone, on what Ubuntu 24.04 ships; without ROS.
+$(OLDEST)/.made:
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 12))' || \
+	    { echo "found `$(PYTHON) --version 2>&1`, expected Python 3.10 to 3.12: NumPy 1.26 has no wheel for it" >&2; exit 2; }
+	$(PYTHON) -m venv --clear $(OLDEST)
+	$(OLDEST)/bin/python -m pip install --quiet 'numpy==1.26.4' 'scipy==1.11.4' 'numba>=0.59' \
+	    pyyaml jinja2 matplotlib mcap rosbags pytest hypothesis scikit-learn mpmath
+	@touch $@
+
 clean:
-	rm -rf $(VENV) .venv-oldest build install log out *.egg-info
+	rm -rf $(VENV) $(OLDEST) build install log out *.egg-info

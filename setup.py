@@ -1,5 +1,6 @@
 """Install `sgp_ros` with pip or colcon (ament_python)."""
 
+import os
 from glob import glob
 from pathlib import Path
 
@@ -7,14 +8,16 @@ from setuptools import find_packages, setup
 
 NAME = 'sgp_ros'
 VERSION = '0.1.0'
+# `colcon build --symlink-install` runs a link to this file in a folder that lacks the rest.
+SOURCES = Path(__file__).resolve().parent
 
 
 def shared_files():
     """Return the files under `share/sgp_ros`, folder by folder."""
     folders = {'': ['package.xml']}
-    for pattern in ('launch/*.py', 'config/**/*.yaml', 'config/**/*.xml', 'bags/*'):
-        for name in sorted(glob(pattern, recursive=True)):
-            folders.setdefault(str(Path(name).parent), []).append(name)
+    for pattern in ('launch/*.py', 'config/**/*', 'bags/**/*'):
+        for name in sorted(filter(os.path.isfile, glob(pattern, recursive=True))):
+            folders.setdefault(os.path.dirname(name), []).append(name)
     return [(f'share/{NAME}/{folder}'.rstrip('/'), names) for folder, names in folders.items()]
 
 
@@ -22,9 +25,10 @@ setup(
     name=NAME,
     version=VERSION,
     description='Online robot identification with semi-parametric Gaussian processes',
-    long_description=Path('README.md').read_text(encoding='utf-8'),
+    long_description=(SOURCES / 'README.md').read_text(encoding='utf-8'),
     long_description_content_type='text/markdown',
     license='Apache-2.0',
+    license_files=['LICENSE'],
     maintainer='The sgp_ros maintainers',
     maintainer_email='maintainers@sgp-ros.example',
     python_requires='>=3.10',
@@ -44,7 +48,6 @@ setup(
         'mcap>=1.6',
         'rosbags>=0.11',
         'zstandard>=0.22',
-        'typing_extensions>=4.10',
     ],
     extras_require={
         # rclpy from PyPI for machines without ROS; apt users have it already.

@@ -235,7 +235,7 @@ def test_results_replace_older_ones_and_leave_no_parts(wheel, tmp_path):
 
 def test_help_shows_an_example(capsys):
     """Every command has one."""
-    for command in ('demo', 'simulate', 'replay', 'import'):
+    for command in ('demo', 'simulate', 'replay', 'import', 'reproduce'):
         with pytest.raises(SystemExit) as caught:
             main([command, '--help'])
         assert caught.value.code == 0
@@ -264,3 +264,14 @@ def test_split_directories_replay_like_one_file(wheel, tmp_path):
         assert main(arguments) == 0
     first, second = (json.loads((out / 'metrics.json').read_text()) for out in (one, other))
     assert first['parameters'] == second['parameters']
+
+
+def test_the_recording_in_the_repository_is_identified(tmp_path):
+    """The command of bags/README.md: all ten coefficients within five standard deviations."""
+    bag, truth = ROOT / 'bags/reaction_wheel.mcap', ROOT / 'bags/reaction_wheel_truth.json'
+    assert main([str(a) for a in _replay(bag, tmp_path, '--truth', truth)]) == 0
+    metrics = json.loads((tmp_path / 'out' / 'metrics.json').read_text())
+    true = json.loads(truth.read_text())['coefficients']
+    for parameter in metrics['parameters']:
+        error = abs(parameter['value'] - true[parameter['name']]['value'])
+        assert error < 5 * parameter['std'], parameter

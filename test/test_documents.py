@@ -30,7 +30,7 @@ def test_commands_in_documents_exist(path):
     targets = set(re.findall(r'^(\w+):', makefile, re.MULTILINE))
     for block in re.findall(r'```(?:bash|console)\n(.*?)```', text, re.DOTALL):
         for name in re.findall(r'^\s*(?:\$ )?(?:\S*/)?sgp (\w+)', block, re.MULTILINE):
-            assert name in {'demo', 'simulate', 'replay', 'import'}, name
+            assert name in {'demo', 'simulate', 'replay', 'import', 'reproduce'}, name
         for name in re.findall(r'^\s*(?:\$ )?make (\w+)', block, re.MULTILINE):
             assert name in targets, name
 
@@ -63,3 +63,12 @@ def test_numbers_in_the_emps_page_are_the_measured_ones():
         assert (
             f'{errors["inverse_nmse_physics"]:.5f} | {errors["inverse_nmse_with_z"]:.5f}' in text
         )
+
+
+def test_the_page_of_the_reproduction_is_that_of_the_results():
+    """Mend with `python docs/generate_reproduction.py`."""
+    path = ROOT / 'docs' / 'generate_reproduction.py'
+    spec = importlib.util.spec_from_file_location('generate_reproduction', path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.TARGET.read_text(encoding='utf-8') == module.text()

@@ -44,8 +44,8 @@ def test_shipped_files_are_found_from_the_source_tree():
     assert find_shipped('nothing.yaml') is None
 
 
-@pytest.fixture(scope='module')
-def workspace(tmp_path_factory):
+@pytest.fixture(scope='module', params=[(), ('--symlink-install',)], ids=['copied', 'linked'])
+def workspace(request, tmp_path_factory):
     """A colcon workspace that holds a copy of the sources, built."""
     folder = tmp_path_factory.mktemp('workspace')
     source = folder / 'src' / 'sgp_ros'
@@ -56,7 +56,7 @@ def workspace(tmp_path_factory):
     colcon = shutil.which('colcon', path=f'{Path(sys.executable).parent}:{os.environ["PATH"]}')
     assert colcon, 'colcon comes with the test extra'
     done = subprocess.run(
-        [colcon, 'build', '--event-handlers', 'console_direct+'],
+        [colcon, 'build', '--event-handlers', 'console_direct+', *request.param],
         cwd=folder, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
@@ -69,30 +69,32 @@ def test_colcon_build_installs_what_a_workspace_needs(workspace):
     share = prefix / 'share' / 'sgp_ros'
     assert (prefix / 'share/ament_index/resource_index/packages/sgp_ros').is_file()
     assert (share / 'package.xml').is_file()
-    for folder in ('launch', 'config'):
+    for folder in ('launch', 'config', 'bags'):
         for path in (ROOT / folder).rglob('*'):
-            if path.suffix in {'.py', '.yaml', '.xml'}:
+            if path.is_file() and '__pycache__' not in path.parts:
                 assert (share / path.relative_to(ROOT)).is_file(), path
     for name in ('sgp', 'sgp_node', 'reaction_wheel'):
         assert (prefix / 'lib' / 'sgp_ros' / name).is_file()
 
 
+def run_in(workspace, *command):
+    """Run a command as a user does who has sourced the workspace."""
+    done = subprocess.run(
+        ['sh', '-c', '. install/setup.sh && exec "$@"', 'sh', *command],
+        cwd=workspace, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
 def test_an_executable_built_by_colcon_runs(workspace):
     """The installed `sgp` imports the installed package and finds the installed configuration."""
-    prefix = workspace / 'install' / 'sgp_ros'
-    site = next((prefix / 'lib').glob('python3*/site-packages'))
-    environment = dict(os.environ, PYTHONPATH=str(site))
-    command = [prefix / 'lib' / 'sgp_ros' / 'sgp', 'simulate', 'reaction_wheel', '--duration', '1']
-    done = subprocess.run(
-        command, cwd=workspace, env=environment, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
+    command = workspace / 'install' / 'sgp_ros' / 'lib' / 'sgp_ros' / 'sgp'
+    assert 'usage: sgp' in run_in(workspace, command, '--help')
+    run_in(workspace, command, 'simulate', 'reaction_wheel', '--duration', '1')
     assert (workspace / 'out' / 'simulate' / 'reaction_wheel.mcap').is_file()
     text = (
         'import sgp_ros.experiments.parameter_file as p; print(p.find_shipped("linear_axis.yaml"))'
     )
-    done = subprocess.run(
-        [sys.executable, '-c', text], cwd=workspace, env=environment, capture_output=True,
-        text=True, check=False,
-    )  # fmt: skip
-    assert Path(done.stdout.strip()).is_relative_to(prefix), done.stdout + done.stderr
+    found = run_in(workspace, sys.executable, '-c', text).strip()
+    assert Path(found).is_relative_to(workspace)

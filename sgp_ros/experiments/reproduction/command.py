@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from sgp_ros.errors import ConfigError
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from sgp_ros.experiments.reproduction.catalogue import Experiment
     from sgp_ros.experiments.reproduction.protocol import Outcome
 
 GROUPS = ('toy', 'reaction-wheel', 'arm', 'choices')
@@ -55,55 +57,102 @@ def run_reproduction(
     Raises:
         ConfigError: no such group, or less than one seed.
     """
-    chosen = [e for e in EXPERIMENTS.values() if group in ('all', e.group)]
+    plan = _plan(group, seeds, is_quick=is_quick)
+    began = time.perf_counter()
+    found = _run_all(plan.jobs(), progress)
+    outcomes = {
+        e.name: _of_seeds(found, e.name, METHOD_NAMES, plan.seeds[e.name]) for e in plan.chosen
+    }
+    choices = {
+        name: summary.summarise(_of_seeds(found, name, tuple(CHOICES), plan.choice_seeds))
+        for name in COMPARED
+        if plan.choice_seeds
+    }
+    results = {
+        'schema': SCHEMA,
+        'seeds': max([*plan.seeds.values(), plan.choice_seeds]),
+        'experiments': {name: summary.summarise(runs) for name, runs in outcomes.items()},
+        'seeds_of': plan.seeds,
+        'bad_seeds': {name: summary.bad_seeds(runs) for name, runs in outcomes.items()},
+        'coefficient_errors': {
+            name: summary.coefficient_errors(runs) for name, runs in outcomes.items()
+        },
+        'chosen_inputs': {name: summary.chosen_inputs(runs) for name, runs in outcomes.items()},
+        'pit': {name: summary.calibration(runs) for name, runs in outcomes.items()},
+        'choices': choices,
+        'choices_seeds': plan.choice_seeds,
+        'versions': versions(),
+        'seconds': round(time.perf_counter() - began, 1),
+    }
+    _write(plan, outcomes, results, out)
+    return results
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """What is run.
+
+    Attributes:
+        chosen: experiments.
+        seeds: worlds per experiment.
+        choice_seeds: worlds on which the choices are compared; 0 for none.
+    """
+
+    chosen: tuple[Experiment, ...]
+    seeds: dict[str, int]
+    choice_seeds: int
+
+    def jobs(self) -> list[tuple[str, int, str]]:
+        """Return experiment, seed and method of every run."""
+        return [
+            (e.name, seed, method)
+            for e in self.chosen
+            for seed in range(self.seeds[e.name])
+            for method in METHOD_NAMES
+        ] + [
+            (name, seed, choice)
+            for name in COMPARED
+            for seed in range(self.choice_seeds)
+            for choice in CHOICES
+        ]
+
+
+def _plan(group: str, seeds: int | None, *, is_quick: bool) -> _Plan:
+    chosen = tuple(e for e in EXPERIMENTS.values() if group in ('all', e.group))
     with_choices = group in ('all', 'choices')
     if not chosen and not with_choices:
         raise ConfigError(f'experiment {group!r}', f'one of {[*GROUPS, "all"]}')
     if seeds is not None and seeds < 1:
         raise ConfigError(f'{seeds} seeds', 'at least one')
-    numbers = {e.name: seeds or (e.quick_seeds if is_quick else e.seeds) for e in chosen}
-    began = time.perf_counter()
-    jobs = [
-        (e.name, seed, method)
-        for e in chosen
-        for seed in range(numbers[e.name])
-        for method in METHOD_NAMES
-    ]
-    compared = min(seeds or CHOICE_SEEDS, QUICK_CHOICE_SEEDS if is_quick else CHOICE_SEEDS)
-    if with_choices:
-        jobs += [(n, seed, c) for n in COMPARED for seed in range(compared) for c in CHOICES]
-    found = _run_all(jobs, progress)
-    outcomes = {e.name: _of_seeds(found, e.name, METHOD_NAMES, numbers[e.name]) for e in chosen}
-    choices = {
-        name: summary.summarise(_of_seeds(found, name, tuple(CHOICES), compared))
-        for name in COMPARED
-        if with_choices
-    }
-    results: dict[str, Any] = {
-        'schema': SCHEMA,
-        'seeds': max([*numbers.values(), compared]),
-        'experiments': {e.name: summary.summarise(outcomes[e.name]) for e in chosen},
-        'seeds_of': numbers,
-        'bad_seeds': {e.name: summary.bad_seeds(outcomes[e.name]) for e in chosen},
-        'coefficient_errors': {
-            e.name: summary.coefficient_errors(outcomes[e.name]) for e in chosen
-        },
-        'chosen_inputs': {e.name: summary.chosen_inputs(outcomes[e.name]) for e in chosen},
-        'pit': {e.name: summary.calibration(outcomes[e.name]) for e in chosen},
-        'choices': choices,
-        'choices_seeds': compared,
-        'versions': versions(),
-        'seconds': round(time.perf_counter() - began, 1),
-    }
+    most = QUICK_CHOICE_SEEDS if is_quick else CHOICE_SEEDS
+    return _Plan(
+        chosen,
+        {e.name: seeds or (e.quick_seeds if is_quick else e.seeds) for e in chosen},
+        min(seeds or most, most) if with_choices else 0,
+    )
+
+
+def _write(
+    plan: _Plan,
+    outcomes: dict[str, dict[str, list[Outcome]]],
+    results: dict[str, Any],
+    out: Path,
+) -> None:
+    """Write results.json, table.md and the figures."""
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / 'results.json', json.dumps(results, indent=1, allow_nan=False) + '\n')
     table = '\n'.join(
-        summary.markdown(e.title, results['experiments'][e.name], numbers[e.name]) for e in chosen
+        [
+            summary.markdown(e.title, results['experiments'][e.name], plan.seeds[e.name])
+            for e in plan.chosen
+        ]
+        + [
+            summary.markdown(f'Choices on {name}', found, plan.choice_seeds)
+            for name, found in results['choices'].items()
+        ]
     )
-    for name, found_choices in choices.items():
-        table += '\n' + summary.markdown(f'Choices on {name}', found_choices, compared)
     write_text(out / 'table.md', table)
-    for experiment in chosen:
+    for experiment in plan.chosen:
         figures = draw_experiment(
             experiment, outcomes[experiment.name], results['experiments'][experiment.name]
         )
@@ -111,7 +160,6 @@ def run_reproduction(
             write_bytes(out / f'{name}.png', png(figure))
     print(table)
     print(f'{results["seconds"]} s; results in {out}')
-    return results
 
 
 def _run_all(
