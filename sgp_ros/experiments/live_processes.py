@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import fcntl
 import importlib.util
 import os
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 _DOMAINS = range(30, 102)
 _STOP_LIMIT_S = 5.0
 _LAST_LINES = 5
+_SET_PARENT_DEATH_SIGNAL = 1
 
 
 @contextlib.contextmanager
@@ -69,6 +71,12 @@ def _free_domain() -> Iterator[int]:
     raise RecordingError('every ROS domain of this package is in use', 'a free one', 'wait')
 
 
+def _die_with_parent() -> None:
+    """Ask the kernel to end this child when its parent dies, even by SIGKILL (Linux)."""
+    with contextlib.suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(_SET_PARENT_DEATH_SIGNAL, signal.SIGTERM)
+
+
 class LiveProcesses:
     """Child processes that never outlive the run.
 
@@ -91,6 +99,7 @@ class LiveProcesses:
             self._children[module] = subprocess.Popen(  # noqa: S603 - our own modules
                 arguments, env=self._environment, stdin=subprocess.DEVNULL, stdout=file,
                 stderr=subprocess.STDOUT, start_new_session=True,
+                preexec_fn=_die_with_parent,  # noqa: PLW1509 - one call, no lock to wait for
             )  # fmt: skip
         self._errors[module] = errors
         return module
