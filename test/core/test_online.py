@@ -144,6 +144,29 @@ def test_dropped_samples_count_once():
     )
 
 
+@pytest.mark.parametrize('prior', PRIORS)
+def test_what_is_kept_and_what_is_buffered_add_up(prior):
+    """Rebuilding from kept rows and buffer gives the information that grew row by row."""
+    model, data = random_problem(14, n=30)
+    online = _stream(model, data, prior, 6)
+    before = online.information
+    online.change(model=model)
+    after = online.information
+    np.testing.assert_allclose(after.coefficients, before.coefficients, rtol=1e-9)
+    np.testing.assert_allclose(after.covariance, before.covariance, rtol=1e-8)
+
+
+def test_kept_rows_follow_a_change_of_noise():
+    """Where Z is zero, new noise gives the least squares of everything under that noise."""
+    model, data = random_problem(15, n=30, noise_like='parametric')
+    other = Model(model.kernels, tuple(9.0 * x for x in model.noise))
+    online = _stream(model, data, PRIORS[1], 5)
+    online.change(model=other)
+    batch = Posterior(other, data, PRIORS[1])
+    np.testing.assert_allclose(online.information.coefficients, batch.coefficients, rtol=1e-9)
+    np.testing.assert_allclose(online.information.covariance, batch.covariance, rtol=1e-8)
+
+
 def test_memory_without_process_equals_least_squares_on_everything():
     """Where Z is zero nothing is lost by dropping: PR keeps all of the stream."""
     model, data = random_problem(5, n=40, noise_like='parametric')
