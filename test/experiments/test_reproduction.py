@@ -114,4 +114,5 @@ def test_unknown_experiments_are_refused(tmp_path, capsys):
     """One line, status 2."""
     assert main(['reproduce', 'everything', '--out', str(tmp_path)]) == 2
     assert 'reaction-wheel' in capsys.readouterr().err
+    assert main(['reproduce', 'arm', '--out', str(tmp_path)]) == 2
     assert main(['reproduce', 'toy', '--seeds', '0', '--out', str(tmp_path)]) == 2

@@ -21,7 +21,7 @@ class Experiment:
 
     Attributes:
         name: key in results.json.
-        group: `toy`, `reaction-wheel` or `arm`: what the command is asked for.
+        group: `toy` or `reaction-wheel`: what the command is asked for.
         title: one line for the table.
         make: from a seed to a world.
         prior: from a world to the prior of W; None for the flat one.

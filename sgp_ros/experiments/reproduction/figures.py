@@ -24,7 +24,7 @@ COLOURS = dict(
 """Okabe and Ito 2008: told apart with every kind of colour vision."""
 _GREY, _LINE = '#B8B8B8', '#555555'
 _TRACE_S = 3.0
-_BARS = {'reaction_wheel': 'fig4', 'reaction_wheel_concealed': 'fig6', 'arm': 'fig9'}
+_BARS = {'reaction_wheel': 'fig4', 'reaction_wheel_concealed': 'fig6'}
 _TRACES = {
     'reaction_wheel': ('fig5', 'pole_up', 1),
     'reaction_wheel_concealed': ('fig7', 'pole_down', 0),
