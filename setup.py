@@ -48,6 +48,7 @@ setup(
         'mcap>=1.6',
         'rosbags>=0.11',
         'zstandard>=0.22',
+        'pin>=3',
     ],
     extras_require={
         # rclpy from PyPI for machines without ROS; apt users have it already.
