@@ -42,10 +42,9 @@ class GrowingFactor:
         self.b = np.zeros(capacity)
         self.size = 0
 
-    @property
-    def prior_variance(self) -> float:
-        """Variance of Z before any sample."""
-        return 0.0 if self._kernel is None else self._kernel.variance
+    def prior_variance(self, u: np.ndarray) -> float:
+        """Return the variance of Z at an input u (d,) before any sample."""
+        return 0.0 if self._kernel is None else float(self._kernel.diagonal(u[None])[0])
 
     def solve(self, u: np.ndarray) -> np.ndarray:
         """Return `L^-1 k(U, u)`, (size,), for an input u (d,)."""
@@ -56,13 +55,13 @@ class GrowingFactor:
         solve_lower(self._L, self.size, v)
         return v
 
-    def pivot(self, v: np.ndarray) -> float:
+    def pivot(self, v: np.ndarray, u: np.ndarray) -> float:
         """Return the diagonal element that `append` would add, for `v = solve(u)`.
 
         Raises:
             NumericalError: the sample adds no positive variance in double precision.
         """
-        square = self.prior_variance + self._noise - float(v @ v)
+        square = self.prior_variance(u) + self._noise - float(v @ v)
         if not square > 0.0:
             raise NumericalError(
                 f'a sample repeats {self.size} others to rounding, variance {square:.3g}',
@@ -89,7 +88,7 @@ class GrowingFactor:
             NumericalError: as `pivot`.
         """
         n = self.size
-        diagonal = self.pivot(v)
+        diagonal = self.pivot(v, u)
         row = (f - v @ self.A[:n]) / diagonal
         value = float((y - v @ self.b[:n]) / diagonal)
         if self._kernel is not None:

@@ -183,8 +183,9 @@ def _bounds(data: Observations, start: Model) -> np.ndarray:
         if kernel is None:
             continue
         variance = power[component] if data.G is None else power.mean()
-        heights = len(kernel.log_parameters) - len(kernel.inputs)
-        rows += [(variance / _RANGE**2, variance * _RANGE)] * heights
-        rows += [(spread[c] / _RANGE, spread[c] * _RANGE) for c in kernel.inputs]
+        scales = kernel.scales(float(variance), spread[list(kernel.inputs)])
+        heights = len(scales) - len(kernel.inputs)
+        rows += [(x / _RANGE**2, x * _RANGE) for x in scales[:heights]]
+        rows += [(x / _RANGE, x * _RANGE) for x in scales[heights:]]
     rows += [(_NOISE_FLOOR * x, 1e2 * x) for x in power]
     return np.log(np.array(rows))

@@ -119,7 +119,7 @@ class OnlineRegression:
             n = len(v)
             rows[j] -= v @ factor.A[:n]
             mean[j] = v @ factor.b[:n]
-            variance[j] = factor.prior_variance - v @ v
+            variance[j] = factor.prior_variance(u) - v @ v
         mean += rows @ self._total.coefficients
         spread = self._total.spread(rows)  # (k, r)
         covariance = spread @ spread.T
@@ -140,7 +140,7 @@ class OnlineRegression:
         if prediction.version != self._version:
             raise ValueError('the prediction was made before the last change of the model')
         for factor, v in zip(self._factors, prediction.solves, strict=True):
-            factor.pivot(v)
+            factor.pivot(v, prediction.u)
         self._version += 1
         for j, (factor, v) in enumerate(zip(self._factors, prediction.solves, strict=True)):
             row, value = factor.append(v, prediction.u, prediction.f[j], float(y[j]))

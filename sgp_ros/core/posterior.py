@@ -155,7 +155,7 @@ class Posterior:
                 kernel = self.model.kernels[component]
                 mean[:, component] += v.T @ self._solution.residual[start:stop]
                 G[:, component] -= v.T @ block.A
-                covariance[:, component, component] += _diagonal(kernel, q)
+                covariance[:, component, component] += _diagonal(kernel, U)
                 for other_column, other in enumerate(block.components):
                     w = cross[other_column]
                     if w is not None:
@@ -183,8 +183,8 @@ class Posterior:
         return weighted.reshape(n, len(block.b) // n, n, -1).sum(axis=(1, 3))
 
 
-def _diagonal(kernel: Kernel | None, q: int) -> np.ndarray:
-    return np.zeros(q) if kernel is None else kernel.diagonal(q)
+def _diagonal(kernel: Kernel | None, U: np.ndarray) -> np.ndarray:
+    return np.zeros(len(U)) if kernel is None else kernel.diagonal(U)
 
 
 def column_scale(F: np.ndarray, root: np.ndarray) -> np.ndarray:

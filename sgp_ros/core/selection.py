@@ -1,9 +1,12 @@
-"""Which inputs the process Z should see, decided by evidence.
+"""Which inputs the process Z should see and how it varies with them, decided by evidence.
 
 A stationary Z extrapolates badly along every input that it uses: far from the data it falls back
 to zero, or carries on a trend that the length scale allowed. An input that does not raise the
 evidence therefore costs accuracy elsewhere for nothing. Starting from all inputs, the one whose
-removal costs least is dropped, as long as that costs less than `MARGIN`.
+removal costs least is dropped, as long as that costs less than `MARGIN`. Then Z is taken for a
+linear function of what is left, where that raises the evidence: a squared exponential can only
+imitate one by long length scales and a large free constant, which it carries into regions
+without data.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.core.kernels import Linear
 from sgp_ros.core.learning import initial_model, learn, screened
 from sgp_ros.core.model import Model, Observations
 
@@ -26,19 +30,27 @@ MARGIN = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Inputs chosen for one component of X.
+    """Inputs and structure chosen for one component of X.
 
     Attributes:
-        inputs: columns of U that Z sees; None where physics and noise explain the data as well.
+        kernel: of Z, as learned on the samples used; None where physics and noise explain the
+            data as well.
+        noise: variance learned beside it.
         evidence: log evidence with these [nat].
         evidence_of_all: with all candidates [nat].
         path: inputs in the order in which they were dropped.
     """
 
-    inputs: tuple[int, ...] | None
+    kernel: Kernel | None
+    noise: float
     evidence: float
     evidence_of_all: float
     path: tuple[int, ...]
+
+    @property
+    def inputs(self) -> tuple[int, ...] | None:
+        """Columns of U that Z sees; None without Z."""
+        return None if self.kernel is None else self.kernel.inputs
 
 
 def select_inputs(
@@ -48,7 +60,7 @@ def select_inputs(
     candidates: tuple[int, ...],
     size: int = 300,
 ) -> Selection:
-    """Choose the inputs of Z for one component of X, observed directly.
+    """Choose inputs and structure of Z for one component of X, observed directly.
 
     Args:
         data: observations without observation matrix.
@@ -66,18 +78,40 @@ def select_inputs(
     part = slice(component, component + 1)
     small = Observations(data.U[rows], data.F[rows, part], data.y[rows, part])
     start = screened(small, prior, initial_model(small, (candidates,)))
-    model, evidence = _fit(small, prior, start)
-    best, of_all, path = model, evidence, []
-    while (kernel := best.kernels[0]) is not None:
-        shorter = [_without(best, kernel, i) for i in range(len(kernel.inputs))]
-        fits = [_fit(small, prior, candidate) for candidate in shorter]
+    model, of_all = _fit(small, prior, start)
+    best, evidence, path = _eliminate(small, prior, model, of_all)
+    if best.kernels[0] is not None:
+        linear, value = _fit_linear(small, prior, best)
+        if value > evidence:
+            best, evidence, more = _eliminate(small, prior, linear, value)
+            path += more
+    return Selection(best.kernels[0], best.noise[0], evidence, of_all, tuple(path))
+
+
+def _eliminate(
+    data: Observations, prior: CoefficientPrior, model: Model, evidence: float
+) -> tuple[Model, float, list[int]]:
+    """Drop inputs one by one; return the model, its evidence, and the inputs dropped."""
+    path = []
+    while (kernel := model.kernels[0]) is not None:
+        shorter = [_without(model, kernel, i) for i in range(len(kernel.inputs))]
+        fits = [_fit(data, prior, candidate) for candidate in shorter]
         least = int(np.argmax([value for _, value in fits]))
         if fits[least][1] < evidence - MARGIN:
             break
         path.append(kernel.inputs[least])
-        best, evidence = fits[least][0], max(evidence, fits[least][1])
-    kernel = best.kernels[0]
-    return Selection(None if kernel is None else kernel.inputs, evidence, of_all, tuple(path))
+        model, evidence = fits[least][0], max(evidence, fits[least][1])
+    return model, evidence, path
+
+
+def _fit_linear(data: Observations, prior: CoefficientPrior, model: Model) -> tuple[Model, float]:
+    """Fit Z as a linear function of the inputs that the model's Z sees."""
+    kernel = model.kernels[0]
+    assert kernel is not None
+    lengths = data.U[:, kernel.inputs].std(axis=0) / data.y.std()
+    usual = tuple(float(x) if x > 0.0 else 1.0 for x in lengths)
+    start = Model((Linear(usual, kernel.inputs),), model.noise)
+    return _fit(data, prior, screened(data, prior, start))
 
 
 def _fit(data: Observations, prior: CoefficientPrior, start: Model) -> tuple[Model, float]:

@@ -15,10 +15,16 @@ NAMES = sorted(KERNELS)
 def _kernel(name, seed):
     rng = np.random.default_rng(seed)
     lengths = tuple(float(x) for x in rng.uniform(0.3, 3.0, size=2))
-    if name == 'additive_squared_exponential':
-        variances = tuple(float(x) for x in rng.uniform(0.2, 5.0, size=2))
-        return KERNELS[name](variances, lengths, (0, 2))
-    return KERNELS[name](float(rng.uniform(0.2, 5.0)), lengths, (0, 2))
+    heights = tuple(float(x) for x in rng.uniform(0.2, 5.0, size=2))
+    return _build(name, heights, lengths, (0, 2))
+
+
+def _build(name, heights, lengths, inputs):
+    if name == 'linear':
+        return KERNELS[name](lengths, inputs)
+    if name == 'squared_exponential':
+        return KERNELS[name](heights[0], lengths, inputs)
+    return KERNELS[name](heights, lengths, inputs)
 
 
 @pytest.mark.parametrize('name', NAMES)
@@ -38,7 +44,7 @@ def test_vector_matrix_and_diagonal_agree(name):
     kernel = _kernel(name, 1)
     U = np.random.default_rng(1).normal(size=(6, 3))
     K = kernel.matrix(U)
-    np.testing.assert_allclose(np.diag(K), kernel.diagonal(6))
+    np.testing.assert_allclose(np.diag(K), kernel.diagonal(U))
     np.testing.assert_allclose(kernel.matrix(U, U[2:4]), K[:, 2:4], atol=1e-14)
     S = kernel.scale(U)
     np.testing.assert_allclose(kernel.vector(S, S[3]), K[:, 3], atol=1e-14)
@@ -81,16 +87,9 @@ def test_parameters_round_trip(name):
 @pytest.mark.parametrize('name', NAMES)
 def test_what_is_no_kernel_is_refused(name):
     """Lengths that do not match the inputs, or are not positive, are a caller's mistake."""
-    variance = _kernel(name, 5).log_parameters[0]
-    first = (variance,) if name.startswith('additive') else variance
-    none = (0.0,) if name.startswith('additive') else 0.0
-    for height, lengths, inputs in (
-        (first, (1.0,), (0, 1)),
-        (none, (1.0,), (0,)),
-        (first, (), ()),
-    ):
+    for lengths, inputs in (((1.0,), (0, 1)), ((0.0,), (0,)), ((), ())):
         with pytest.raises(ValueError, match='length scales'):
-            KERNELS[name](height, lengths, inputs)
+            _build(name, (1.0,), lengths, inputs)
 
 
 @pytest.mark.parametrize('name', NAMES)
@@ -101,4 +100,25 @@ def test_inputs_can_be_left_out_and_length_scales_changed(name):
     assert shorter.inputs == kernel.inputs[1:]
     assert shorter.lengthscales == kernel.lengthscales[1:]
     assert kernel.with_lengthscales((1.0, 2.0)).lengthscales == (1.0, 2.0)
-    assert kernel.variance == pytest.approx(kernel.diagonal(1)[0])
+
+
+@pytest.mark.parametrize('name', [name for name in NAMES if name != 'linear'])
+def test_stationary_kernels_have_one_variance_and_refuse_zero(name):
+    """The same everywhere; without variance there is no process."""
+    kernel = _kernel(name, 7)
+    U = np.random.default_rng(7).normal(size=(4, 3))
+    np.testing.assert_allclose(kernel.diagonal(U), kernel.variance)
+    with pytest.raises(ValueError, match='length scales'):
+        _build(name, (0.0,), (1.0,), (0,))
+
+
+def test_linear_kernel_is_that_of_random_slopes():
+    """`Z = a u_0 / l_0 + b u_2 / l_2` with standard normal a, b: one unit a length scale away."""
+    kernel = _kernel('linear', 8)
+    rng = np.random.default_rng(8)
+    U = rng.normal(size=(5, 3))
+    slopes = rng.standard_normal((20_000, 2)) / np.array(kernel.lengthscales)
+    Z = slopes @ U[:, [0, 2]].T
+    spread = np.sqrt(np.outer(kernel.diagonal(U), kernel.diagonal(U)))
+    np.testing.assert_allclose((Z.T @ Z / 20_000 - kernel.matrix(U)) / spread, 0.0, atol=0.04)
+    assert kernel.variance == kernel.diagonal(np.array([[kernel.lengthscales[0], 9.0, 0.0]]))[0]

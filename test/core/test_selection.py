@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sgp_ros.core.kernels import Linear, SquaredExponential
 from sgp_ros.core.model import Observations
 from sgp_ros.core.prior import CoefficientPrior
 from sgp_ros.core.selection import select_inputs
@@ -30,6 +31,23 @@ def test_inputs_of_a_planted_residual_are_chosen(residual, expected):
     selection = select_inputs(_data(0, residual), CoefficientPrior.flat(1), 0, (0, 1, 2))
     assert selection.inputs == expected
     assert set(selection.path) | set(expected) == {0, 1, 2}
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_a_linear_residual_is_taken_for_linear(seed):
+    """And so extrapolated without the constant that a smooth process would leave free."""
+    data = _data(seed, lambda U: 0.7 * U[:, 2])
+    selection = select_inputs(data, CoefficientPrior.flat(1), 0, (0, 1, 2))
+    assert isinstance(selection.kernel, Linear)
+    assert selection.inputs == (2,)
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_a_curved_residual_is_not(seed):
+    """A constant or a bend is nothing that a line through the origin can follow."""
+    data = _data(seed, lambda U: 0.5 * np.tanh(2.0 * U[:, 2]))
+    selection = select_inputs(data, CoefficientPrior.flat(1), 0, (0, 1, 2))
+    assert isinstance(selection.kernel, SquaredExponential)
 
 
 def test_complete_physics_needs_no_process():

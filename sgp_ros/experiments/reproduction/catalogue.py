@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from sgp_ros.experiments.reproduction import reaction_wheel, toy
+from sgp_ros.experiments.reproduction import arm, reaction_wheel, toy
 from sgp_ros.experiments.reproduction.choices import CHOICES, run_choice
 from sgp_ros.experiments.reproduction.protocol import Outcome, World, run_method
 
@@ -21,7 +21,7 @@ class Experiment:
 
     Attributes:
         name: key in results.json.
-        group: `toy` or `reaction-wheel`: what the command is asked for.
+        group: `toy`, `reaction-wheel` or `arm`: what the command is asked for.
         title: one line for the table.
         make: from a seed to a world.
         prior: from a world to the prior of W; None for the flat one.
@@ -65,6 +65,10 @@ EXPERIMENTS: dict[str, Experiment] = {
             'reaction_wheel_concealed', 'reaction-wheel',
             'Ten coefficients and an effect that is none of them, in simulation, for section IV.C',
             _concealed,
+        ),
+        Experiment(
+            'arm', 'arm', 'Three-link arm whose third joint rubs near its limits, section IV.D',
+            arm.make_world, arm.make_prior, quick_seeds=1,
         ),
     )
 }  # fmt: skip

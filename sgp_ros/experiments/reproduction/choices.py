@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.core.kernels import AdditiveSquaredExponential, SquaredExponential
+from sgp_ros.core.kernels import AdditiveSquaredExponential, Linear, SquaredExponential
 from sgp_ros.core.learning import initial_model, learn, screened
 from sgp_ros.core.methods import FittedMethod
 from sgp_ros.core.model import Model
@@ -17,6 +17,7 @@ from sgp_ros.core.selection import select_inputs
 from sgp_ros.experiments.reproduction.protocol import Outcome, score, thinned
 
 if TYPE_CHECKING:
+    from sgp_ros.core.kernels import Kernel
     from sgp_ros.core.model import Observations
     from sgp_ros.experiments.reproduction.protocol import World
 
@@ -26,8 +27,9 @@ class Choice:
     """One way to set up SGP.
 
     Attributes:
-        inputs: `chosen` by evidence, `all`, or `velocities` and command for the wheel.
-        is_additive: a sum of kernels of one input each instead of one of all.
+        inputs: `chosen` by evidence, or `all`.
+        structure: `chosen` by evidence between smooth and linear, `smooth` in all inputs together,
+            or `additive`, a sum of smooth functions of one input each.
         rule: starting values, `standardised` (and screened) or `paper`.
         prior_factor: standard deviation of W in units of sqrt(var y / mean square of its column);
             infinite for the flat prior.
@@ -36,7 +38,7 @@ class Choice:
     """
 
     inputs: str = 'chosen'
-    is_additive: bool = False
+    structure: str = 'chosen'
     rule: str = 'standardised'
     prior_factor: float = np.inf
     is_standardised: bool = False
@@ -45,10 +47,11 @@ class Choice:
 
 DEFAULT = Choice()
 CHOICES: dict[str, Choice] = {
-    'default: inputs by evidence, flat prior': DEFAULT,
-    'inputs: all, one kernel (paper)': replace(DEFAULT, inputs='all'),
-    'inputs: all, additive': replace(DEFAULT, inputs='all', is_additive=True),
-    'inputs: by evidence, additive': replace(DEFAULT, is_additive=True),
+    'default: inputs and structure by evidence, flat prior': DEFAULT,
+    'inputs: all, smooth (paper)': replace(DEFAULT, inputs='all', structure='smooth'),
+    'inputs: all, additive': replace(DEFAULT, inputs='all', structure='additive'),
+    'inputs: by evidence, smooth': replace(DEFAULT, structure='smooth'),
+    'inputs: by evidence, additive': replace(DEFAULT, structure='additive'),
     'sigma_w: 1e4 times the scale of y': replace(DEFAULT, prior_factor=1e4),
     'sigma_w: the scale of y': replace(DEFAULT, prior_factor=1.0),
     'sigma_w: a hundredth of it': replace(DEFAULT, prior_factor=0.01),
@@ -66,12 +69,7 @@ def run_choice(world: World, choice: Choice) -> Outcome:
     power = np.sqrt(train.y.var(axis=0)) if choice.is_shared else np.ones(train.y.shape[1])
     scaled = _scaled(train, scale, power)
     prior = _prior(scaled, choice.prior_factor)
-    inputs = _inputs(world, scaled, prior, choice)
-    start = initial_model(scaled, inputs, choice.rule)
-    if choice.is_additive:
-        start = Model(tuple(_additive(k) for k in start.kernels), start.noise)
-    if choice.rule != 'paper':
-        start = screened(scaled, prior, start)
+    start = _start(world, scaled, prior, choice)
     learned = learn(scaled, prior, start)
     model = _shared(learned.model) if choice.is_shared else learned.model
     fitted = FittedMethod(Posterior(model, scaled, prior), None, learned.log_evidence)
@@ -81,7 +79,7 @@ def run_choice(world: World, choice: Choice) -> Outcome:
         )
         for region, test in world.tests.items()
     }  # fmt: skip
-    return score(fitted, replace(world, tests=tests), inputs)
+    return score(fitted, replace(world, tests=tests))
 
 
 def _scaled(data: Observations, scale: np.ndarray, power: np.ndarray) -> Observations:
@@ -94,14 +92,21 @@ def _prior(data: Observations, factor: float) -> CoefficientPrior:
     return CoefficientPrior.from_std(np.zeros(len(std)), std)
 
 
-def _inputs(
-    world: World, data: Observations, prior: CoefficientPrior, choice: Choice
-) -> tuple[tuple[int, ...] | None, ...]:
-    if choice.inputs == 'all':
-        return world.candidates
-    return tuple(
-        select_inputs(data, prior, j, columns).inputs for j, columns in enumerate(world.candidates)
-    )
+def _start(world: World, data: Observations, prior: CoefficientPrior, choice: Choice) -> Model:
+    """Return inputs, structure and the values from which learning starts."""
+    inputs: tuple[tuple[int, ...] | None, ...] = world.candidates
+    kernels: tuple[Kernel | None, ...] = (None,) * len(inputs)
+    if choice.inputs == 'chosen':
+        chosen = [select_inputs(data, prior, j, c) for j, c in enumerate(world.candidates)]
+        inputs = tuple(s.inputs for s in chosen)
+        kernels = tuple(s.kernel for s in chosen)
+    start = initial_model(data, inputs, choice.rule)
+    if choice.structure == 'additive':
+        start = Model(tuple(_additive(k) for k in start.kernels), start.noise)
+    elif choice.structure == 'chosen':
+        pairs = zip(kernels, start.kernels, strict=True)
+        start = Model(tuple(k if isinstance(k, Linear) else s for k, s in pairs), start.noise)
+    return start if choice.rule == 'paper' else screened(data, prior, start)
 
 
 def _additive(kernel: object) -> AdditiveSquaredExponential | None:
@@ -116,7 +121,8 @@ def _additive(kernel: object) -> AdditiveSquaredExponential | None:
 def _shared(model: Model) -> Model:
     """Return the geometric mean of the outputs' hyper-parameters for all of them."""
     kernels = [k for k in model.kernels if k is not None]
-    if len(kernels) != len(model.kernels) or len({k.inputs for k in kernels}) > 1:
+    alike = len({(type(k), k.inputs) for k in kernels}) == 1
+    if len(kernels) != len(model.kernels) or not alike:
         return model
     theta = np.mean([k.log_parameters for k in kernels], axis=0)
     noise = float(np.exp(np.mean(np.log(model.noise))))

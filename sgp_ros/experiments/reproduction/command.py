@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from sgp_ros.experiments.reproduction.catalogue import Experiment
     from sgp_ros.experiments.reproduction.protocol import Outcome
 
-GROUPS = ('toy', 'reaction-wheel', 'choices')
+GROUPS = ('toy', 'reaction-wheel', 'arm', 'choices')
 SCHEMA = 1
 
 

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.core.learning import initial_model, learn, screened
+from sgp_ros.core.learning import learn
 from sgp_ros.core.methods import METHODS, FitOptions, FittedMethod
+from sgp_ros.core.model import Model
 from sgp_ros.core.posterior import Posterior
 from sgp_ros.core.prior import CoefficientPrior
 from sgp_ros.core.scores import coverage95, nlpd, nmse, pit
@@ -17,6 +18,7 @@ from sgp_ros.core.selection import select_inputs
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from sgp_ros.core.kernels import Kernel
     from sgp_ros.core.model import Observations
 
 SGP_ALL = 'SGP_all'
@@ -70,27 +72,29 @@ class Outcome:
         pit: region to (n, k) probability integral transforms of the measured targets.
         means: region to (n, k) predictions.
         errors: relative error of W by index.
-        inputs: columns Z saw, per component; None where there was no Z.
+        kernels: of Z per component, as learned; None where there was no Z.
     """
 
     scores: dict[str, dict[str, dict[str, float]]]
     pit: dict[str, np.ndarray]
     means: dict[str, np.ndarray]
     errors: dict[int, float]
-    inputs: tuple[tuple[int, ...] | None, ...]
+    kernels: tuple[Kernel | None, ...]
+
+    @property
+    def inputs(self) -> tuple[tuple[int, ...] | None, ...]:
+        """Columns Z saw, per component; None where there was no Z."""
+        return tuple(None if k is None else k.inputs for k in self.kernels)
 
 
 def run_method(name: str, world: World, prior: CoefficientPrior | None = None) -> Outcome:
     """Fit one method out of `METHOD_NAMES` to a world and score it on every region."""
     train = thinned(world.train, world.size)
     prior = prior or CoefficientPrior.flat(train.F.shape[2])
-    fitted, inputs = _fit(name, world, train, prior)
-    return score(fitted, world, inputs)
+    return score(_fit(name, world, train, prior), world)
 
 
-def score(
-    fitted: FittedMethod, world: World, inputs: tuple[tuple[int, ...] | None, ...]
-) -> Outcome:
+def score(fitted: FittedMethod, world: World) -> Outcome:
     """Score a fitted method on every region of a world.
 
     nMSE is against the noise-free truth; NLPD, coverage and PIT are against measured targets.
@@ -114,7 +118,7 @@ def score(
         means[region] = seen.mean
     w = fitted.coefficients
     errors = {i: float(w[i] / true - 1.0) for i, true in world.true_coefficients.items() if len(w)}
-    return Outcome(scores, transforms, means, errors, inputs)
+    return Outcome(scores, transforms, means, errors, fitted.model.kernels)
 
 
 def thinned(data: Observations, size: int) -> Observations:
@@ -125,19 +129,14 @@ def thinned(data: Observations, size: int) -> Observations:
     return type(data)(data.U[rows], data.F[rows], data.y[rows])
 
 
-def _fit(
-    name: str, world: World, train: Observations, prior: CoefficientPrior
-) -> tuple[FittedMethod, tuple[tuple[int, ...] | None, ...]]:
+def _fit(name: str, world: World, train: Observations, prior: CoefficientPrior) -> FittedMethod:
     if name != 'SGP':
         method = METHODS['SGP' if name == SGP_ALL else name]
-        inputs = None if name == 'PR' else world.candidates
-        fitted = method(train, prior, world.candidates, FitOptions(restarts=RESTARTS))
-        return fitted, inputs or (None,) * len(world.candidates)
-    chosen = tuple(
-        select_inputs(train, prior, j, columns).inputs
-        for j, columns in enumerate(world.candidates)
-    )
-    start = screened(train, prior, initial_model(train, chosen))
+        return method(train, prior, world.candidates, FitOptions(restarts=RESTARTS))
+    chosen = [
+        select_inputs(train, prior, j, columns) for j, columns in enumerate(world.candidates)
+    ]
+    start = Model(tuple(s.kernel for s in chosen), tuple(s.noise for s in chosen))
     learned = learn(train, prior, start, RESTARTS, np.random.default_rng(0))
     posterior = Posterior(learned.model, train, prior)
-    return FittedMethod(posterior, None, learned.log_evidence), chosen
+    return FittedMethod(posterior, None, learned.log_evidence)

@@ -6,9 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sgp_ros.core.kernels import Linear
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from sgp_ros.core.kernels import Kernel
     from sgp_ros.experiments.reproduction.protocol import Outcome
 
 SCORES = ('nmse', 'nmse_measured', 'nlpd', 'coverage95')
@@ -61,11 +64,19 @@ def coefficient_errors(outcomes: Mapping[str, Sequence[Outcome]]) -> dict[str, d
 
 
 def chosen_inputs(outcomes: Mapping[str, Sequence[Outcome]]) -> dict[str, int]:
-    """Return how often each set of inputs was chosen by evidence."""
+    """Return how often each kernel and set of inputs was chosen by evidence."""
     counts: dict[str, int] = {}
     for run in outcomes.get('SGP', ()):
-        counts[str(run.inputs)] = counts.get(str(run.inputs), 0) + 1
+        chosen = ', '.join(_described(kernel) for kernel in run.kernels)
+        counts[chosen] = counts.get(chosen, 0) + 1
     return dict(sorted(counts.items(), key=lambda item: -item[1]))
+
+
+def _described(kernel: Kernel | None) -> str:
+    if kernel is None:
+        return 'no Z'
+    name = 'linear' if isinstance(kernel, Linear) else 'smooth'
+    return f'{name} {kernel.inputs}'
 
 
 def calibration(outcomes: Mapping[str, Sequence[Outcome]]) -> dict[str, dict[str, list[float]]]:
