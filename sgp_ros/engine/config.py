@@ -103,7 +103,7 @@ class EngineConfig:
     )  # fmt: skip
     model_residual_inputs: tuple[str, ...] = _setting(
         'model.residual_inputs', 'str_array', ('default',),
-        'What Z sees: default (the choice of the robot), all, own, or names like velocity:pole.',
+        'What Z sees: default (the choice of the robot), all, own, or names (direction:pole).',
         read_only=True,
     )  # fmt: skip
     parameters_source: str = _setting(

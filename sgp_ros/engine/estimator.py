@@ -150,7 +150,7 @@ class Estimator:
     def _arrays(self, equation: Equation) -> Arrays:
         """Return input (4 k,), regressor (k, p) and target (k,)."""
         motion = equation.motion
-        u = motion.stacked()[0]
+        u = self._robot.inputs(motion)[0]
         k = len(self._robot.joints)
         start = {'acceleration': 2 * k, 'effort': 3 * k}
         u[start[self._robot.target] : start[self._robot.target] + k] = 0.0

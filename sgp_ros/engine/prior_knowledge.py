@@ -50,7 +50,7 @@ def prior_of_robot(robot: Robot, config: EngineConfig) -> CoefficientPrior:
 
 
 def complement_columns(robot: Robot) -> set[int]:
-    """Return the columns of `Motion.stacked` that hold the complement signals."""
+    """Return the columns of `Robot.inputs` that hold the complement signals."""
     k = len(robot.joints)
     start = 2 * k if robot.complement == 'acceleration' else 3 * k
     return {

@@ -25,7 +25,8 @@ _SIGNALS: tuple[tuple[Signal, str], ...] = (
     (velocity(_WHEEL), '1/s'),
 )
 _INPUT = (effort(_WHEEL), 'rad/s^2/V')
-_Z_INPUTS = ('velocity:pole', 'velocity:wheel', 'effort:wheel')
+_Z_INPUTS = ('velocity:pole', 'velocity:wheel')
+"""What evidence chooses for the six-coefficient model (docs/reproduction.md)."""
 
 
 def _term(number: int, axis: int, signal: tuple[Signal, str], equation: str) -> Term:

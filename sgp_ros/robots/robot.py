@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
 CHANNELS = ('position', 'velocity', 'acceleration', 'effort')
-"""The four quantities of a joint, in the order in which inputs are stacked."""
+"""The four quantities of a joint."""
+INPUT_CHANNELS = (*CHANNELS, 'direction')
+"""What Z can see of a joint, in the order of `Robot.inputs`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,10 +40,6 @@ class Motion:
     acceleration: np.ndarray
     effort: np.ndarray
 
-    def stacked(self) -> np.ndarray:
-        """Return all four quantities side by side in the order of `CHANNELS`, (n, 4 k)."""
-        return np.hstack([self.position, self.velocity, self.acceleration, self.effort])
-
 
 @dataclass(frozen=True, slots=True)
 class Joint:
@@ -52,20 +50,23 @@ class Joint:
         kind: `revolute` or `prismatic`.
         is_actuated: whether an effort acts that is measured or commanded.
         effort_unit: unit of that effort; empty for [N m] or [N] by kind.
+        direction_width: speed at which its direction counts as 76 % certain [rad/s or m/s].
     """
 
     name: str
     kind: str = 'revolute'
     is_actuated: bool = True
     effort_unit: str = ''
+    direction_width: float = 0.02
 
     def unit(self, channel: str) -> str:
-        """Return the unit of one of `CHANNELS`."""
+        """Return the unit of one of `INPUT_CHANNELS`."""
         length = 'rad' if self.kind == 'revolute' else 'm'
         if channel == 'effort':
             return self.effort_unit or ('N m' if self.kind == 'revolute' else 'N')
         return {
-            'position': length, 'velocity': f'{length}/s', 'acceleration': f'{length}/s^2'
+            'position': length, 'velocity': f'{length}/s', 'acceleration': f'{length}/s^2',
+            'direction': '1',
         }[channel]  # fmt: skip
 
 
@@ -150,13 +151,25 @@ class Robot:
             return np.zeros((*motion.position.shape, 0))
         return np.concatenate(blocks, axis=2)
 
+    def inputs(self, motion: Motion) -> np.ndarray:
+        """Return all that Z could see, in the order of `INPUT_CHANNELS`, (n, 5 k).
+
+        The direction of a joint is `tanh(velocity / direction_width)`. Dry friction jumps with
+        it, and a smooth function of the velocity can follow a jump only with length scales that
+        leave it without memory elsewhere.
+        """
+        widths = np.array([joint.direction_width for joint in self.joints])
+        direction = np.tanh(motion.velocity / widths)
+        quantities = (motion.position, motion.velocity, motion.acceleration, motion.effort)
+        return np.hstack([*quantities, direction])
+
     def residual_columns(self, spec: Sequence[str]) -> tuple[tuple[int, ...], ...]:
-        """Resolve what Z sees to columns of `Motion.stacked`, one tuple per joint.
+        """Resolve what Z sees to columns of `inputs`, one tuple per joint.
 
         Args:
             spec: `('default',)` for the robot's own choice, `('all',)` for the state and the
                 other input, `('own',)` for position and velocity of the joint itself, or names
-                such as `velocity:pole`, which then hold for every joint.
+                such as `velocity:pole` or `direction:pole`, which then hold for every joint.
 
         Raises:
             ConfigError: a name that is no input of this robot.
@@ -166,15 +179,15 @@ class Robot:
         elif tuple(spec) == ('own',):
             named = tuple((f'position:{j}', f'velocity:{j}') for j in self.joint_names)
         elif tuple(spec) == ('all',):
-            named = (self._input_names(),) * len(self.joints)
+            named = (self._input_names()[: -len(self.joints)],) * len(self.joints)
         else:
             named = (tuple(spec),) * len(self.joints)
         return tuple(tuple(self._column(name) for name in names) for names in named)
 
     def input_name(self, column: int) -> str:
-        """Return the name of a column of `Motion.stacked`, such as `velocity:pole`."""
+        """Return the name of a column of `inputs`, such as `velocity:pole`."""
         channel, joint = divmod(column, len(self.joints))
-        return f'{CHANNELS[channel]}:{self.joint_names[joint]}'
+        return f'{INPUT_CHANNELS[channel]}:{self.joint_names[joint]}'
 
     def renamed(self, names: Sequence[str]) -> Robot:
         """Return this robot with other joint names, in the same order.
@@ -216,7 +229,7 @@ class Robot:
         return replace(self, terms=tuple(_with_prior(term, prior) for term in self.terms))
 
     def _input_names(self) -> tuple[str, ...]:
-        channels = ('position', 'velocity', self.complement)
+        channels = ('position', 'velocity', self.complement, 'direction')
         return tuple(
             f'{channel}:{joint.name}'
             for channel in channels
@@ -231,7 +244,7 @@ class Robot:
                 f'residual input {name!r}', f'default, own, all, or some of {list(names)}'
             )
         channel, joint = name.split(':', 1)
-        return CHANNELS.index(channel) * len(self.joints) + self.joint_names.index(joint)
+        return INPUT_CHANNELS.index(channel) * len(self.joints) + self.joint_names.index(joint)
 
 
 def _renamed_term(term: Term, new: Mapping[str, str]) -> Term:

@@ -107,6 +107,13 @@ def joint_positions(points: np.ndarray) -> np.ndarray:
     return np.column_stack([np.arctan2(y, x), -lift, elbow])
 
 
+def tip_positions(q: np.ndarray) -> np.ndarray:
+    """Return where the tip is at joint positions (n, 3) [rad], (n, 3) [m]."""
+    height = SHOULDER - UPPER * np.sin(q[:, 1]) - FORE * np.sin(q[:, 1] + q[:, 2])
+    reach = UPPER * np.cos(q[:, 1]) + FORE * np.cos(q[:, 1] + q[:, 2])
+    return np.column_stack([reach * np.cos(q[:, 0]), reach * np.sin(q[:, 0]), height])
+
+
 def follow(
     curves: tuple[FigureEight, ...],
     count: int,

@@ -57,7 +57,9 @@ def test_worlds_repeat():
 
 def test_accelerations_are_no_input_of_z(world):
     """They are columns 6 to 8."""
-    assert max(max(columns) for columns in world.candidates) < 6
+    robot = arm.make_robot()
+    seen = {robot.input_name(column).partition(':')[0] for column in world.candidates[0]}
+    assert seen == {'position', 'velocity', 'direction'}
 
 
 def test_the_weak_prior_bounds_what_no_torque_tells(world):
@@ -81,13 +83,13 @@ def test_a_process_alone_fails_on_the_vertical_curve(outcomes):
 
 
 def test_sgp_learns_the_growth_and_keeps_the_physics(outcomes):
-    """On joint 3 at most 0.6 of PR near the data and not above PR far from them."""
-    for region, share in (('horizontal', 0.6), ('vertical', 1.0)):
+    """On joint 3 at most a fifth of PR near the data and a tenth far from them."""
+    for region, share in (('horizontal', 0.2), ('vertical', 0.1)):
         sgp, pr = _nmse(outcomes, 'SGP', region), _nmse(outcomes, 'PR', region)
         assert sgp[2] < share * pr[2]
         assert np.all(sgp[:2] < 0.005)
 
 
 def test_evidence_finds_what_the_growing_friction_depends_on(outcomes):
-    """Position and velocity of joint 3, columns 2 and 5."""
-    assert set(outcomes['SGP'].inputs[2]) >= {2, 5}
+    """Position and direction of joint 3, columns 2 and 14; the latter is not in the paper."""
+    assert outcomes['SGP'].inputs[2] == (2, 14)

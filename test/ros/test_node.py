@@ -161,7 +161,7 @@ def test_an_invalid_parameter_is_refused_with_the_reason_and_changes_nothing(
         ('filter.window', -1.0, 'filter.window'),
         ('filter.window', 1, 'DOUBLE'),
         ('filter.velocity', 'guessed', 'measured'),
-        ('hyper.pole.lengthscales', [1.0, 2.0], '3 positive'),
+        ('hyper.pole.lengthscales', [1.0, 2.0, 3.0], '2 positive'),
         ('model.method', 'PR', 'read-only'),
         ('seed', -1, 'seed'),
     ):

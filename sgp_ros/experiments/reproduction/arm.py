@@ -31,9 +31,12 @@ DISTURBANCE = np.array([1.0, 2.5, 0.8])
 """Standard deviation of what shakes the joints; it is part of the torque measured [N m]."""
 ACCELERATION_NOISE = 0.02
 """Standard deviation of the measured accelerations [rad/s^2]."""
-CANDIDATES = (0, 1, 2, 3, 4, 5)
-"""Positions and velocities of all joints. Accelerations are left out: along one figure-eight they
-are nearly a function of the positions, so Z could lean on them and fail on any other curve."""
+CANDIDATES = (0, 1, 2, 3, 4, 5, 12, 13, 14)
+"""Positions, velocities and directions of motion of all joints. Accelerations are left out: along
+one figure-eight they are nearly a function of the positions, so Z could lean on them and fail on
+any other curve."""
+SMOOTH = (0, 1, 2, 3, 4, 5)
+"""The same without directions, as in the paper."""
 PRIOR_FACTOR = 1e2
 
 
@@ -45,7 +48,10 @@ def make_world(seed: int) -> World:
     """
     train, horizontal, vertical = (_observe(run, seed, i) for i, run in enumerate(_runs(seed)))
     tests = {'horizontal': horizontal, 'vertical': vertical}
-    return World(train.data, tests, CHANNELS, (CANDIDATES,) * len(CHANNELS), size=SIZE)
+    k = len(CHANNELS)
+    return World(
+        train.data, tests, CHANNELS, (CANDIDATES,) * k, size=SIZE, paper_inputs=(SMOOTH,) * k
+    )
 
 
 def make_prior(world: World) -> CoefficientPrior:
@@ -77,10 +83,10 @@ def make_robot() -> Robot:
     ]
     return Robot(
         name='three_link_arm',
-        joints=tuple(Joint(name) for name in CHANNELS),
+        joints=tuple(Joint(name, direction_width=ARM.width) for name in CHANNELS),
         target='effort',
         terms=(inertial_term(model, ('link1', 'link2', 'link3')), *viscous, *dry),
-        residual_inputs=tuple((f'position:{name}', f'velocity:{name}') for name in CHANNELS),
+        residual_inputs=tuple((f'position:{name}', f'direction:{name}') for name in CHANNELS),
         description='Three-link arm with constant friction, Wu and Movellan, section IV.D',
     )
 
@@ -136,6 +142,6 @@ def _observe(run: ArmRun, seed: int, index: int) -> Test:
     rng = np.random.default_rng((seed, 1, index))
     y = run.torque + TORQUE_NOISE * rng.standard_normal(run.torque.shape)
     a = run.acceleration + ACCELERATION_NOISE * rng.standard_normal(run.torque.shape)
-    F = make_robot().regressor(Motion(run.position, run.velocity, a, y))
-    U = np.hstack([run.position, run.velocity, a])
-    return Test(Observations(U, F, y), run.torque)
+    motion = Motion(run.position, run.velocity, a, y)
+    robot = make_robot()
+    return Test(Observations(robot.inputs(motion), robot.regressor(motion), y), run.torque)

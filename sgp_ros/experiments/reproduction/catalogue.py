@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from sgp_ros.experiments.reproduction import arm, reaction_wheel, toy
-from sgp_ros.experiments.reproduction.choices import CHOICES, run_choice
-from sgp_ros.experiments.reproduction.protocol import Outcome, World, run_method
+from sgp_ros.experiments.reproduction.choices import CHOICES, FILTERS, Choice, run_choice
+from sgp_ros.experiments.reproduction.protocol import METHOD_NAMES, Outcome, World, run_method
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from sgp_ros.core.prior import CoefficientPrior
 
@@ -46,6 +47,14 @@ def _concealed(seed: int) -> World:
     return reaction_wheel.make_world(seed, 'reaction_wheel', reaction_wheel.CONCEALED)
 
 
+def _chosen(name: str, choice: Choice, seed: int) -> Outcome:
+    return run_choice(EXPERIMENTS[name].make(seed), choice)
+
+
+def _filtered(settings: Mapping[str, float] | None, seed: int) -> Outcome:
+    return run_method('SGP', reaction_wheel.make_encoder_world(seed, settings))
+
+
 EXPERIMENTS: dict[str, Experiment] = {
     experiment.name: experiment
     for experiment in (
@@ -75,15 +84,26 @@ EXPERIMENTS: dict[str, Experiment] = {
 
 
 CHOICE_SEEDS, QUICK_CHOICE_SEEDS = 5, 1
-COMPARED = ('toy', 'reaction_wheel')
-"""Experiments on which the choices are compared."""
+COMPARED: dict[str, dict[str, Callable[[int], Outcome]]] = {
+    **{
+        name: {label: partial(_chosen, name, choice) for label, choice in CHOICES.items()}
+        for name in ('toy', 'reaction_wheel')
+    },
+    'reaction_wheel_encoder': {
+        label: partial(_filtered, settings) for label, settings in FILTERS.items()
+    },
+}
+"""Choices compared per experiment: label to what runs it on a seed."""
 
 
-def run_seed(name: str, seed: int, method: str) -> Outcome:
-    """Run one method or choice on one seed; a function that another process can call."""
+def run_seed(name: str, seed: int) -> dict[str, Outcome]:
+    """Run every method on one seed; a function that another process can call."""
     experiment = EXPERIMENTS[name]
     world = experiment.make(seed)
-    if method in CHOICES:
-        return run_choice(world, CHOICES[method])
     prior = None if experiment.prior is None else experiment.prior(world)
-    return run_method(method, world, prior)
+    return {method: run_method(method, world, prior) for method in METHOD_NAMES}
+
+
+def run_compared(name: str, seed: int, label: str) -> dict[str, Outcome]:
+    """Run one choice of `COMPARED` on one seed."""
+    return {label: COMPARED[name][label](seed)}

@@ -15,8 +15,11 @@ from sgp_ros.core.posterior import Posterior
 from sgp_ros.core.prior import CoefficientPrior
 from sgp_ros.core.selection import select_inputs
 from sgp_ros.experiments.reproduction.protocol import Outcome, score, thinned
+from sgp_ros.experiments.reproduction.reaction_wheel import ENCODER_SETTINGS
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from sgp_ros.core.kernels import Kernel
     from sgp_ros.core.model import Observations
     from sgp_ros.experiments.reproduction.protocol import World
@@ -60,6 +63,15 @@ CHOICES: dict[str, Choice] = {
     'one kernel and noise for all outputs': replace(DEFAULT, is_shared=True),
 }
 
+FILTERS: dict[str, Mapping[str, float] | None] = {
+    'filter: weak form, 0.1 s, every 0.05 s (default)': ENCODER_SETTINGS,
+    'filter: the same, every 0.01 s (coloured noise)': {**ENCODER_SETTINGS, 'filter.hop': 0.01},
+    'filter: weak form, 0.05 s': {**ENCODER_SETTINGS, 'filter.window': 0.05},
+    'filter: weak form, 0.2 s': {**ENCODER_SETTINGS, 'filter.window': 0.2},
+    'filter: none, differences paired by index': None,
+}
+"""Settings of the filter by label; None for no filter at all."""
+
 
 def run_choice(world: World, choice: Choice) -> Outcome:
     """Fit SGP with one choice and score it on every region."""
@@ -94,16 +106,17 @@ def _prior(data: Observations, factor: float) -> CoefficientPrior:
 
 def _start(world: World, data: Observations, prior: CoefficientPrior, choice: Choice) -> Model:
     """Return inputs, structure and the values from which learning starts."""
-    inputs: tuple[tuple[int, ...] | None, ...] = world.candidates
+    inputs: tuple[tuple[int, ...] | None, ...] = world.paper_inputs or world.candidates
     kernels: tuple[Kernel | None, ...] = (None,) * len(inputs)
     if choice.inputs == 'chosen':
         chosen = [select_inputs(data, prior, j, c) for j, c in enumerate(world.candidates)]
-        inputs = tuple(s.inputs for s in chosen)
-        kernels = tuple(s.kernel for s in chosen)
+        inputs, kernels = tuple(s.inputs for s in chosen), tuple(s.kernel for s in chosen)
+        if choice.structure == 'chosen' and choice.rule != 'paper':
+            return Model(kernels, tuple(s.noise for s in chosen))
     start = initial_model(data, inputs, choice.rule)
     if choice.structure == 'additive':
         start = Model(tuple(_additive(k) for k in start.kernels), start.noise)
-    elif choice.structure == 'chosen':
+    if choice.structure == 'chosen':
         pairs = zip(kernels, start.kernels, strict=True)
         start = Model(tuple(k if isinstance(k, Linear) else s for k, s in pairs), start.noise)
     return start if choice.rule == 'paper' else screened(data, prior, start)

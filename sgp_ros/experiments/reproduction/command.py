@@ -17,9 +17,9 @@ from sgp_ros.experiments.reproduction.catalogue import (
     COMPARED,
     EXPERIMENTS,
     QUICK_CHOICE_SEEDS,
+    run_compared,
     run_seed,
 )
-from sgp_ros.experiments.reproduction.choices import CHOICES
 from sgp_ros.experiments.reproduction.figures import draw_experiment
 from sgp_ros.experiments.reproduction.protocol import METHOD_NAMES
 from sgp_ros.report.figures import png
@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 
     from sgp_ros.experiments.reproduction.catalogue import Experiment
     from sgp_ros.experiments.reproduction.protocol import Outcome
+
+    Runner = Callable[..., dict[str, Outcome]]
+    Job = tuple[Runner, str, int] | tuple[Runner, str, int, str]
 
 GROUPS = ('toy', 'reaction-wheel', 'arm', 'choices')
 SCHEMA = 1
@@ -60,11 +63,9 @@ def run_reproduction(
     plan = _plan(group, seeds, is_quick=is_quick)
     began = time.perf_counter()
     found = _run_all(plan.jobs(), progress)
-    outcomes = {
-        e.name: _of_seeds(found, e.name, METHOD_NAMES, plan.seeds[e.name]) for e in plan.chosen
-    }
+    outcomes = {e.name: _of_seeds(found, run_seed, e.name) for e in plan.chosen}
     choices = {
-        name: summary.summarise(_of_seeds(found, name, tuple(CHOICES), plan.choice_seeds))
+        name: summary.summarise(_of_seeds(found, run_compared, name))
         for name in COMPARED
         if plan.choice_seeds
     }
@@ -74,6 +75,8 @@ def run_reproduction(
         'experiments': {name: summary.summarise(runs) for name, runs in outcomes.items()},
         'seeds_of': plan.seeds,
         'bad_seeds': {name: summary.bad_seeds(runs) for name, runs in outcomes.items()},
+        'behind_physics': {name: summary.behind_physics(runs) for name, runs in outcomes.items()},
+        'not_best': {name: summary.not_best(runs) for name, runs in outcomes.items()},
         'coefficient_errors': {
             name: summary.coefficient_errors(runs) for name, runs in outcomes.items()
         },
@@ -102,19 +105,18 @@ class _Plan:
     seeds: dict[str, int]
     choice_seeds: int
 
-    def jobs(self) -> list[tuple[str, int, str]]:
-        """Return experiment, seed and method of every run."""
-        return [
-            (e.name, seed, method)
-            for e in self.chosen
-            for seed in range(self.seeds[e.name])
-            for method in METHOD_NAMES
-        ] + [
-            (name, seed, choice)
-            for name in COMPARED
-            for seed in range(self.choice_seeds)
-            for choice in CHOICES
-        ]
+    def jobs(self) -> list[Job]:
+        """Return every run: what to call with which experiment, seed and choice.
+
+        The last experiments take longest, so they come first.
+        """
+        jobs: list[Job] = []
+        for e in reversed(self.chosen):
+            jobs += [(run_seed, e.name, seed) for seed in range(self.seeds[e.name])]
+        for name, labels in COMPARED.items():
+            for seed in range(self.choice_seeds):
+                jobs += [(run_compared, name, seed, label) for label in labels]
+        return jobs
 
 
 def _plan(group: str, seeds: int | None, *, is_quick: bool) -> _Plan:
@@ -162,14 +164,12 @@ def _write(
     print(f'{results["seconds"]} s; results in {out}')
 
 
-def _run_all(
-    jobs: list[tuple[str, int, str]], progress: Callable[[float], None]
-) -> dict[tuple[str, int, str], Outcome]:
+def _run_all(jobs: list[Job], progress: Callable[[float], None]) -> dict[Job, dict[str, Outcome]]:
     """Run all jobs in as many processes as there are cores."""
-    found: dict[tuple[str, int, str], Outcome] = {}
+    found: dict[Job, dict[str, Outcome]] = {}
     context = multiprocessing.get_context('spawn')
     with ProcessPoolExecutor(max_workers=os.cpu_count() or 1, mp_context=context) as pool:
-        futures = {pool.submit(run_seed, *job): job for job in jobs}
+        futures = {pool.submit(*job): job for job in jobs}
         try:
             for done, future in enumerate(as_completed(futures), start=1):
                 found[futures[future]] = future.result()
@@ -181,6 +181,13 @@ def _run_all(
 
 
 def _of_seeds(
-    found: dict[tuple[str, int, str], Outcome], name: str, methods: tuple[str, ...], seeds: int
+    found: dict[Job, dict[str, Outcome]], run: Runner, name: str
 ) -> dict[str, list[Outcome]]:
-    return {method: [found[name, seed, method] for seed in range(seeds)] for method in methods}
+    """Return outcomes by label, in the order of seeds."""
+    runs: dict[str, dict[int, Outcome]] = {}
+    for job, outcomes in found.items():
+        if job[:2] == (run, name):
+            for label, outcome in outcomes.items():
+                runs.setdefault(label, {})[job[2]] = outcome
+    order = METHOD_NAMES if run is run_seed else tuple(COMPARED[name])
+    return {label: [runs[label][seed] for seed in sorted(runs[label])] for label in order}

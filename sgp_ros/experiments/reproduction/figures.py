@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from sgp_ros.experiments.reproduction import toy
 from sgp_ros.experiments.reproduction.protocol import METHOD_NAMES, thinned
+from sgp_ros.simulation.figure_eight import ARM, tip_positions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -24,7 +25,7 @@ COLOURS = dict(
 """Okabe and Ito 2008: told apart with every kind of colour vision."""
 _GREY, _LINE = '#B8B8B8', '#555555'
 _TRACE_S = 3.0
-_BARS = {'reaction_wheel': 'fig4', 'reaction_wheel_concealed': 'fig6'}
+_BARS = {'reaction_wheel': 'fig4', 'reaction_wheel_concealed': 'fig6', 'arm': 'fig9'}
 _TRACES = {
     'reaction_wheel': ('fig5', 'pole_up', 1),
     'reaction_wheel_concealed': ('fig7', 'pole_down', 0),
@@ -42,6 +43,8 @@ def draw_experiment(
         world = experiment.make(0)
         figures['fig1'] = draw_toy(world, outcomes, ('PR', 'GP'))
         figures['fig2'] = draw_toy(world, outcomes, ('PRGP', 'SGP'))
+    if experiment.name == 'arm':
+        figures['fig8'] = draw_arm(experiment.make(0))
     if experiment.name in _BARS:
         figures[_BARS[experiment.name]] = draw_bars(experiment.title, summary)
     if experiment.name in _TRACES:
@@ -69,6 +72,29 @@ def draw_toy(
             position = world.tests[region].data.U[:, 0]
             axes.plot(position, mean, color=COLOURS[method], lw=1.8, label=label)
     axes.set(xlabel='position [rad]', ylabel='acceleration [rad/s^2]')
+    axes.legend(fontsize='small')
+    return figure
+
+
+def draw_arm(world: World) -> Figure:
+    """Draw the curves of the tip and where joint 3 has its friction, as in figure 8."""
+    figure = Figure(figsize=(12, 4), layout='constrained')
+    runs = {'learned from': world.train, **{name: t.data for name, t in world.tests.items()}}
+    panels = (('x [m]', 'y [m]', 0, 1), ('y [m]', 'z [m]', 1, 2))
+    for i, (across, up, first, second) in enumerate(panels):
+        axes = figure.add_subplot(1, 3, i + 1)
+        for name, data in runs.items():
+            tip = tip_positions(data.U[:, :3])
+            axes.plot(tip[:, first], tip[:, second], lw=0.8, label=name)
+        axes.set(xlabel=across, ylabel=up, aspect='equal')
+    axes.legend(fontsize='small')
+    axes = figure.add_subplot(1, 3, 3)
+    for name, data in runs.items():
+        axes.hist(data.U[:, 2], bins=40, density=True, histtype='step', label=name)
+    q = np.linspace(*np.percentile(np.concatenate([d.U[:, 2] for d in runs.values()]), (0, 100)))
+    friction = ARM.frictions[2]
+    axes.plot(q, friction.coulomb + friction.near_limits(q), color='k', label='dry friction [N m]')
+    axes.set(xlabel='position of joint 3 [rad]', ylabel='density of samples, friction')
     axes.legend(fontsize='small')
     return figure
 

@@ -51,6 +51,7 @@ class World:
         tests: by region.
         channels: names of the k components.
         candidates: per component, the columns of U that Z could see.
+        paper_inputs: the same as the paper has it, where that is less.
         true_coefficients: by index of W, where known.
         size: most samples that a fit uses, evenly spaced.
     """
@@ -61,6 +62,7 @@ class World:
     candidates: tuple[tuple[int, ...], ...]
     true_coefficients: Mapping[int, float] = field(default_factory=dict)
     size: int = 500
+    paper_inputs: tuple[tuple[int, ...], ...] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,7 +134,10 @@ def thinned(data: Observations, size: int) -> Observations:
 def _fit(name: str, world: World, train: Observations, prior: CoefficientPrior) -> FittedMethod:
     if name != 'SGP':
         method = METHODS['SGP' if name == SGP_ALL else name]
-        return method(train, prior, world.candidates, FitOptions(restarts=RESTARTS))
+        inputs = world.candidates
+        if name == SGP_ALL and world.paper_inputs is not None:
+            inputs = world.paper_inputs
+        return method(train, prior, inputs, FitOptions(restarts=RESTARTS))
     chosen = [
         select_inputs(train, prior, j, columns) for j, columns in enumerate(world.candidates)
     ]

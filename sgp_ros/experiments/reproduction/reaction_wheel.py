@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,8 @@ from sgp_ros.simulation.recording import simulate
 from sgp_ros.simulation.sensors import Sensors
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from sgp_ros.engine.windows import Equation
     from sgp_ros.robots.robot import Robot
     from sgp_ros.simulation.recording import SimulatedRecording
@@ -28,8 +31,10 @@ RATE_HZ = 100.0
 CHANNELS = ('pole', 'wheel')
 _TEST_SEEDS = {'pole_down': 1_000_000, 'pole_up': 2_000_000}
 _CONTROLLERS = {'pole_down': 'sinusoids', 'pole_up': 'balance'}
-_INPUTS = (0, 1, 2, 3, 4)
+PAPER_INPUTS = (0, 1, 2, 3, 7)
 """Both angles, both velocities, the voltage."""
+CANDIDATES = (*PAPER_INPUTS, 8, 9)
+"""The same and both directions of motion."""
 CONCEALED = ('position_friction:joint=pole,amplitude=0.02,lo=2.7,hi=3.1,kind=coulomb',)
 """What stands for the unknown physics of section IV.C: extra dry friction of the pole near the
 bottom of its swing, which is none of the ten coefficients. No recording of the paper's physical
@@ -53,22 +58,34 @@ def make_world(seed: int, robot: str = 'reaction_wheel_6', effects: tuple[str, .
         )
         for region, offset in _TEST_SEEDS.items()
     }
-    return World(
-        train.data, tests, CHANNELS, (_INPUTS, _INPUTS), true_coefficients=_truth(seed, model)
-    )
+    return _world(seed, train, tests, model)
 
 
-def make_encoder_world(seed: int, robot: str = 'reaction_wheel_6') -> World:
-    """The same from 12-bit encoder positions, through the package's own filter."""
-    model = ROBOTS[robot]
-    train = _filtered(_record(seed, 'sinusoids', (), None), model)
+def make_encoder_world(
+    seed: int, settings: Mapping[str, float] | None = ENCODER_SETTINGS
+) -> World:
+    """The same from 12-bit encoder positions.
+
+    Args:
+        seed: of training and test motions.
+        settings: of the package's own filter; None for differences of positions, paired with the
+            command by index.
+    """
+    model = ROBOTS['reaction_wheel_6']
+    filtered = _index_paired if settings is None else partial(_filtered, settings=settings)
+    train = filtered(_record(seed, 'sinusoids', (), None), model)
     tests = {
-        region: _filtered(_record(seed + offset, _CONTROLLERS[region], (), None), model)
+        region: filtered(_record(seed + offset, _CONTROLLERS[region], (), None), model)
         for region, offset in _TEST_SEEDS.items()
     }
+    return _world(seed, train, tests, model)
+
+
+def _world(seed: int, train: Test, tests: dict[str, Test], model: Robot) -> World:
     return World(
-        train.data, tests, CHANNELS, (_INPUTS, _INPUTS), true_coefficients=_truth(seed, model)
-    )
+        train.data, tests, CHANNELS, (CANDIDATES, CANDIDATES),
+        true_coefficients=_truth(seed, model), paper_inputs=(PAPER_INPUTS, PAPER_INPUTS),
+    )  # fmt: skip
 
 
 def _record(
@@ -86,24 +103,34 @@ def _differences(recording: SimulatedRecording, model: Robot) -> Test:
     m = recording.command[:-1, 0]
     y = np.diff(recording.true_velocity, axis=0) * RATE_HZ
     effort = np.column_stack([np.zeros_like(m), m])
-    F = model.regressor(Motion(q, v, np.zeros_like(q), effort))
-    data = Observations(np.column_stack([q, v, m]), F, y)
+    motion = Motion(q, v, np.zeros_like(q), effort)
+    data = Observations(model.inputs(motion), model.regressor(motion), y)
     return Test(data, recording.true_acceleration[:-1])
 
 
-def _filtered(recording: SimulatedRecording, model: Robot) -> Test:
+def _index_paired(recording: SimulatedRecording, model: Robot) -> Test:
+    """Return backward differences of the positions, and of these, beside the command."""
+    v = np.diff(recording.position, axis=0) * RATE_HZ
+    y = np.diff(v, axis=0) * RATE_HZ
+    q, v, m = recording.position[1:-1], v[:-1], recording.command[1:-1, 0]
+    motion = Motion(q, v, np.zeros_like(q), np.column_stack([np.zeros_like(m), m]))
+    data = Observations(model.inputs(motion), model.regressor(motion), y)
+    return Test(data, recording.true_acceleration[1:-1])
+
+
+def _filtered(recording: SimulatedRecording, model: Robot, settings: Mapping[str, float]) -> Test:
     """Return the equations of the weak form, and the noise-free acceleration in the same form.
 
     The true motion carries the process noise, so the noise-free acceleration is equation (27) with
     the true coefficients at the true states, averaged like everything else.
     """
-    config = EngineConfig.from_mapping(ENCODER_SETTINGS, model)
+    config = EngineConfig.from_mapping(settings, model)
     complete = ROBOTS['reaction_wheel']
     w = _coefficients(recording.truth, complete)
     U, F, y = [], [], []
     for equation in _equations(recording, recording.position, model, config):
         motion = equation.motion
-        U.append(np.concatenate([motion.position[0], motion.velocity[0], motion.effort[0, 1:]]))
+        U.append(model.inputs(motion)[0])
         F.append(equation.regressor(motion.effort[0, 1:]))
         y.append(motion.acceleration[0])
     truth = [

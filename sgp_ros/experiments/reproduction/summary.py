@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from sgp_ros.experiments.reproduction.protocol import Outcome
 
 SCORES = ('nmse', 'nmse_measured', 'nlpd', 'coverage95')
+EQUAL = 1.15
+"""Medians within 15 % count as equal."""
 BAD = 10.0
 """A seed is named bad where its nMSE is this many times the median."""
 
@@ -49,6 +51,35 @@ def bad_seeds(outcomes: Mapping[str, Sequence[Outcome]]) -> dict[str, list[int]]
                 seeds = np.flatnonzero(values > BAD * np.median(values))
                 if len(seeds):
                     found[f'{method} {region} {channel}'] = [int(s) for s in seeds]
+    return found
+
+
+def behind_physics(outcomes: Mapping[str, Sequence[Outcome]]) -> dict[str, list[int]]:
+    """Return the seeds in which the nMSE of SGP is not below that of PR, per region, channel."""
+    found = {}
+    for region, channels in outcomes['SGP'][0].scores.items():
+        for channel in channels:
+            ours, physics = (_values(outcomes[m], region, channel, 'nmse') for m in ('SGP', 'PR'))
+            seeds = np.flatnonzero(ours >= physics)
+            if len(seeds):
+                found[f'{region} {channel}'] = [int(s) for s in seeds]
+    return found
+
+
+def not_best(outcomes: Mapping[str, Sequence[Outcome]]) -> dict[str, dict[str, Any]]:
+    """Return the cells in which the median nMSE of SGP is over 15 % above the best method's."""
+    found = {}
+    for region, channels in outcomes['SGP'][0].scores.items():
+        for channel in channels:
+            medians = {
+                method: float(np.median(_values(runs, region, channel, 'nmse')))
+                for method, runs in outcomes.items()
+            }
+            best = min(medians, key=lambda method: medians[method])
+            if medians['SGP'] > EQUAL * medians[best]:
+                found[f'{region} {channel}'] = {
+                    'best': best, 'nmse': medians[best], 'nmse_of_sgp': medians['SGP']
+                }  # fmt: skip
     return found
 
 
