@@ -87,7 +87,6 @@ def draw_arm(world: World) -> Figure:
             tip = tip_positions(data.U[:, :3])
             axes.plot(tip[:, first], tip[:, second], lw=0.8, label=name)
         axes.set(xlabel=across, ylabel=up, aspect='equal')
-    axes.legend(fontsize='small')
     axes = figure.add_subplot(1, 3, 3)
     for name, data in runs.items():
         axes.hist(data.U[:, 2], bins=40, density=True, histtype='step', label=name)
@@ -113,7 +112,7 @@ def draw_bars(title: str, summary: Mapping[str, Any]) -> Figure:
         axes.set(yscale='log', title=region.replace('_', ' '), ylabel='nMSE, median over seeds')
         axes.set_xticks(range(len(channels)), list(channels))
         axes.axhline(1.0, color=_LINE, lw=0.8, ls=':')
-    axes.legend(fontsize='small')
+    figure.legend(*axes.get_legend_handles_labels(), loc='outside lower center', ncols=5)
     return figure
 
 
