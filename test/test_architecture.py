@@ -19,7 +19,7 @@ MESSAGES = {
 LAYERS = {
     'errors': set(),
     'core': NUMERIC | {'numba', 'errors'},
-    'robots': {'numpy', 'pinocchio', 'yaml', 'errors'},
+    'robots': {'numpy', 'numba', 'pinocchio', 'yaml', 'errors'},
     'simulation': NUMERIC | {'errors'},
     'engine': {'numpy', 'core', 'robots', 'errors'},
     'recordings': {
