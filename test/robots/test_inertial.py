@@ -1,9 +1,8 @@
-"""Pinocchio's regressor as a term, beside an independent Newton-Euler recursion."""
+"""The rigid-body term, beside an independent Newton-Euler recursion."""
 
 from __future__ import annotations
 
 import numpy as np
-import pinocchio
 import pytest
 
 from sgp_ros.errors import ConfigError
@@ -32,7 +31,7 @@ def _arm(seed, k=4):
     return SerialArm(tuple(links), (JointFriction(0.0, 0.0),) * k, 0.02)
 
 
-def _model(arm):
+def _tree(arm):
     return revolute_chain(
         NAMES[: len(arm.links)], [x.axis for x in arm.links], [x.offset for x in arm.links]
     )
@@ -47,7 +46,7 @@ def _motion(seed, n=10, k=4):
 def test_regressor_times_true_parameters_is_newton_euler(seed):
     """Two independent implementations, to 1e-9 of the torque."""
     arm, motion = _arm(seed), _motion(seed)
-    F = inertial_term(_model(arm)).columns(motion)
+    F = inertial_term(_tree(arm)).columns(motion)
     w = np.concatenate([link.parameters() for link in arm.links])
     expected = arm.rigid_torque(motion.position, motion.velocity, motion.acceleration)
     assert np.allclose(F @ w, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
@@ -55,7 +54,7 @@ def test_regressor_times_true_parameters_is_newton_euler(seed):
 
 def test_columns_are_affine_in_acceleration():
     """The filter of the engine relies on it."""
-    term, one, other = inertial_term(_model(_arm(0))), _motion(0), _motion(1)
+    term, one, other = inertial_term(_tree(_arm(0))), _motion(0), _motion(1)
 
     def at(acceleration):
         return term.columns(Motion(one.position, one.velocity, acceleration, one.effort))
@@ -66,42 +65,38 @@ def test_columns_are_affine_in_acceleration():
 
 def test_a_link_does_not_act_on_joints_behind_it():
     """The regressor is block upper triangular."""
-    F = inertial_term(_model(_arm(0))).columns(_motion(0))
+    F = inertial_term(_tree(_arm(0))).columns(_motion(0))
     for joint in range(4):
         assert not np.any(F[:, joint, : 10 * joint])
 
 
 def test_coefficients_are_named_by_link_with_units():
-    """Ten of each link in Pinocchio's order."""
-    model = _model(_arm(0, k=2))
-    names = [c.name for c in inertial_term(model, ('link1', 'link2')).coefficients]
+    """Ten of each link."""
+    tree = _tree(_arm(0, k=2))
+    names = [c.name for c in inertial_term(tree, ('link1', 'link2')).coefficients]
     assert names == [f'{link}.{p}' for link in ('link1', 'link2') for p, _ in PARAMETERS]
-    assert inertial_term(model).coefficients[10].name == 'b.mass'
-    assert inertial_term(model).coefficients[13].unit == 'kg m'
+    assert inertial_term(tree).coefficients[10].name == 'b.mass'
+    assert inertial_term(tree).coefficients[13].unit == 'kg m'
 
 
-def test_a_continuous_joint_is_a_revolute_one():
-    """Pinocchio stores its cosine and sine; the term takes its angle."""
-    place = pinocchio.SE3.Identity()
-    models = []
-    for joint in (pinocchio.JointModelRY(), pinocchio.JointModelRUBY()):
-        model = pinocchio.Model()
-        model.addJoint(0, joint, place, 'hinge')
-        models.append(model)
-    motion = _motion(0, k=1)
-    revolute, continuous = (inertial_term(model).columns(motion) for model in models)
-    assert np.allclose(revolute, continuous, atol=1e-12)
+def test_columns_of_some_bodies_are_those_of_all():
+    """A body that is left out takes its ten coefficients along."""
+    tree = _tree(_arm(0))
+    every, some = inertial_term(tree), inertial_term(tree, bodies=[2, 0])
+    assert some.coefficients == every.coefficients[20:30] + every.coefficients[:10]
+    columns = every.columns(_motion(0))
+    np.testing.assert_array_equal(
+        some.columns(_motion(0)), np.concatenate([columns[..., 20:30], columns[..., :10]], axis=2)
+    )
 
 
-def test_joints_of_several_degrees_of_freedom_are_refused():
-    """A ball joint has no single angle."""
-    model = pinocchio.Model()
-    model.addJoint(0, pinocchio.JointModelSpherical(), pinocchio.SE3.Identity(), 'ball')
-    with pytest.raises(ConfigError, match='ball'):
-        inertial_term(model)
+def test_a_coefficient_belongs_to_the_joint_that_carries_it():
+    """Also where links have names of their own."""
+    term = inertial_term(_tree(_arm(0, k=2)), ('link1', 'link2'))
+    assert [c.joint for c in term.coefficients] == ['a'] * 10 + ['b'] * 10
 
 
 def test_every_link_has_a_name():
     """As many names as joints."""
     with pytest.raises(ConfigError, match='1 links'):
-        inertial_term(_model(_arm(0)), ('link1',))
+        inertial_term(_tree(_arm(0)), ('link1',))

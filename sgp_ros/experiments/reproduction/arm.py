@@ -1,6 +1,6 @@
 """Section IV.D: a three-link arm, trained on a horizontal figure-eight, tested on a vertical one.
 
-The physics is Pinocchio's regressor with viscous and Coulomb friction of constant size. What it
+The physics is the rigid-body regressor with viscous and Coulomb friction of constant size. What it
 does not know is that the dry friction of joint 3 grows towards its limits.
 """
 
@@ -69,7 +69,7 @@ def make_prior(world: World) -> CoefficientPrior:
 
 def make_robot() -> Robot:
     """Return the inverse model of the arm: 30 inertial, 3 viscous and 3 Coulomb coefficients."""
-    model = revolute_chain(
+    tree = revolute_chain(
         CHANNELS, [link.axis for link in ARM.links], [link.offset for link in ARM.links]
     )
     source = 'Wu and Movellan, equation (29)'
@@ -85,7 +85,7 @@ def make_robot() -> Robot:
         name='three_link_arm',
         joints=tuple(Joint(name, direction_width=ARM.width) for name in CHANNELS),
         target='effort',
-        terms=(inertial_term(model, ('link1', 'link2', 'link3')), *viscous, *dry),
+        terms=(inertial_term(tree, ('link1', 'link2', 'link3')), *viscous, *dry),
         residual_inputs=tuple((f'position:{name}', f'direction:{name}') for name in CHANNELS),
         description='Three-link arm with constant friction, Wu and Movellan, section IV.D',
     )
