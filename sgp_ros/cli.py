@@ -128,7 +128,7 @@ def _add_replay(commands: Any) -> None:
     )  # fmt: skip
     parser.add_argument('bag', metavar='BAG', help='.mcap file, rosbag2 directory or ROS 1 .bag')
     parser.add_argument(
-        '--robot', required=True, metavar='ROBOT', help='a built-in robot or a robot YAML'
+        '--robot', required=True, metavar='ROBOT', help='a built-in robot, a robot YAML or a URDF'
     )
     parser.add_argument(
         '--params', metavar='YAML', help="ROS 2 parameter file (default: the robot's own)"

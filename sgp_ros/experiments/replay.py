@@ -68,7 +68,7 @@ def run_replay(
 
     Args:
         bag: the recording.
-        robot_name: built-in name or robot YAML.
+        robot_name: built-in name, robot YAML or URDF.
         params: ROS 2 parameter file; None takes the shipped one of the robot, if there is one.
         out: folder of the results.
         options: see `ReplayOptions`.
@@ -204,8 +204,7 @@ def identified_robot(engine: Engine) -> str:
     robot = engine.robot
     document = {
         'schema': 1,
-        'robot': robot.name,
-        'joints': list(robot.joint_names),
+        **(robot.source or {'robot': robot.name, 'joints': list(robot.joint_names)}),
         'parameters': {
             p.name: {'value': p.value, 'std': p.std, 'unit': p.unit} for p in engine.parameters()
         },
@@ -241,7 +240,9 @@ def _parameter_line(parameter: Mapping[str, Any], truth: Mapping[str, float] | N
 
 
 def _make_engine(robot: Robot, params: str | None, options: ReplayOptions) -> Engine:
-    shipped = find_shipped(f'{robot.name}.yaml') if params is None else None
+    # settings are shipped for built-in robots; a URDF may have the same name by chance
+    is_built_in = params is None and not robot.source
+    shipped = find_shipped(f'{robot.name}.yaml') if is_built_in else None
     source = params or shipped
     settings = load_parameters(source) if source else {}
     config = EngineConfig.from_mapping(settings, robot)

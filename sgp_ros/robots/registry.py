@@ -1,8 +1,8 @@
 """Robots by name or file.
 
 A robot YAML names a built-in robot and changes what differs: joint names, and prior means and
-standard deviations of coefficients. `sgp replay` writes its result in the same form, so what was
-identified on one recording is the prior for the next.
+standard deviations of coefficients. Or it names a URDF, see `urdf_robot`. `sgp replay` writes its
+result in the same form, so what was identified on one recording is the prior for the next.
 
     schema: 1
     robot: linear_axis
@@ -20,11 +20,15 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.robots.entries import Entries, is_finite
 from sgp_ros.robots.linear_axis import LINEAR_AXIS
 from sgp_ros.robots.reaction_wheel import REACTION_WHEEL, REACTION_WHEEL_6
 from sgp_ros.robots.toy_pendulum import TOY_PENDULUM
+from sgp_ros.robots.urdf_robot import KEYS, build_urdf_robot
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from sgp_ros.robots.robot import Robot
 
 ROBOTS: dict[str, Robot] = {
@@ -34,7 +38,7 @@ _KEYS = {'schema', 'robot', 'joints', 'parameters'}
 
 
 def load_robot(name_or_path: str) -> Robot:
-    """Return a built-in robot, or the robot that a YAML file describes.
+    """Return a built-in robot, or the robot that a robot YAML or a URDF describes.
 
     Raises:
         ConfigError: neither a built-in name nor a readable robot file; all problems of a file are
@@ -43,9 +47,11 @@ def load_robot(name_or_path: str) -> Robot:
     if name_or_path in ROBOTS:
         return ROBOTS[name_or_path]
     path = Path(name_or_path)
-    expected = f'one of {sorted(ROBOTS)} or a robot YAML file'
+    expected = f'one of {sorted(ROBOTS)} or a robot file (.yaml, .urdf)'
     if not path.is_file():
         raise ConfigError(f'robot {name_or_path!r} is no built-in name and no file', expected)
+    if path.suffix == '.urdf':
+        return _plain(path)
     if path.suffix not in ('.yaml', '.yml'):
         raise ConfigError(f'robot file {path} with ending {path.suffix!r}', expected)
     try:
@@ -55,29 +61,54 @@ def load_robot(name_or_path: str) -> Robot:
     return _build(document, path)
 
 
+def _plain(path: Path) -> Robot:
+    problems: list[str] = []
+    robot = build_urdf_robot({'urdf': path.name}, path.parent, problems)
+    if problems or robot is None:
+        raise ConfigError(' | '.join(problems))
+    return robot
+
+
 def _build(document: object, path: Path) -> Robot:
     if not isinstance(document, dict):
         raise ConfigError(f'robot file {path} holds {type(document).__name__}', 'a mapping')
-    problems = [f'unknown key {key!r}' for key in document if key not in _KEYS]
+    problems: list[str] = []
     if document.get('schema') != 1:
         problems.append(f'schema is {document.get("schema")!r}, not 1')
-    base = document.get('robot')
-    if base not in ROBOTS:
-        problems.append(f'robot is {base!r}, not one of {sorted(ROBOTS)}')
-    joints = document.get('joints')
-    if joints is not None and not (
-        isinstance(joints, list) and all(isinstance(joint, str) for joint in joints)
-    ):
-        problems.append(f'joints is {joints!r}, not a list of names')
+    is_tree = 'urdf' in document
+    if is_tree:
+        robot = build_urdf_robot(document, path.parent, problems)
+    else:
+        robot = _built_in(document, problems)
     prior = _read_parameters(document.get('parameters', {}), problems)
-    if problems:
+    if robot is not None:
+        try:
+            robot = robot.with_prior(prior)
+        except ConfigError as error:
+            problems.append(str(error))
+    if problems or robot is None:
         raise ConfigError(
-            f'robot file {path}: ' + ' | '.join(problems), f'the keys {sorted(_KEYS)}'
+            f'robot file {path}: ' + ' | '.join(problems),
+            f'the keys {sorted(KEYS if is_tree else _KEYS)}',
         )
-    robot = ROBOTS[str(base)]
-    if joints is not None:
-        robot = robot.renamed(joints)
-    return robot.with_prior(prior)
+    return robot
+
+
+def _built_in(document: Mapping[str, Any], problems: list[str]) -> Robot | None:
+    entries = Entries(document, problems)
+    entries.refuse_others(_KEYS)
+    base = document.get('robot')
+    joints = entries.names('joints')
+    if not isinstance(base, str) or base not in ROBOTS:
+        problems.append(f'robot is {base!r}, not one of {sorted(ROBOTS)}, and there is no urdf')
+        return None
+    if joints is None:
+        return ROBOTS[base]
+    try:
+        return ROBOTS[base].renamed(joints)
+    except ConfigError as error:
+        problems.append(str(error))
+        return None
 
 
 def _read_parameters(entries: Any, problems: list[str]) -> dict[str, tuple[float, float]]:
@@ -91,10 +122,8 @@ def _read_parameters(entries: Any, problems: list[str]) -> dict[str, tuple[float
             continue
         value, std = entry['value'], entry.get('std')
         std = math.inf if std is None else std
-        numbers = all(
-            isinstance(x, (int, float)) and not isinstance(x, bool) for x in (value, std)
-        )
-        if not numbers or not math.isfinite(value) or math.isnan(std) or std <= 0:
+        is_spread = std == math.inf or (is_finite(std) and std > 0)
+        if not is_finite(value) or not is_spread:
             problems.append(f'parameter {name}: {entry!r} has no finite value or no positive std')
             continue
         prior[str(name)] = (float(value), float(std))

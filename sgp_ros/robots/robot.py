@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,6 +51,8 @@ class Joint:
         is_actuated: whether an effort acts that is measured or commanded.
         effort_unit: unit of that effort; empty for [N m] or [N] by kind.
         direction_width: speed at which its direction counts as 76 % certain [rad/s or m/s].
+        effort_gain: [N m or N] per unit of the effort in a recording, such as a current; what
+            the physics sees is the recorded effort times this.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Joint:
     is_actuated: bool = True
     effort_unit: str = ''
     direction_width: float = 0.02
+    effort_gain: float = 1.0
 
     def unit(self, channel: str) -> str:
         """Return the unit of one of `INPUT_CHANNELS`."""
@@ -116,6 +119,7 @@ class Robot:
         terms: the physics.
         residual_inputs: per joint, the names (`velocity:pole`) of what its Z sees.
         description: one sentence with the source of the model.
+        source: the entries of a robot YAML that build this robot; empty for a built-in one.
     """
 
     name: str
@@ -124,6 +128,7 @@ class Robot:
     terms: tuple[Term, ...]
     residual_inputs: tuple[tuple[str, ...], ...]
     description: str = ''
+    source: Mapping[str, object] = field(default_factory=dict, compare=False)
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ NO_COMMAND = 'none'
 
 ROBOT = Setting(
     'robot', 'str', 'reaction_wheel',
-    'Name of a built-in robot, or path of a robot YAML.', read_only=True,
+    'Name of a built-in robot, or path of a robot YAML or URDF.', read_only=True,
 )  # fmt: skip
 MODEL_PATH = Setting(
     'model.path', 'str', '',

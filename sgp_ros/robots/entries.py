@@ -1,0 +1,87 @@
+"""Typed reading of a mapping from a robot YAML, which lists all that is wrong with it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping
+
+
+@dataclass(frozen=True, slots=True)
+class Entries:
+    """Entries of a mapping; a wrong one is described in `problems` and read as a default.
+
+    Attributes:
+        document: the mapping.
+        problems: collected so far, also those of others.
+        prefix: of the keys in messages.
+    """
+
+    document: Mapping[Any, Any]
+    problems: list[str]
+    prefix: str = ''
+
+    def refuse_others(self, known: Collection[str]) -> None:
+        """Complain of keys that mean nothing."""
+        self.problems.extend(
+            f'unknown key {self.prefix + str(key)!r}' for key in self.document if key not in known
+        )
+
+    def text(self, key: str, default: str) -> str:
+        """Return a text that is not empty."""
+        value = self.document.get(key, default)
+        if not isinstance(value, str) or not value:
+            return self._wrong(key, value, 'a text', default)
+        return value
+
+    def names(self, key: str) -> list[str] | None:
+        """Return a list of names; None where there is none."""
+        value = self.document.get(key)
+        if value is not None and not (
+            isinstance(value, list) and all(isinstance(name, str) for name in value)
+        ):
+            return self._wrong(key, value, 'a list of names', None)
+        return value
+
+    def mapping(self, key: str) -> Mapping[Any, Any] | None:
+        """Return a mapping; None where there is none."""
+        value = self.document.get(key)
+        if value is not None and not isinstance(value, dict):
+            return self._wrong(key, value, 'a mapping', None)
+        return value
+
+    def numbers(self, key: str) -> dict[str, float]:
+        """Return a mapping from names to finite numbers, possibly empty."""
+        value = self.document.get(key, {})
+        if not isinstance(value, dict) or not all(
+            isinstance(name, str) and is_finite(number) for name, number in value.items()
+        ):
+            return self._wrong(key, value, 'a mapping from names to numbers', {})
+        return {name: float(number) for name, number in value.items()}
+
+    def positive(self, key: str, default: float | None) -> float:
+        """Return a positive number; without a default it must be there."""
+        value = self.document.get(key, default)
+        if not is_finite(value) or value <= 0.0:
+            return self._wrong(key, value, 'a positive number', 1.0)
+        return float(value)
+
+    def vector(self, key: str, size: int) -> tuple[float, ...]:
+        """Return a list of finite numbers; zeros where there is none."""
+        value = self.document.get(key, [0.0] * size)
+        if not isinstance(value, list) or len(value) != size or not all(map(is_finite, value)):
+            return self._wrong(key, value, f'{size} numbers', (0.0,) * size)
+        return tuple(float(number) for number in value)
+
+    def _wrong(self, key: str, value: object, expected: str, default: Any) -> Any:
+        self.problems.append(f'{self.prefix}{key} is {value!r}, not {expected}')
+        return default
+
+
+def is_finite(value: object) -> bool:
+    """Whether a value of a YAML file is a finite number."""
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return is_number and math.isfinite(value)  # type: ignore[arg-type]  # a number by now

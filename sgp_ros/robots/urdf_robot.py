@@ -1,0 +1,206 @@
+"""A robot from a URDF: inverse model of a tree of joints with friction and offsets.
+
+A robot YAML with the key `urdf` says which joints move and which physics is assumed:
+
+    schema: 1
+    urdf: panda.urdf            # relative to this file
+    name: panda
+    joints: [j1, j2]            # those that move, in this order; others are locked
+    locked: {torso: 0.15}       # where [rad or m]; 0 if not said
+    passive: [j3]               # without effort; else as `ros2_control` says
+    effort_gain: {j1: 13.6}     # N m or N per unit of the recorded effort
+    payload: {link: tool0, mass: 0.5, com: [0, 0, 0.05]}
+    terms: {inertial: all, viscous: all, coulomb: [j1], offset: all}
+    coulomb_width: 0.01         # rad/s or m/s, over which dry friction changes its sign
+    stribeck_velocity: 0.1      # rad/s or m/s
+    prior: {inertial: {spread: 0.3}}   # about the values of the URDF; flat if not said
+    residual_inputs: own        # or all, or a list such as [velocity:j1]
+
+Only `schema` and `urdf` must be there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from sgp_ros.errors import ConfigError
+from sgp_ros.robots.entries import Entries
+from sgp_ros.robots.inertial import inertial_term
+from sgp_ros.robots.joint_terms import JOINT_TERMS, Shape, joint_term
+from sgp_ros.robots.nominal_prior import inertial_prior, joint_prior
+from sgp_ros.robots.robot import Joint, Robot
+from sgp_ros.robots.tree import Payload, Tree, read_urdf
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from sgp_ros.robots.robot import Term
+
+KEYS = frozenset({
+    'schema', 'urdf', 'name', 'joints', 'locked', 'passive', 'effort_gain', 'payload', 'terms',
+    'coulomb_width', 'stribeck_velocity', 'prior', 'residual_inputs', 'parameters',
+})  # fmt: skip
+"""What a robot YAML with a URDF may hold."""
+DEFAULT_TERMS: Mapping[str, str] = dict.fromkeys(
+    ('inertial', 'viscous', 'coulomb', 'offset'), 'all'
+)
+_TERMS = ('inertial', *JOINT_TERMS)
+
+
+def build_urdf_robot(
+    document: Mapping[str, Any], folder: Path, problems: list[str]
+) -> Robot | None:
+    """Return the robot of a robot YAML with the key `urdf`, without its `parameters`.
+
+    Args:
+        document: the content of the file.
+        folder: that `urdf` is relative to.
+        problems: what is wrong is appended here.
+
+    Returns:
+        None where the URDF cannot be read as the document asks for.
+    """
+    entries = Entries(document, problems)
+    entries.refuse_others(KEYS)
+    path = folder / entries.text('urdf', '')
+    tree = _read_tree(entries, path)
+    if tree is None:
+        return None
+    joints = _joints(tree, entries.numbers('effort_gain'), problems)
+    terms = tuple(_terms(tree, joints, entries))
+    names = tree.moving_names
+    robot = Robot(
+        name=entries.text('name', tree.name),
+        joints=joints,
+        target='effort',
+        terms=terms,
+        residual_inputs=tuple((f'position:{name}', f'velocity:{name}') for name in names),
+        description=f'Rigid-body tree of {tree.size} joints from {path.name}',
+        source={k: v for k, v in document.items() if k not in {'schema', 'urdf', 'parameters'}}
+        | {'urdf': str(path.resolve())},
+    )
+    return _with_inputs(robot, document.get('residual_inputs', 'own'), problems)
+
+
+def _read_tree(entries: Entries, path: Path) -> Tree | None:
+    payload = _payload(entries)
+    arguments = {
+        'joints': entries.names('joints'),
+        'locked': entries.numbers('locked'),
+        'passive': entries.names('passive'),
+    }
+    try:
+        return read_urdf(path, **arguments, payload=payload)  # type: ignore[arg-type]  # as named
+    except ConfigError as error:
+        entries.problems.append(str(error))
+        return None
+
+
+def _payload(entries: Entries) -> Payload | None:
+    load = entries.mapping('payload')
+    if load is None:
+        return None
+    inner = Entries(load, entries.problems, 'payload.')
+    inner.refuse_others({'link', 'mass', 'com', 'inertia'})
+    return Payload(
+        inner.text('link', ''),
+        inner.positive('mass', None),
+        inner.vector('com', 3),
+        inner.vector('inertia', 6),
+    )
+
+
+def _joints(tree: Tree, gains: Mapping[str, float], problems: list[str]) -> tuple[Joint, ...]:
+    for name, gain in gains.items():
+        if name not in tree.moving_names:
+            problems.append(f'effort_gain of {name!r}, not one of {list(tree.moving_names)}')
+        elif gain == 0.0:
+            problems.append(f'effort_gain of {name} is 0')
+    return tuple(
+        Joint(
+            name,
+            kind='prismatic' if tree.is_prismatic[i] else 'revolute',
+            is_actuated=bool(tree.is_actuated[i]),
+            effort_gain=gains.get(name, 1.0),
+        )
+        for i, name in enumerate(tree.moving_names)
+    )
+
+
+def _terms(tree: Tree, joints: tuple[Joint, ...], entries: Entries) -> list[Term]:
+    wanted = entries.mapping('terms') or DEFAULT_TERMS
+    spreads = _spreads(entries, wanted)
+    shape = Shape(
+        entries.positive('coulomb_width', Shape().coulomb_width),
+        entries.positive('stribeck_velocity', Shape().stribeck_velocity),
+    )
+    terms = []
+    for kind, who in wanted.items():
+        chosen = _chosen(kind, who, tree, entries.problems)
+        if chosen is None:
+            continue
+        if kind == 'inertial':
+            bodies = [i for i, leader in enumerate(tree.follows) if int(leader) in chosen]
+            is_all = len(bodies) == len(tree.follows)
+            term = inertial_term(tree, bodies=None if is_all else bodies)
+            prior = inertial_prior(tree, bodies, term, spreads.get(kind, 1.0))
+        else:
+            term = joint_term(kind, joints, chosen, shape)
+            prior = joint_prior(tree, kind, chosen, term, spreads.get(kind, 1.0))
+        terms.append(_informed(term, prior) if kind in spreads else term)
+    return terms
+
+
+def _informed(term: Term, prior: Mapping[str, tuple[float, float]]) -> Term:
+    coefficients = tuple(
+        replace(c, prior_mean=prior[c.name][0], prior_std=prior[c.name][1])
+        for c in term.coefficients
+    )
+    return replace(term, coefficients=coefficients)
+
+
+def _spreads(entries: Entries, wanted: Mapping[str, object]) -> dict[str, float]:
+    prior = entries.mapping('prior') or {}
+    spreads = {}
+    for kind, entry in prior.items():
+        if kind not in wanted:
+            entries.problems.append(f'prior of {kind!r}, which is not among the terms')
+        elif not isinstance(entry, dict) or set(entry) != {'spread'}:
+            entries.problems.append(f'prior of {kind} is {entry!r}, not {{spread: number}}')
+        else:
+            inner = Entries(entry, entries.problems, f'prior.{kind}.')
+            spreads[str(kind)] = inner.positive('spread', None)
+    return spreads
+
+
+def _chosen(kind: str, who: object, tree: Tree, problems: list[str]) -> list[int] | None:
+    """Return the joints a term is for; None where it or they are unknown."""
+    if kind not in _TERMS:
+        problems.append(f'term {kind!r} is not one of {list(_TERMS)}')
+        return None
+    names = list(tree.moving_names)
+    if who == 'all':
+        return list(range(len(names)))
+    if not isinstance(who, list) or any(name not in names for name in who):
+        problems.append(f'term {kind} for {who!r}, not `all` or a list of some of {names}')
+        return None
+    if len(set(who)) != len(who):
+        problems.append(f'term {kind} names a joint twice: {who}')
+        return None
+    return [names.index(name) for name in who]
+
+
+def _with_inputs(robot: Robot, spec: object, problems: list[str]) -> Robot:
+    wanted = [spec] if isinstance(spec, str) else spec
+    if not isinstance(wanted, list) or not all(isinstance(name, str) for name in wanted):
+        problems.append(f'residual_inputs is {spec!r}, not own, all or a list of inputs')
+        return robot
+    try:
+        columns = robot.residual_columns(tuple(wanted))
+    except ConfigError as error:
+        problems.append(str(error))
+        return robot
+    inputs = tuple(tuple(robot.input_name(c) for c in chosen) for chosen in columns)
+    return replace(robot, residual_inputs=inputs)
