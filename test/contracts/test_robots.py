@@ -1,14 +1,58 @@
-"""What every registered robot promises."""
+"""What every robot promises, built in or from a URDF."""
 
 from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
 
 from sgp_ros.engine.config import EngineConfig, describe_settings
-from sgp_ros.robots.registry import ROBOTS
+from sgp_ros.robots.registry import ROBOTS as BUILT_IN
+from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Motion
+from test.robots.random_urdf import random_urdf
 
+CHAIN = """
+<robot name="chain"><link name="base"/>
+  <link name="one"><inertial><mass value="1"/></inertial></link>
+  <link name="two"><inertial><origin xyz="0 0.1 0"/><mass value="2"/></inertial></link>
+  <joint name="hinge" type="continuous"><parent link="base"/><child link="one"/>
+    <axis xyz="0 1 0"/></joint>
+  <joint name="slide" type="prismatic"><parent link="one"/><child link="two"/>
+    <axis xyz="1 0 1"/><limit lower="-1" upper="1" effort="20" velocity="1"/></joint>
+  <ros2_control name="c" type="system">
+    <joint name="slide"><command_interface name="effort"/></joint>
+  </ros2_control>
+</robot>
+"""
+EVERYTHING = """
+terms: {inertial: all, viscous: all, asymmetric_coulomb: all, stribeck: all, quadratic: all,
+        offset: all, armature: all, spring: all}
+prior: {inertial: {spread: 0.3}, armature: {spread: 1.0}}
+residual_inputs: all
+"""
+
+
+def _from_urdf(name, text, yaml=None):
+    with TemporaryDirectory() as folder:
+        path = Path(folder, f'{name}.urdf')
+        path.write_text(text, encoding='utf-8')
+        if yaml is not None:
+            path = path.with_suffix('.yaml')
+            path.write_text(f'schema: 1\nurdf: {name}.urdf\nname: {name}{yaml}')
+        return load_robot(str(path))
+
+
+ROBOTS = (
+    BUILT_IN
+    | {'chain': _from_urdf('chain', CHAIN), 'full': _from_urdf('full', CHAIN, EVERYTHING)}
+    | {
+        f'tree_{seed}': _from_urdf(f'tree_{seed}', random_urdf(seed, joints, mimics))
+        for seed, joints, mimics in ((1, 3, 0), (2, 7, 0), (3, 5, 2))
+    }
+)
 NAMES = sorted(ROBOTS)
 
 
