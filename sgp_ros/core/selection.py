@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.core.kernels import Linear
 from sgp_ros.core.learning import initial_model, learn, screened
+from sgp_ros.core.linear_kernel import Linear
 from sgp_ros.core.model import Model, Observations
 
 if TYPE_CHECKING:

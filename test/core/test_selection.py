@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sgp_ros.core.kernels import Linear, SquaredExponential
+from sgp_ros.core.kernels import SquaredExponential
+from sgp_ros.core.linear_kernel import Linear
 from sgp_ros.core.model import Observations
 from sgp_ros.core.prior import CoefficientPrior
 from sgp_ros.core.selection import select_inputs

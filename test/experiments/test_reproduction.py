@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sgp_ros.cli import main
-from sgp_ros.core.kernels import Linear
+from sgp_ros.core.linear_kernel import Linear
 from sgp_ros.experiments.reproduction import reaction_wheel, toy
 from sgp_ros.experiments.reproduction.choices import CHOICES, run_choice
 from sgp_ros.experiments.reproduction.protocol import METHOD_NAMES, SGP_ALL, run_method

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.core.kernels import AdditiveSquaredExponential, Linear, SquaredExponential
+from sgp_ros.core.kernels import AdditiveSquaredExponential, SquaredExponential
 from sgp_ros.core.learning import initial_model, learn, screened
+from sgp_ros.core.linear_kernel import Linear
 from sgp_ros.core.methods import FittedMethod
 from sgp_ros.core.model import Model
 from sgp_ros.core.posterior import Posterior

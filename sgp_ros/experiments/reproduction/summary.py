@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sgp_ros.core.kernels import Linear
+from sgp_ros.core.linear_kernel import Linear
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
