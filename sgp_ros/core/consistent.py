@@ -1,0 +1,217 @@
+"""The physically consistent coefficients nearest to an estimate, by semidefinite programming.
+
+Least squares may give a link a negative mass or a moment of inertia that no body has. Among the
+coefficients that belong to real bodies, this finds those that the data contradict least:
+
+    minimise  |R (w - mean)|^2 + pull |N^T (y(w) - y(reference))|^2
+    subject to  J(w of each link) >= margin J0,  friction >= 0,
+
+with `R^T R` the information on w, J the pseudo-inertia of a link (Wensing, Kim, Slotine 2018),
+and N the directions that the data leave undetermined. `y` are the coefficients in natural size:
+`y = L^-1 J L^-T` for a link whose reference body has `J0 = L L^T`. In them the distance of two
+bodies is the same in any frame and unit (Lee, Wensing, Park 2020, Geometric robot dynamic
+identification: a convex programming approach: the constant pullback of the affine-invariant
+metric).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import clarabel
+import numpy as np
+from scipy import linalg, sparse
+
+from sgp_ros.core.base_parameters import RegressorFactor, base_parameters
+from sgp_ros.core.pseudo_inertia import PSEUDO_BASIS, is_consistent, pseudo_inertia
+from sgp_ros.errors import NumericalError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+MARGIN = 1e-6
+"""Least eigenvalue of J beside that of the reference body: far above the solver's 1e-9, far below
+what tells one real body from another."""
+PULL = 1e-3
+"""Weight of the reference in undetermined directions: a body twice as heavy as its reference costs
+as much as an error of 0.03 standard deviations, so the data have the say where they say anything."""
+_LEAST_MASS, _LEAST_RADIUS = 1e-3, 1e-2
+"""Size of the body that stands in for a missing reference, where the estimate is smaller [kg, m]."""
+_UPPER = np.array([(i, j) for j in range(4) for i in range(j + 1)]).T
+"""Entries of a symmetric 4 x 4 matrix, upper triangle column by column, as the solver wants it."""
+_ROOT2 = np.where(_UPPER[0] == _UPPER[1], 1.0, np.sqrt(2.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConsistentEstimate:
+    """Coefficients of real bodies.
+
+    Attributes:
+        coefficients: (p,) w.
+        distance: `|R (w - mean)|^2` from the estimate, in squared standard deviations; about the
+            number of active constraints where the truth is consistent and the model right.
+        was_consistent: whether the estimate already met the constraints, up to undetermined
+            directions; then `distance` is zero.
+    """
+
+    coefficients: np.ndarray
+    distance: float
+    was_consistent: bool
+
+
+def project(
+    mean: np.ndarray,
+    covariance: np.ndarray,
+    blocks: Sequence[Sequence[int]],
+    *,
+    nonnegative: Sequence[int] = (),
+    reference: np.ndarray | None = None,
+    pull: float = PULL,
+) -> ConsistentEstimate:
+    """Return the consistent coefficients nearest to an estimate with a covariance.
+
+    Args:
+        mean: (p,) estimate of w.
+        covariance: (p, p) of the determined directions; a direction without variance is one that
+            nothing determines, as in `Information.covariance`.
+        blocks: the ten columns of each link, in the order of `pseudo_inertia`.
+        nonnegative: columns of friction and armature, which dissipate or store energy.
+        reference: (p,) nominal w that fills in undetermined directions; None keeps the estimate.
+        pull: weight of the reference there.
+
+    Raises:
+        NumericalError: the solver did not converge.
+        ValueError: shapes that do not belong together.
+    """
+    size = np.sqrt(np.diag(covariance))
+    size[size == 0.0] = 1.0
+    values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
+    known = values > len(mean) * np.finfo(np.float64).eps * values.max(initial=0.0)
+    R = vectors[:, known].T / np.sqrt(values[known])[:, None] / size  # (r, p)
+    return project_information(
+        mean, R, blocks, nonnegative=nonnegative, reference=reference, pull=pull
+    )
+
+
+def project_information(
+    mean: np.ndarray,
+    R: np.ndarray,
+    blocks: Sequence[Sequence[int]],
+    *,
+    nonnegative: Sequence[int] = (),
+    reference: np.ndarray | None = None,
+    pull: float = PULL,
+) -> ConsistentEstimate:
+    """Return the consistent coefficients nearest to an estimate with square-root information.
+
+    As `project`, with R (r, p) such that `R^T R` is the inverse covariance, of any rank: the
+    triangle of a weighted regressor keeps more digits than a covariance does. One semidefinite
+    program with a 4 x 4 cone for each link, O(p^3) per iteration.
+    """
+    p = len(mean)
+    if R.shape[1:] != (p,) or any(len(block) != 10 for block in blocks):
+        raise ValueError(f'mean {mean.shape}, information {R.shape}, blocks {blocks}')
+    nominal = mean if reference is None else reference
+    Y = _natural_size(mean, nominal, blocks)  # y = Y w
+    R_y = linalg.solve(Y.T, R.T).T
+    base = base_parameters(RegressorFactor.nothing(p).with_rows(R_y).R, [''] * p)
+    N = np.linalg.qr(base.null)[0]  # (p, p - r)
+    y = Y @ mean
+    y = y + N @ (N.T @ (Y @ nominal - y))
+    if _is_feasible(y, blocks, nonnegative):
+        return ConsistentEstimate(linalg.solve(Y, y), 0.0, was_consistent=True)
+    C = np.linalg.qr(np.vstack([R_y, np.sqrt(pull) * N.T]), mode='r')
+    y = _feasible(y + _solve(C, y, blocks, nonnegative), blocks, nonnegative)
+    w = linalg.solve(Y, y)
+    return ConsistentEstimate(w, float(np.sum((R @ (w - mean)) ** 2)), was_consistent=False)
+
+
+def _natural_size(
+    mean: np.ndarray, nominal: np.ndarray, blocks: Sequence[Sequence[int]]
+) -> np.ndarray:
+    """Return Y (p, p): a link's part of `Y w` is `L^-1 J L^-T` as the solver stacks it."""
+    size = np.where(nominal != 0.0, np.abs(nominal), np.abs(mean))
+    Y = np.diag(1.0 / np.where(size != 0.0, size, 1.0))
+    for block in blocks:
+        columns = np.asarray(block)
+        J0 = pseudo_inertia(nominal[columns])
+        if not is_consistent(nominal[columns]):
+            J0 = _stand_in(pseudo_inertia(mean[columns]))
+        L = linalg.cholesky(J0, lower=True)
+        half = linalg.solve_triangular(L, PSEUDO_BASIS.reshape(10, 4, 4), lower=True)
+        whole = linalg.solve_triangular(L, half.transpose(0, 2, 1), lower=True)
+        Y[np.ix_(columns, columns)] = (whole[:, _UPPER[0], _UPPER[1]] * _ROOT2).T
+    return Y
+
+
+def _stand_in(J: np.ndarray) -> np.ndarray:
+    """Return the pseudo-inertia of a ball of about the size of an inconsistent body."""
+    mass = max(abs(J[3, 3]), _LEAST_MASS)
+    second_moment = max(float(np.abs(np.diag(J)[:3]).max()), mass * _LEAST_RADIUS**2)
+    return np.diag([second_moment, second_moment, second_moment, mass])
+
+
+def _matrix(y: np.ndarray) -> np.ndarray:
+    """Return the symmetric matrix that the solver stacks as y (10,)."""
+    matrix = np.zeros((4, 4))
+    matrix[_UPPER[0], _UPPER[1]] = matrix[_UPPER[1], _UPPER[0]] = y / _ROOT2
+    return matrix
+
+
+def _is_feasible(
+    y: np.ndarray, blocks: Sequence[Sequence[int]], nonnegative: Sequence[int]
+) -> bool:
+    return bool(np.all(y[list(nonnegative)] >= 0.0)) and all(
+        np.linalg.eigvalsh(_matrix(y[list(block)]))[0] >= MARGIN for block in blocks
+    )
+
+
+def _solve(
+    C: np.ndarray, y: np.ndarray, blocks: Sequence[Sequence[int]], nonnegative: Sequence[int]
+) -> np.ndarray:
+    """Return the least `|C dy|` for which `y + dy` meets the constraints, (p,).
+
+    The solver sees `x = C dy`, in which the objective is round.
+    """
+    rows = np.array([*nonnegative, *(i for block in blocks for i in block)], dtype=int)
+    floor = np.tile(MARGIN * (_UPPER[0] == _UPPER[1]), len(blocks))
+    bound = y[rows] - np.concatenate([np.zeros(len(nonnegative)), floor])
+    inverse = linalg.solve_triangular(C, np.eye(len(y)))  # dy = inverse x
+    cones = [clarabel.PSDTriangleConeT(4)] * len(blocks)
+    if len(nonnegative):
+        cones = [clarabel.NonnegativeConeT(len(nonnegative)), *cones]
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.max_threads = 1
+    solver = clarabel.DefaultSolver(
+        sparse.csc_matrix(np.eye(len(y))),
+        np.zeros(len(y)),
+        sparse.csc_matrix(-inverse[rows]),
+        bound,
+        cones,
+        settings,
+    )
+    solution = solver.solve()
+    if solution.status != clarabel.SolverStatus.Solved:
+        raise NumericalError(
+            f'consistent parameters: the conic solver ended with {solution.status}'
+            f' after {solution.iterations} iterations',
+            'Solved',
+            'check the size of the reference and of the estimate, or record more motion',
+        )
+    return inverse @ np.array(solution.x)
+
+
+def _feasible(
+    y: np.ndarray, blocks: Sequence[Sequence[int]], nonnegative: Sequence[int]
+) -> np.ndarray:
+    """Return y with what the solver's tolerance left below the bounds lifted onto them."""
+    y = y.copy()
+    columns = list(nonnegative)
+    y[columns] = np.maximum(y[columns], 0.0)
+    for block in blocks:
+        values, vectors = np.linalg.eigh(_matrix(y[list(block)]))
+        lifted = (vectors * np.maximum(values, MARGIN)) @ vectors.T
+        y[list(block)] = lifted[_UPPER[0], _UPPER[1]] * _ROOT2
+    return y
