@@ -80,7 +80,7 @@ $(OLDEST)/.made:
 	    { echo "found `$(PYTHON) --version 2>&1`, expected Python 3.10 to 3.12: NumPy 1.26 has no wheel for it" >&2; exit 2; }
 	$(PYTHON) -m venv --clear $(OLDEST)
 	$(OLDEST)/bin/python -m pip install --quiet 'numpy==1.26.4' 'scipy==1.11.4' 'numba>=0.59' \
-	    pyyaml jinja2 matplotlib mcap rosbags pin pytest hypothesis scikit-learn mpmath
+	    pyyaml jinja2 matplotlib mcap rosbags pin clarabel pytest hypothesis scikit-learn mpmath
 	@touch $@
 
 clean:

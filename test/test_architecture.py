@@ -18,7 +18,7 @@ MESSAGES = {
 }  # fmt: skip
 LAYERS = {
     'errors': set(),
-    'core': NUMERIC | {'numba', 'errors'},
+    'core': NUMERIC | {'clarabel', 'numba', 'errors'},
     'robots': {'numpy', 'numba', 'pinocchio', 'yaml', 'errors'},
     'simulation': NUMERIC | {'errors'},
     'engine': {'numpy', 'core', 'robots', 'errors'},

@@ -33,11 +33,12 @@ if TYPE_CHECKING:
 MARGIN = 1e-6
 """Least eigenvalue of J beside that of the reference body: far above the solver's 1e-9, far below
 what tells one real body from another."""
-PULL = 1e-3
+PULL = 1e-6
 """Weight of the reference in undetermined directions: a body twice as heavy as its reference costs
-as much as an error of 0.03 standard deviations, so the data have the say where they say anything."""
+as much as an error of a thousandth standard deviation, so data come first wherever they speak."""
 _LEAST_MASS, _LEAST_RADIUS = 1e-3, 1e-2
-"""Size of the body that stands in for a missing reference, where the estimate is smaller [kg, m]."""
+"""Size of the ball that stands in for a missing reference, where the estimate is smaller, as mass
+and radius of gyration [kg, m]."""
 _UPPER = np.array([(i, j) for j in range(4) for i in range(j + 1)]).T
 """Entries of a symmetric 4 x 4 matrix, upper triangle column by column, as the solver wants it."""
 _ROOT2 = np.where(_UPPER[0] == _UPPER[1], 1.0, np.sqrt(2.0))
@@ -65,6 +66,7 @@ def project(
     covariance: np.ndarray,
     blocks: Sequence[Sequence[int]],
     *,
+    undetermined: np.ndarray | None = None,
     nonnegative: Sequence[int] = (),
     reference: np.ndarray | None = None,
     pull: float = PULL,
@@ -73,25 +75,47 @@ def project(
 
     Args:
         mean: (p,) estimate of w.
-        covariance: (p, p) of the determined directions; a direction without variance is one that
-            nothing determines, as in `Information.covariance`.
+        covariance: (p, p), positive definite but for the undetermined directions.
         blocks: the ten columns of each link, in the order of `pseudo_inertia`.
+        undetermined: (p, q) changes of w that the data do not show, such as
+            `BaseParameters.null`; what the covariance says of them is ignored.
         nonnegative: columns of friction and armature, which dissipate or store energy.
         reference: (p,) nominal w that fills in undetermined directions; None keeps the estimate.
         pull: weight of the reference there.
 
     Raises:
-        NumericalError: the solver did not converge.
+        NumericalError: the solver did not converge, or the covariance is singular in other
+            directions too.
         ValueError: shapes that do not belong together.
     """
-    size = np.sqrt(np.diag(covariance))
-    size[size == 0.0] = 1.0
-    values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
-    known = values > len(mean) * np.finfo(np.float64).eps * values.max(initial=0.0)
-    R = vectors[:, known].T / np.sqrt(values[known])[:, None] / size  # (r, p)
+    N = np.zeros((len(mean), 0)) if undetermined is None else undetermined
     return project_information(
-        mean, R, blocks, nonnegative=nonnegative, reference=reference, pull=pull
+        mean,
+        _information_root(covariance, N),
+        blocks,
+        nonnegative=nonnegative,
+        reference=reference,
+        pull=pull,
     )
+
+
+def _information_root(covariance: np.ndarray, N: np.ndarray) -> np.ndarray:
+    """Return R with `R^T R` the inverse of the covariance across N, and `R N = 0`."""
+    N = N * np.sqrt(np.diag(covariance).max() / np.maximum((N**2).sum(axis=0), 1e-300))
+    whole = covariance + N @ N.T
+    size = np.sqrt(np.diag(whole))
+    size[size == 0.0] = 1.0
+    try:
+        lower = linalg.cholesky(whole / np.outer(size, size), lower=True)
+    except linalg.LinAlgError as error:
+        raise NumericalError(
+            'consistent parameters: the covariance is singular',
+            'a positive definite covariance in all determined directions',
+            'name the undetermined directions, or pass the information',
+        ) from error
+    R = linalg.solve_triangular(lower, np.diag(1.0 / size), lower=True)
+    Q = np.linalg.qr(R @ N)[0]
+    return R - Q @ (Q.T @ R)
 
 
 def project_information(
@@ -121,7 +145,7 @@ def project_information(
     y = y + N @ (N.T @ (Y @ nominal - y))
     if _is_feasible(y, blocks, nonnegative):
         return ConsistentEstimate(linalg.solve(Y, y), 0.0, was_consistent=True)
-    C = np.linalg.qr(np.vstack([R_y, np.sqrt(pull) * N.T]), mode='r')
+    C = RegressorFactor.nothing(p).with_rows(np.vstack([R_y, np.sqrt(pull) * N.T])).R
     y = _feasible(y + _solve(C, y, blocks, nonnegative), blocks, nonnegative)
     w = linalg.solve(Y, y)
     return ConsistentEstimate(w, float(np.sum((R @ (w - mean)) ** 2)), was_consistent=False)
@@ -184,6 +208,7 @@ def _solve(
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.max_threads = 1
+    settings.equilibrate_enable = False  # both sides are in natural size already
     solver = clarabel.DefaultSolver(
         sparse.csc_matrix(np.eye(len(y))),
         np.zeros(len(y)),

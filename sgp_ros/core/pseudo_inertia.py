@@ -51,9 +51,7 @@ def inertial_parameters(J: np.ndarray) -> np.ndarray:
     """Return the ten parameters of pseudo-inertias (..., 4, 4), (..., 10): `I = tr(S) 1 - S`."""
     S = J[..., :3, :3]
     tensor = np.trace(S, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - S
-    return np.concatenate(
-        [J[..., 3, 3, None], J[..., :3, 3], tensor[..., ROWS, COLUMNS]], axis=-1
-    )
+    return np.concatenate([J[..., 3, 3, None], J[..., :3, 3], tensor[..., ROWS, COLUMNS]], axis=-1)
 
 
 PSEUDO_BASIS = pseudo_inertia(np.eye(10))
