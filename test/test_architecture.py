@@ -22,6 +22,7 @@ LAYERS = {
     'robots': {'numpy', 'numba', 'pinocchio', 'yaml', 'errors'},
     'simulation': NUMERIC | {'errors'},
     'engine': {'numpy', 'core', 'robots', 'errors'},
+    'offline': NUMERIC | {'numba', 'core', 'robots', 'engine.samples', 'errors'},
     'recordings': {
         'numpy', 'scipy', 'yaml', 'rosbags', 'mcap', 'zstandard', 'engine.samples',
         'engine.results', 'errors',
@@ -44,7 +45,7 @@ LAYERS = {
 }  # fmt: skip
 """Layer to what it may import beside the standard library, itself and the package's version."""
 
-PURE = ('core', 'engine', 'robots', 'simulation')
+PURE = ('core', 'engine', 'robots', 'simulation', 'offline')
 SILENT = ('errors', *PURE, 'recordings', 'diagnosis')
 IMPURE_MODULES = {
     'asyncio', 'concurrent', 'datetime', 'multiprocessing', 'os', 'random', 'secrets', 'socket',

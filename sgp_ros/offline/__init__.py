@@ -1,0 +1,1 @@
+"""Identification of whole recordings: both directions of time are at hand."""
