@@ -52,6 +52,8 @@ class Outcome:
     inside_alone: int
     intervals_alone: int
     least_value: float
+    largest_zero: float
+    tolerance: float
     inconsistent_before: int
     inconsistent_after: int | None
     distance_before: float
@@ -192,7 +194,8 @@ def study(seed, joints):
         joints, base.rank, exact_rank, structural.rank, exact_identifiability(fine)[0],
         int((base.identifiable & ~exact).sum()), int((exact & ~base.identifiable).sum()),
         int(inside.sum()), len(inside), int(inside[alone].sum()), int(alone.sum()),
-        float(base.singular_values[base.rank - 1]), *consistent,
+        float(base.singular_values[base.rank - 1]),
+        float(base.singular_values[base.rank :].max(initial=0.0)), base.tolerance, *consistent,
     )  # fmt: skip
 
 
@@ -247,6 +250,8 @@ def summary(outcomes):
         ),
         'flags_missed': total('missed'),
         'flags_false': total('false'),
+        'largest_singular_value_of_zero': max(x.largest_zero for x in outcomes),
+        'rank_tolerance': [min(x.tolerance for x in outcomes), max(x.tolerance for x in outcomes)],
         'least_singular_value': min(x.least_value for x in outcomes),
         'trees_inconsistent_before': sum(x.inconsistent_before > 0 for x in outcomes),
         'trees_inconsistent_after': sum(x.inconsistent_after > 0 for x in solved),

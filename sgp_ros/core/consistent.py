@@ -36,6 +36,13 @@ what tells one real body from another."""
 PULL = 1e-6
 """Weight of the reference in undetermined directions: a body twice as heavy as its reference costs
 as much as an error of a thousandth standard deviation, so data come first wherever they speak."""
+GAP_ABSOLUTE, GAP_RELATIVE = 1e-6, 1e-7
+"""How far above the optimum the objective may stay. The objective is round in units of standard
+deviations, so a gap g leaves the result within `sqrt(2 g)` of them from the optimum."""
+_REGULARISATION = 1e-16
+"""What the solver adds to the diagonal of its equations, beside the largest entry. With its own
+5e-32, 12 of 810 random problems, some with directions known a million times better than others,
+ended short of the gap; with this, none."""
 _LEAST_MASS, _LEAST_RADIUS = 1e-3, 1e-2
 """Size of the ball that stands in for a missing reference, where the estimate is smaller, as mass
 and radius of gyration [kg, m]."""
@@ -208,7 +215,9 @@ def _solve(
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.max_threads = 1
-    settings.equilibrate_enable = False  # both sides are in natural size already
+    settings.equilibrate_enable = False  # objective and bodies are in natural size already
+    settings.static_regularization_proportional = _REGULARISATION
+    settings.tol_gap_abs, settings.tol_gap_rel = GAP_ABSOLUTE, GAP_RELATIVE
     solver = clarabel.DefaultSolver(
         sparse.csc_matrix(np.eye(len(y))),
         np.zeros(len(y)),
