@@ -65,6 +65,18 @@ def test_numbers_in_the_emps_page_are_the_measured_ones():
         )
 
 
+def test_numbers_in_the_identifiability_page_are_the_measured_ones():
+    """Coverage and flags are those of the committed result."""
+    path = ROOT / 'benchmarks/results/trees.json'
+    found = json.loads(path.read_text(encoding='utf-8'))['all']
+    text = (ROOT / 'docs/identifiability.md').read_text(encoding='utf-8')
+    assert (
+        f'| {found["trees"]} | {found["base_parameters"]} | {100 * found["coverage95_base"]:.1f} %'
+        f' | {found["unidentifiable_directions"]} | {found["directions_missed"]}'
+        f' | {found["directions_false"]} |'
+    ) in text
+
+
 def test_the_page_of_the_reproduction_is_that_of_the_results():
     """Mend with `python docs/generate_reproduction.py`."""
     path = ROOT / 'docs' / 'generate_reproduction.py'

@@ -203,11 +203,12 @@ def _solve(
 ) -> np.ndarray:
     """Return the least `|C dy|` for which `y + dy` meets the constraints, (p,).
 
-    The solver sees `x = C dy`, in which the objective is round.
+    The solver sees `x = C dy`, in which the objective is round. It stays a `MARGIN` inside the
+    bounds, so that its tolerance does not lead across them.
     """
     rows = np.array([*nonnegative, *(i for block in blocks for i in block)], dtype=int)
-    floor = np.tile(MARGIN * (_UPPER[0] == _UPPER[1]), len(blocks))
-    bound = y[rows] - np.concatenate([np.zeros(len(nonnegative)), floor])
+    floor = np.tile(2.0 * MARGIN * (_UPPER[0] == _UPPER[1]), len(blocks))
+    bound = y[rows] - np.concatenate([np.full(len(nonnegative), MARGIN), floor])
     inverse = linalg.solve_triangular(C, np.eye(len(y)))  # dy = inverse x
     cones = [clarabel.PSDTriangleConeT(4)] * len(blocks)
     if len(nonnegative):
