@@ -42,7 +42,7 @@ setup(
         'numpy>=1.26',
         'scipy>=1.11',
         'numba>=0.59',
-        'clarabel>=0.9',
+        'clarabel>=0.11',
         'pyyaml>=6',
         'jinja2>=3',
         'matplotlib>=3.6',
