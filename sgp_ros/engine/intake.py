@@ -31,6 +31,7 @@ class Intake:
         self._counts = counts
         self._is_driven = any(joint.is_actuated for joint in robot.joints)
         self._actuated = np.array([joint.is_actuated for joint in robot.joints])
+        self._gains = np.array([joint.effort_gain for joint in robot.joints])
         self.commands = CommandHistory()
         self.last_state_ns: int | None = None
         self.configure(config)
@@ -73,7 +74,8 @@ class Intake:
         effort = held[-1].copy() if held else np.zeros(len(self._robot.joints))
         for name, value in zip(names, command.effort, strict=True):
             if name in self._robot.joint_names:
-                effort[self._robot.joint_names.index(name)] = value
+                joint = self._robot.joint_names.index(name)
+                effort[joint] = value * self._gains[joint]
         self.commands.add(command.stamp_ns, effort)
 
     def take_state(self, sample: JointSample) -> list[Equation]:
@@ -102,7 +104,7 @@ class Intake:
         if self._config.effort_source == 'command':
             effort = None
         if effort is not None:
-            effort = np.where(self._actuated, effort, 0.0)
+            effort = np.where(self._actuated, effort * self._gains, 0.0)
         elif self._is_driven and not self._has_command(sample.stamp_ns):
             return None
         return State(sample.stamp_ns, sample.position[order], velocity, effort)

@@ -278,6 +278,28 @@ def test_measured_effort_is_used_where_the_state_carries_it():
     assert engine.counts.refused['unpaired'] == 300
 
 
+@pytest.mark.parametrize('is_measured', [False, True])
+def test_effort_in_another_unit_is_converted_by_its_gain(is_measured):
+    """Currents with a torque constant tell the same as torques, measured or commanded."""
+    (hinge,) = PENDULUM.joints
+    in_amperes = dataclasses.replace(
+        PENDULUM, joints=(dataclasses.replace(hinge, effort_gain=0.5),)
+    )
+    found = []
+    for robot, gain in ((PENDULUM, 1.0), (in_amperes, 0.5)):
+        events, efforts = [], None
+        for event in pendulum_events():
+            if isinstance(event, CommandSample):
+                efforts = event.effort / gain
+                event = dataclasses.replace(event, effort=efforts)  # noqa: PLW2901 - in its unit
+            elif is_measured:
+                event = dataclasses.replace(event, effort=efforts)  # noqa: PLW2901 - measured
+            events.append(event)
+        engine, _ = _run(events, robot, model__method='PR')
+        found.append([p.value for p in engine.parameters()])
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-9)
+
+
 def test_measured_velocity_is_used_where_asked_for():
     """From exact velocities the parameters are as good; `position` ignores them."""
     t, q, v, m = motion(1200, 100.0, 3)
