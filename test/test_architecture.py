@@ -27,20 +27,21 @@ LAYERS = {
         'numpy', 'scipy', 'yaml', 'rosbags', 'mcap', 'zstandard', 'engine.samples',
         'engine.results', 'errors',
     },
-    'diagnosis': NUMERIC | {'core', 'robots', 'engine', 'errors'},
+    'diagnosis': NUMERIC | {'core', 'robots', 'engine', 'offline', 'errors'},
     'report': {
-        'numpy', 'matplotlib', 'jinja2', 'core', 'robots', 'engine', 'diagnosis', 'errors',
+        'numpy', 'matplotlib', 'jinja2', 'core', 'robots', 'engine', 'offline', 'diagnosis',
+        'errors',
     },
     'ros': MESSAGES | {
         'numpy', 'yaml', 'engine', 'robots', 'simulation', 'diagnosis', 'recordings', 'errors',
     },
     'experiments': {
         'numpy', 'matplotlib', 'yaml', 'core', 'robots', 'simulation', 'engine', 'recordings',
-        'diagnosis', 'report', 'errors',
+        'diagnosis', 'report', 'offline', 'errors',
     },
     'cli': {
         'core', 'robots', 'simulation', 'engine', 'recordings', 'diagnosis', 'report',
-        'experiments', 'errors',
+        'experiments', 'offline', 'errors',
     },
 }  # fmt: skip
 """Layer to what it may import beside the standard library, itself and the package's version."""
