@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from scipy import signal
 
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
-from sgp_ros.offline.signals import collect_signals
+from sgp_ros.offline.signals import Signals, collect_signals
 from sgp_ros.recordings.table_map import read_map
 from sgp_ros.recordings.tables import read_table
 from sgp_ros.robots.linear_axis import LINEAR_AXIS
@@ -74,3 +75,35 @@ def cart_events(times, switches, forces, mass=2.0):
         position, velocity = position + velocity * h + 0.5 * a * h * h, velocity + a * h
     order = np.random.default_rng(1).permutation(len(events))
     return [events[i] for i in order]
+
+
+def moved_axis(seed, *, duration=30.0, rate=200.0, encoder=0.0, force=1.0, colour=0.0, extra=None):
+    """Return signals of an axis that follows five sinusoids exactly, in closed form.
+
+    Args:
+        seed: of motion and noise.
+        duration: [s].
+        rate: [Hz].
+        encoder: standard deviation of the position [m].
+        force: standard deviation of the force [N].
+        colour: correlation of the force noise from sample to sample.
+        extra: force beside the physics, from velocity (n,) [m/s] to (n,) [N].
+    """
+    rng = np.random.default_rng(seed)
+    n = round(duration * rate)
+    t = np.arange(n) / rate
+    omega = 2.0 * np.pi * rng.uniform(0.1, 0.8, 5)
+    phase = rng.uniform(0.0, 2.0 * np.pi, 5)
+    angle = np.outer(t, omega) + phase
+    q = 0.05 * np.sin(angle).sum(axis=1)
+    v = 0.05 * (np.cos(angle) @ omega)
+    a = -0.05 * (np.sin(angle) @ omega**2)
+    noise = rng.normal(size=n) * force * np.sqrt(1.0 - colour**2)
+    noise = signal.lfilter([1.0], [1.0, -colour], noise)
+    effort = np.column_stack([a, v, np.sign(v), np.ones(n)]) @ AXIS_TRUTH + noise
+    if extra is not None:
+        effort = effort + extra(v)
+    q = q + encoder * rng.normal(size=n)
+    return Signals(
+        t, q[:, None], None, effort[:, None], None, (slice(0, n),), {}, {}, rate, START_NS
+    )
