@@ -42,7 +42,7 @@ PRIORS = [
 @settings(max_examples=15)
 @given(seed=st.integers(0, 10_000))
 def test_all_rows_in_a_basis_equal_the_dense_posterior(prior, seed):
-    """What the basis leaves out is a thousandth of the noise, and so is the difference."""
+    """What the basis leaves out is a thousandth of the noise: a tenth of a deviation at most."""
     dense, batch = _both(seed, prior)
     spread = np.sqrt(np.diag(dense.covariance))
     assert np.abs(batch.coefficients - dense.coefficients).max() < 0.02 * spread.max()
@@ -51,7 +51,7 @@ def test_all_rows_in_a_basis_equal_the_dense_posterior(prior, seed):
     observed = dense.predict(query.U, query.F).observed(np.array(MODEL.noise))
     mean, variance = batch.predict(query.U, query.F)
     excess = batch.covariance - batch.white_covariance
-    assert mean == pytest.approx(observed.mean, abs=0.02)
+    assert np.all(np.abs(mean - observed.mean) < 0.1 * np.sqrt(observed.variance))
     if np.abs(excess).max() < 1e-12:
         assert variance == pytest.approx(observed.variance, rel=0.02)
 
