@@ -108,11 +108,10 @@ class OfflineFit:
         PRGP adds the means; its variance is that of the process alone, since the second step
         takes the coefficients of the first for known.
         """
-        U = data.motion.stacked()
         if self.process is None:
             assert self.physics is not None
-            return self.physics.predict(U, data.F)
-        mean, variance = self.process.predict(U, data.F[:, :, :0])
+            return self.physics.predict(data.U, data.F)
+        mean, variance = self.process.predict(data.U, data.F[:, :, :0])
         if self.physics is not None:
             mean = mean + data.F @ self.physics.coefficients
         return mean, variance
@@ -151,7 +150,7 @@ def fit_offline(
         )
     inputs = robot.residual_columns(residual_inputs or ('default',))
     prior = prior_of(robot, is_flat=options.has_flat_prior)
-    whole = Observations(data.motion.stacked(), data.F, data.y)
+    whole = Observations(data.U, data.F, data.y)
     points = np.unique(np.linspace(0, n - 1, min(options.max_points, n)).astype(int))
     learned = METHODS[method](_rows(whole, points), prior, inputs, options.learning)
     physics, process, residual = None, None, whole

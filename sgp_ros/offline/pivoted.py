@@ -40,10 +40,10 @@ class PivotedBasis:
         cross = self.kernel.matrix(self.pivots, U)  # (r, n)
         return np.asarray(linalg.solve_triangular(self.L, cross, lower=True, check_finite=False).T)
 
-    def remainder(self, phi: np.ndarray) -> np.ndarray:
-        """Return the variance that the functions phi (n, r) leave out, (n,), not below zero."""
+    def remainder(self, U: np.ndarray, phi: np.ndarray) -> np.ndarray:
+        """Return the variance that phi = rows(U) (n, r) leaves out, (n,), not below zero."""
         explained = np.einsum('nr,nr->n', phi, phi)
-        return np.maximum(self.kernel.diagonal(len(phi)) - explained, 0.0)
+        return np.maximum(self.kernel.diagonal(U) - explained, 0.0)
 
 
 def pivoted_basis(kernel: Kernel, U: np.ndarray, tolerance: float, limit: int) -> PivotedBasis:
@@ -56,7 +56,7 @@ def pivoted_basis(kernel: Kernel, U: np.ndarray, tolerance: float, limit: int) -
         limit: most pivots.
     """
     n = len(U)
-    left = kernel.diagonal(n)
+    left = kernel.diagonal(U)
     floor = max(tolerance, _ROUNDING * float(left.max()))
     V = np.zeros((min(limit, n), n))
     chosen: list[int] = []

@@ -69,7 +69,7 @@ class _JointPart:
         if kernel is not None:
             basis = pivoted_basis(kernel, U, _TOLERANCE * noise, limit)
             phi = basis.rows(U)
-            remainder = basis.remainder(phi)
+            remainder = basis.remainder(U, phi)
         weight = 1.0 / (noise + remainder)
         r = phi.shape[1]
         R = np.eye(r, r + Fy.shape[1])
@@ -175,7 +175,7 @@ class BatchPosterior:
             phi, own = np.zeros((len(U), 0)), np.zeros(len(U))
             if part.basis is not None:
                 phi = part.basis.rows(U)
-                own = part.basis.remainder(phi)
+                own = part.basis.remainder(U, phi)
                 spread = linalg.solve_triangular(part.factor, phi.T, trans='T')
                 own += np.einsum('rq,rq->q', spread, spread)
             mean[:, j] += phi @ v

@@ -16,7 +16,7 @@ import numpy as np
 
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.offline.zero_phase import ZeroPhase
-from sgp_ros.robots.robot import Motion
+from sgp_ros.robots.robot import CHANNELS, INPUT_CHANNELS, Motion
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -35,7 +35,8 @@ class FilteredData:
 
     Attributes:
         time: (n,) [s], on the clock of the signals.
-        motion: filtered states, accelerations and efforts.
+        U: (n, 5 k) what Z could see, as `Robot.inputs` lays it out, filtered too: a direction
+            fades in and out as it does in the columns and in the target.
         F: (n, k, p).
         y: (n, k) filtered target.
         rate: of the rows inside a block [Hz].
@@ -43,11 +44,16 @@ class FilteredData:
     """
 
     time: np.ndarray
-    motion: Motion
+    U: np.ndarray
     F: np.ndarray
     y: np.ndarray
     rate: float
     block: np.ndarray
+
+    @property
+    def motion(self) -> Motion:
+        """Filtered states, accelerations and efforts, views of U."""
+        return Motion(*np.split(self.U, len(INPUT_CHANNELS), axis=1)[: len(CHANNELS)])
 
     def rows(self, chosen: np.ndarray) -> FilteredData:
         """Return some rows, by increasing indices or a mask; a hole starts a new block."""
@@ -67,8 +73,9 @@ class FilteredData:
         return self._at(index, self.block[index], self.rate / decimation)
 
     def _at(self, index: np.ndarray, block: np.ndarray, rate: float) -> FilteredData:
-        motion = Motion(*(x[index] for x in _channels(self.motion)))
-        return FilteredData(self.time[index], motion, self.F[index], self.y[index], rate, block)
+        return FilteredData(
+            self.time[index], self.U[index], self.F[index], self.y[index], rate, block
+        )
 
 
 def filtered_data(signals: Signals, robot: Robot, plan: FilterPlan) -> FilteredData:
@@ -102,12 +109,9 @@ def filtered_data(signals: Signals, robot: Robot, plan: FilterPlan) -> FilteredD
 
 def joined(parts: list[FilteredData]) -> FilteredData:
     """Put data of one rate one after the other, their blocks as they are."""
-    motion = Motion(
-        *(np.concatenate(x) for x in zip(*(_channels(p.motion) for p in parts), strict=True))
-    )
     return FilteredData(
         np.concatenate([part.time for part in parts]),
-        motion,
+        np.concatenate([part.U for part in parts]),
         np.concatenate([part.F for part in parts]),
         np.concatenate([part.y for part in parts]),
         parts[0].rate,
@@ -137,12 +141,12 @@ def _segment_data(
     lowpass: ZeroPhase,
 ) -> FilteredData:
     motion = smoothed_motion(signals, segment, plan.velocity_source, light)
-    filtered = Motion(*(lowpass.smooth(x)[kept] for x in _channels(motion)))
+    U = lowpass.smooth(robot.inputs(motion))[kept]
     F = np.concatenate(list(_filtered_columns(robot, motion, lowpass, kept)))
-    y = filtered.effort if robot.target == 'effort' else filtered.acceleration
+    target = np.split(U, len(INPUT_CHANNELS), axis=1)[INPUT_CHANNELS.index(robot.target)]
     time = signals.time[segment][kept]
     rate = signals.rate / plan.decimation
-    return FilteredData(time, filtered, F, y, rate, np.zeros(len(kept), dtype=np.int64))
+    return FilteredData(time, U, F, target, rate, np.zeros(len(kept), dtype=np.int64))
 
 
 def _filtered_columns(
