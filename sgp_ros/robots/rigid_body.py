@@ -39,11 +39,12 @@ def torque_regressor(
         ValueError: motions or `out` of another shape.
     """
     full = full_motion(tree, q, v, a)
-    shape = (len(full[0]), tree.size, 10 * len(tree.parents))
+    g = geometry(tree)
+    shape = (len(full[0]), g.size, 10 * len(tree.parents))
     Y = np.empty(shape) if out is None else out
     if Y.shape != shape or Y.dtype != np.float64 or not Y.flags.c_contiguous:
         raise ValueError(f'out {Y.shape} of {Y.dtype} for a contiguous {shape} of float64')
-    fill_regressor(geometry(tree), tree.gravity.copy(), *full, Y)
+    fill_regressor(g, tree.gravity.copy(), *full, Y)
     return Y
 
 
@@ -65,12 +66,10 @@ def inverse_dynamics(
 def mass_matrix(tree: Tree, parameters: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Return the joint-space inertia, (n, k, k), a column per unit acceleration. O(k b)."""
     n, k = np.shape(q)
-    rest = np.zeros((n, k))
-    columns = [
-        _inverse(tree, parameters, np.zeros(3), q, rest, np.broadcast_to(unit, (n, k)))
-        for unit in np.eye(k)
-    ]
-    return np.stack(columns, axis=2)
+    units = np.tile(np.eye(k), (n, 1))
+    still = np.zeros((n * k, k))
+    columns = _inverse(tree, parameters, np.zeros(3), np.repeat(q, k, axis=0), still, units)
+    return columns.reshape(n, k, k).transpose(0, 2, 1)
 
 
 def forward_dynamics(
@@ -110,7 +109,7 @@ def _inverse(
     a: np.ndarray,
 ) -> np.ndarray:
     full = full_motion(tree, q, v, a)
-    tau = np.zeros((len(full[0]), tree.size))
+    tau = np.zeros((len(full[0]), geometry(tree).size))
     table = np.array(parameters, dtype=np.float64).reshape(len(tree.parents), 10)
     fill_torque(geometry(tree), gravity.copy(), *full, table, tau)
     return tau

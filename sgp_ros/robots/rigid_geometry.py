@@ -27,6 +27,7 @@ class Geometry(NamedTuple):
         slidings: (b,) whether a joint slides.
         rows: (b,) independent joint that each follows.
         gains: (b,) multiplier of its motion.
+        size: number of independent joints k.
     """
 
     order: np.ndarray
@@ -38,20 +39,22 @@ class Geometry(NamedTuple):
     slidings: np.ndarray
     rows: np.ndarray
     gains: np.ndarray
+    size: int
 
 
 def full_motion(
     tree: Tree, q: np.ndarray, v: np.ndarray, a: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the motion of all b joints, also of those that follow others."""
-    shapes = {np.shape(x) for x in (q, v, a)}
-    if len(shapes) > 1 or np.shape(q)[1:] != (tree.size,):
-        raise ValueError(f'motions {sorted(shapes)} for {tree.size} joints')
-    position, velocity, acceleration = (
-        np.take(np.asarray(x, dtype=np.float64), tree.follows, axis=1) * tree.multipliers
-        for x in (q, v, a)
-    )
-    return position + tree.offsets, velocity, acceleration
+    # copies, so that the loops are compiled for arrays that may be written to alone
+    q, v, a = (np.array(x, dtype=np.float64, order='C') for x in (q, v, a))
+    k = geometry(tree).size
+    if not q.shape == v.shape == a.shape or q.ndim != 2 or q.shape[1] != k:
+        raise ValueError(f'motions {q.shape}, {v.shape}, {a.shape} for {k} joints')
+    if k == len(tree.parents):
+        return q, v, a
+    q, v, a = (np.take(x, tree.follows, axis=1) * tree.multipliers for x in (q, v, a))
+    return q + tree.offsets, v, a
 
 
 @lru_cache(maxsize=64)
@@ -74,4 +77,5 @@ def geometry(tree: Tree) -> Geometry:
         slidings=tree.is_prismatic.copy(),
         rows=tree.follows.copy(),
         gains=tree.multipliers.copy(),
+        size=tree.size,
     )
