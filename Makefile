@@ -43,6 +43,7 @@ oldest: $(OLDEST)/.made
 
 bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.filter
+	$(BIN)/python -m benchmarks.regressor
 
 reproduce: venv
 	$(BIN)/sgp reproduce
