@@ -158,7 +158,7 @@ def _add_reproduce(commands: Any) -> None:
         'sgp reproduce toy --seeds 20 --out out/reproduce',
     )  # fmt: skip
     parser.add_argument('experiment', metavar='NAME', nargs='?', default='all',
-                        help='toy, reaction-wheel, choices or all (default)')  # fmt: skip
+                        help='toy, reaction-wheel, arm, choices or all (default)')  # fmt: skip
     parser.add_argument('--seeds', type=int, default=None, metavar='N',
                         help='worlds per experiment (default: 20)')  # fmt: skip
     parser.add_argument('--quick', action='store_true', help='few seeds, under two minutes')
