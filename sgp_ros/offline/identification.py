@@ -1,0 +1,157 @@
+"""A robot identified from a whole recording: filter, fits side by side, parameters, excitation.
+
+Every method learns from the same rows and is scored on the same held-out ones: other recordings,
+or stretches of time of this one. The parameters come from the physics alone, fitted to all rows
+of the recording: a process that sees position and velocity could imitate its columns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.core.base_parameters import RegressorFactor
+from sgp_ros.core.consistent import ConsistentEstimate, project
+from sgp_ros.errors import ConfigError
+from sgp_ros.offline.blocks import holdout
+from sgp_ros.offline.excitation import Excitation, judge_excitation, structural_base
+from sgp_ros.offline.fit import OfflineFit, fit_offline
+from sgp_ros.offline.plan import PlanChoice, choose_plan
+from sgp_ros.offline.regression_data import FilteredData, filtered_data
+from sgp_ros.offline.suggestions import Suggestion, suggest_motions
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from sgp_ros.offline.signals import Signals
+    from sgp_ros.robots.robot import Robot
+
+METHODS = ('PR', 'GP', 'PRGP', 'SGP')
+HELD_OUT = 'held out'
+"""Name of the held-out part of the recording itself."""
+DISSIPATIVE = ('viscous', 'coulomb', 'coulomb_positive', 'coulomb_negative', 'armature')
+"""Endings of names of coefficients that are not negative in a real machine."""
+
+
+@dataclass(frozen=True, slots=True)
+class IdentificationOptions:
+    """How a recording is identified.
+
+    Attributes:
+        methods: that are compared.
+        residual_inputs: what Z sees, as for `Robot.residual_columns`; None for the robot's choice.
+        holdout: `tail` or `alternate`, where no other recording is given.
+        share: of the rows held out then.
+        stretch_s: length of a stretch for `alternate` [s].
+        seed: of random motions that judge the excitation.
+    """
+
+    methods: tuple[str, ...] = METHODS
+    residual_inputs: tuple[str, ...] | None = None
+    holdout: str = 'tail'
+    share: float = 0.4
+    stretch_s: float = 6.0
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Identification:
+    """What was found in a recording.
+
+    Attributes:
+        robot: that was identified.
+        choice: of the filter, with all that was tried.
+        data: all rows of the recording.
+        train: those that the methods learned from.
+        held: by name, rows that no method has seen.
+        fits: by method, learned from `train`.
+        physics: the physics alone, fitted to `data`.
+        excitation: what this motion and any motion show of the parameters.
+        suggestions: motions that would show more.
+        consistent: the coefficients of real bodies nearest to `physics`; None for a robot
+            without inertial parameters.
+    """
+
+    robot: Robot
+    choice: PlanChoice
+    data: FilteredData
+    train: FilteredData
+    held: Mapping[str, FilteredData]
+    fits: Mapping[str, OfflineFit]
+    physics: OfflineFit
+    excitation: Excitation
+    suggestions: tuple[Suggestion, ...] = field(default=())
+    consistent: ConsistentEstimate | None = None
+
+
+def identify(
+    signals: Signals,
+    robot: Robot,
+    tests: Mapping[str, Signals],
+    options: IdentificationOptions,
+    *,
+    nominal: np.ndarray | None = None,
+    progress: Callable[[float], None] = lambda _share: None,
+) -> Identification:
+    """Identify a robot.
+
+    Args:
+        signals: of the recording that is learned from.
+        robot: with its prior.
+        tests: other recordings to score on, by name; without any, a part of `signals`.
+        options: see `IdentificationOptions`.
+        nominal: (p,) coefficients that fill in what no torque tells; None for none.
+        progress: called with the share that is done.
+
+    Raises:
+        ConfigError: a method, input or hold-out that does not exist.
+        RecordingError: too short.
+        NumericalError: hyper-parameters cannot be learned.
+    """
+    if not options.methods or set(options.methods) - set(METHODS):
+        raise ConfigError(f'methods {list(options.methods)}', f'some of {list(METHODS)}')
+    choice = choose_plan(signals, robot)
+    progress(0.3)
+    data = filtered_data(signals, robot, choice.plan)
+    held = {name: filtered_data(test, robot, choice.plan) for name, test in tests.items()}
+    train = data
+    if not held:
+        train, held[HELD_OUT] = holdout(data, options.holdout, options.share, options.stretch_s)
+    progress(0.4)
+    fits = {}
+    for i, method in enumerate(options.methods):
+        fits[method] = fit_offline(train, robot, method, options.residual_inputs)
+        progress(0.4 + 0.4 * (i + 1) / len(options.methods))
+    physics = fit_offline(data, robot, 'PR')
+    rng = np.random.default_rng(options.seed)
+    recorded = RegressorFactor.nothing(data.F.shape[2]).with_rows(data.F)
+    excitation = judge_excitation(structural_base(robot, rng), recorded)
+    progress(0.9)
+    suggestions: tuple[Suggestion, ...] = ()
+    if excitation.missing and robot.target == 'effort':
+        suggestions = suggest_motions(robot, recorded, rng)
+    return Identification(
+        robot, choice, data, train, held, fits, physics, excitation, suggestions,
+        make_consistent(robot, physics, excitation, nominal),
+    )  # fmt: skip
+
+
+def make_consistent(
+    robot: Robot, physics: OfflineFit, excitation: Excitation, nominal: np.ndarray | None
+) -> ConsistentEstimate | None:
+    """Return the coefficients of real bodies nearest to a fit; None without bodies."""
+    names = [c.name for c in robot.coefficients]
+    blocks = [range(i, i + 10) for i, name in enumerate(names) if name.endswith('.mass')]
+    if not blocks:
+        return None
+    dissipative = [i for i, name in enumerate(names) if name.rpartition('.')[2] in DISSIPATIVE]
+    return project(
+        physics.coefficients.mean,
+        physics.coefficients.covariance,
+        blocks,
+        undetermined=excitation.excited.null,
+        nonnegative=dissipative,
+        reference=nominal,
+    )
