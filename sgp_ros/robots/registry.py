@@ -24,7 +24,6 @@ from sgp_ros.robots.entries import Entries, is_finite
 from sgp_ros.robots.linear_axis import LINEAR_AXIS
 from sgp_ros.robots.reaction_wheel import REACTION_WHEEL, REACTION_WHEEL_6
 from sgp_ros.robots.toy_pendulum import TOY_PENDULUM
-from sgp_ros.robots.urdf_robot import KEYS, build_urdf_robot
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -35,6 +34,10 @@ ROBOTS: dict[str, Robot] = {
     robot.name: robot for robot in (REACTION_WHEEL, REACTION_WHEEL_6, TOY_PENDULUM, LINEAR_AXIS)
 }
 _KEYS = {'schema', 'robot', 'joints', 'parameters'}
+_URDF_KEYS = {
+    'schema', 'urdf', 'name', 'joints', 'locked', 'passive', 'effort_gain', 'payload', 'terms',
+    'coulomb_width', 'stribeck_velocity', 'prior', 'residual_inputs', 'parameters',
+}  # fmt: skip
 
 
 def load_robot(name_or_path: str) -> Robot:
@@ -63,7 +66,7 @@ def load_robot(name_or_path: str) -> Robot:
 
 def _plain(path: Path) -> Robot:
     problems: list[str] = []
-    robot = build_urdf_robot({'urdf': path.name}, path.parent, problems)
+    robot = _from_urdf({'urdf': path.name}, path, problems)
     if problems or robot is None:
         raise ConfigError(' | '.join(problems))
     return robot
@@ -76,10 +79,7 @@ def _build(document: object, path: Path) -> Robot:
     if document.get('schema') != 1:
         problems.append(f'schema is {document.get("schema")!r}, not 1')
     is_tree = 'urdf' in document
-    if is_tree:
-        robot = build_urdf_robot(document, path.parent, problems)
-    else:
-        robot = _built_in(document, problems)
+    robot = _from_urdf(document, path, problems) if is_tree else _built_in(document, problems)
     prior = _read_parameters(document.get('parameters', {}), problems)
     if robot is not None:
         try:
@@ -89,9 +89,18 @@ def _build(document: object, path: Path) -> Robot:
     if problems or robot is None:
         raise ConfigError(
             f'robot file {path}: ' + ' | '.join(problems),
-            f'the keys {sorted(KEYS if is_tree else _KEYS)}',
+            f'the keys {sorted(_URDF_KEYS if is_tree else _KEYS)}',
         )
     return robot
+
+
+def _from_urdf(document: Mapping[str, Any], path: Path, problems: list[str]) -> Robot | None:
+    from sgp_ros.robots.urdf_robot import (  # noqa: PLC0415  # a built-in robot needs no Pinocchio
+        build_urdf_robot,
+    )
+
+    Entries(document, problems).refuse_others(_URDF_KEYS)
+    return build_urdf_robot(document, path.parent, problems)
 
 
 def _built_in(document: Mapping[str, Any], problems: list[str]) -> Robot | None:

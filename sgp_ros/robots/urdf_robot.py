@@ -16,7 +16,8 @@ A robot YAML with the key `urdf` says which joints move and which physics is ass
     prior: {inertial: {spread: 0.3}}   # about the values of the URDF; flat if not said
     residual_inputs: own        # or all, or a list such as [velocity:j1]
 
-Only `schema` and `urdf` must be there.
+Only `schema` and `urdf` must be there. The model predicts efforts; where accelerations are wanted,
+as on joints without effort, the engine solves the same equation of motion for them.
 """
 
 from __future__ import annotations
@@ -38,11 +39,6 @@ if TYPE_CHECKING:
 
     from sgp_ros.robots.robot import Term
 
-KEYS = frozenset({
-    'schema', 'urdf', 'name', 'joints', 'locked', 'passive', 'effort_gain', 'payload', 'terms',
-    'coulomb_width', 'stribeck_velocity', 'prior', 'residual_inputs', 'parameters',
-})  # fmt: skip
-"""What a robot YAML with a URDF may hold."""
 DEFAULT_TERMS: Mapping[str, str] = dict.fromkeys(
     ('inertial', 'viscous', 'coulomb', 'offset'), 'all'
 )
@@ -63,7 +59,6 @@ def build_urdf_robot(
         None where the URDF cannot be read as the document asks for.
     """
     entries = Entries(document, problems)
-    entries.refuse_others(KEYS)
     path = folder / entries.text('urdf', '')
     tree = _read_tree(entries, path)
     if tree is None:
