@@ -88,7 +88,7 @@ class FittedMethod:
         return self.predict(U, F).observed(np.array(self.model.noise), G)
 
 
-Inputs = tuple[tuple[int, ...], ...]
+Inputs = tuple[tuple[int, ...] | None, ...]
 Method = Callable[[Observations, CoefficientPrior, Inputs, FitOptions], FittedMethod]
 
 

@@ -82,6 +82,7 @@ class _Table:
         self.rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self._orders: dict[tuple[str, ...], list[int] | None] = {}
         self._missing = np.full(len(robot.joints), np.nan)
+        self._gains = np.array([joint.effort_gain for joint in robot.joints])
 
     def add(self, sample: JointSample) -> None:
         order = self._order(sample.names)
@@ -90,7 +91,7 @@ class _Table:
             return
         position = sample.position[order]
         velocity = self._missing if sample.velocity is None else sample.velocity[order]
-        effort = self._missing if sample.effort is None else sample.effort[order]
+        effort = self._missing if sample.effort is None else sample.effort[order] * self._gains
         bad = np.isinf(velocity).any() or np.isinf(effort[self.actuated]).any()
         if bad or not np.isfinite(position).all():
             self.refused['nonfinite'] += 1
@@ -134,7 +135,8 @@ class _CommandTable:
             effort = effort.copy()
             for name, value in zip(command.names or self._joints, command.effort, strict=True):
                 if name in self._robot.joint_names:
-                    effort[self._robot.joint_names.index(name)] = value
+                    joint = self._robot.joint_names.index(name)
+                    effort[joint] = value * self._robot.joints[joint].effort_gain
             latest[command.stamp_ns] = effort
         if not latest:
             return None

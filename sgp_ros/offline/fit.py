@@ -20,8 +20,7 @@ from sgp_ros.offline.physics import autocorrelation
 from sgp_ros.offline.posterior import BatchPosterior
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
+    from sgp_ros.core.methods import Inputs
     from sgp_ros.core.model import Model
     from sgp_ros.offline.regression_data import FilteredData
     from sgp_ros.robots.robot import Robot
@@ -121,7 +120,7 @@ def fit_offline(
     data: FilteredData,
     robot: Robot,
     method: str = 'SGP',
-    residual_inputs: Sequence[str] | None = None,
+    inputs: Inputs | None = None,
     options: OfflineOptions | None = None,
 ) -> OfflineFit:
     """Identify a robot from filtered data.
@@ -130,7 +129,8 @@ def fit_offline(
         data: n rows, thinned out until the residual is white, as far as that is possible.
         robot: with its prior of W.
         method: PR, GP, PRGP or SGP.
-        residual_inputs: what Z sees, as for `Robot.residual_columns`; None for its own choice.
+        inputs: per joint the columns of U that Z sees, as `Robot.residual_columns` resolves them,
+            None for a joint without Z; None for the robot's own choice.
         options: as usual where None.
 
     Raises:
@@ -148,7 +148,7 @@ def fit_offline(
             f'at least {p + FEWEST_ROWS}',
             'take a longer recording, a higher cut-off or less decimation',
         )
-    inputs = robot.residual_columns(residual_inputs or ('default',))
+    inputs = inputs or robot.residual_columns(('default',))
     prior = prior_of(robot, is_flat=options.has_flat_prior)
     whole = Observations(data.U, data.F, data.y)
     points = np.unique(np.linspace(0, n - 1, min(options.max_points, n)).astype(int))

@@ -7,7 +7,7 @@ of the recording: a process that sees position and velocity could imitate its co
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +18,7 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.offline.blocks import holdout
 from sgp_ros.offline.excitation import Excitation, judge_excitation, structural_base
 from sgp_ros.offline.fit import OfflineFit, fit_offline
+from sgp_ros.offline.inputs import CANDIDATES, InputChoice, choose_inputs
 from sgp_ros.offline.plan import PlanChoice, choose_plan
 from sgp_ros.offline.regression_data import FilteredData, filtered_data
 from sgp_ros.offline.suggestions import Suggestion, suggest_motions
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     from sgp_ros.robots.robot import Robot
 
 METHODS = ('PR', 'GP', 'PRGP', 'SGP')
+OWN = CANDIDATES[-1]
+"""What GP and PRGP see, unless said otherwise: all candidates."""
 HELD_OUT = 'held out'
 """Name of the held-out part of the recording itself."""
 DISSIPATIVE = ('viscous', 'coulomb', 'coulomb_positive', 'coulomb_negative', 'armature')
@@ -41,7 +44,8 @@ class IdentificationOptions:
 
     Attributes:
         methods: that are compared.
-        residual_inputs: what Z sees, as for `Robot.residual_columns`; None for the robot's choice.
+        residual_inputs: what Z sees, as for `Robot.residual_columns`; None lets held-out stretches
+            of the training rows choose.
         holdout: `tail` or `alternate`, where no other recording is given.
         share: of the rows held out then.
         stretch_s: length of a stretch for `alternate` [s].
@@ -69,6 +73,7 @@ class Identification:
         fits: by method, learned from `train`.
         physics: the physics alone, fitted to `data`.
         excitation: what this motion and any motion show of the parameters.
+        inputs: what Z of SGP sees, where held-out stretches chose it.
         suggestions: motions that would show more.
         consistent: the coefficients of real bodies nearest to `physics`; None for a robot
             without inertial parameters.
@@ -82,8 +87,9 @@ class Identification:
     fits: Mapping[str, OfflineFit]
     physics: OfflineFit
     excitation: Excitation
-    suggestions: tuple[Suggestion, ...] = field(default=())
-    consistent: ConsistentEstimate | None = None
+    inputs: InputChoice | None
+    suggestions: tuple[Suggestion, ...]
+    consistent: ConsistentEstimate | None
 
 
 def identify(
@@ -120,10 +126,15 @@ def identify(
     if not held:
         train, held[HELD_OUT] = holdout(data, options.holdout, options.share, options.stretch_s)
     progress(0.4)
+    inputs, of_all = None, robot.residual_columns(options.residual_inputs or OWN)
+    if options.residual_inputs is None and 'SGP' in options.methods:
+        inputs = choose_inputs(train, robot)
+    progress(0.6)
     fits = {}
     for i, method in enumerate(options.methods):
-        fits[method] = fit_offline(train, robot, method, options.residual_inputs)
-        progress(0.4 + 0.4 * (i + 1) / len(options.methods))
+        seen = inputs.inputs if inputs is not None and method == 'SGP' else of_all
+        fits[method] = fit_offline(train, robot, method, seen)
+        progress(0.6 + 0.2 * (i + 1) / len(options.methods))
     physics = fit_offline(data, robot, 'PR')
     rng = np.random.default_rng(options.seed)
     recorded = RegressorFactor.nothing(data.F.shape[2]).with_rows(data.F)
@@ -133,8 +144,8 @@ def identify(
     if excitation.missing and robot.target == 'effort':
         suggestions = suggest_motions(robot, recorded, rng)
     return Identification(
-        robot, choice, data, train, held, fits, physics, excitation, suggestions,
-        make_consistent(robot, physics, excitation, nominal),
+        robot, choice, data, train, held, fits, physics, excitation, inputs,
+        suggestions, make_consistent(robot, physics, excitation, nominal),
     )  # fmt: skip
 
 

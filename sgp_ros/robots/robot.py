@@ -174,7 +174,8 @@ class Robot:
         Args:
             spec: `('default',)` for the robot's own choice, `('all',)` for the state and the
                 other input, `('own',)` for position and velocity of the joint itself, or names
-                such as `velocity:pole` or `direction:pole`, which then hold for every joint.
+                such as `velocity:pole`, which then hold for every joint; `own:direction` is the
+                direction of the joint itself.
 
         Raises:
             ConfigError: a name that is no input of this robot.
@@ -186,7 +187,9 @@ class Robot:
         elif tuple(spec) == ('all',):
             named = (self._input_names()[: -len(self.joints)],) * len(self.joints)
         else:
-            named = (tuple(spec),) * len(self.joints)
+            named = tuple(
+                tuple(_of_own_joint(name, joint) for name in spec) for joint in self.joint_names
+            )
         return tuple(tuple(self._column(name) for name in names) for names in named)
 
     def input_name(self, column: int) -> str:
@@ -250,6 +253,11 @@ class Robot:
             )
         channel, joint = name.split(':', 1)
         return INPUT_CHANNELS.index(channel) * len(self.joints) + self.joint_names.index(joint)
+
+
+def _of_own_joint(name: str, joint: str) -> str:
+    place, _, channel = name.partition(':')
+    return f'{channel}:{joint}' if place == 'own' and channel else name
 
 
 def _renamed_term(term: Term, new: Mapping[str, str]) -> Term:

@@ -119,8 +119,6 @@ def test_bad_requests_are_refused():
     data = _data(0)
     with pytest.raises(ConfigError, match='method'):
         fit_offline(data, LINEAR_AXIS, 'OLS')
-    with pytest.raises(ConfigError, match='residual input'):
-        fit_offline(data, LINEAR_AXIS, 'SGP', ('effort:axis',))
     with pytest.raises(RecordingError, match='12 filtered rows'):
         fit_offline(data.rows(np.arange(12)), LINEAR_AXIS)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -117,6 +119,20 @@ def test_joints_come_in_the_order_of_the_robot():
     assert signals.position[3] == pytest.approx([2.0, 1.0])
     assert signals.velocity[3] == pytest.approx([4.0, 3.0])
     assert signals.effort[3] == pytest.approx([0.0, 5.0])
+
+
+@pytest.mark.parametrize('is_measured', [False, True])
+def test_a_gain_turns_recorded_efforts_into_those_of_the_physics(is_measured):
+    """A current and its torque constant, measured or commanded."""
+    (cart,) = CART.joints
+    driven = replace(CART, joints=(replace(cart, effort_gain=-4.0),))
+    events = cart_events(np.arange(0.0, 1.0, 0.01), [0.0, 0.4], [3.0, -2.0])
+    if is_measured:
+        events = [
+            replace(e, effort=frozen_array([1.0])) for e in events if isinstance(e, JointSample)
+        ]
+    plain, scaled = (collect_signals(events, robot, max_gap=0.1) for robot in (CART, driven))
+    np.testing.assert_allclose(scaled.effort, -4.0 * plain.effort, atol=1e-12)
 
 
 def test_a_stale_command_pairs_with_no_state():
