@@ -20,9 +20,11 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.robots.double_pendulum import DOUBLE_PENDULUM
 from sgp_ros.robots.entries import Entries, is_finite
 from sgp_ros.robots.linear_axis import LINEAR_AXIS
 from sgp_ros.robots.reaction_wheel import REACTION_WHEEL, REACTION_WHEEL_6
+from sgp_ros.robots.simple_pendulum import SIMPLE_PENDULUM
 from sgp_ros.robots.toy_pendulum import TOY_PENDULUM
 
 if TYPE_CHECKING:
@@ -31,7 +33,15 @@ if TYPE_CHECKING:
     from sgp_ros.robots.robot import Robot
 
 ROBOTS: dict[str, Robot] = {
-    robot.name: robot for robot in (REACTION_WHEEL, REACTION_WHEEL_6, TOY_PENDULUM, LINEAR_AXIS)
+    robot.name: robot
+    for robot in (
+        REACTION_WHEEL,
+        REACTION_WHEEL_6,
+        TOY_PENDULUM,
+        LINEAR_AXIS,
+        SIMPLE_PENDULUM,
+        DOUBLE_PENDULUM,
+    )  # fmt: skip
 }
 _KEYS = {'schema', 'robot', 'joints', 'parameters'}
 _URDF_KEYS = {
