@@ -41,7 +41,7 @@ ROBOTS: dict[str, Robot] = {
         LINEAR_AXIS,
         SIMPLE_PENDULUM,
         DOUBLE_PENDULUM,
-    )  # fmt: skip
+    )
 }
 _KEYS = {'schema', 'robot', 'joints', 'parameters'}
 _URDF_KEYS = {
