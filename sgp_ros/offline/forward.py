@@ -46,37 +46,44 @@ class Dynamics:
     W: np.ndarray
     residual: Residual | None = None
 
-    def mass(self, q: np.ndarray) -> np.ndarray:
-        """Return M, (m, k, k) [kg m^2 or kg]: torques at unit accelerations less those at none."""
+    def equations(
+        self, q: np.ndarray, v: np.ndarray, effort: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return M, (m, k, k), and the drive, (m, k), of m states.
+
+        For the target `effort` both are read off one regressor of (k + 1) m rows: torques without
+        acceleration, and what each unit acceleration adds.
+
+        Args:
+            q: (m, k) [rad or m].
+            v: (m, k) [rad/s or m/s].
+            effort: (m, k) [N m, N or the joint's command unit].
+        """
         m, k = q.shape
+        z = 0.0 if self.residual is None else self.residual(q, v)
         if self.robot.target == 'acceleration':
-            return np.broadcast_to(np.eye(k), (m, k, k))
+            physics = self.robot.regressor(Motion(q, v, np.zeros_like(q), effort)) @ self.W
+            return np.broadcast_to(np.eye(k), (m, k, k)), physics + z
         unit = np.repeat(np.vstack([np.zeros((1, k)), np.eye(k)]), m, axis=0)
-        places, rest = np.tile(q, (k + 1, 1)), np.zeros_like(unit)
-        torque = self._physics(Motion(places, rest, unit, rest)).reshape(k + 1, m, k)
-        return np.moveaxis(torque[1:] - torque[0], 0, 2)
+        q_s, v_s, effort_s = (np.tile(x, (k + 1, 1)) for x in (q, v, effort))
+        torque = self.robot.regressor(Motion(q_s, v_s, unit, effort_s)) @ self.W
+        torque = torque.reshape(k + 1, m, k)
+        return np.moveaxis(torque[1:] - torque[0], 0, 2), effort - torque[0] - z
 
-    def drive(self, q: np.ndarray, v: np.ndarray, effort: np.ndarray) -> np.ndarray:
-        """Return what accelerates the mass, (m, k) [N m, N, or acceleration]."""
-        bias = self._physics(Motion(q, v, np.zeros_like(q), effort))
-        if self.residual is not None:
-            bias = bias + self.residual(q, v)
-        return bias if self.robot.target == 'acceleration' else effort - bias
-
-    def dry_friction(self, q: np.ndarray, effort: np.ndarray) -> np.ndarray:
+    def level_of_dry_friction(self, q: np.ndarray, effort: np.ndarray) -> np.ndarray:
         """Return the level of dry friction of each joint, (m, k) [unit of the drive].
 
-        Half the fall of the drive of a joint as its own velocity passes through zero; negative
-        where W says that friction pushes. Friction that depends on the direction of another
-        joint is no part of it.
+        Half the jump of a joint's equation as its own velocity passes through zero; negative where
+        W says that friction pushes. Friction that depends on the direction of another joint is
+        no part of it.
         """
-        beside = np.full_like(q, _BESIDE_REST)
-        physics = Dynamics(self.robot, self.W)
-        fall = physics.drive(q, -beside, effort) - physics.drive(q, beside, effort)
-        return np.where(np.abs(fall) > _JUMP, 0.5 * fall, 0.0)
-
-    def _physics(self, motion: Motion) -> np.ndarray:
-        return self.robot.regressor(motion) @ self.W
+        m, rest = len(q), np.zeros_like(q)
+        beside = np.vstack([rest + _BESIDE_REST, rest - _BESIDE_REST])
+        places, none, efforts = (np.vstack([x, x]) for x in (q, rest, effort))
+        physics = self.robot.regressor(Motion(places, beside, none, efforts)) @ self.W
+        jump = physics[:m] - physics[m:]
+        sign = -1.0 if self.robot.target == 'acceleration' else 1.0
+        return np.where(np.abs(jump) > _JUMP, 0.5 * sign * jump, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,7 +115,7 @@ def dry_friction(
         v: (m, k) [rad/s or m/s]; exactly zero at rest.
         effort: (m, k) [N m, N or the joint's command unit].
     """
-    level = dynamics.dry_friction(q, effort)
+    level = dynamics.level_of_dry_friction(q, effort)
     side = np.where(level != 0.0, np.sign(v), 0.0)
     sticks = (v == 0.0) & (level != 0.0)
     rows = np.flatnonzero(sticks.any(axis=1))
@@ -175,7 +182,8 @@ def _equations(
     """Mass matrix and drive with friction on the side it is on, (m, k, k) and (m, k)."""
     felt = np.where(v == 0.0, _BESIDE_REST * friction.side, v)
     correction = friction.level * (np.sign(felt) - friction.side)
-    return dynamics.mass(q), dynamics.drive(q, felt, effort) + correction
+    M, drive = dynamics.equations(q, felt, effort)
+    return M, drive + correction
 
 
 def _solve(M: np.ndarray, drive: np.ndarray, sticks: np.ndarray) -> np.ndarray:
