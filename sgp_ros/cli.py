@@ -63,6 +63,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_demo(commands)
     _add_simulate(commands)
     _add_replay(commands)
+    _add_identify(commands)
     _add_import(commands)
     _add_reproduce(commands)
     return parser
@@ -141,6 +142,33 @@ def _add_replay(commands: Any) -> None:
     parser.add_argument('--truth', metavar='JSON', help='truth.json to compare with')
 
 
+def _add_identify(commands: Any) -> None:
+    parser = _add(
+        commands, 'identify', _identify,
+        'Identify a robot from a whole recording, offline: filters, parameters, URDF, roll-outs.',
+        'sgp identify arm.mcap --robot arm.urdf --test other.mcap --out out/identify',
+    )  # fmt: skip
+    parser.add_argument('bag', metavar='BAG', help='.mcap file, rosbag2 directory or ROS 1 .bag')
+    parser.add_argument(
+        '--robot', required=True, metavar='ROBOT', help='a built-in robot, a robot YAML or a URDF'
+    )
+    parser.add_argument('--test', action='append', default=[], metavar='BAG',
+                        help='recording to score on; may be repeated')  # fmt: skip
+    parser.add_argument('--holdout', choices=('tail', 'alternate'), default='tail',
+                        help='part held out without --test (default: %(default)s)')  # fmt: skip
+    parser.add_argument('--share', type=float, default=0.4, metavar='X',
+                        help='how much of it (default: %(default)s)')  # fmt: skip
+    parser.add_argument('--stretch', type=float, default=6.0, metavar='S',
+                        help='length of alternate stretches [s]')  # fmt: skip
+    parser.add_argument('--inputs', nargs='+', metavar='NAME', default=None,
+                        help='what Z sees, such as own:velocity')  # fmt: skip
+    parser.add_argument('--effort', choices=('auto', 'state', 'command'), default='auto',
+                        help='where efforts come from (default: %(default)s)')  # fmt: skip
+    parser.add_argument('--joint-states', metavar='TOPIC', help='topic of the states')
+    parser.add_argument('--command', metavar='TOPIC', dest='command_topic',
+                        help='topic of the commands')  # fmt: skip
+
+
 def _add_import(commands: Any) -> None:
     parser = _add(
         commands, 'import', _import,
@@ -215,6 +243,27 @@ def _replay(arguments: argparse.Namespace) -> Result:
         arguments.out,
         options,
         progress=Progress('replay'),
+    )
+
+
+def _identify(arguments: argparse.Namespace) -> Result:
+    from sgp_ros.experiments.identify import IdentifyOptions, run_identify
+    from sgp_ros.offline.identification import IdentificationOptions
+
+    options = IdentifyOptions(
+        tests=arguments.test,
+        joint_states=arguments.joint_states,
+        command=arguments.command_topic,
+        effort_source=arguments.effort,
+        identification=IdentificationOptions(
+            residual_inputs=None if arguments.inputs is None else tuple(arguments.inputs),
+            holdout=arguments.holdout,
+            share=arguments.share,
+            stretch_s=arguments.stretch,
+        ),
+    )
+    return run_identify(
+        arguments.bag, arguments.robot, arguments.out, options, progress=Progress('identify')
     )
 
 

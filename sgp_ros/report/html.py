@@ -76,13 +76,13 @@ def render(
         subtitle=engine.robot.description,
         verdict=verdict(metrics),
         checks=list(checks),
-        predictions=_images(figures, ('acceleration_', 'effort_')),
+        predictions=embedded(figures, ('acceleration_', 'effort_')),
         scores=_scores(metrics),
         parameters=[_parameter_row(p, metrics, truth) for p in metrics['parameters']],
         parameter_note=_parameter_note(metrics),
-        parameter_figures=_images(figures, ('parameters',)),
+        parameter_figures=embedded(figures, ('parameters',)),
         has_truth=bool(truth),
-        calibration=_images(figures, ('calibration',)),
+        calibration=embedded(figures, ('calibration',)),
         counts=(
             f'{samples["read"]} states read, {samples["used"]} used; '
             f'{metrics["commands"]["read"]} commands read, '
@@ -179,7 +179,8 @@ def _parameter_note(metrics: Mapping[str, Any]) -> str:
     )
 
 
-def _images(figures: Mapping[str, bytes], prefixes: tuple[str, ...]) -> list[dict[str, str]]:
+def embedded(figures: Mapping[str, bytes], prefixes: tuple[str, ...]) -> list[dict[str, str]]:
+    """Return those PNG figures whose names begin with one of `prefixes` as data for a page."""
     return [
         {
             'alt': name.replace('_', ' of ', 1),

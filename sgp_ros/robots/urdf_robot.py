@@ -23,6 +23,7 @@ as on joints without effort, the engine solves the same equation of motion for t
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sgp_ros.errors import ConfigError
@@ -35,7 +36,6 @@ from sgp_ros.robots.tree import Payload, Tree, read_urdf
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
     from sgp_ros.robots.robot import Term
 
@@ -77,6 +77,23 @@ def build_urdf_robot(
         | {'urdf': str(path.resolve())},
     )
     return _with_inputs(robot, document.get('residual_inputs', 'own'), problems)
+
+
+def nominal_robot(robot: Robot) -> Robot:
+    """Return a robot from a URDF with the values of the URDF as the means of its prior.
+
+    Raises:
+        ConfigError: the URDF is no longer what it was.
+    """
+    source = dict(robot.source)
+    terms = source.get('terms') or DEFAULT_TERMS
+    assert isinstance(terms, dict)
+    source |= {'prior': {kind: {'spread': 1.0} for kind in terms}}
+    problems: list[str] = []
+    nominal = build_urdf_robot(source, Path(), problems)
+    if nominal is None or problems:
+        raise ConfigError(f'URDF {source["urdf"]}: ' + ' | '.join(problems), 'as it was before')
+    return nominal
 
 
 def _read_tree(entries: Entries, path: Path) -> Tree | None:

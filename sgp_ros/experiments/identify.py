@@ -1,0 +1,260 @@
+"""`sgp identify`: a robot from a whole recording: parameters, intervals, URDF and a report."""
+
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import yaml
+
+from sgp_ros.errors import RecordingError
+from sgp_ros.offline.identification import IdentificationOptions, identify
+from sgp_ros.offline.regression_data import smoothed_motion
+from sgp_ros.offline.rollout_scores import score_windows
+from sgp_ros.offline.rollout_windows import cut_windows, joined
+from sgp_ros.offline.signals import collect_signals
+from sgp_ros.offline.zero_phase import ZeroPhase
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.report.files import write_text
+from sgp_ros.report.findings import collect_findings
+from sgp_ros.report.identification import cautions, excitation, verdict, write_identification
+from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.urdf_robot import nominal_robot
+from sgp_ros.robots.urdf_writer import write_urdf
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from sgp_ros.offline.identification import Identification
+    from sgp_ros.offline.regression_data import FilteredData
+    from sgp_ros.offline.rollout_scores import RolloutScore
+    from sgp_ros.offline.signals import Signals
+    from sgp_ros.robots.robot import Robot
+
+    Stretch = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+MAX_GAP_S = 0.25
+HORIZONS: tuple[float | None, ...] = (0.0, 0.3, None)
+"""One step, 0.3 s, the longest held-out stretch."""
+_STRIDE_S = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class IdentifyOptions:
+    """How a recording is read and identified.
+
+    Attributes:
+        tests: recordings that are only scored on; without any, a part of the recording.
+        joint_states: topic of the states; None for the one there is.
+        command: topic of the commands; None for the one there is.
+        effort_source: `state`, `command` or `auto`.
+        identification: what is fitted and held out.
+    """
+
+    tests: Sequence[str] = ()
+    joint_states: str | None = None
+    command: str | None = None
+    effort_source: str = 'auto'
+    identification: IdentificationOptions = field(default_factory=IdentificationOptions)
+
+
+def run_identify(
+    bag: str,
+    robot_name: str,
+    out: Path,
+    options: IdentifyOptions,
+    *,
+    progress: Callable[[float], None],
+) -> dict[str, Any]:
+    """Identify a robot and write findings, report, robot YAML and URDF.
+
+    Args:
+        bag: the recording that is learned from.
+        robot_name: built-in name, robot YAML or URDF.
+        out: folder of the results.
+        options: see `IdentifyOptions`.
+        progress: called with the share that is done.
+
+    Raises:
+        ConfigError: a wrong robot, method or hold-out.
+        RecordingError: nothing in the recording can be used.
+    """
+    robot = load_robot(robot_name)
+    remarks: list[str] = []
+    signals = read_signals(bag, robot, options, remarks)
+    tests = {Path(t).stem: read_signals(t, robot, options, remarks) for t in options.tests}
+    progress(0.1)
+    found = identify(
+        signals, robot, tests, options.identification,
+        nominal=nominal_coefficients(robot), progress=lambda share: progress(0.1 + 0.7 * share),
+    )  # fmt: skip
+    rollouts = roll_out_held(found, signals, tests)
+    progress(0.95)
+    counts = {'states on the grid': len(signals.time)}
+    for what, refused in (('states', signals.refused), ('commands', signals.commands_refused)):
+        counts |= {f'{what} refused: {reason}': n for reason, n in refused.items() if n}
+    findings = collect_findings(found, Path(bag).name, rollouts, counts)
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / 'identification.json', json.dumps(findings, indent=1, allow_nan=False) + '\n')
+    write_text(out / 'robot_identified.yaml', identified_yaml(found))
+    urdf = identified_urdf(found)
+    if urdf is not None:
+        write_text(out / 'robot_identified.urdf', urdf)
+    write_identification(out, found, findings, remarks)
+    progress(1.0)
+    print_findings(findings)
+    print(f'report: {out / "report.html"}')
+    return findings
+
+
+def read_signals(bag: str, robot: Robot, options: IdentifyOptions, remarks: list[str]) -> Signals:
+    """Return the signals of a recording; what is odd about it is appended to `remarks`."""
+    recording = open_recording(bag)
+    signals = collect_signals(
+        recording.events(options.joint_states, options.command), robot,
+        max_gap=MAX_GAP_S, effort_source=options.effort_source,
+    )  # fmt: skip
+    remarks += recording.remarks
+    remarks += [
+        f'{count} messages could not be read: {why}' for why, count in recording.unreadable.items()
+    ]
+    return signals
+
+
+def nominal_coefficients(robot: Robot) -> np.ndarray | None:
+    """Return the coefficients as the robot's URDF has them, (p,); None without a URDF."""
+    if 'urdf' not in robot.source:
+        return None
+    return np.array([c.prior_mean for c in nominal_robot(robot).coefficients])
+
+
+def best_coefficients(found: Identification) -> np.ndarray:
+    """Return those of real bodies where there are bodies, else those of the physics."""
+    if found.consistent is not None:
+        return found.consistent.coefficients
+    return found.physics.coefficients.mean
+
+
+def roll_out_held(
+    found: Identification, signals: Signals, tests: Mapping[str, Signals]
+) -> dict[str, tuple[RolloutScore, ...]]:
+    """Simulate the identified robot over what was held out, from many starts.
+
+    Stretches too short for a horizon are left out, and so is a robot whose mass matrix the
+    coefficients leave singular.
+    """
+    scores = {}
+    for name, data in found.held.items():
+        stretches = _stretches(found, tests.get(name, signals), data)
+        done = [_scored(found, stretches, horizon) for horizon in HORIZONS]
+        scores[name] = tuple(score for score in done if score is not None)
+    return scores
+
+
+def _stretches(found: Identification, signals: Signals, data: FilteredData) -> list[Stretch]:
+    """Return time, position, velocity and effort at the full rate of each held-out stretch."""
+    plan = found.choice.plan
+    light = ZeroPhase(signals.rate, plan.state_cutoff)
+    motions = [
+        (signals.time[s], smoothed_motion(signals, s, plan.velocity_source, light), s)
+        for s in signals.segments
+    ]
+    stretches = []
+    for block in np.unique(data.block):
+        rows = data.time[data.block == block]
+        for time, motion, segment in motions:
+            kept = slice(*np.searchsorted(time, (rows[0], rows[-1])))
+            if kept.stop - kept.start > 1:
+                effort = signals.effort[segment][kept]
+                stretches.append(
+                    (time[kept], motion.position[kept], motion.velocity[kept], effort)
+                )
+    return stretches
+
+
+def _scored(
+    found: Identification, stretches: list[Stretch], horizon: float | None
+) -> RolloutScore | None:
+    if horizon is None:  # as long as the longest one
+        stretches = sorted(stretches, key=lambda s: len(s[0]))[-1:]
+    windows = []
+    for stretch in stretches:
+        with suppress(RecordingError):
+            windows.append(cut_windows(*stretch, horizon, _STRIDE_S))
+    try:
+        return score_windows(joined(windows), found.robot, best_coefficients(found))
+    except (ValueError, np.linalg.LinAlgError):
+        return None
+
+
+def identified_yaml(found: Identification) -> str:
+    """Return the identified robot as a robot YAML, the prior for the next run."""
+    robot, physics = found.robot, found.physics.coefficients
+    values = best_coefficients(found)
+    document = {
+        'schema': 1,
+        **(robot.source or {'robot': robot.name, 'joints': list(robot.joint_names)}),
+        'parameters': {
+            c.name: {
+                'value': float(values[i]),
+                'std': float(physics.std[i]) if physics.is_identifiable[i] else None,
+                'unit': c.unit,
+            }
+            for i, c in enumerate(robot.coefficients)
+        },
+    }
+    return yaml.safe_dump(document, sort_keys=False)
+
+
+def identified_urdf(found: Identification) -> str | None:
+    """Return the robot's URDF with the identified bodies and friction; None without a URDF."""
+    if 'urdf' not in found.robot.source or found.consistent is None:
+        return None
+    found_values = best_coefficients(found)
+    names = [c.name for c in found.robot.coefficients]
+    values = dict(zip(names, found_values.tolist(), strict=True))
+    bodies = {
+        name.removesuffix('.mass'): found_values[i : i + 10]
+        for i, name in enumerate(names)
+        if name.endswith('.mass')
+    }
+    dynamics = {
+        joint: (values.get(f'{joint}.viscous', 0.0), values.get(f'{joint}.coulomb', 0.0))
+        for joint in found.robot.joint_names
+    }
+    text = Path(str(found.robot.source['urdf'])).read_text(encoding='utf-8')
+    return write_urdf(text, bodies, dynamics)
+
+
+def print_findings(findings: Mapping[str, Any]) -> None:
+    """Print scores per method, parameters, and what is not to be trusted."""
+    print(verdict(findings))
+    plan = findings['filter']
+    print(
+        f'filter: {plan["cutoff_hz"]:g} Hz, {plan["rate_hz"]:.3g} rows/s, velocity from '
+        f'{plan["velocity_source"]}'
+    )
+    for name in (name for name in findings['rows'] if name != 'train'):
+        for method, scores in findings['scores'].items():
+            joints = scores[name].get('joints', {})
+            each = '  '.join(f'{joint} {s["nmse"]:.3g}' for joint, s in joints.items())
+            print(f'{name:20s} {method:5s} nMSE {each}')
+    for name, all_ in findings['rollouts'].items():
+        for score in all_:
+            ends = {joint: s['nmse_end'] for joint, s in score['joints'].items()}
+            each = '  '.join(f'{joint} {_short(end)}' for joint, end in ends.items())
+            print(f'{name:20s} roll-outs of {score["horizon_s"]:.3g} s: nMSE {each}')
+    for p in findings['parameters']:
+        known = f'{p["value"]:11.5g} +- {1.96 * p["std"]:<9.3g} {p["unit"]}' if p['std'] else ''
+        print(f'{p["name"]:24s} {known or p["status"]}')
+    print(excitation(findings['excitation']))
+    for text in (*findings['excitation']['suggestions'], *cautions(findings)):
+        print(text)
+
+
+def _short(x: float | None) -> str:
+    return 'none' if x is None else f'{x:.3g}'

@@ -1,0 +1,183 @@
+"""What was found in a whole recording, as data for JSON: `identification.json`."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sgp_ros.core.scores import coverage95, nlpd, nmse
+from sgp_ros.offline.blocks import distance_to
+from sgp_ros.report.metrics import versions
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sgp_ros.offline.fit import OfflineFit
+    from sgp_ros.offline.identification import Identification
+    from sgp_ros.offline.regression_data import FilteredData
+    from sgp_ros.offline.rollout_scores import RolloutScore
+
+SCHEMA = 1
+
+
+def collect_findings(
+    found: Identification,
+    recording: str,
+    rollouts: Mapping[str, tuple[RolloutScore, ...]],
+    counts: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Return all numbers of an identification.
+
+    Args:
+        found: the identification.
+        recording: name of the recording.
+        rollouts: by name of the recording, one score per horizon.
+        counts: states and commands read and refused.
+    """
+    names = found.robot.joint_names
+    regions = {'train': found.train, **found.held}
+    for name, data in found.held.items():
+        distance = distance_to(found.train, data)
+        is_far = distance > np.median(distance)
+        regions[f'{name}, near'] = data.rows(~is_far)
+        regions[f'{name}, far'] = data.rows(is_far)
+    return {
+        'schema': SCHEMA,
+        'robot': found.robot.name,
+        'recording': recording,
+        'joints': list(names),
+        'target': found.robot.target,
+        'counts': dict(counts),
+        'filter': _filter(found),
+        'rows': {name: len(data.time) for name, data in regions.items()},
+        'scores': {
+            method: {name: _scores(fit, data, names) for name, data in regions.items()}
+            for method, fit in found.fits.items()
+        },
+        'noise': {
+            method: dict(zip(names, (math.sqrt(x) for x in fit.model.noise), strict=True))
+            for method, fit in found.fits.items()
+        },
+        'inputs': None if found.inputs is None else [list(n) for n in found.inputs.names],
+        'parameters': _parameters(found),
+        'base_parameters': _base_parameters(found),
+        'excitation': {
+            'rank': found.excitation.excited.rank,
+            'structural_rank': found.excitation.structural.rank,
+            'condition': found.excitation.excited.condition,
+            'tolerance': found.excitation.excited.tolerance,
+            'not_excited': list(found.excitation.unexcited),
+            'suggestions': [s.text for s in found.suggestions],
+        },
+        'consistency': None if found.consistent is None else {
+            'was_consistent': found.consistent.was_consistent,
+            'distance': found.consistent.distance,
+        },
+        'rollouts': {
+            name: [_rollout(score, names) for score in scores] for name, scores in rollouts.items()
+        },
+        'versions': versions(),
+    }  # fmt: skip
+
+
+def _filter(found: Identification) -> dict[str, Any]:
+    choice = found.choice
+    return {
+        'cutoff_hz': choice.plan.cutoff,
+        'state_cutoff_hz': choice.plan.state_cutoff,
+        'decimation': choice.plan.decimation,
+        'rate_hz': found.data.rate,
+        'velocity_source': choice.plan.velocity_source,
+        'residual_autocorrelation': choice.autocorrelation,
+        'is_white': choice.is_white,
+        'candidates': [
+            {
+                'cutoff_hz': c.plan.cutoff,
+                'velocity_source': c.plan.velocity_source,
+                'rows': c.rows,
+                'autocorrelation': c.autocorrelation,
+                'regret': c.regret,
+                'error': c.error,
+            }
+            for c in choice.candidates
+        ],
+    }
+
+
+def _scores(fit: OfflineFit, data: FilteredData, names: tuple[str, ...]) -> dict[str, Any]:
+    """Return scores per joint, their mean, and the share of all squared error.
+
+    `stacked` is the sum of the joints' squared errors over the sum of their variances.
+    """
+    mean, variance = fit.predict(data)
+    known = np.isfinite(variance).all(axis=1)
+    y, mean, variance = data.y[known], mean[known], variance[known]
+    if not len(y):
+        return {'n': 0, 'unknown': len(known)}
+    errors, total = nmse(y, mean), y.var(axis=0).sum()
+    each = zip(names, errors, nlpd(y, mean, variance), coverage95(y, mean, variance), strict=True)
+    return {
+        'joints': {
+            name: {'nmse': float(e), 'nlpd': float(p), 'coverage95': float(c)}
+            for name, e, p, c in each
+        },
+        'mean_nmse': float(errors.mean()),
+        'stacked_nmse': float(((y - mean) ** 2).mean(axis=0).sum() / total),
+        'relative_error': float(np.sqrt(((y - mean) ** 2).sum() / (y**2).sum())),
+        'n': len(y),
+        'unknown': int((~known).sum()),
+    }
+
+
+def _parameters(found: Identification) -> list[dict[str, Any]]:
+    physics, sgp = found.physics.coefficients, found.fits.get('SGP')
+    beside = None if sgp is None else sgp.coefficients
+    rows = []
+    for i, c in enumerate(found.robot.coefficients):
+        is_known = bool(physics.is_identifiable[i])
+        row: dict[str, Any] = {
+            'name': c.name,
+            'joint': c.joint,
+            'value': float(physics.mean[i]),
+            'std': float(physics.std[i]) if is_known else None,
+            'unit': c.unit,
+            'identifiable': is_known,
+            'status': found.excitation.status[i],
+        }
+        if beside is not None and is_known:
+            row['beside_z'] = {'value': float(beside.mean[i]), 'std': _finite(beside.std[i])}
+        if found.consistent is not None:
+            row['consistent'] = float(found.consistent.coefficients[i])
+        rows.append(row)
+    return rows
+
+
+def _base_parameters(found: Identification) -> list[dict[str, Any]]:
+    base, physics = found.excitation.excited, found.physics.coefficients
+    values = base.combinations @ physics.mean
+    spread = np.einsum('rp,pq,rq->r', base.combinations, physics.covariance, base.combinations)
+    return [
+        {'text': text, 'value': float(value), 'std': math.sqrt(max(float(variance), 0.0))}
+        for text, value, variance in zip(base.texts, values, spread, strict=True)
+    ]
+
+
+def _rollout(score: RolloutScore, names: tuple[str, ...]) -> dict[str, Any]:
+    return {
+        'horizon_s': score.horizon,
+        'n': score.n,
+        'diverged': score.diverged,
+        'joints': {
+            name: {
+                key: _finite(getattr(score, key)[j])
+                for key in ('nmse_end', 'nmse_path', 'rms_end', 'rms_path')
+            }
+            for j, name in enumerate(names)
+        },
+    }
+
+
+def _finite(x: float) -> float | None:
+    return float(x) if math.isfinite(x) else None
