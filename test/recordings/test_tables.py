@@ -58,6 +58,20 @@ def test_ready_map_imports_its_recording(file, tmp_path):
     assert sorted(worlds.everything(open_recording(out))) == sorted(written)
 
 
+def test_imported_currents_are_those_of_the_recorded_messages():
+    """A robot file holds the gain: it must not matter whether the table or the bag was read."""
+    table = read_table(
+        worlds.DATA / 'tiago' / 'tiago_dynamic.npz', read_map(worlds.MAPS / 'tiago.yaml')
+    )
+    recorded = list(open_recording(worlds.DATA / 'tiago' / 'mcap_tiago_dynamic').events())
+    imported = list(table.events())
+    assert len(imported) == len(recorded)
+    for ours, theirs in zip(imported, recorded, strict=True):
+        assert ours.names == theirs.names
+        for channel in ('position', 'velocity', 'effort'):
+            np.testing.assert_array_equal(getattr(ours, channel), getattr(theirs, channel))
+
+
 def test_every_ready_map_is_tested_here():
     assert {path.stem for path in worlds.MAPS.glob('*.yaml')} == {m for m, _, _ in READY.values()}
 
