@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sgp_ros.core.base_parameters import RegressorFactor
-from sgp_ros.core.consistent import ConsistentEstimate, project
-from sgp_ros.errors import ConfigError
+from sgp_ros.core.consistent import ConsistentEstimate, project_information
+from sgp_ros.errors import ConfigError, NumericalError
 from sgp_ros.offline.blocks import holdout
 from sgp_ros.offline.excitation import Excitation, judge_excitation, structural_base
 from sgp_ros.offline.fit import OfflineFit, fit_offline
@@ -26,6 +26,7 @@ from sgp_ros.offline.suggestions import Suggestion, suggest_motions
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from sgp_ros.core.base_parameters import BaseParameters
     from sgp_ros.offline.signals import Signals
     from sgp_ros.robots.robot import Robot
 
@@ -158,11 +159,32 @@ def make_consistent(
     if not blocks:
         return None
     dissipative = [i for i, name in enumerate(names) if name.rpartition('.')[2] in DISSIPATIVE]
-    return project(
+    return project_information(
         physics.coefficients.mean,
-        physics.coefficients.covariance,
+        information_root(physics, excitation.excited),
         blocks,
-        undetermined=excitation.excited.null,
         nonnegative=dissipative,
         reference=nominal,
     )
+
+
+def information_root(physics: OfflineFit, base: BaseParameters) -> np.ndarray:
+    """Return R (r, p) with `R^T R` the information of a fit on what the recording determines.
+
+    Taken over the r base parameters `C w`, whose covariance `S = L L^T` is regular: `R = L^-1 C`.
+
+    Raises:
+        NumericalError: it is not.
+    """
+    covariance = physics.coefficients.covariance
+    spread = base.combinations @ covariance @ base.combinations.T
+    scale = np.sqrt(np.diag(spread))
+    try:
+        L = np.linalg.cholesky(spread / np.outer(scale, scale))
+    except np.linalg.LinAlgError as error:
+        raise NumericalError(
+            f'the covariance of {base.rank} base parameters is singular',
+            'more independent rows than parameters',
+            'take a longer recording',
+        ) from error
+    return np.asarray(np.linalg.solve(L, base.combinations / scale[:, None]))

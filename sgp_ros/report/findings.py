@@ -9,6 +9,7 @@ import numpy as np
 
 from sgp_ros.core.scores import coverage95, nlpd, nmse
 from sgp_ros.offline.blocks import distance_to
+from sgp_ros.offline.excitation import IDENTIFIABLE
 from sgp_ros.report.metrics import versions
 
 if TYPE_CHECKING:
@@ -136,7 +137,7 @@ def _parameters(found: Identification) -> list[dict[str, Any]]:
     beside = None if sgp is None else sgp.coefficients
     rows = []
     for i, c in enumerate(found.robot.coefficients):
-        is_known = bool(physics.is_identifiable[i])
+        is_known = found.excitation.status[i] == IDENTIFIABLE and bool(physics.is_identifiable[i])
         row: dict[str, Any] = {
             'name': c.name,
             'joint': c.joint,
