@@ -160,6 +160,8 @@ def _add_identify(commands: Any) -> None:
                         help='how much of it (default: %(default)s)')  # fmt: skip
     parser.add_argument('--stretch', type=float, default=6.0, metavar='S',
                         help='length of alternate stretches [s]')  # fmt: skip
+    parser.add_argument('--cutoff', type=float, default=None, metavar='HZ',
+                        help='of the low-pass (default: chosen from the data)')  # fmt: skip
     parser.add_argument('--inputs', nargs='+', metavar='NAME', default=None,
                         help='what Z sees, such as own:velocity')  # fmt: skip
     parser.add_argument('--effort', choices=('auto', 'state', 'command'), default='auto',
@@ -260,6 +262,7 @@ def _identify(arguments: argparse.Namespace) -> Result:
             holdout=arguments.holdout,
             share=arguments.share,
             stretch_s=arguments.stretch,
+            cutoff=arguments.cutoff,
         ),
     )
     return run_identify(

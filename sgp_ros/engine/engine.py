@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from sgp_ros.engine.estimator import Estimator
 from sgp_ros.engine.fitting import FitRequest, FitResult
 from sgp_ros.engine.intake import Intake
@@ -22,8 +24,6 @@ from sgp_ros.errors import NumericalError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    import numpy as np
 
     from sgp_ros.core.model import Model
     from sgp_ros.engine.config import EngineConfig
@@ -172,6 +172,18 @@ class Engine:
         """
         model = self.estimator.baseline or self.estimator.regression
         return read_parameters(self.robot, self.config, model)
+
+    def information(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return mean (p,) and square-root information (r, p) of what `parameters` reports.
+
+        `R^T R` is the inverse covariance, of any rank; both are empty where there is none.
+        """
+        is_physics = self.config.parameters_source == 'physics'
+        model = self.estimator.baseline if is_physics else None
+        model = model or self.estimator.regression
+        if model is None or self.config.model_method == 'GP':
+            return np.zeros(0), np.zeros((0, 0))
+        return model.information.coefficients, model.information.R
 
     def scores(self) -> dict[str, dict[str, Score]]:
         """Return the scores of each joint's channels; a channel without samples is absent."""

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import yaml
 
 from sgp_ros.errors import RecordingError
+from sgp_ros.experiments.identified_robot import nominal_coefficients, write_identified
 from sgp_ros.offline.identification import IdentificationOptions, identify
 from sgp_ros.offline.regression_data import smoothed_motion
 from sgp_ros.offline.rollout_scores import score_windows
@@ -23,8 +23,6 @@ from sgp_ros.report.files import write_text
 from sgp_ros.report.findings import collect_findings
 from sgp_ros.report.identification import cautions, excitation, verdict, write_identification
 from sgp_ros.robots.registry import load_robot
-from sgp_ros.robots.urdf_robot import nominal_robot
-from sgp_ros.robots.urdf_writer import write_urdf
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -100,10 +98,9 @@ def run_identify(
     findings = collect_findings(found, Path(bag).name, rollouts, counts)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / 'identification.json', json.dumps(findings, indent=1, allow_nan=False) + '\n')
-    write_text(out / 'robot_identified.yaml', identified_yaml(found))
-    urdf = identified_urdf(found)
-    if urdf is not None:
-        write_text(out / 'robot_identified.urdf', urdf)
+    known = found.physics.coefficients
+    std = np.where(known.is_identifiable, known.std, np.inf)
+    write_identified(out, robot, best_coefficients(found), std)
     write_identification(out, found, findings, remarks)
     progress(1.0)
     print_findings(findings)
@@ -123,13 +120,6 @@ def read_signals(bag: str, robot: Robot, options: IdentifyOptions, remarks: list
         f'{count} messages could not be read: {why}' for why, count in recording.unreadable.items()
     ]
     return signals
-
-
-def nominal_coefficients(robot: Robot) -> np.ndarray | None:
-    """Return the coefficients as the robot's URDF has them, (p,); None without a URDF."""
-    if 'urdf' not in robot.source:
-        return None
-    return np.array([c.prior_mean for c in nominal_robot(robot).coefficients])
 
 
 def best_coefficients(found: Identification) -> np.ndarray:
@@ -189,45 +179,6 @@ def _scored(
         return score_windows(joined(windows), found.robot, best_coefficients(found))
     except (ValueError, np.linalg.LinAlgError):
         return None
-
-
-def identified_yaml(found: Identification) -> str:
-    """Return the identified robot as a robot YAML, the prior for the next run."""
-    robot, physics = found.robot, found.physics.coefficients
-    values = best_coefficients(found)
-    document = {
-        'schema': 1,
-        **(robot.source or {'robot': robot.name, 'joints': list(robot.joint_names)}),
-        'parameters': {
-            c.name: {
-                'value': float(values[i]),
-                'std': float(physics.std[i]) if physics.is_identifiable[i] else None,
-                'unit': c.unit,
-            }
-            for i, c in enumerate(robot.coefficients)
-        },
-    }
-    return yaml.safe_dump(document, sort_keys=False)
-
-
-def identified_urdf(found: Identification) -> str | None:
-    """Return the robot's URDF with the identified bodies and friction; None without a URDF."""
-    if 'urdf' not in found.robot.source or found.consistent is None:
-        return None
-    found_values = best_coefficients(found)
-    names = [c.name for c in found.robot.coefficients]
-    values = dict(zip(names, found_values.tolist(), strict=True))
-    bodies = {
-        name.removesuffix('.mass'): found_values[i : i + 10]
-        for i, name in enumerate(names)
-        if name.endswith('.mass')
-    }
-    dynamics = {
-        joint: (values.get(f'{joint}.viscous', 0.0), values.get(f'{joint}.coulomb', 0.0))
-        for joint in found.robot.joint_names
-    }
-    text = Path(str(found.robot.source['urdf'])).read_text(encoding='utf-8')
-    return write_urdf(text, bodies, dynamics)
 
 
 def print_findings(findings: Mapping[str, Any]) -> None:

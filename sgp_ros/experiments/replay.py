@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -10,14 +11,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import yaml
 
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import is_record, replay
 from sgp_ros.engine.samples import CommandSample, JointSample
 from sgp_ros.errors import ConfigError, RecordingError
+from sgp_ros.experiments.identified_robot import nominal_coefficients, write_identified
 from sgp_ros.experiments.parameter_file import find_shipped, load_parameters
+from sgp_ros.offline.bodies import nearest_bodies
 from sgp_ros.recordings.predictions import PredictionTopics, outputs, write_outputs
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.writer import RecordingWriter
@@ -101,7 +103,7 @@ def run_replay(
                 for reason, count in recording.unreadable.items()]  # fmt: skip
     metrics = collect_metrics(engine, Path(bag).name, timing=timing, remarks=remarks)
     write_text(out / 'metrics.json', json.dumps(metrics, indent=1, allow_nan=False) + '\n')
-    write_text(out / 'robot_identified.yaml', identified_robot(engine))
+    write_identified_robot(out, engine)
     save_model(out / 'model.npz', engine.snapshot())
     write_report(out, engine, history, metrics, truth=truth)
     print_summary(metrics, truth)
@@ -199,17 +201,15 @@ def save_model(path: Path, snapshot: Mapping[str, np.ndarray]) -> None:
     growing.replace(path)
 
 
-def identified_robot(engine: Engine) -> str:
-    """Return the identified robot as a robot YAML, the prior for the next run."""
+def write_identified_robot(out: Path, engine: Engine) -> None:
+    """Write the identified robot: of real bodies, where it has bodies."""
     robot = engine.robot
-    document = {
-        'schema': 1,
-        **(robot.source or {'robot': robot.name, 'joints': list(robot.joint_names)}),
-        'parameters': {
-            p.name: {'value': p.value, 'std': p.std, 'unit': p.unit} for p in engine.parameters()
-        },
-    }
-    return yaml.safe_dump(document, sort_keys=False)
+    values, root = engine.information()
+    std = np.array([math.inf if p.std is None else p.std for p in engine.parameters()])
+    if len(values):
+        bodies = nearest_bodies(robot, values, root, nominal_coefficients(robot))
+        values = values if bodies is None else bodies.coefficients
+    write_identified(out, robot, values, std)
 
 
 def print_summary(metrics: Mapping[str, Any], truth: Mapping[str, float] | None) -> None:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from sgp_ros.robots.robot import Robot
 
 FEWEST_ROWS = 10
-"""Rows beyond the number of coefficients without which nothing is fitted."""
+"""Rows beyond the coefficients per joint without which nothing is fitted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,11 +141,11 @@ def fit_offline(
     options = options or OfflineOptions()
     if method not in METHODS:
         raise ConfigError(f'method {method!r}', f'one of {list(METHODS)}')
-    n, _, p = data.F.shape
-    if n < p + FEWEST_ROWS:
+    n, k, p = data.F.shape
+    if n * k < p + k * FEWEST_ROWS:
         raise RecordingError(
             f'{n} filtered rows for {p} coefficients',
-            f'at least {p + FEWEST_ROWS}',
+            f'at least {-(-p // k) + FEWEST_ROWS}',
             'take a longer recording, a higher cut-off or less decimation',
         )
     inputs = inputs or robot.residual_columns(('default',))

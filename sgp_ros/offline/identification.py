@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sgp_ros.core.base_parameters import RegressorFactor
-from sgp_ros.core.consistent import ConsistentEstimate, project_information
 from sgp_ros.errors import ConfigError, NumericalError
 from sgp_ros.offline.blocks import holdout
+from sgp_ros.offline.bodies import nearest_bodies
 from sgp_ros.offline.excitation import Excitation, judge_excitation, structural_base
 from sgp_ros.offline.fit import OfflineFit, fit_offline
 from sgp_ros.offline.inputs import CANDIDATES, InputChoice, choose_inputs
-from sgp_ros.offline.plan import PlanChoice, choose_plan
+from sgp_ros.offline.plan import CUTOFFS, PlanChoice, choose_plan
 from sgp_ros.offline.regression_data import FilteredData, filtered_data
 from sgp_ros.offline.suggestions import Suggestion, suggest_motions
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from sgp_ros.core.base_parameters import BaseParameters
+    from sgp_ros.core.consistent import ConsistentEstimate
     from sgp_ros.offline.signals import Signals
     from sgp_ros.robots.robot import Robot
 
@@ -35,8 +36,6 @@ OWN = CANDIDATES[-1]
 """What GP and PRGP see, unless said otherwise: all candidates."""
 HELD_OUT = 'held out'
 """Name of the held-out part of the recording itself."""
-DISSIPATIVE = ('viscous', 'coulomb', 'coulomb_positive', 'coulomb_negative', 'armature')
-"""Endings of names of coefficients that are not negative in a real machine."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +49,7 @@ class IdentificationOptions:
         holdout: `tail` or `alternate`, where no other recording is given.
         share: of the rows held out then.
         stretch_s: length of a stretch for `alternate` [s].
+        cutoff: of the low-pass [Hz]; None chooses it from the recording.
         seed: of random motions that judge the excitation.
     """
 
@@ -58,6 +58,7 @@ class IdentificationOptions:
     holdout: str = 'tail'
     share: float = 0.4
     stretch_s: float = 6.0
+    cutoff: float | None = None
     seed: int = 0
 
 
@@ -119,7 +120,8 @@ def identify(
     """
     if not options.methods or set(options.methods) - set(METHODS):
         raise ConfigError(f'methods {list(options.methods)}', f'some of {list(METHODS)}')
-    choice = choose_plan(signals, robot)
+    cutoffs = CUTOFFS if options.cutoff is None else (options.cutoff,)
+    choice = choose_plan(signals, robot, cutoffs)
     progress(0.3)
     data = filtered_data(signals, robot, choice.plan)
     held = {name: filtered_data(test, robot, choice.plan) for name, test in tests.items()}
@@ -146,26 +148,13 @@ def identify(
         suggestions = suggest_motions(robot, recorded, rng)
     return Identification(
         robot, choice, data, train, held, fits, physics, excitation, inputs,
-        suggestions, make_consistent(robot, physics, excitation, nominal),
+        suggestions, nearest_bodies(
+            robot,
+            physics.coefficients.mean,
+            information_root(physics, excitation.excited),
+            nominal,
+        ),
     )  # fmt: skip
-
-
-def make_consistent(
-    robot: Robot, physics: OfflineFit, excitation: Excitation, nominal: np.ndarray | None
-) -> ConsistentEstimate | None:
-    """Return the coefficients of real bodies nearest to a fit; None without bodies."""
-    names = [c.name for c in robot.coefficients]
-    blocks = [range(i, i + 10) for i, name in enumerate(names) if name.endswith('.mass')]
-    if not blocks:
-        return None
-    dissipative = [i for i, name in enumerate(names) if name.rpartition('.')[2] in DISSIPATIVE]
-    return project_information(
-        physics.coefficients.mean,
-        information_root(physics, excitation.excited),
-        blocks,
-        nonnegative=dissipative,
-        reference=nominal,
-    )
 
 
 def information_root(physics: OfflineFit, base: BaseParameters) -> np.ndarray:

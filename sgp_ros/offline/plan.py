@@ -27,6 +27,8 @@ from sgp_ros.offline.physics import autocorrelation, least_squares, solved, tria
 from sgp_ros.offline.regression_data import FilteredData, filtered_data
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from sgp_ros.offline.signals import Signals
     from sgp_ros.robots.robot import Robot
 
@@ -112,11 +114,16 @@ class PlanChoice:
         return min(tried, key=lambda c: c.regret, default=None)
 
 
-def choose_plan(signals: Signals, robot: Robot) -> PlanChoice:
+def choose_plan(signals: Signals, robot: Robot, cutoffs: Sequence[float] = CUTOFFS) -> PlanChoice:
     """Choose cut-off, decimation and source of velocity from a recording.
 
     Of a long recording a part of each block is used. Cost: columns and filters once per cut-off
     and source, least squares once more.
+
+    Args:
+        signals: the recording.
+        robot: whose physics judges.
+        cutoffs: that are tried [Hz].
 
     Raises:
         RecordingError: too short for every cut-off.
@@ -125,7 +132,7 @@ def choose_plan(signals: Signals, robot: Robot) -> PlanChoice:
     sources = ['position'] if signals.velocity is None else ['measured', 'position']
     trials = [
         trial
-        for cutoff in CUTOFFS
+        for cutoff in cutoffs
         if cutoff <= _HIGHEST_SHARE * signals.rate
         for source in sources
         if (trial := _Trial.of(signals, robot, cutoff, source)) is not None

@@ -14,7 +14,7 @@ from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
 from sgp_ros.engine.samples import JointSample
 from sgp_ros.errors import ConfigError
-from sgp_ros.experiments.replay import identified_robot
+from sgp_ros.experiments.replay import write_identified_robot
 from sgp_ros.robots.nominal_prior import LEAST_EFFORT, LIMIT_SHARE
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.rigid_body import inverse_dynamics
@@ -202,7 +202,7 @@ def test_the_identified_robot_is_the_same_robot_with_a_prior(tmp_path):
     replay(engine, _swing(), lambda _step: None)
     other = tmp_path / 'out' / 'robot_identified.yaml'
     other.parent.mkdir()
-    other.write_text(identified_robot(engine))
+    write_identified_robot(other.parent, engine)
     again = load_robot(str(other))
     assert again.name == 'mine'
     assert again.joints == robot.joints
@@ -219,7 +219,7 @@ def test_the_identified_robot_of_a_bare_urdf_loads(tmp_path):
     _write(tmp_path)
     robot = load_robot(str(tmp_path / 'arm.urdf'))
     path = tmp_path / 'robot_identified.yaml'
-    path.write_text(identified_robot(Engine(robot, EngineConfig.from_mapping({}, robot))))
+    write_identified_robot(tmp_path, Engine(robot, EngineConfig.from_mapping({}, robot)))
     assert load_robot(str(path)).joints == robot.joints
 
 
