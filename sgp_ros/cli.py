@@ -21,6 +21,7 @@ for _name in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS'):
 
 from sgp_ros import __version__  # noqa: E402 - the environment above comes first
 from sgp_ros.errors import SgpError  # noqa: E402 - the environment above comes first
+from sgp_ros.report.progress import Progress  # noqa: E402 - the environment above comes first
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -276,32 +277,6 @@ def _import(arguments: argparse.Namespace) -> Result:
     summary = import_table(arguments.file, arguments.map, arguments.out)
     print(f'{summary.samples} states of {", ".join(summary.joints)} in {summary.path}')
     return summary.to_mapping()
-
-
-class Progress:
-    """A progress bar on stderr, where that is a terminal.
-
-    Args:
-        name: of the command, in front of the bar.
-    """
-
-    _WIDTH = 40
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-        self._shown = -1
-
-    def __call__(self, share: float) -> None:
-        """Show that `share` of the work, 0 to 1, is done."""
-        percent = int(100.0 * min(max(share, 0.0), 1.0))
-        if percent == self._shown or not sys.stderr.isatty():
-            return
-        self._shown = percent
-        filled = self._WIDTH * percent // 100
-        bar = '#' * filled + '.' * (self._WIDTH - filled)
-        end = '\n' if percent == 100 else ''
-        sys.stderr.write(f'\rsgp {self._name} [{bar}] {percent:3d} %{end}')
-        sys.stderr.flush()
 
 
 if __name__ == '__main__':

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sgp_ros.cli import Progress, main
+from sgp_ros.cli import main
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.writer import RecordingWriter
+from sgp_ros.report.progress import Progress
 
 ROOT = Path(__file__).parents[1]
 

@@ -161,19 +161,23 @@ def information_root(physics: OfflineFit, base: BaseParameters) -> np.ndarray:
     """Return R (r, p) with `R^T R` the information of a fit on what the recording determines.
 
     Taken over the r base parameters `C w`, whose covariance `S = L L^T` is regular: `R = L^-1 C`.
+    A strongly coloured residual of a short recording can leave it singular; then it is that of
+    white noise.
 
     Raises:
-        NumericalError: it is not.
+        NumericalError: that is singular too.
     """
-    covariance = physics.coefficients.covariance
-    spread = base.combinations @ covariance @ base.combinations.T
-    scale = np.sqrt(np.diag(spread))
-    try:
-        L = np.linalg.cholesky(spread / np.outer(scale, scale))
-    except np.linalg.LinAlgError as error:
-        raise NumericalError(
-            f'the covariance of {base.rank} base parameters is singular',
-            'more independent rows than parameters',
-            'take a longer recording',
-        ) from error
-    return np.asarray(np.linalg.solve(L, base.combinations / scale[:, None]))
+    fitted = physics.coefficients
+    for covariance in (fitted.covariance, fitted.white_covariance):
+        spread = base.combinations @ covariance @ base.combinations.T
+        scale = np.sqrt(np.diag(spread))
+        try:
+            L = np.linalg.cholesky(spread / np.outer(scale, scale))
+        except np.linalg.LinAlgError:
+            continue
+        return np.asarray(np.linalg.solve(L, base.combinations / scale[:, None]))
+    raise NumericalError(
+        f'the covariance of {base.rank} base parameters is singular',
+        'more independent rows than parameters',
+        'take a longer recording',
+    )

@@ -130,7 +130,7 @@ class BatchPosterior:
             for part in self._parts
         ]
         self.rows_per_free_row = np.ones(len(self._parts))
-        self._excess = self._coloured_excess(data, block)
+        self._spread = self._coloured_spread(data, prior, block)
 
     @property
     def coefficients(self) -> np.ndarray:
@@ -145,7 +145,7 @@ class BatchPosterior:
     @property
     def covariance(self) -> np.ndarray:
         """Covariance of W under the correlations of the residual, (p, p)."""
-        return self._physics.covariance + self._excess
+        return self._spread @ self._spread.T
 
     @property
     def is_identifiable(self) -> np.ndarray:
@@ -181,11 +181,18 @@ class BatchPosterior:
             mean[:, j] += phi @ v
             free = part.eliminate(F[:, j], phi)
             of_w = self._physics.predict(np.zeros((len(U), 1)), free[:, None, :]).variance[:, 0]
-            of_w = of_w + np.einsum('qp,pr,qr->q', free, self._excess, free)
-            variance[:, j] = own + of_w + part.noise
+            coloured = ((free @ self._spread) ** 2).sum(axis=1)
+            variance[:, j] = own + part.noise + np.where(np.isfinite(of_w), coloured, np.inf)
         return mean, variance
 
-    def _coloured_excess(self, data: Observations, block: np.ndarray) -> np.ndarray:
+    def _coloured_spread(
+        self, data: Observations, prior: CoefficientPrior, block: np.ndarray
+    ) -> np.ndarray:
+        """Return a square root of the covariance of W under the residual's correlations, (p, r).
+
+        `P^-1 (P_0 + H^T R H) P^-1` with the information P of prior and data and P_0 of the prior:
+        a sum of squares, so that no rounding makes a variance negative.
+        """
         residual = self.residual(data)
         inverse = self._physics.covariance
         total = np.zeros_like(inverse)
@@ -196,5 +203,6 @@ class BatchPosterior:
             H = part.eliminate(data.F[:, j], part.phi) * part.weight[:, None]
             power = max(part.noise, float(np.mean(error**2)))
             total += power * coloured_products(H, block, weights, innovation)
-            total -= part.noise * (H.T @ H)
-        return inverse @ total @ inverse
+        values, vectors = np.linalg.eigh(total)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        return np.asarray(inverse @ np.hstack([prior.root.T, root]))

@@ -38,12 +38,7 @@ def collect_findings(
         counts: states and commands read and refused.
     """
     names = found.robot.joint_names
-    regions = {'train': found.train, **found.held}
-    for name, data in found.held.items():
-        distance = distance_to(found.train, data)
-        is_far = distance > np.median(distance)
-        regions[f'{name}, near'] = data.rows(~is_far)
-        regions[f'{name}, far'] = data.rows(is_far)
+    regions = _regions(found)
     return {
         'schema': SCHEMA,
         'robot': found.robot.name,
@@ -64,14 +59,7 @@ def collect_findings(
         'inputs': None if found.inputs is None else [list(n) for n in found.inputs.names],
         'parameters': _parameters(found),
         'base_parameters': _base_parameters(found),
-        'excitation': {
-            'rank': found.excitation.excited.rank,
-            'structural_rank': found.excitation.structural.rank,
-            'condition': found.excitation.excited.condition,
-            'tolerance': found.excitation.excited.tolerance,
-            'not_excited': list(found.excitation.unexcited),
-            'suggestions': [s.text for s in found.suggestions],
-        },
+        'excitation': _excitation(found),
         'consistency': None if found.consistent is None else {
             'was_consistent': found.consistent.was_consistent,
             'distance': found.consistent.distance,
@@ -81,6 +69,29 @@ def collect_findings(
         },
         'versions': versions(),
     }  # fmt: skip
+
+
+def _regions(found: Identification) -> dict[str, FilteredData]:
+    """Return what was learned from, what was held out, and its near and far halves."""
+    regions = {'train': found.train, **found.held}
+    for name, data in found.held.items():
+        distance = distance_to(found.train, data)
+        is_far = distance > np.median(distance)
+        regions[f'{name}, near'] = data.rows(~is_far)
+        regions[f'{name}, far'] = data.rows(is_far)
+    return regions
+
+
+def _excitation(found: Identification) -> dict[str, Any]:
+    excited = found.excitation.excited
+    return {
+        'rank': excited.rank,
+        'structural_rank': found.excitation.structural.rank,
+        'condition': excited.condition,
+        'tolerance': excited.tolerance,
+        'not_excited': list(found.excitation.unexcited),
+        'suggestions': [s.text for s in found.suggestions],
+    }
 
 
 def _filter(found: Identification) -> dict[str, Any]:
