@@ -77,10 +77,11 @@ def test_numbers_in_the_identifiability_page_are_the_measured_ones():
     ) in text
 
 
-def test_the_page_of_the_reproduction_is_that_of_the_results():
-    """Mend with `python docs/generate_reproduction.py`."""
-    path = ROOT / 'docs' / 'generate_reproduction.py'
-    spec = importlib.util.spec_from_file_location('generate_reproduction', path)
+@pytest.mark.parametrize('name', ['reproduction', 'recordings'])
+def test_generated_pages_are_those_of_the_results(name):
+    """Mend with `python docs/generate_<name>.py`."""
+    path = ROOT / 'docs' / f'generate_{name}.py'
+    spec = importlib.util.spec_from_file_location(f'generate_{name}', path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     assert module.TARGET.read_text(encoding='utf-8') == module.text()
