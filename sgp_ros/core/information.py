@@ -12,15 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
-from sgp_ros.core.posterior import NULL_TOLERANCE
+from sgp_ros.core.posterior import NULL_TOLERANCE, RANK_TOLERANCE
 from sgp_ros.core.rotations import absorb_row, absorbed_rows_numpy
 
 if TYPE_CHECKING:
     from sgp_ros.core.prior import CoefficientPrior
-
-_RANK_TOLERANCE = 1e-11
-"""Least share of a column's norm that is new to the columns before it. Rounding leaves 1e-16 times
-the root of the number of rows; a real signal below 1e-11 could not be told from it."""
 
 
 class Information:
@@ -114,11 +110,11 @@ class _Solved:
         if not p:
             self.spread, self.w = np.zeros((0, 0)), np.zeros(0)
             return
-        if np.all(np.abs(np.diag(R)) > _RANK_TOLERANCE * self.scale):
+        if np.all(np.abs(np.diag(R)) > RANK_TOLERANCE * self.scale):
             self.w = linalg.solve_triangular(R, z, check_finite=False)
             return
         U, S, Vt = np.linalg.svd(R / self.scale)
-        rank = int((_RANK_TOLERANCE * max(S[0], 1e-300) < S).sum())
+        rank = int((RANK_TOLERANCE * max(S[0], 1e-300) < S).sum())
         self.spread = Vt[:rank].T / S[:rank] / self.scale[:, None]
         self.null = Vt[rank:].T
         self.w = self.spread @ (U[:, :rank].T @ z)

@@ -23,6 +23,11 @@ if TYPE_CHECKING:
     from sgp_ros.core.model import Model, Observations
     from sgp_ros.core.prior import CoefficientPrior
 
+RANK_TOLERANCE = 1e-11
+"""Least singular value of balanced columns, over the largest, that counts as information on W.
+Rounding leaves 1e-16 times the root of the number of rows in rows computed from a state, and a
+hundred times that once rows were filtered or Z was eliminated from them; a real signal below 1e-11
+could not be told from it."""
 NULL_TOLERANCE = 1e-8
 """Share of a regressor row that may point along undetermined directions before it counts."""
 
@@ -202,7 +207,7 @@ def _solve(A: np.ndarray, b: np.ndarray, data: Observations, prior: CoefficientP
     norms = np.linalg.norm(A / scale, axis=0)
     norms[norms == 0.0] = 1.0
     U, S, Vt = np.linalg.svd(A / (scale * norms), full_matrices=False)
-    limit = max(A.shape) * np.finfo(float).eps * (S[0] if len(S) else 0.0)
+    limit = RANK_TOLERANCE * (S[0] if len(S) else 0.0)
     rank = int((limit < S).sum())
     U, S = U[:, :rank], S[:rank]
     spread = Vt[:rank].T / S / (scale * norms)[:, None]

@@ -179,6 +179,22 @@ def test_collinear_columns_are_unidentifiable_but_predict():
     assert np.all(np.isfinite(posterior.predict(data.U, F).variance))
 
 
+@pytest.mark.parametrize('share', [1e-15, 1e-13, 2e-12])
+def test_rounding_in_columns_is_no_information(share):
+    """Filters and eliminations leave more of it than one rounding per number."""
+    rng = np.random.default_rng(7)
+    n, p = 200, 12
+    F = rng.normal(size=(n, 1, 6)) @ rng.normal(size=(6, p))  # rank 6
+    data = Observations(np.zeros((n, 1)), F, rng.normal(size=(n, 1)))
+    rounded = Observations(data.U, F + share * rng.normal(size=F.shape), data.y)
+    model, prior = Model((None,), (1.0,)), CoefficientPrior.flat(p)
+    clean, posterior = (Posterior(model, d, prior) for d in (data, rounded))
+    assert not posterior.is_identifiable.any()
+    assert np.linalg.matrix_rank(posterior.covariance, tol=1e-9) == 6
+    expected = clean.predict(data.U, F).variance
+    assert posterior.predict(data.U, F).variance == pytest.approx(expected, rel=1e-6)
+
+
 def test_evidence_does_not_depend_on_units_of_columns_beyond_a_constant():
     """Differences of evidence between models survive a change of units of W."""
     model, data = random_problem(11, p=3)
