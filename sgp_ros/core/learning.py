@@ -162,12 +162,24 @@ class _Search:
             posterior = Posterior(model, self._data, self._prior)
         except NumericalError:
             self.refused += 1
-            return _REFUSED, np.zeros_like(theta)
+            return self._wall(theta)
         value = -posterior.log_evidence
         if value < self.lowest:
             self.lowest = value
             self.best = theta.copy()
         return value, -posterior.evidence_gradient()
+
+    def _wall(self, theta: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return what stands for the evidence where the covariance has no factor.
+
+        A bowl about the best point: a line search that came from there is led back by a usable
+        step. From a huge constant it would step back to where it started, and end there.
+        """
+        if self.best is None:
+            return _REFUSED, np.zeros_like(theta)
+        offset = theta - self.best
+        height = 1.0 + abs(self.lowest)
+        return self.lowest + height * (1.0 + 0.5 * float(offset @ offset)), height * offset
 
 
 def _variance_or_one(x: np.ndarray) -> np.ndarray:

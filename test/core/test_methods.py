@@ -141,6 +141,24 @@ def test_restarts_never_lower_the_evidence():
         learn(data, prior, start, 1)
 
 
+@pytest.mark.parametrize('seed', range(3))
+def test_a_trial_without_factor_does_not_end_the_search(seed):
+    """Far from the origin distances are rounded, so a corner of the box has no factor there.
+
+    The evidence does not depend on the origin, so both searches must find the same.
+    """
+    rng = np.random.default_rng(seed)
+    u = np.round(rng.uniform(-3.0, 3.0, (100, 1)), 1)
+    y = np.sin(u) + 0.05 * rng.standard_normal((100, 1))
+    start = Model((SquaredExponential(1.0, (1.0,), (0,)),), (1.0,))
+    near, far = (
+        learn(Observations(u + origin, np.zeros((100, 1, 0)), y), CoefficientPrior.flat(0), start)
+        for origin in (0.0, 1e5)
+    )
+    assert far.refused > 0
+    assert far.log_evidence == pytest.approx(near.log_evidence, abs=0.1)
+
+
 def test_a_fit_without_any_factor_raises(monkeypatch):
     """Where no start has a positive definite covariance, the error says what to look at."""
     data = Observations(np.zeros((6, 1)), np.zeros((6, 1, 0)), np.zeros((6, 1)))
