@@ -59,7 +59,10 @@ learned from, the last 40 % held out.
 Mean nMSE {panda_pr} parametric, {panda_sgp} with Z behind {panda_cutoff} Hz; behind 5 Hz {panda5_pr} and {panda5_sgp}. Those who
 collected the recordings found 0.0049 with the same structure, behind a low-pass they do not state. The published sigmoid friction with refitted rigid part
 reaches 0.0076 (low-passed likewise; computed by those who collected the recordings). Joint 7 decides the
-mean: its torque is hardly more than friction. GP alone shows what 12 s of data are worth without physics.
+mean: its torque is hardly more than friction. A trap of this recording: the path repeats after 13.35 s, so
+most of what is held out is a second pass over what was learned. The score tells of repeatability and
+noise; of motions of another kind the far half tells a little more. GP alone fails even so where the second pass
+differs.
 
 ## TIAGo: four joints of an arm, from motor currents
 

@@ -203,6 +203,13 @@ class BatchPosterior:
             H = part.eliminate(data.F[:, j], part.phi) * part.weight[:, None]
             power = max(part.noise, float(np.mean(error**2)))
             total += power * coloured_products(H, block, weights, innovation)
-        values, vectors = np.linalg.eigh(total)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        return np.asarray(inverse @ np.hstack([prior.root.T, root]))
+        S = _square_root(inverse)
+        return S @ np.hstack([S.T @ prior.root.T, _square_root(S.T @ total @ S)])
+
+
+def _square_root(covariance: np.ndarray) -> np.ndarray:
+    """Return S with `S S^T = covariance`, positive semidefinite up to rounding."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    scale[scale == 0.0] = 1.0
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
