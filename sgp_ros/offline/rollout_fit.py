@@ -70,7 +70,8 @@ class RolloutFit:
         W: coefficients, (p,).
         gains: factors of the efforts, (k,); 1 where not free.
         covariance: of W and the free gains, (p + g, p + g): sandwich over blocks of roll-outs,
-            whose errors are taken as independent.
+            whose errors are taken as independent. Not numbers where there are no more blocks
+            than coefficients.
         error_std: standard deviation of the position errors, (k,) [rad or m].
         diverged: roll-outs that leave the range of numbers at the solution.
         cost: half the sum of squared errors in standard deviations.
@@ -256,5 +257,7 @@ def _sandwich(jacobian: np.ndarray, errors: np.ndarray, block: np.ndarray) -> np
             'drop terms of the robot, or fix a gain',
         )
     inverse = (basis.T / singular**2) @ basis / np.outer(unit, unit)
-    correction = len(labels) / max(len(labels) - 1, 1)
+    if len(labels) <= size:
+        return np.full((size, size), np.nan)
+    correction = len(labels) / (len(labels) - 1)
     return correction * inverse @ (sums.T @ sums) @ inverse

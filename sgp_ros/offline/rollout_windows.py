@@ -12,7 +12,7 @@ from sgp_ros.errors import RecordingError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-_HORIZONS_A_BLOCK = 5
+_HORIZONS_A_BLOCK = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,8 +24,8 @@ class Windows:
         v: measured velocities, (m, n + 1, k) [rad/s or m/s].
         effort: mean over each step, (m, n, k) [N m, N or the joint's command unit].
         step: length of a step [s].
-        block: (m,) labels of the stretch of five horizons in which a window starts: errors of
-            one block are dependent, those of two blocks nearly independent.
+        block: (m,) labels of the stretch of two horizons in which a window starts: errors of
+            one block are dependent, those of two blocks are taken as independent.
     """
 
     q: np.ndarray

@@ -47,27 +47,33 @@ def test_planted_coefficients_are_recovered_without_noise():
 
 def test_planted_coefficients_of_two_joints_are_recovered():
     """Coupled inertias and dry friction in both joints."""
-    windows = _recorded(DOUBLE, W_DOUBLE, 1, 0.0, seconds=4.0)
+    windows = _recorded(DOUBLE, W_DOUBLE, 1, 0.0, seconds=3.0)
     start = W_DOUBLE * np.random.default_rng(0).uniform(0.9, 1.1, 12)
     fit = fit_rollouts(windows, DOUBLE, start, RolloutFitOptions(compare_every=10))
     np.testing.assert_allclose(fit.W, W_DOUBLE, rtol=1e-3, atol=1e-4)
 
 
 def test_intervals_are_of_the_size_of_the_errors():
-    """Chi-squared of six fits of five coefficients: 30 within five standard deviations of it."""
+    """Chi-squared of three fits of five coefficients: 15 within five standard deviations of it."""
     chi_squared = 0.0
-    for seed in range(6):
+    for seed in range(3):
         windows = _recorded(PENDULUM, W, seed, 2e-3, seconds=40.0)
         fit = fit_rollouts(windows, PENDULUM, W, RolloutFitOptions(compare_every=10))
         error = fit.W - W
         chi_squared += error @ np.linalg.solve(fit.covariance, error)
-    print(chi_squared)
-    assert 6.0 < chi_squared < 30.0 + 5.0 * np.sqrt(2.0 * 30.0)
+    assert 2.0 < chi_squared < 15.0 + 5.0 * np.sqrt(2.0 * 15.0)
+
+
+def test_too_few_blocks_give_no_intervals():
+    """Four stretches say nothing of the scatter of five coefficients; the fit itself stands."""
+    fit = fit_rollouts(_recorded(PENDULUM, W, 0, 0.0, seconds=2.5), PENDULUM, W)
+    assert np.isnan(fit.std).all()
+    assert np.isfinite(fit.W).all()
 
 
 def test_a_scale_of_one_effort_is_found():
     """The torque constant of one joint is wrong, that of the other is the unit."""
-    windows = _recorded(DOUBLE, W_DOUBLE, 1, 0.0, seconds=4.0)
+    windows = _recorded(DOUBLE, W_DOUBLE, 1, 0.0, seconds=3.0)
     wrong = replace(windows, effort=windows.effort / [1.0, 1.2])
     options = RolloutFitOptions(compare_every=10, free_gains=('elbow',))
     fit = fit_rollouts(wrong, DOUBLE, W_DOUBLE, options)

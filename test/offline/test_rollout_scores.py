@@ -65,7 +65,7 @@ def test_blocks_of_joined_recordings_differ():
     both = joined([one, one])
     assert len(both.q) == 2 * len(one.q)
     assert not set(both.block[: len(one.q)]) & set(both.block[len(one.q) :])
-    assert len(set(one.block)) == 6
+    assert len(set(one.block)) == 15
     with pytest.raises(ValueError, match='steps'):
         joined([one, cut_windows(*_smooth(), 0.2, 0.1)])
 
