@@ -1,4 +1,4 @@
-"""Real recordings through `sgp identify`: EMPS, Panda, TIAGo's arm.
+"""Real recordings through `sgp identify`: EMPS, double pendulum, Panda, TIAGo's arm.
 
     python -m benchmarks.recordings [NAME ...]
 
@@ -21,11 +21,27 @@ ROOT = Path(__file__).parents[1]
 DATA = ROOT.parent / 'shared' / 'data'
 RESULTS = Path(__file__).parent / 'results'
 ROBOTS = ROOT / 'config' / 'robots'
+DOUBLE = 'dfki_double_pendulum/design_{}__sys_id__trajectory_{}.npz'
 IMPORTED = {
-    'emps': ('emps/emps_id.csv', 'emps/emps_val_pulses.csv'),
-    'panda': ('panda/panda_exciting.npz',),
-}
+    'emps': ('emps', ('emps/emps_id.csv', 'emps/emps_val_pulses.csv')),
+    'panda': ('panda', ('panda/panda_exciting.npz',)),
+    'double_pendulum_a0': (
+        'dfki_double_pendulum', [DOUBLE.format('A.0__20220815', i) for i in ('00', '01')],
+    ),
+    'double_pendulum_c0': (
+        'dfki_double_pendulum', [DOUBLE.format('C.0__20220914', i) for i in ('00', '01')],
+    ),
+}  # fmt: skip
+"""Name to map and files under the shared data."""
 COMMANDS = {
+    'double_pendulum_a0': (
+        'design_A.0__20220815__sys_id__trajectory_00.mcap', '--robot', 'double_pendulum',
+        '--test', 'design_A.0__20220815__sys_id__trajectory_01.mcap',
+    ),
+    'double_pendulum_c0': (
+        'design_C.0__20220914__sys_id__trajectory_00.mcap', '--robot', 'double_pendulum',
+        '--test', 'design_C.0__20220914__sys_id__trajectory_01.mcap',
+    ),
     'emps': ('emps_id.mcap', '--robot', 'linear_axis', '--test', 'emps_val_pulses.mcap'),
     'panda': ('panda_exciting.mcap', '--robot', 'panda.yaml', '--share', '0.4'),
     'tiago': (
@@ -54,8 +70,9 @@ def _found(argument: str, folder: Path) -> str:
 def run(name: str, folder: Path) -> dict:
     """Import and identify one recording."""
     machine = name.removesuffix('_5hz')
-    for file in IMPORTED.get(machine, ()):
-        mapping = ROOT / 'config' / 'import' / f'{machine}.yaml'
+    name_of_map, files = IMPORTED.get(machine, ('', ()))
+    for file in files:
+        mapping = ROOT / 'config' / 'import' / f'{name_of_map}.yaml'
         if sgp(['import', str(DATA / file), '--map', str(mapping), '--out', str(folder)]):
             raise SystemExit(f'{file} cannot be imported')
     began = time.perf_counter()

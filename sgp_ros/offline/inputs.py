@@ -3,8 +3,8 @@
 Evidence takes the noise for white. What the physics of a real machine leaves is not: it changes
 slowly, and a process that may bend at will follows it, at the price of what it says elsewhere. So
 sets of inputs compete by their squared error on stretches that were not learned from. No process
-at all is one of them, and stands unless another is better by more than a standard error of the
-difference from stretch to stretch.
+at all is one of them, and stands unless another is better in sum, and by a t-test on the
+logarithms of the errors over the stretches, at a level of 5 % for all candidates together.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import stats
 
 from sgp_ros.offline.fit import OfflineOptions, fit_offline
 
@@ -29,7 +30,9 @@ CANDIDATES: tuple[tuple[str, ...], ...] = (
     ('own:position', 'own:velocity', 'own:direction'),
 )
 """Sets of inputs of a joint that compete; the first one is no process."""
-_FOLDS, _STRETCHES = 4, 3
+_FOLDS, _STRETCHES, _LEVEL = 4, 3, 0.05
+_EQUAL = 1.02
+"""Errors within 2 % are equal: the first, smallest set is taken."""
 _OPTIONS = OfflineOptions(max_points=300, max_basis=200)
 
 
@@ -85,8 +88,13 @@ def choose_inputs(data: FilteredData, robot: Robot) -> InputChoice:
 
 def _chosen(squares: np.ndarray) -> np.ndarray:
     """Return the index of the candidate per joint, from errors (candidates, stretches, k)."""
-    gain = squares[0] - squares  # (candidates, stretches, k)
-    doubt = gain.std(axis=1, ddof=1) * np.sqrt(gain.shape[1])
-    is_better = gain.sum(axis=1) > doubt
+    total = squares.sum(axis=1)
+    gain = np.log(squares[0] / np.maximum(squares, np.finfo(float).tiny))
+    count = gain.shape[1]
+    doubt = gain.std(axis=1, ddof=1) * np.sqrt(count)
+    level = _LEVEL / (len(CANDIDATES) - 1)  # Bonferroni
+    is_better = gain.sum(axis=1) > stats.t.ppf(1.0 - level, count - 1) * doubt
+    is_better &= total < total[0]
     is_better[0] = True
-    return np.asarray(np.where(is_better, squares.sum(axis=1), np.inf).argmin(axis=0))
+    errors = np.where(is_better, total, np.inf)
+    return np.asarray((errors <= _EQUAL * errors.min(axis=0)).argmax(axis=0))
