@@ -140,8 +140,8 @@ def choose_plan(signals: Signals, robot: Robot, cutoffs: Sequence[float] = CUTOF
     if not trials:
         raise RecordingError(
             f'a recording of {len(signals.time) / signals.rate:.3g} s at {signals.rate:.3g} Hz',
-            f'one that lasts some periods of {CUTOFFS[0]:g} to {CUTOFFS[-1]:g} Hz',
-            'take a longer one',
+            f'one long and fast enough for a cut-off of {cutoffs[0]:g} to {cutoffs[-1]:g} Hz',
+            'take a longer one or another cut-off',
         )
     regret = _total_regret(trials)
     candidates = tuple(
