@@ -82,43 +82,13 @@ recordings was found with alternate stretches too, behind a low-pass that they d
 physics leaves is not white (correlation {tiago_white} from row to row): gears, cables and a current that
 is no torque.
 
-## Double pendulum, two builds
+## Double pendulum through inverse regression
 
-DFKI's double pendulum, designs A.0 and C.0, 500 Hz, torque from motor currents. Torques are small differences of
-large terms here, and inverse regression, whose columns carry noise, goes wrong: coefficients are fitted
-to roll-outs of 0.3 s (`offline/rollout_fit.py`). nMSE is the squared error of the positions along the roll-out over that of
-holding the state; runs {double_train} trained on (A.0), {double_held} held out; C.0 likewise.
-
-```bash
-python -m benchmarks.double_pendulum
-```
-
-| held out | A.0 shoulder | elbow | C.0 shoulder | elbow |
-|---|---|---|---|---|
-{double_rows}
-
-Targets of those who collected the recordings: 0.0021 / 0.0018 and 0.0076 / 0.0070. The mean of Z on the one-step residual
-(last rows) buys nothing on these: what the friction leaves is no function of the state.
-
-The same through `sgp identify`, one run learned from and one held out, effort behind the chosen low-pass: what
-inverse regression makes of it, near and far. It is the wrong tool for this machine, and coverage says so.
+DFKI's double pendulum, designs A.0 and C.0: one run learned from and one held out. It is the wrong tool for this
+machine, whose torques are small differences of large terms, and coverage says so; fitted by roll-outs
+instead it does well: [pendulums.md](pendulums.md).
 
 {double_tables}
-
-## Simple pendulum, with and without 1 kg more
-
-DFKI's torque-limited pendulum, cut before hands or a balancing controller act on it.
-
-```bash
-python -m benchmarks.simple_pendulum
-```
-
-| fitted to | J [kg m^2] | G [N m] | Fv [N m s/rad] | Fc [N m] | roll-outs of 1 s: nMSE | rms [rad] |
-|---|---|---|---|---|---|---|
-{simple_rows}
-
-The equivalent point mass grows by {simple_low} to {simple_high} kg where 1 kg was added, at the same length: the torque constant of the
-drive reads too high, in all recordings alike, and mass cannot be told from it without a load that is known.
 
 ## What the choice of the filter looked like
 
@@ -171,50 +141,11 @@ def _filters(results):
     return '\n'.join(lines)
 
 
-def _double_rows():
-    """Return held-out roll-outs of every model of the double pendulum."""
-    designs = json.loads((RESULTS / 'double_pendulum.json').read_text(encoding='utf-8'))['designs']
-    held = {name: design['held_out'] for name, design in designs.items()}
-    lines = []
-    for model in dict.fromkeys(m for found in held.values() for m in found):
-        cells = [
-            f'{x:.4f}' for found in held.values()
-            for x in (found[model]['nmse_path'] if model in found else ())
-        ]  # fmt: skip
-        if model in held['A.0'] and model in held['C.0']:
-            lines.append(f'| {model} | ' + ' | '.join(cells) + ' |')
-        else:
-            side = [*cells, '', ''] if model in held['A.0'] else ['', '', *cells]
-            lines.append(f'| {model} | ' + ' | '.join(side) + ' |')
-    return '\n'.join(lines), designs['A.0']
-
-
-def _simple_rows(found):
-    """Return coefficients and in-sample roll-outs of the complete model per recording."""
-    lines = []
-    for name, fits in found['recordings'].items():
-        fit = fits['1 s']['Coulomb']
-        values = [f'{fit["parameters"][c]["value"]:.3g}' for c in ('J', 'G', 'Fv', 'Fc')]
-        score = fit['in_sample']['1 s']
-        lines.append(
-            f'| {name} | ' + ' | '.join(values)
-            + f' | {score["nmse_path"][0]:.2g} | {score["rms_path_rad"][0]:.2g} |'
-        )  # fmt: skip
-    return '\n'.join(lines)
-
-
 def text():
     """Return the page."""
     results = {name: _load(name) for name in ('emps', 'panda', 'tiago')}
     emps, panda, tiago = (results[n]['findings'] for n in ('emps', 'panda', 'tiago'))
     panda5, tiago5 = (_load(f'{n}_5hz')['findings'] for n in ('panda', 'tiago'))
-    double_rows, design = _double_rows()
-    simple = json.loads((RESULTS / 'simple_pendulum.json').read_text(encoding='utf-8'))
-    gained = [
-        entry['mass_kg']
-        for horizon in simple['change_with_the_heavier_weight'].values()
-        for entry in horizon.values()
-    ]
     doubles = {f'{d}.0': _load(f'double_pendulum_{d.lower()}0') for d in 'AC'}
     machine = results['emps']['environment']
     parameters = [
@@ -249,16 +180,10 @@ def text():
         tiago_sgp=f'{_score(tiago, "SGP", "stacked_nmse"):.3f}',
         tiago_cutoff=f'{tiago["filter"]["cutoff_hz"]:g}',
         tiago_white=f'{tiago["filter"]["residual_autocorrelation"]:.2f}',
-        double_rows=double_rows,
-        double_train=', '.join(design['training_runs']),
-        double_held=', '.join(design['held_out_runs']),
         double_tables='\n\n'.join(
             f'Design {name}, `{found["command"]}`:\n\n' + _table(found['findings'])
             for name, found in doubles.items()
         ),
-        simple_rows=_simple_rows(simple),
-        simple_low=f'{min(gained):.2f}',
-        simple_high=f'{max(gained):.2f}',
         filters=_filters(results),
     )
 

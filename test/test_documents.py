@@ -77,6 +77,27 @@ def test_numbers_in_the_identifiability_page_are_the_measured_ones():
     ) in text
 
 
+def test_numbers_in_the_page_of_pendulums_are_the_measured_ones():
+    """Every row of the two tables is that of the committed results."""
+    text = (ROOT / 'docs/pendulums.md').read_text(encoding='utf-8')
+    folder = ROOT / 'benchmarks' / 'results'
+    double = json.loads((folder / 'double_pendulum.json').read_text(encoding='utf-8'))
+    for design, result in double['designs'].items():
+        for name, row in result['held_out'].items():
+            assert row['diverged'] == 0, name
+            if name.startswith('published model_1.0'):
+                continue
+            cells = (row[f'nmse_{kind}'] for kind in ('path', 'end'))
+            cells = (' / '.join(f'{x:.4f}' for x in cell) for cell in cells)
+            assert f'| {" | ".join(cells)} |' in text, (design, name)
+    simple = json.loads((folder / 'simple_pendulum.json').read_text(encoding='utf-8'))
+    for recording in simple['recordings'].values():
+        for model in recording['whole'].values():
+            cells = [model['in_sample'], *model['held_out'].values()]
+            cells = (f'{cell["whole"]["rms_path_rad"][0]:.4f}' for cell in cells)
+            assert f'| {" | ".join(cells)} |' in text
+
+
 @pytest.mark.parametrize('name', ['reproduction', 'recordings'])
 def test_generated_pages_are_those_of_the_results(name):
     """Mend with `python docs/generate_<name>.py`."""

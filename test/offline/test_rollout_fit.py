@@ -47,7 +47,7 @@ def test_planted_coefficients_are_recovered_without_noise():
 
 def test_planted_coefficients_of_two_joints_are_recovered():
     """Coupled inertias and dry friction in both joints."""
-    windows = _recorded(DOUBLE, W_DOUBLE, 1, 0.0, seconds=3.0)
+    windows = _recorded(DOUBLE, W_DOUBLE, 1, 0.0, seconds=2.0)
     start = W_DOUBLE * np.random.default_rng(0).uniform(0.9, 1.1, 12)
     fit = fit_rollouts(windows, DOUBLE, start, RolloutFitOptions(compare_every=10))
     np.testing.assert_allclose(fit.W, W_DOUBLE, rtol=1e-3, atol=1e-4)
@@ -57,7 +57,7 @@ def test_intervals_are_of_the_size_of_the_errors():
     """Chi-squared of three fits of five coefficients: 15 within five standard deviations of it."""
     chi_squared = 0.0
     for seed in range(3):
-        windows = _recorded(PENDULUM, W, seed, 2e-3, seconds=40.0)
+        windows = _recorded(PENDULUM, W, seed, 2e-3, seconds=20.0)
         fit = fit_rollouts(windows, PENDULUM, W, RolloutFitOptions(compare_every=10))
         error = fit.W - W
         chi_squared += error @ np.linalg.solve(fit.covariance, error)
@@ -73,7 +73,7 @@ def test_too_few_blocks_give_no_intervals():
 
 def test_a_scale_of_one_effort_is_found():
     """The torque constant of one joint is wrong, that of the other is the unit."""
-    windows = _recorded(DOUBLE, W_DOUBLE, 1, 0.0, seconds=3.0)
+    windows = _recorded(DOUBLE, W_DOUBLE, 1, 0.0, seconds=2.0)
     wrong = replace(windows, effort=windows.effort / [1.0, 1.2])
     options = RolloutFitOptions(compare_every=10, free_gains=('elbow',))
     fit = fit_rollouts(wrong, DOUBLE, W_DOUBLE, options)
@@ -92,7 +92,7 @@ def test_bounds_hold():
 
 def test_robust_loss_follows_the_many_not_the_few():
     """Two windows of twenty whose effort was recorded wrongly."""
-    windows = _recorded(PENDULUM, W, 4, 1e-4)
+    windows = _recorded(PENDULUM, W, 4, 1e-4, seconds=4.0)
     effort = windows.effort.copy()
     effort[::10] += 1.0
     broken = replace(windows, effort=effort)
