@@ -25,7 +25,7 @@ Written by `python docs/generate_reproduction.py` from the committed results of
 sgp reproduce all
 ```
 
-It took {seconds} s. {worlds} worlds per experiment, where the paper has five. Every method goes
+It took {seconds} s on two cores that other work shared. {worlds} worlds per experiment, where the paper has five. Every method goes
 through one interface and learns its hyper-parameters by evidence. nMSE is against the noise-free
 target, coverage of the 95 % interval against measured ones. **SGP** lets evidence choose what Z sees
 and whether it is smooth or linear; GP and PRGP see all candidates; **SGP_all** is the paper's choice,

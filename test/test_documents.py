@@ -30,7 +30,7 @@ def test_commands_in_documents_exist(path):
     targets = set(re.findall(r'^(\w+):', makefile, re.MULTILINE))
     for block in re.findall(r'```(?:bash|console)\n(.*?)```', text, re.DOTALL):
         for name in re.findall(r'^\s*(?:\$ )?(?:\S*/)?sgp (\w+)', block, re.MULTILINE):
-            assert name in {'demo', 'simulate', 'replay', 'import', 'reproduce'}, name
+            assert name in {'demo', 'simulate', 'replay', 'identify', 'import', 'reproduce'}, name
         for name in re.findall(r'^\s*(?:\$ )?make (\w+)', block, re.MULTILINE):
             assert name in targets, name
 
