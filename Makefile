@@ -5,7 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OLDEST := .venv-oldest
-NUMERIC := test/core test/contracts test/robots test/engine test/simulation
+NUMERIC := test/core test/contracts test/robots test/engine test/offline test/simulation
 
 # rclpy of .venv and a ROS that was sourced before do not mix: forget the other one.
 ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
@@ -75,13 +75,14 @@ $(VENV)/.lint: setup.py | $(VENV)/.made
 	$(BIN)/python -m pip install --quiet --editable '.[wheels,test,lint]'
 	@touch $(VENV)/.package $(VENV)/.test $@
 
-# The numeric layers alone, on what Ubuntu 24.04 ships; without ROS.
+# The numeric layers alone, on what Ubuntu 24.04 ships; without ROS, and without Pinocchio, of which
+# no wheel goes with NumPy 1.26.
 $(OLDEST)/.made:
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 12))' || \
 	    { echo "found `$(PYTHON) --version 2>&1`, expected Python 3.10 to 3.12: NumPy 1.26 has no wheel for it" >&2; exit 2; }
 	$(PYTHON) -m venv --clear $(OLDEST)
 	$(OLDEST)/bin/python -m pip install --quiet 'numpy==1.26.4' 'scipy==1.11.4' 'numba>=0.59' \
-	    pyyaml jinja2 matplotlib mcap rosbags pin clarabel pytest hypothesis scikit-learn mpmath
+	    pyyaml jinja2 matplotlib mcap rosbags clarabel pytest hypothesis scikit-learn mpmath
 	@touch $@
 
 clean:

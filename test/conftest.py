@@ -1,11 +1,31 @@
-"""Profiles of Hypothesis, one for every machine and one for repeatable runs."""
+"""Profiles of Hypothesis, and what is left out where Pinocchio is not at hand."""
 
 from __future__ import annotations
 
 import os
+from importlib.util import find_spec
 
 from hypothesis import settings
 
 settings.register_profile('dev', deadline=None)
 settings.register_profile('ci', deadline=None, derandomize=True)
 settings.load_profile(os.environ.get('HYPOTHESIS_PROFILE', 'dev'))
+
+collect_ignore = (
+    []
+    if find_spec('pinocchio')
+    else [
+        f'{folder}/test_{name}.py'
+        for folder, names in {
+            'contracts': ('robots',),
+            'offline': ('excitation', 'suggestions', 'real_arms'),
+            'robots': (
+                'inertial', 'pendulums', 'ready_robots', 'rigid_body', 'tree', 'urdf_robot',
+                'urdf_writer',
+            ),
+            'simulation': ('random_tree', 'serial_arm'),
+        }.items()
+        for name in names
+    ]
+)  # fmt: skip
+"""No wheel of Pinocchio 3 goes with NumPy 1.26, the oldest that is tested."""

@@ -170,8 +170,8 @@ def _natural_size(
         if not is_consistent(nominal[columns]):
             J0 = _stand_in(pseudo_inertia(mean[columns]))
         L = linalg.cholesky(J0, lower=True)
-        half = linalg.solve_triangular(L, PSEUDO_BASIS.reshape(10, 4, 4), lower=True)
-        whole = linalg.solve_triangular(L, half.transpose(0, 2, 1), lower=True)
+        half = np.linalg.solve(L, PSEUDO_BASIS.reshape(10, 4, 4))
+        whole = np.linalg.solve(L, half.transpose(0, 2, 1))
         Y[np.ix_(columns, columns)] = (whole[:, _UPPER[0], _UPPER[1]] * _ROOT2).T
     return Y
 
