@@ -37,6 +37,8 @@ class PivotedBasis:
 
     def rows(self, U: np.ndarray) -> np.ndarray:
         """Return `phi` at inputs U (n, d), (n, r). O(n r^2)."""
+        if not len(self.L):  # SciPy before 1.14 refuses a triangle of size zero
+            return np.zeros((len(U), 0))
         cross = self.kernel.matrix(self.pivots, U)  # (r, n)
         return np.asarray(linalg.solve_triangular(self.L, cross, lower=True, check_finite=False).T)
 

@@ -91,7 +91,7 @@ class _JointPart:
 
     def eliminate(self, F: np.ndarray, phi: np.ndarray) -> np.ndarray:
         """Return `F - phi factor^-1 coupling`, (n, p): the part of F that v cannot imitate."""
-        return F - phi @ linalg.solve_triangular(self.factor, self.coupling)
+        return F - phi @ _back(self.factor, self.coupling)
 
 
 class BatchPosterior:
@@ -126,7 +126,7 @@ class BatchPosterior:
         told = Observations(np.zeros((len(rows), 1)), rows[:, None, :], target[:, None])
         self._physics = Posterior(Model((None,), (1.0,)), told, prior)
         self._weights = [
-            linalg.solve_triangular(part.factor, part.data - part.coupling @ self.coefficients)
+            _back(part.factor, part.data - part.coupling @ self.coefficients)
             for part in self._parts
         ]
         self.rows_per_free_row = np.ones(len(self._parts))
@@ -176,7 +176,7 @@ class BatchPosterior:
             if part.basis is not None:
                 phi = part.basis.rows(U)
                 own = part.basis.remainder(U, phi)
-                spread = linalg.solve_triangular(part.factor, phi.T, trans='T')
+                spread = _back(part.factor, phi.T, trans='T')
                 own += np.einsum('rq,rq->q', spread, spread)
             mean[:, j] += phi @ v
             free = part.eliminate(F[:, j], phi)
@@ -205,6 +205,11 @@ class BatchPosterior:
             total += power * coloured_products(H, block, weights, innovation)
         S = _square_root(inverse)
         return S @ np.hstack([S.T @ prior.root.T, _square_root(S.T @ total @ S)])
+
+
+def _back(R: np.ndarray, b: np.ndarray, trans: str = 'N') -> np.ndarray:
+    """Solve R x = b for an upper triangle; SciPy before 1.14 refuses one of size zero."""
+    return np.asarray(linalg.solve_triangular(R, b, trans)) if len(b) else np.zeros(b.shape)
 
 
 def _square_root(covariance: np.ndarray) -> np.ndarray:
