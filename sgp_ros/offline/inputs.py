@@ -44,7 +44,7 @@ class InputChoice:
         inputs: per joint the columns of U; None where no process predicts best.
         names: the same in words.
         errors: (candidates, k) mean squared error on held-out stretches over the variance of the
-            target, in the order of `CANDIDATES`.
+            target, or in its unit squared where it is constant, in the order of `CANDIDATES`.
     """
 
     inputs: Inputs
@@ -76,7 +76,8 @@ def choose_inputs(data: FilteredData, robot: Robot) -> InputChoice:
             fit = fit_offline(known, robot, 'SGP', candidate, _OPTIONS)
             error = (fit.predict(asked)[0] - asked.y) ** 2
             np.add.at(squares[i], stretch[is_held], error)
-    squares /= n * np.maximum(data.y.var(axis=0), np.finfo(float).tiny)
+    spread = data.y.var(axis=0)
+    squares /= n * np.where(spread > 0.0, spread, 1.0)  # the effort of a passive joint is zero
     errors = squares.sum(axis=1)
     best = _chosen(squares)
     return InputChoice(
