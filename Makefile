@@ -34,7 +34,7 @@ format: $(VENV)/.lint
 MEASURED := $(patsubst sgp_ros/%/__init__.py,--cov=sgp_ros.%,\
     $(wildcard $(patsubst %,sgp_ros/%/__init__.py,core engine diagnosis)))
 coverage: $(VENV)/.test
-	$(BIN)/python -m pytest $(NUMERIC) $(wildcard test/diagnosis) \
+	$(BIN)/python -m pytest -q test/core test/contracts test/engine $(wildcard test/diagnosis) \
 	    $(MEASURED) --cov-branch --cov-fail-under=95 --cov-report=term:skip-covered
 
 oldest: $(OLDEST)/.made
