@@ -1,11 +1,15 @@
-"""Profiles of Hypothesis, and what is left out where Pinocchio is not at hand."""
+"""One BLAS thread, profiles of Hypothesis, and what is left out where Pinocchio is not at hand."""
 
 from __future__ import annotations
 
 import os
 from importlib.util import find_spec
 
-from hypothesis import settings
+# As the commands do, before NumPy loads: the small matrices here are slower with more threads.
+for _name in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS'):
+    os.environ.setdefault(_name, '1')
+
+from hypothesis import settings  # noqa: E402 - the environment above comes first
 
 settings.register_profile('dev', deadline=None)
 settings.register_profile('ci', deadline=None, derandomize=True)
