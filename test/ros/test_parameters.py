@@ -49,11 +49,13 @@ def test_a_shipped_file_configures_the_robot_of_its_name(path: Path) -> None:
     document = yaml.safe_load(path.read_text())
     assert list(document) == ['/**']  # a section named after the node would miss a renamed one
     given = _flat('', document['/**']['ros__parameters'])
-    assert given.pop('robot') == path.stem
+    robot = given.pop('robot')
+    assert Path(robot).stem == path.stem
     known = {setting.name: setting for setting in NODE_SETTINGS}
     for name in set(given) & set(known):
         assert known[name].problem(given.pop(name)) is None
-    EngineConfig.from_mapping(given, load_robot(path.stem))
+    found = load_robot(robot if robot in ROBOTS else str(CONFIG.parent / robot))
+    EngineConfig.from_mapping(given, found)
 
 
 def test_every_robot_has_a_file() -> None:

@@ -36,7 +36,7 @@ class Experiment:
     make: Callable[[int], World]
     prior: Callable[[World], CoefficientPrior] | None = None
     seeds: int = 20
-    quick_seeds: int = 2
+    quick_seeds: int = 1
 
 
 def _few(seed: int) -> World:
@@ -77,7 +77,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         ),
         Experiment(
             'arm', 'arm', 'Three-link arm whose third joint rubs near its limits, section IV.D',
-            arm.make_world, arm.make_prior, quick_seeds=1,
+            arm.make_world, arm.make_prior,
         ),
     )
 }  # fmt: skip
