@@ -25,7 +25,9 @@ def nominal_coefficients(robot: Robot) -> np.ndarray | None:
     return np.array([c.prior_mean for c in nominal_robot(robot).coefficients])
 
 
-def write_identified(out: Path, robot: Robot, values: np.ndarray, std: np.ndarray) -> None:
+def write_identified(
+    out: Path, robot: Robot, values: np.ndarray, std: np.ndarray, *, has_bodies: bool = True
+) -> None:
     """Write `robot_identified.yaml`, and `robot_identified.urdf` for a robot from a URDF.
 
     Args:
@@ -33,9 +35,11 @@ def write_identified(out: Path, robot: Robot, values: np.ndarray, std: np.ndarra
         robot: that was identified.
         values: (p,) coefficients; none where nothing was learned.
         std: (p,) standard deviations, infinite for what is not determined.
+        has_bodies: the values are those of real bodies; no URDF can hold others.
     """
     write_text(out / 'robot_identified.yaml', robot_yaml(robot, values, std))
-    if 'urdf' in robot.source and len(values):
+    (out / 'robot_identified.urdf').unlink(missing_ok=True)  # of an earlier run
+    if has_bodies and 'urdf' in robot.source and len(values):
         try:
             text = robot_urdf(robot, values)
         except ConfigError:  # no body of positive mass, so no URDF can hold it

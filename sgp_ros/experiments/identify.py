@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sgp_ros.errors import RecordingError
+from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.experiments.identified_robot import nominal_coefficients, write_identified
-from sgp_ros.offline.identification import IdentificationOptions, identify
+from sgp_ros.offline.identification import HELD_OUT, IdentificationOptions, identify
 from sgp_ros.offline.regression_data import smoothed_motion
 from sgp_ros.offline.rollout_scores import score_windows
 from sgp_ros.offline.rollout_windows import cut_windows, joined
@@ -81,10 +81,14 @@ def run_identify(
         ConfigError: a wrong robot, method or hold-out.
         RecordingError: nothing in the recording can be used.
     """
+    require_folder(out)
     robot = load_robot(robot_name)
     remarks: list[str] = []
     signals = read_signals(bag, robot, options, remarks)
-    tests = {Path(t).stem: read_signals(t, robot, options, remarks) for t in options.tests}
+    tests = {
+        name: read_signals(path, robot, options, remarks)
+        for name, path in test_names(options.tests).items()
+    }
     progress(0.1)
     found = identify(
         signals, robot, tests, options.identification,
@@ -100,7 +104,8 @@ def run_identify(
     write_text(out / 'identification.json', json.dumps(findings, indent=1, allow_nan=False) + '\n')
     known = found.physics.coefficients
     std = np.where(known.is_identifiable, known.std, np.inf)
-    write_identified(out, robot, best_coefficients(found), std)
+    values, has_bodies = best_coefficients(found), found.consistent is not None
+    write_identified(out, robot, values, std, has_bodies=has_bodies)
     write_identification(out, found, findings, remarks)
     progress(1.0)
     print_findings(findings)
@@ -108,16 +113,44 @@ def run_identify(
     return findings
 
 
+def require_folder(out: Path) -> None:
+    """Refuse a place where no result can be written, before anything is computed.
+
+    Raises:
+        ConfigError: there is a file of that name.
+    """
+    places = [out, *out.parents]
+    files = [place for place in places if place.exists() and not place.is_dir()]
+    if files:
+        raise ConfigError(f'{files[0]} is a file', 'a folder for the results', 'change --out')
+
+
+def test_names(tests: Sequence[str]) -> dict[str, str]:
+    """Return the recordings to score on by names that differ from each other and from `train`."""
+    named: dict[str, str] = {}
+    for path in tests:
+        stem, name, count = Path(path).stem or path, Path(path).stem or path, 1
+        while name in {*named, 'train', HELD_OUT}:
+            count += 1
+            name = f'{stem} {count}'
+        named[name] = path
+    return named
+
+
 def read_signals(bag: str, robot: Robot, options: IdentifyOptions, remarks: list[str]) -> Signals:
     """Return the signals of a recording; what is odd about it is appended to `remarks`."""
     recording = open_recording(bag)
-    signals = collect_signals(
-        recording.events(options.joint_states, options.command), robot,
-        max_gap=MAX_GAP_S, effort_source=options.effort_source,
-    )  # fmt: skip
+    events = recording.events(options.joint_states, options.command)
+    try:
+        signals = collect_signals(
+            events, robot, max_gap=MAX_GAP_S, effort_source=options.effort_source
+        )
+    except RecordingError as error:
+        raise RecordingError(f'{bag}: {error.found}', error.expected, error.remedy) from error
     remarks += recording.remarks
     remarks += [
-        f'{count} messages could not be read: {why}' for why, count in recording.unreadable.items()
+        f'{bag}: {count} messages could not be read: {why}'
+        for why, count in recording.unreadable.items()
     ]
     return signals
 

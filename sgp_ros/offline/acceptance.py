@@ -66,8 +66,9 @@ def accept(
             commands.add(event)
     if not states.stamps_ns:
         raise RecordingError(
-            f'no usable state of robot {robot.name}, refused {states.refused}',
+            f'no usable state of robot {robot.name}: {states.why_refused()}',
             f'states of the joints {list(robot.joint_names)}',
+            'name the joints in a robot file, or take the robot of this recording',
         )
     return _paired(states, commands.held(), commands.refused, effort_source, command_timeout)
 
@@ -98,6 +99,13 @@ class _Table:
             return
         self.stamps_ns.append(sample.stamp_ns)
         self.rows.append((position, velocity, effort))
+
+    def why_refused(self) -> str:
+        reasons = [f'{count} {reason}' for reason, count in self.refused.items() if count]
+        strangers = [list(names) for names, order in self._orders.items() if order is None]
+        return ', '.join(reasons or ['there is none']) + (
+            f', the joints are {strangers[0]}' if strangers else ''
+        )
 
     @property
     def actuated(self) -> list[int]:
@@ -181,7 +189,7 @@ def _paired(
         raise RecordingError(
             f'no state with an effort among {len(keep)}, effort source {source!r}',
             'an effort in the states, or commands before them',
-            'give the command topic, or another effort source',
+            'give the topic of the commands with --command, or another --effort',
         )
     passive = [j for j in range(position.shape[1]) if j not in states.actuated]
     effort[:, passive] = 0.0

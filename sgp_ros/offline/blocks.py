@@ -38,11 +38,10 @@ def holdout(
     """
     if kind not in KINDS:
         raise ConfigError(f'hold-out {kind!r}', f'one of {list(KINDS)}')
-    if not 0.0 < share < 1.0 or not length_s > 0.0:
-        raise ConfigError(
-            f'hold-out of share {share:g} in stretches of {length_s:g} s',
-            'a share between 0 and 1, a length above 0 s',
-        )
+    if not 0.0 < share < 1.0:
+        raise ConfigError(f'hold-out of share {share:g}', 'a share between 0 and 1')
+    if not length_s > 0.0:
+        raise ConfigError(f'hold-out in stretches of {length_s:g} s', 'a length above 0 s')
     n = len(data.time)
     if kind == 'tail':
         is_held = np.arange(n) >= round((1.0 - share) * n)
@@ -51,9 +50,10 @@ def holdout(
         is_held = np.floor((stretch + 1) * share) > np.floor(stretch * share)
     if is_held.all() or not is_held.any():
         raise ConfigError(
-            f'{n / data.rate:.3g} s of data, hold-out {kind} of {share:g}',
-            f'at least two stretches of {length_s:g} s, and rows on either side',
-            'take a longer recording or shorter stretches',
+            f'{n} rows of data, hold-out {kind} of {share:g}',
+            'rows on either side'
+            + (f', in stretches of {length_s:g} s' if kind == 'alternate' else ''),
+            'take a longer recording, another share or shorter stretches',
         )
     return data.rows(~is_held), data.rows(is_held)
 

@@ -146,7 +146,7 @@ def fit_offline(
         raise RecordingError(
             f'{n} filtered rows for {p} coefficients',
             f'at least {-(-p // k) + FEWEST_ROWS}',
-            'take a longer recording, a higher cut-off or less decimation',
+            'take a longer recording with more motion, or a higher cut-off',
         )
     inputs = inputs or robot.residual_columns(('default',))
     prior = prior_of(robot, is_flat=options.has_flat_prior)

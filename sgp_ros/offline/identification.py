@@ -7,19 +7,20 @@ of the recording: a process that sees position and velocity could imitate its co
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sgp_ros.core.base_parameters import RegressorFactor
-from sgp_ros.errors import ConfigError, NumericalError
+from sgp_ros.errors import ConfigError, NumericalError, RecordingError
 from sgp_ros.offline.blocks import holdout
 from sgp_ros.offline.bodies import nearest_bodies
 from sgp_ros.offline.excitation import Excitation, judge_excitation, structural_base
 from sgp_ros.offline.fit import OfflineFit, fit_offline
 from sgp_ros.offline.inputs import CANDIDATES, InputChoice, choose_inputs
-from sgp_ros.offline.plan import CUTOFFS, PlanChoice, choose_plan
+from sgp_ros.offline.motion import require_motion
+from sgp_ros.offline.plan import CUTOFFS, FilterPlan, PlanChoice, choose_plan
 from sgp_ros.offline.regression_data import FilteredData, filtered_data
 from sgp_ros.offline.suggestions import Suggestion, suggest_motions
 
@@ -78,7 +79,7 @@ class Identification:
         inputs: what Z of SGP sees, where held-out stretches chose it.
         suggestions: motions that would show more.
         consistent: the coefficients of real bodies nearest to `physics`; None for a robot
-            without inertial parameters.
+            without inertial parameters, and where none could be found.
     """
 
     robot: Robot
@@ -115,21 +116,24 @@ def identify(
 
     Raises:
         ConfigError: a method, input or hold-out that does not exist.
-        RecordingError: too short.
+        RecordingError: too short, or without motion or efforts.
         NumericalError: hyper-parameters cannot be learned.
     """
     if not options.methods or set(options.methods) - set(METHODS):
         raise ConfigError(f'methods {list(options.methods)}', f'some of {list(METHODS)}')
+    inputs, of_all = None, robot.residual_columns(options.residual_inputs or OWN)
+    require_motion(signals, robot)
+    if any(test.velocity is None for test in tests.values()):  # one filter for all of them
+        signals = replace(signals, velocity=None)
     cutoffs = CUTOFFS if options.cutoff is None else (options.cutoff,)
     choice = choose_plan(signals, robot, cutoffs)
     progress(0.3)
     data = filtered_data(signals, robot, choice.plan)
-    held = {name: filtered_data(test, robot, choice.plan) for name, test in tests.items()}
+    held = {name: _test_data(name, test, robot, choice.plan) for name, test in tests.items()}
     train = data
     if not held:
         train, held[HELD_OUT] = holdout(data, options.holdout, options.share, options.stretch_s)
     progress(0.4)
-    inputs, of_all = None, robot.residual_columns(options.residual_inputs or OWN)
     if options.residual_inputs is None and 'SGP' in options.methods:
         inputs = choose_inputs(train, robot)
     progress(0.6)
@@ -148,13 +152,28 @@ def identify(
         suggestions = suggest_motions(robot, recorded, rng)
     return Identification(
         robot, choice, data, train, held, fits, physics, excitation, inputs,
-        suggestions, nearest_bodies(
-            robot,
-            physics.coefficients.mean,
-            information_root(physics, excitation.excited),
-            nominal,
-        ),
+        suggestions, _consistent(robot, physics, excitation.excited, nominal),
     )  # fmt: skip
+
+
+def _test_data(name: str, test: Signals, robot: Robot, plan: FilterPlan) -> FilteredData:
+    try:
+        return filtered_data(test, robot, plan)
+    except (ConfigError, RecordingError) as error:
+        raise RecordingError(
+            f'test recording {name}: {error.found}', error.expected, 'take a longer or denser one'
+        ) from error
+
+
+def _consistent(
+    robot: Robot, physics: OfflineFit, base: BaseParameters, nominal: np.ndarray | None
+) -> ConsistentEstimate | None:
+    """Return the coefficients of real bodies nearest to a fit; None without, or none found."""
+    try:
+        R = information_root(physics, base)
+        return nearest_bodies(robot, physics.coefficients.mean, R, nominal)
+    except NumericalError:  # the fit stands without them, and the findings say so
+        return None
 
 
 def information_root(physics: OfflineFit, base: BaseParameters) -> np.ndarray:

@@ -138,10 +138,12 @@ def choose_plan(signals: Signals, robot: Robot, cutoffs: Sequence[float] = CUTOF
         if (trial := _Trial.of(signals, robot, cutoff, source)) is not None
     ]
     if not trials:
+        longest = max(s.stop - s.start for s in signals.segments) / signals.rate
         raise RecordingError(
-            f'a recording of {len(signals.time) / signals.rate:.3g} s at {signals.rate:.3g} Hz',
-            f'one long and fast enough for a cut-off of {cutoffs[0]:g} to {cutoffs[-1]:g} Hz',
-            'take a longer one or another cut-off',
+            f'{len(signals.time) / signals.rate:.3g} s of recording at {signals.rate:.3g} Hz, '
+            f'the longest stretch without a gap {longest:.3g} s',
+            f'some {3 * len(robot.coefficients)} rows after a low-pass of {cutoffs[0]:g} Hz',
+            'record longer, without gaps, or take another cut-off',
         )
     regret = _total_regret(trials)
     candidates = tuple(

@@ -91,9 +91,10 @@ def collect_signals(
     accepted.refused['gap'] += sum(len(rows) for rows in stretches) - sum(map(len, used))
     if not used:
         raise RecordingError(
-            f'no stretch of {SHORTEST_SEGMENT} states without a pause of {max_gap:g} s',
+            f'{len(accepted.stamps_ns)} states, nowhere {SHORTEST_SEGMENT} of them without a pause'
+            f' above {max_gap:g} s',
             'a recording without such pauses',
-            'allow longer gaps',
+            'record longer, and more states per second',
         )
     steps = np.concatenate([np.diff(accepted.stamps_ns[rows]) for rows in used])
     step = 1e-9 * float(np.median(steps))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sgp_ros.core.scores import coverage95, nlpd, nmse
+from sgp_ros.core.scores import coverage95, nlpd
 from sgp_ros.offline.blocks import distance_to
 from sgp_ros.offline.excitation import IDENTIFIABLE
 from sgp_ros.report.metrics import versions
@@ -45,6 +45,11 @@ def collect_findings(
         'recording': recording,
         'joints': list(names),
         'target': found.robot.target,
+        'units': {
+            channel: {joint.name: joint.unit(channel) for joint in found.robot.joints}
+            for channel in ('position', found.robot.target)
+        },
+        'held_out': list(found.held),
         'counts': dict(counts),
         'filter': _filter(found),
         'rows': {name: len(data.time) for name, data in regions.items()},
@@ -60,10 +65,7 @@ def collect_findings(
         'parameters': _parameters(found),
         'base_parameters': _base_parameters(found),
         'excitation': _excitation(found),
-        'consistency': None if found.consistent is None else {
-            'was_consistent': found.consistent.was_consistent,
-            'distance': found.consistent.distance,
-        },
+        'consistency': _consistency(found),
         'rollouts': {
             name: [_rollout(score, names) for score in scores] for name, scores in rollouts.items()
         },
@@ -75,8 +77,7 @@ def _regions(found: Identification) -> dict[str, FilteredData]:
     """Return what was learned from, what was held out, and its near and far halves."""
     regions = {'train': found.train, **found.held}
     for name, data in found.held.items():
-        distance = distance_to(found.train, data)
-        is_far = distance > np.median(distance)
+        is_far = far_half(found.train, data)
         regions[f'{name}, near'] = data.rows(~is_far)
         regions[f'{name}, far'] = data.rows(is_far)
     return regions
@@ -92,6 +93,27 @@ def _excitation(found: Identification) -> dict[str, Any]:
         'not_excited': list(found.excitation.unexcited),
         'suggestions': [s.text for s in found.suggestions],
     }
+
+
+def far_half(train: FilteredData, data: FilteredData) -> np.ndarray:
+    """Say which rows belong to the half that lies further from `train`, (n,) of bool.
+
+    The halves differ by one row at most, also where distances are equal.
+    """
+    order = np.argsort(distance_to(train, data), kind='stable')
+    is_far = np.zeros(len(order), dtype=bool)
+    is_far[order[(len(order) + 1) // 2 :]] = True
+    return is_far
+
+
+def _consistency(found: Identification) -> dict[str, Any] | None:
+    if found.consistent is not None:
+        return {
+            'was_consistent': found.consistent.was_consistent,
+            'distance': found.consistent.distance,
+        }
+    has_bodies = any(c.name.endswith('.mass') for c in found.robot.coefficients)
+    return {'was_consistent': False, 'distance': None} if has_bodies else None
 
 
 def _filter(found: Identification) -> dict[str, Any]:
@@ -121,23 +143,36 @@ def _filter(found: Identification) -> dict[str, Any]:
 def _scores(fit: OfflineFit, data: FilteredData, names: tuple[str, ...]) -> dict[str, Any]:
     """Return scores per joint, their mean, and the share of all squared error.
 
-    `stacked` is the sum of the joints' squared errors over the sum of their variances.
+    `stacked` is the sum of the joints' squared errors over the sum of their variances. What is
+    constant, such as the effort of a passive joint, has no nMSE.
     """
+    if not len(data.time):
+        return {'n': 0, 'unknown': 0}
     mean, variance = fit.predict(data)
     known = np.isfinite(variance).all(axis=1)
     y, mean, variance = data.y[known], mean[known], variance[known]
     if not len(y):
         return {'n': 0, 'unknown': len(known)}
-    errors, total = nmse(y, mean), y.var(axis=0).sum()
-    each = zip(names, errors, nlpd(y, mean, variance), coverage95(y, mean, variance), strict=True)
+    squares, spread = ((y - mean) ** 2).mean(axis=0), y.var(axis=0)
+    errors = np.divide(squares, spread, out=np.full_like(squares, np.nan), where=spread > 0.0)
+    each = zip(
+        names, errors, nlpd(y, mean, variance), coverage95(y, mean, variance), np.sqrt(squares),
+        strict=True,
+    )  # fmt: skip
+    varies, power = spread > 0.0, (y**2).sum()
     return {
         'joints': {
-            name: {'nmse': float(e), 'nlpd': float(p), 'coverage95': float(c)}
-            for name, e, p, c in each
+            name: {
+                'nmse': _finite(e),
+                'nlpd': float(p),
+                'coverage95': float(c),
+                'rmse': float(r),
+            }
+            for name, e, p, c, r in each
         },
-        'mean_nmse': float(errors.mean()),
-        'stacked_nmse': float(((y - mean) ** 2).mean(axis=0).sum() / total),
-        'relative_error': float(np.sqrt(((y - mean) ** 2).sum() / (y**2).sum())),
+        'mean_nmse': float(errors[varies].mean()) if varies.any() else None,
+        'stacked_nmse': float(squares.sum() / spread.sum()) if varies.any() else None,
+        'relative_error': float(np.sqrt(((y - mean) ** 2).sum() / power)) if power else None,
         'n': len(y),
         'unknown': int((~known).sum()),
     }

@@ -124,7 +124,7 @@ def test_a_part_of_a_long_recording_decides_for_it(monkeypatch):
 
 def test_a_recording_too_short_for_every_filter_is_refused():
     """The error says what would do."""
-    with pytest.raises(RecordingError, match='take a longer one'):
+    with pytest.raises(RecordingError, match='record longer'):
         choose_plan(moved_axis(0, duration=0.3), LINEAR_AXIS)
 
 

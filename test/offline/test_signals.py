@@ -159,11 +159,11 @@ def test_refused_commands_are_counted_by_reason():
 def test_a_recording_without_effort_is_refused_with_the_remedy():
     """An actuated joint needs one."""
     states = [_state(0.01 * i, [0.0]) for i in range(30)]
-    with pytest.raises(RecordingError, match='give the command topic'):
+    with pytest.raises(RecordingError, match='topic of the commands'):
         collect_signals(states, LINEAR_AXIS, max_gap=0.1)
     with pytest.raises(RecordingError, match='no usable state'):
         collect_signals([], LINEAR_AXIS, max_gap=0.1)
-    with pytest.raises(RecordingError, match='allow longer gaps'):
+    with pytest.raises(RecordingError, match='record longer'):
         collect_signals(_axis_states([0.0, 0.01]), LINEAR_AXIS, max_gap=0.1)
     with pytest.raises(ConfigError, match='effort source'):
         collect_signals(states, LINEAR_AXIS, max_gap=0.1, effort_source='motor')
