@@ -12,6 +12,7 @@ import numpy as np
 
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.experiments.identified_robot import nominal_coefficients, write_identified
+from sgp_ros.experiments.identify_summary import print_findings
 from sgp_ros.offline.identification import HELD_OUT, IdentificationOptions, identify
 from sgp_ros.offline.regression_data import smoothed_motion
 from sgp_ros.offline.rollout_scores import score_windows
@@ -21,7 +22,7 @@ from sgp_ros.offline.zero_phase import ZeroPhase
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.report.files import write_text
 from sgp_ros.report.findings import collect_findings
-from sgp_ros.report.identification import cautions, excitation, verdict, write_identification
+from sgp_ros.report.identification import write_identification
 from sgp_ros.robots.registry import load_robot
 
 if TYPE_CHECKING:
@@ -212,33 +213,3 @@ def _scored(
         return score_windows(joined(windows), found.robot, best_coefficients(found))
     except (ValueError, np.linalg.LinAlgError):
         return None
-
-
-def print_findings(findings: Mapping[str, Any]) -> None:
-    """Print scores per method, parameters, and what is not to be trusted."""
-    print(verdict(findings))
-    plan = findings['filter']
-    print(
-        f'filter: {plan["cutoff_hz"]:g} Hz, {plan["rate_hz"]:.3g} rows/s, velocity from '
-        f'{plan["velocity_source"]}'
-    )
-    for name in (name for name in findings['rows'] if name != 'train'):
-        for method, scores in findings['scores'].items():
-            joints = scores[name].get('joints', {})
-            each = '  '.join(f'{joint} {s["nmse"]:.3g}' for joint, s in joints.items())
-            print(f'{name:20s} {method:5s} nMSE {each}')
-    for name, all_ in findings['rollouts'].items():
-        for score in all_:
-            ends = {joint: s['nmse_end'] for joint, s in score['joints'].items()}
-            each = '  '.join(f'{joint} {_short(end)}' for joint, end in ends.items())
-            print(f'{name:20s} roll-outs of {score["horizon_s"]:.3g} s: nMSE {each}')
-    for p in findings['parameters']:
-        known = f'{p["value"]:11.5g} +- {1.96 * p["std"]:<9.3g} {p["unit"]}' if p['std'] else ''
-        print(f'{p["name"]:24s} {known or p["status"]}')
-    print(excitation(findings['excitation']))
-    for text in (*findings['excitation']['suggestions'], *cautions(findings)):
-        print(text)
-
-
-def _short(x: float | None) -> str:
-    return 'none' if x is None else f'{x:.3g}'

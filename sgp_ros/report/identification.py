@@ -9,6 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from sgp_ros.core.scores import INTERVAL_95
+from sgp_ros.offline.identification import HELD_OUT
 from sgp_ros.report.figures import BAND, GREY, MEASURED, PREDICTED, png
 from sgp_ros.report.files import write_bytes, write_text
 from sgp_ros.report.html import embedded
@@ -44,25 +45,28 @@ def render(
     environment = Environment(
         loader=PackageLoader('sgp_ros.report'), autoescape=True, undefined=StrictUndefined
     )
-    held = [name for name in findings['rows'] if name != 'train']
+    regions = list(findings['rows'])
     return environment.get_template('identification.html').render(
         title=f'{findings["robot"]} identified from {findings["recording"]}',
         subtitle=description,
         verdict=verdict(findings),
         cautions=cautions(findings),
-        held_note=f'Held out: {", ".join(held)}; near and far: the halves of the rows that lie '
-        'closer to and further from the states learned from.',
+        held_note=f'No method has learned from {" or ".join(map(called, findings["held_out"]))}. '
+        'Near and far are the halves of its rows that lie closer to and further from the states '
+        'learned from.',
+        drawn=drawn(findings['scores']),
         predictions=embedded(figures, ('prediction_',)),
         methods=list(findings['scores']),
-        tables=[{'title': name, 'rows': _rows(findings, name)} for name in ('train', *held)],
+        tables=[{'title': name, 'rows': _rows(findings, name)} for name in regions],
         inputs=_inputs(findings),
-        joints=findings['joints'],
+        joints=[{'name': j, 'unit': findings['units']['position'][j]} for j in findings['joints']],
         rollouts=[
             _rollout(name, score) for name, all_ in findings['rollouts'].items() for score in all_
         ],
         excitation=excitation(findings['excitation']),
         suggestions=findings['excitation']['suggestions'],
         parameters=[_parameter(p) for p in findings['parameters']],
+        bodies=any('consistent' in p for p in findings['parameters']),
         base=[_base(b) for b in findings['base_parameters']],
         filter=filter_sentence(findings['filter']),
         filter_figures=embedded(figures, ('filter',)),
@@ -72,23 +76,40 @@ def render(
     )
 
 
+def called(name: str) -> str:
+    """Return a name of held-out data as it stands in a sentence."""
+    return 'the held-out part' if name == HELD_OUT else name
+
+
+def drawn(scores: Mapping[str, Any]) -> str:
+    """Return the method that speaks for the identification, from `scores` by method."""
+    return 'SGP' if 'SGP' in scores else next(iter(scores))
+
+
 def verdict(findings: Mapping[str, Any]) -> str:
     """Say how well what was held out is predicted, and what Z adds."""
     parts = []
-    for name in findings['rows']:
-        if name == 'train' or name.endswith((', near', ', far')):
-            continue
+    for name in findings['held_out']:
         scores = {m: s[name].get('mean_nmse') for m, s in findings['scores'].items()}
         sgp, physics = scores.get('SGP'), scores.get('PR')
         best = sgp if sgp is not None else next(iter(scores.values()))
         if best is None:
-            parts.append(f'nothing of {name}, which asks about parameters not determined')
+            parts.append(
+                f'nothing of {called(name)}: it asks for parameters that are not determined'
+            )
             continue
-        text = f'{findings["target"]} of {name} with a mean nMSE of {best:.2g}'
+        text = f'the {findings["target"]} in {called(name)} with a mean nMSE of {best:.2g}'
         if sgp is not None and physics is not None:
             text += f' (physics alone {physics:.2g})'
         parts.append(text)
-    return 'The model predicts ' + '; '.join(parts) + '.'
+    scale = ' 0 is perfect, 1 no better than a constant.'
+    return 'The model predicts ' + '; '.join(parts) + '.' + scale + _learned(findings['inputs'])
+
+
+def _learned(inputs: Sequence[Sequence[str]] | None) -> str:
+    if inputs is None or any(inputs):
+        return ''
+    return ' Nothing was learned beside the physics: it would not predict better.'
 
 
 def cautions(findings: Mapping[str, Any]) -> list[str]:
@@ -104,7 +125,7 @@ def cautions(findings: Mapping[str, Any]) -> list[str]:
     narrow = [
         f'{joint} ({100 * score["coverage95"]:.0f} %)'
         for name, scores in findings['scores'].get('SGP', {}).items()
-        if name in findings['rows'] and name != 'train' and ', ' not in name
+        if name in findings['held_out']
         for joint, score in scores.get('joints', {}).items()
         if score['coverage95'] < 0.9
     ]
@@ -112,36 +133,47 @@ def cautions(findings: Mapping[str, Any]) -> list[str]:
         found.append(f'Intervals of SGP are too narrow on held-out data: {", ".join(narrow)}.')
     if findings['consistency'] and not findings['consistency']['was_consistent']:
         found.append(
-            'The fitted parameters belong to no real bodies; the nearest ones that do lie '
-            f'{findings["consistency"]["distance"] ** 0.5:.2g} standard deviations away.'
+            'The fitted parameters belong to no real bodies: a mass or an inertia is not '
+            'positive, or a friction drives. ' + _nearest(findings['consistency']['distance'])
         )
     return found
+
+
+def _nearest(distance: float | None) -> str:
+    if distance is None:
+        return 'None near them could be found, so no URDF is written: record more motion.'
+    return f'The nearest real bodies lie {distance**0.5:.2g} standard deviations away.'
 
 
 def excitation(found: Mapping[str, Any]) -> str:
     """Say how many combinations of parameters the motion determines."""
     text = (
-        f'{found["rank"]} combinations of parameters are determined by this motion, of '
-        f'{found["structural_rank"]} that any motion could show; condition '
-        f'{found["condition"]:.3g}.'
+        f'This motion determines {found["rank"]} combinations of parameters, of '
+        f'{found["structural_rank"]} that some motion could show. The least visible one shows '
+        f'{found["condition"]:.3g} times less than the most visible one (condition number).'
     )
     if found['not_excited']:
-        text += ' Not excited: ' + '; '.join(found['not_excited']) + '.'
+        text += ' Not determined: ' + '; '.join(found['not_excited']) + '.'
     return text
+
+
+def filter_choice(plan: Mapping[str, Any]) -> str:
+    """Say which filter was chosen."""
+    taken = 'as measured' if plan['velocity_source'] == 'measured' else 'from the position'
+    return (
+        'Both sides of the equation of motion passed a low-pass without delay of '
+        f'{plan["cutoff_hz"]:g} Hz; {plan["rate_hz"]:.3g} rows per second were kept. '
+        f'The velocity was taken {taken}.'
+    )
 
 
 def filter_sentence(plan: Mapping[str, Any]) -> str:
     """Say which filter was chosen and why."""
-    sources = {c['velocity_source'] for c in plan['candidates']}
-    text = (
-        f'Both sides of the equation of motion passed one zero-phase low-pass of '
-        f'{plan["cutoff_hz"]:g} Hz and were thinned out to {plan["rate_hz"]:.3g} Hz. '
-    )
-    if len(sources) > 1:
-        taken = 'measured' if plan['velocity_source'] == 'measured' else 'differentiated'
-        text += f'The {taken} velocity predicts held-out stretches better and was taken. '
+    text = filter_choice(plan)
+    if len({c['velocity_source'] for c in plan['candidates']}) > 1:
+        text += ' It predicts held-out stretches better than the other one.'
     return text + (
-        'The curve shows what each cut-off loses on held-out stretches, summed over all bands; '
+        ' The curve shows what each cut-off loses on held-out stretches, summed over all bands; '
         'the least one was taken.'
     )
 
@@ -159,7 +191,12 @@ def draw_filter(plan: Mapping[str, Any]) -> Figure:
                 color=colour, label=label,
             )  # fmt: skip
     axes.axvline(plan['cutoff_hz'], color=GREY, ls=':', label='taken')
-    axes.set(xscale='log', yscale='log', xlabel='cut-off [Hz]', ylabel='1 + regret [nat]')
+    axes.set(
+        xscale='log',
+        yscale='log',
+        xlabel='cut-off [Hz]',
+        ylabel='loss beside the best: 1 + regret [nat]',
+    )
     axes.legend(fontsize='small')
     return figure
 
@@ -167,7 +204,7 @@ def draw_filter(plan: Mapping[str, Any]) -> Figure:
 def draw_prediction(found: Identification, name: str) -> Figure:
     """Draw the target of every joint over the first seconds of what was held out."""
     data = found.held[name]
-    method = 'SGP' if 'SGP' in found.fits else next(iter(found.fits))
+    method = drawn(found.fits)
     mean, variance = found.fits[method].predict(data)
     shown = np.flatnonzero(data.time <= data.time[0] + _SHOWN_S)
     joints = found.robot.joints
@@ -181,21 +218,24 @@ def draw_prediction(found: Identification, name: str) -> Figure:
         axes.plot(time, m, color=PREDICTED, lw=1.2)
         axes.set_ylabel(f'{joint.name}\n[{joint.unit(found.robot.target)}]', fontsize='small')
     axes.set_xlabel('time [s]')
-    figure.suptitle(f'{found.robot.target} of {name}: measured, and predicted by {method}')
+    figure.suptitle(f'{found.robot.target} in {called(name)}: measured, and predicted by {method}')
     return figure
 
 
 def _rows(findings: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
-    rows = []
+    rows, units = [], findings['units'][findings['target']]
+    speaker = drawn(findings['scores'])
     for joint in findings['joints']:
         cells = []
         for scores in findings['scores'].values():
             cell = scores[name].get('joints', {}).get(joint)
             cells.append(
                 {'nmse': '', 'coverage': ''} if cell is None else
-                {'nmse': f'{cell["nmse"]:.3g}', 'coverage': f'{100 * cell["coverage95"]:.0f} %'}
+                {'nmse': _short(cell['nmse']), 'coverage': f'{100 * cell["coverage95"]:.0f} %'}
             )  # fmt: skip
-        rows.append({'joint': joint, 'cells': cells})
+        best = findings['scores'][speaker][name].get('joints', {}).get(joint)
+        rmse = '' if best is None else f'{best["rmse"]:.3g} {units[joint]}'
+        rows.append({'joint': joint, 'cells': cells, 'rmse': rmse})
     return rows
 
 
@@ -204,7 +244,7 @@ def _inputs(findings: Mapping[str, Any]) -> str:
         return ''
     said = zip(findings['joints'], findings['inputs'], strict=True)
     return '; '.join(
-        f'{joint}: ' + (', '.join(n.removeprefix('own:') for n in names) or 'nothing')
+        f'{joint}: ' + (', '.join(n.removeprefix('own:') for n in names) or 'no Z')
         for joint, names in said
     )
 
@@ -221,13 +261,9 @@ def _rollout(name: str, score: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _parameter(p: Mapping[str, Any]) -> dict[str, Any]:
-    reasons = {
-        'not_excited': 'not determined by this motion',
-        'structural': 'known only in combination with others',
-    }
     row = {
         'name': p['name'], 'unit': p['unit'], 'known': p['identifiable'], 'value': '',
-        'interval': reasons.get(p['status'], 'not determined by this motion'),
+        'interval': unknown(p['status']),
         'consistent': _short(p.get('consistent')),
     }  # fmt: skip
     if p['std'] is not None:
@@ -235,6 +271,13 @@ def _parameter(p: Mapping[str, Any]) -> dict[str, Any]:
         row['value'] = f'{p["value"]:.5g}'
         row['interval'] = f'{p["value"] - half:.4g} to {p["value"] + half:.4g}'
     return row
+
+
+def unknown(status: str) -> str:
+    """Say why a parameter has no value."""
+    if status == 'structural':
+        return 'known only in combination with others'
+    return 'not determined by this motion'
 
 
 def _base(b: Mapping[str, Any]) -> dict[str, str]:
