@@ -3,8 +3,8 @@
 Evidence takes the noise for white. What the physics of a real machine leaves is not: it changes
 slowly, and a process that may bend at will follows it, at the price of what it says elsewhere. So
 sets of inputs compete by their squared error on stretches that were not learned from. No process
-at all is one of them, and stands unless another is better in sum, and by a t-test on the
-logarithms of the errors over the stretches, at a level of 5 % for all candidates together.
+at all is one of them, and stands unless another is better by more than a hundredth in sum, and by
+a t-test on the logarithms of the errors over the stretches, at a level of 5 % for all candidates.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ CANDIDATES: tuple[tuple[str, ...], ...] = (
 )
 """Sets of inputs of a joint that compete; the first one is no process."""
 _FOLDS, _STRETCHES, _LEVEL = 4, 3, 0.05
+_LEAST_GAIN = 0.01  # of the squared error without a process
 _EQUAL = 1.02
 """Errors within 2 % are equal: the first, smallest set is taken."""
 _OPTIONS = OfflineOptions(max_points=300, max_basis=200)
@@ -95,7 +96,7 @@ def _chosen(squares: np.ndarray) -> np.ndarray:
     doubt = gain.std(axis=1, ddof=1) * np.sqrt(count)
     level = _LEVEL / (len(CANDIDATES) - 1)  # Bonferroni
     is_better = gain.sum(axis=1) > stats.t.ppf(1.0 - level, count - 1) * doubt
-    is_better &= total < total[0]
+    is_better &= total < (1.0 - _LEAST_GAIN) * total[0]
     is_better[0] = True
     errors = np.where(is_better, total, np.inf)
     return np.asarray((errors <= _EQUAL * errors.min(axis=0)).argmax(axis=0))

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
+import numpy as np
+import pytest
+
+from sgp_ros.errors import ConfigError
 from sgp_ros.offline.fit import fit_offline
 from sgp_ros.offline.inputs import CANDIDATES, choose_inputs
-from sgp_ros.offline.regression_data import FilteredData
+from sgp_ros.offline.plan import FilterPlan
+from sgp_ros.offline.regression_data import FilteredData, filtered_data
+from sgp_ros.robots.linear_axis import LINEAR_AXIS
+from sgp_ros.robots.reaction_wheel import REACTION_WHEEL
 from sgp_ros.robots.robot import Coefficient, Joint, Motion, Robot
 from sgp_ros.robots.terms import acceleration, single_column
+from test.offline.worlds import moved_axis
+
+PLAN = FilterPlan(4.0, 20.0, 25)
+SMOOTH_AXIS = replace(LINEAR_AXIS, terms=(*LINEAR_AXIS.terms[:2], LINEAR_AXIS.terms[3]))
+"""Without a column for dry friction."""
+WORLDS = 5
 
 SLIDER = Robot(
     name='slider',
@@ -70,3 +83,34 @@ def test_the_first_candidate_is_no_process():
     assert CANDIDATES[0] == ()
     assert choice.errors.shape == (len(CANDIDATES), 1)
     assert choice.inputs == SLIDER.residual_columns(choice.names[0])
+
+
+def _axis(robot, seed=0, seconds=40.0, **choices):
+    return filtered_data(moved_axis(seed, duration=seconds, **choices), robot, PLAN)
+
+
+@pytest.mark.parametrize('colour', [0.0, 0.9])
+def test_complete_physics_gets_no_process(colour):
+    """In no world, whether its noise is white or not."""
+    worlds = [_axis(LINEAR_AXIS, seed, seconds=20.0, colour=colour) for seed in range(WORLDS)]
+    assert [choose_inputs(world, LINEAR_AXIS).names for world in worlds] == [((),)] * WORLDS
+
+
+def test_the_choice_does_not_depend_on_the_unit_of_the_effort():
+    data = _axis(SMOOTH_AXIS, seed=1, seconds=20.0)
+    scaled = replace(data, y=1000.0 * data.y, F=1000.0 * data.F)
+    names = [choose_inputs(each, SMOOTH_AXIS).names for each in (data, scaled)]
+    assert names[0] == names[1]
+
+
+def test_own_inputs_are_those_of_each_joint_itself():
+    """`own:direction` is another column for every joint, `direction:pole` the same."""
+    own = REACTION_WHEEL.residual_columns(('own:velocity', 'own:direction'))
+    assert [[REACTION_WHEEL.input_name(c) for c in columns] for columns in own] == [
+        ['velocity:pole', 'direction:pole'],
+        ['velocity:wheel', 'direction:wheel'],
+    ]
+    assert len(set(REACTION_WHEEL.residual_columns(('direction:pole',)))) == 1
+    for name in ('own:speed', 'own:', 'own'):
+        with pytest.raises(ConfigError, match='own:velocity and the like'):
+            REACTION_WHEEL.residual_columns(('own:velocity', name))
