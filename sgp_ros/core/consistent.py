@@ -46,6 +46,8 @@ ended short of the gap; with this, none."""
 _LEAST_MASS, _LEAST_RADIUS = 1e-3, 1e-2
 """Size of the ball that stands in for a missing reference, where the estimate is smaller, as mass
 and radius of gyration [kg, m]."""
+_ROUNDING = 1e-12
+"""What least squares leaves of a coefficient that no datum shows, beside the largest one."""
 _UPPER = np.array([(i, j) for j in range(4) for i in range(j + 1)]).T
 """Entries of a symmetric 4 x 4 matrix, upper triangle column by column, as the solver wants it."""
 _ROOT2 = np.where(_UPPER[0] == _UPPER[1], 1.0, np.sqrt(2.0))
@@ -163,7 +165,8 @@ def _natural_size(
 ) -> np.ndarray:
     """Return Y (p, p): a link's part of `Y w` is `L^-1 J L^-T` as the solver stacks it."""
     size = np.where(nominal != 0.0, np.abs(nominal), np.abs(mean))
-    Y = np.diag(1.0 / np.where(size != 0.0, size, 1.0))
+    is_zero = size <= _ROUNDING * size.max(initial=0.0)
+    Y = np.diag(1.0 / np.where(is_zero, 1.0, size))
     for block in blocks:
         columns = np.asarray(block)
         J0 = pseudo_inertia(nominal[columns])

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
-from sgp_ros.core.posterior import NULL_TOLERANCE, RANK_TOLERANCE
+from sgp_ros.core.posterior import NULL_TOLERANCE, RANK_TOLERANCE, ZERO_COLUMN
 from sgp_ros.core.rotations import absorb_row, absorbed_rows_numpy
 
 if TYPE_CHECKING:
@@ -104,16 +104,17 @@ class _Solved:
     def __init__(self, R: np.ndarray, z: np.ndarray) -> None:
         p = len(z)
         self.scale = np.sqrt((R * R).sum(axis=0))
-        self.scale[self.scale == 0.0] = 1.0
+        is_zero = self.scale <= ZERO_COLUMN * self.scale.max(initial=0.0)
+        self.scale[is_zero] = 1.0
         self.null = np.zeros((p, 0))
         self.spread: np.ndarray | None = None
         if not p:
             self.spread, self.w = np.zeros((0, 0)), np.zeros(0)
             return
-        if np.all(np.abs(np.diag(R)) > RANK_TOLERANCE * self.scale):
+        if not is_zero.any() and np.all(np.abs(np.diag(R)) > RANK_TOLERANCE * self.scale):
             self.w = linalg.solve_triangular(R, z, check_finite=False)
             return
-        U, S, Vt = np.linalg.svd(R / self.scale)
+        U, S, Vt = np.linalg.svd(np.where(is_zero, 0.0, R / self.scale))
         rank = int((RANK_TOLERANCE * max(S[0], 1e-300) < S).sum())
         self.spread = Vt[:rank].T / S[:rank] / self.scale[:, None]
         self.null = Vt[rank:].T

@@ -28,6 +28,9 @@ RANK_TOLERANCE = 1e-11
 Rounding leaves 1e-16 times the root of the number of rows in rows computed from a state, and a
 hundred times that once rows were filtered or Z was eliminated from them; a real signal below 1e-11
 could not be told from it."""
+ZERO_COLUMN = 4096 * float(np.finfo(float).eps)
+"""Norm of a column beside the largest one up to which it is rounding, as in `base_parameters`: as
+a number, something would be divided by it and give a coefficient of 1e15."""
 NULL_TOLERANCE = 1e-8
 """Share of a regressor row that may point along undetermined directions before it counts."""
 
@@ -204,8 +207,10 @@ def _solve(A: np.ndarray, b: np.ndarray, data: Observations, prior: CoefficientP
     # The scale leaves out the hyper-parameters: the evidence over the determined directions
     # would otherwise change with the scale. A second scaling balances the columns for the SVD.
     scale = column_scale(data.F, prior.root)
-    norms = np.linalg.norm(A / scale, axis=0)
-    norms[norms == 0.0] = 1.0
+    size = np.linalg.norm(A, axis=0)
+    is_zero = size <= ZERO_COLUMN * size.max(initial=0.0)
+    A, scale = np.where(is_zero, 0.0, A), np.where(is_zero, 1.0, scale)
+    norms = np.where(is_zero, 1.0, np.linalg.norm(A / scale, axis=0))
     U, S, Vt = np.linalg.svd(A / (scale * norms), full_matrices=False)
     limit = RANK_TOLERANCE * (S[0] if len(S) else 0.0)
     rank = int((limit < S).sum())

@@ -8,6 +8,7 @@ import pytest
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
+from sgp_ros.core.information import Information
 from sgp_ros.core.kernels import SquaredExponential
 from sgp_ros.core.model import Model, Observations
 from sgp_ros.core.posterior import Posterior
@@ -242,3 +243,22 @@ def test_priors_that_mean_nothing_are_refused():
         CoefficientPrior.from_std(np.zeros(1), np.zeros(1))
     with pytest.raises(ValueError, match='positive definite'):
         CoefficientPrior.from_covariance(np.zeros(2), np.ones((2, 2)))
+
+
+@pytest.mark.parametrize('kind', ['batch', 'information'])
+def test_a_column_of_rounding_errors_determines_nothing(kind):
+    """What cancels in exact arithmetic leaves 1e-16 of the other columns, not a coefficient."""
+    rng = np.random.default_rng(0)
+    F = rng.normal(size=(50, 3))
+    F[:, 1] = 1e-16 * rng.normal(size=50)
+    y = F @ [1.0, 0.0, 2.0] + 0.01 * rng.normal(size=50)
+    data = Observations(np.zeros((50, 1)), F[:, None], y[:, None])
+    found = (
+        Information.nothing(3).with_rows(F, y)
+        if kind == 'information'
+        else Posterior(Model((None,), (1e-4,)), data, CoefficientPrior.flat(3))
+    )
+    np.testing.assert_array_equal(found.is_identifiable, [True, False, True])
+    assert found.coefficients == pytest.approx([1.0, 0.0, 2.0], abs=0.01)
+    if kind == 'batch':
+        assert np.isfinite(found.predict(data.U, data.F).variance).all()
