@@ -110,7 +110,8 @@ def project(
 
 def _information_root(covariance: np.ndarray, N: np.ndarray) -> np.ndarray:
     """Return R with `R^T R` the inverse of the covariance across N, and `R N = 0`."""
-    N = N * np.sqrt(np.diag(covariance).max() / np.maximum((N**2).sum(axis=0), 1e-300))
+    longest = np.diag(covariance).max(initial=0.0)
+    N = N * np.sqrt(longest / np.maximum((N**2).sum(axis=0), 1e-300))
     whole = covariance + N @ N.T
     size = np.sqrt(np.maximum(np.diag(whole), 0.0))
     size[size == 0.0] = 1.0
