@@ -88,7 +88,7 @@ def run_identify(
     signals = read_signals(bag, robot, options, remarks)
     tests = {
         name: read_signals(path, robot, options, remarks)
-        for name, path in test_names(options.tests).items()
+        for name, path in names_of_tests(options.tests).items()
     }
     progress(0.1)
     found = identify(
@@ -126,7 +126,7 @@ def require_folder(out: Path) -> None:
         raise ConfigError(f'{files[0]} is a file', 'a folder for the results', 'change --out')
 
 
-def test_names(tests: Sequence[str]) -> dict[str, str]:
+def names_of_tests(tests: Sequence[str]) -> dict[str, str]:
     """Return the recordings to score on by names that differ from each other and from `train`."""
     named: dict[str, str] = {}
     for path in tests:

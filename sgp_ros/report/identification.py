@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from sgp_ros.offline.identification import Identification
 
 _SHOWN_S = 12.0
+_CORRELATED = 0.2
+"""Correlation from row to row that is worth a word: the filter alone leaves some tenth."""
 
 
 def write_identification(
@@ -116,7 +118,9 @@ def cautions(findings: Mapping[str, Any]) -> list[str]:
     """Say what is not to be trusted, and why."""
     found = []
     plan = findings['filter']
-    if not plan['is_white']:
+    rows = [c['rows'] for c in plan['candidates'] if c['cutoff_hz'] == plan['cutoff_hz']]
+    by_chance = max(_CORRELATED, 3.0 / max(rows, default=1) ** 0.5)  # white noise has the latter
+    if not plan['is_white'] and plan['residual_autocorrelation'] > by_chance:
         found.append(
             'The physics leaves a residual that is not white (correlation '
             f'{plan["residual_autocorrelation"]:.2f} from row to row): something is missing. '
