@@ -20,6 +20,7 @@ from sgp_ros.offline.excitation import Excitation, judge_excitation, structural_
 from sgp_ros.offline.fit import OfflineFit, fit_offline
 from sgp_ros.offline.inputs import CANDIDATES, InputChoice, choose_inputs
 from sgp_ros.offline.motion import require_motion
+from sgp_ros.offline.passive import require_balance
 from sgp_ros.offline.plan import CUTOFFS, FilterPlan, PlanChoice, choose_plan
 from sgp_ros.offline.regression_data import FilteredData, filtered_data
 from sgp_ros.offline.suggestions import Suggestion, suggest_motions
@@ -143,10 +144,10 @@ def identify(
         fits[method] = fit_offline(train, robot, method, seen)
         progress(0.6 + 0.2 * (i + 1) / len(options.methods))
     physics = fit_offline(data, robot, 'PR')
-    _require_spread(physics, robot)
     rng = np.random.default_rng(options.seed)
     recorded = RegressorFactor.nothing(data.F.shape[2]).with_rows(data.F)
     excitation = judge_excitation(structural_base(robot, rng), recorded)
+    require_balance(physics.coefficients, excitation.excited, data, robot)
     progress(0.9)
     suggestions: tuple[Suggestion, ...] = ()
     if excitation.missing and robot.target == 'effort':
@@ -155,21 +156,6 @@ def identify(
         robot, choice, data, train, held, fits, physics, excitation, inputs,
         suggestions, _consistent(robot, physics, excitation.excited, nominal),
     )  # fmt: skip
-
-
-def _require_spread(physics: OfflineFit, robot: Robot) -> None:
-    """Refuse a fit that collapsed: `0 = F W` of a passive joint holds best for W = 0."""
-    found = physics.coefficients
-    spread = np.diag(found.covariance)[found.is_identifiable]
-    if np.isfinite(found.mean).all() and np.all(spread > 0.0):
-        return
-    passive = [joint.name for joint in robot.joints if not joint.is_actuated]
-    raise NumericalError(
-        'the fit of the physics determines no coefficient: its variances are not positive'
-        + (f', with passive joints {passive}' if passive else ''),
-        'efforts from which the coefficients follow',
-        'leave passive joints out of the robot file, or drive the others harder',
-    )
 
 
 def _test_data(name: str, test: Signals, robot: Robot, plan: FilterPlan) -> FilteredData:

@@ -106,18 +106,6 @@ def far_half(train: FilteredData, data: FilteredData) -> np.ndarray:
     return is_far
 
 
-def _excitation(found: Identification) -> dict[str, Any]:
-    excited = found.excitation.excited
-    return {
-        'rank': excited.rank,
-        'structural_rank': found.excitation.structural.rank,
-        'condition': excited.condition,
-        'tolerance': excited.tolerance,
-        'not_excited': list(found.excitation.unexcited),
-        'suggestions': [s.text for s in found.suggestions],
-    }
-
-
 def _consistency(found: Identification) -> dict[str, Any] | None:
     if found.consistent is not None:
         return {
