@@ -75,6 +75,34 @@ def arm_samples(seconds=24.0, *, rate=100.0, seed=0, encoder=2e-5, noise=0.02):
     ]
 
 
+def passive_samples(seconds=24.0, rate=50.0):
+    """Return states of the arm whose second joint swings freely, integrated by Pinocchio."""
+    data, rng, h = MODEL.createData(), np.random.default_rng(0), 0.005
+    omega, phase = 2.0 * np.pi * rng.uniform(0.2, 1.2, 5), rng.uniform(0.0, 6.0, 5)
+
+    def effort(t):
+        return np.array([1.2 * np.sin(omega * t + phase).sum(), 0.0])
+
+    def rate_of(t, x):
+        friction = VISCOUS * x[2:] + COULOMB * [1.0, 0.3] * np.tanh(x[2:] / WIDTH)
+        a = pinocchio.aba(MODEL, data, _places(x[:2]), x[2:], effort(t) - friction)
+        return np.concatenate([x[2:], a])
+
+    x, samples = np.array([0.0, 1.0, 0.0, 0.0]), []
+    for i in range(round(seconds / h)):
+        t = i * h
+        if i % round(1.0 / (rate * h)) == 0:
+            seen = x[:2] + 1e-5 * rng.normal(size=2)
+            felt = np.array([effort(t)[0] + 0.01 * rng.normal(), np.nan])
+            row = (frozen_array(y) for y in (seen, x[2:], felt))
+            samples.append(JointSample(START_NS + round(1e9 * t), JOINTS, *row))
+        k1 = rate_of(t, x)
+        k2 = rate_of(t + 0.5 * h, x + 0.5 * h * k1)
+        k3 = rate_of(t + 0.5 * h, x + 0.5 * h * k2)
+        x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + rate_of(t + h, x + h * k3))
+    return samples
+
+
 def write_bag(path, samples):
     """Write states as MCAP and return the path as text."""
     with RecordingWriter(path) as writer:
