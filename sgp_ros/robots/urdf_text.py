@@ -10,9 +10,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.robots.urdf_control import commanded_joints, mimic_parameters
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 MOVING = ('revolute', 'continuous', 'prismatic')
 _KNOWN = (*MOVING, 'fixed')
@@ -36,7 +41,7 @@ class UrdfJoint:
         effort: limit [N m or N], inf where none is stated.
         damping: viscous coefficient of `<dynamics>` [N m s/rad or N s/m].
         friction: Coulomb friction of `<dynamics>` [N m or N].
-        follows: joint of its `<mimic>`; None where it moves on its own.
+        follows: joint that it mimics; None where it moves on its own.
         multiplier: position per position of that joint.
         offset: position where that joint is at 0 [rad or m].
     """
@@ -97,7 +102,7 @@ def parse_urdf(path_or_text: str | Path) -> Urdf:
         raise ConfigError(
             f'{place} holds <{root.tag}>', 'a URDF with <robot>', 'expand xacro files first'
         )
-    reading = _Reading(place)
+    reading = _Reading(place, mimic_parameters(root))
     links = [reading.name(link) for link in root.findall('link')]
     joints = [reading.joint(joint) for joint in root.findall('joint')]
     reading.check_tree(links, joints)
@@ -105,7 +110,7 @@ def parse_urdf(path_or_text: str | Path) -> Urdf:
     reading.check_mimics(by_name)
     return Urdf(
         root.get('name') or 'robot', place, by_name, tuple(links),
-        _commanded(root), reading.plain(root, by_name),
+        commanded_joints(root), reading.plain(root, by_name),
     )  # fmt: skip
 
 
@@ -122,23 +127,12 @@ def _text(path_or_text: str | Path) -> tuple[str, str]:
     return f'URDF {path}', text.lstrip()
 
 
-def _commanded(root: ET.Element) -> frozenset[str] | None:
-    """Return the joints with an effort interface; where none has one, those with any."""
-    interfaces = [
-        (joint.get('name', ''), interface.get('name', ''))
-        for block in root.iter('ros2_control')
-        for joint in block.iter('joint')
-        for interface in joint.iter('command_interface')
-    ]
-    effort = frozenset(joint for joint, interface in interfaces if interface == 'effort')
-    return effort or frozenset(joint for joint, _ in interfaces) or None
-
-
 @dataclass(frozen=True, slots=True)
 class _Reading:
     """Reads elements of one file, naming it in every complaint."""
 
     place: str
+    mimics: Mapping[str, ET.Element]
 
     def name(self, element: ET.Element) -> str:
         name = element.get('name')
@@ -155,6 +149,8 @@ class _Reading:
                 'make it fixed, or replace it by joints of one degree of freedom',
             )  # fmt: skip
         limit, dynamics, mimic = (element.find(tag) for tag in ('limit', 'dynamics', 'mimic'))
+        if mimic is None:
+            mimic = self.mimics.get(name)
         is_bounded = kind in {'revolute', 'prismatic'}
         follows = None if mimic is None or kind == 'fixed' else mimic.get('joint', '')
         return UrdfJoint(

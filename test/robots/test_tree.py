@@ -116,6 +116,30 @@ def test_a_follower_adds_no_joint_but_its_inertia():
     np.testing.assert_allclose(right.translation, [0.01 - 2 * 0.03, 0.0, 0.2])
 
 
+def test_parameters_of_ros2_control_make_a_joint_follow_as_a_mimic_does():
+    """Some files leave `<mimic>` out and say it there; a multiplier is 1 where none is stated."""
+    free = FINGER.replace('<mimic joint="grip" multiplier="-2" offset="0.01"/>', '')
+
+    def controlled(text, *parameters):
+        lines = ''.join(f'<param name="{name}">{value}</param>' for name, value in parameters)
+        return text + (
+            f'<ros2_control name="c" type="system"><joint name="other">{lines}</joint>'
+            '<joint name="grip"><command_interface name="effort"/></joint></ros2_control>'
+        )
+
+    said = (('mimic', 'grip'), ('multiplier', '-2'), ('offset', ' 0.01 '))
+    tree, plain = read_urdf(ARM % controlled(free, *said)), read_urdf(ARM % FINGER)
+    assert tree.moving_names == plain.moving_names
+    np.testing.assert_array_equal(tree.follows, plain.follows)
+    np.testing.assert_array_equal(tree.multipliers, plain.multipliers)
+    np.testing.assert_array_equal(tree.offsets, plain.offsets)
+    assert read_urdf(ARM % controlled(free, said[0])).multipliers[3] == 1.0
+    both = read_urdf(ARM % controlled(FINGER, ('mimic', 'grip'), ('multiplier', '7')))
+    assert both.multipliers[3] == -2.0
+    with pytest.raises(ConfigError, match="mimics 'thumb'"):
+        read_urdf(ARM % controlled(free, ('mimic', 'thumb')))
+
+
 def test_chains_of_followers_lead_to_the_joint_that_moves_on_its_own():
     """Multipliers multiply, offsets add up."""
     third = FINGER + (
