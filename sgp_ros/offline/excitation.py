@@ -6,6 +6,7 @@ would, had this recording moved the right joint in the right pose: see `suggesti
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from sgp_ros.core.base_parameters import BaseParameters
-    from sgp_ros.robots.robot import Robot
+    from sgp_ros.robots.robot import Joint, Robot
 
 IDENTIFIABLE, NOT_EXCITED, STRUCTURAL = 'identifiable', 'not_excited', 'structural'
 """A parameter by itself: known from this motion; from another one; only in combinations."""
@@ -39,6 +40,28 @@ class JointRange:
     upper: float = np.pi
     velocity: float = 2.0
     acceleration: float = 5.0
+
+    @classmethod
+    def of(cls, joint: Joint) -> JointRange:
+        """Return the range that a joint's file states; what it leaves open turns once around.
+
+        Limits that leave no room, such as zeros of a file that states none, are taken for open.
+        """
+        lower = joint.lower if math.isfinite(joint.lower) else min(-np.pi, joint.upper - np.pi)
+        upper = joint.upper if math.isfinite(joint.upper) else max(np.pi, lower + np.pi)
+        if not lower < upper:
+            lower, upper = -np.pi, np.pi
+        speed = joint.velocity_limit if joint.velocity_limit > 0.0 else math.inf
+        return cls(lower, upper, min(cls().velocity, speed))
+
+
+def joint_ranges(
+    robot: Robot, ranges: Mapping[str, JointRange] | None = None
+) -> dict[str, JointRange]:
+    """Return the range of each joint: the given one, else what the robot's file states."""
+    return {
+        joint.name: (ranges or {}).get(joint.name, JointRange.of(joint)) for joint in robot.joints
+    }
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,11 +101,11 @@ def structural_base(
         robot: any.
         rng: of the random motion.
         samples: number of states; None takes four times as many rows as parameters.
-        ranges: by joint; what is missing turns once around.
+        ranges: by joint; what is missing is that of the robot's file.
     """
     k, p = len(robot.joints), len(robot.coefficients)
     n = samples or 8 + -(-4 * p // k)
-    limits = [(ranges or {}).get(name, JointRange()) for name in robot.joint_names]
+    limits = joint_ranges(robot, ranges).values()
     lower, upper, speed, push = np.array(
         [(x.lower, x.upper, x.velocity, x.acceleration) for x in limits]
     ).T

@@ -14,7 +14,7 @@ import numpy as np
 
 from sgp_ros.core.base_parameters import RegressorFactor
 from sgp_ros.errors import ConfigError
-from sgp_ros.offline.excitation import JointRange, judge_excitation, structural_base
+from sgp_ros.offline.excitation import JointRange, joint_ranges, judge_excitation, structural_base
 from sgp_ros.robots.robot import Motion
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def suggest_motions(
         robot: inverse model, from motion to efforts.
         recorded: factor of the recording's regressor; `RegressorFactor.nothing(p)` for none.
         rng: of the poses.
-        ranges: by joint; what is missing turns once around.
+        ranges: by joint; what is missing is that of the robot's file.
         limit: number of suggestions.
 
     Raises:
@@ -94,7 +94,7 @@ def suggest_motions(
         raise ConfigError(
             f'robot {robot.name} predicts {robot.target}', 'a robot that predicts effort'
         )
-    ranges = ranges or {}
+    ranges = joint_ranges(robot, ranges)
     structural = structural_base(robot, rng, ranges=ranges)
     trials = [
         (moving, held, RegressorFactor.nothing(len(structural.names)).with_rows(F))
@@ -121,13 +121,12 @@ def suggest_motions(
 def _candidates(
     robot: Robot, rng: np.random.Generator, ranges: Mapping[str, JointRange]
 ) -> Iterator[tuple[tuple[Sinusoid, ...], dict[str, float], np.ndarray]]:
-    limits = {name: ranges.get(name, JointRange()) for name in robot.joint_names}
-    singles = [(name,) for name in limits]
-    for names in (*singles, *combinations(limits, 2)):
+    singles = [(name,) for name in ranges]
+    for names in (*singles, *combinations(ranges, 2)):
         for _ in range(_POSES):
-            pose = {name: rng.uniform(x.lower, x.upper) for name, x in limits.items()}
+            pose = {name: rng.uniform(x.lower, x.upper) for name, x in ranges.items()}
             moving = tuple(
-                _sinusoid(name, limits[name], 1.0 if i else 1.0 / _RATIO)
+                _sinusoid(name, ranges[name], 1.0 if i else 1.0 / _RATIO)
                 for i, name in enumerate(names)
             )
             held = {name: float(q) for name, q in pose.items() if name not in names}

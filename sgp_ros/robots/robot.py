@@ -53,6 +53,9 @@ class Joint:
         direction_width: speed at which its direction counts as 76 % certain [rad/s or m/s].
         effort_gain: [N m or N] per unit of the effort in a recording, such as a current; what
             the physics sees is the recorded effort times this.
+        lower: least position [rad or m], -inf where none is known.
+        upper: greatest position [rad or m], inf where none is known.
+        velocity_limit: [rad/s or m/s], inf where none is known.
     """
 
     name: str
@@ -61,6 +64,9 @@ class Joint:
     effort_unit: str = ''
     direction_width: float = 0.02
     effort_gain: float = 1.0
+    lower: float = -math.inf
+    upper: float = math.inf
+    velocity_limit: float = math.inf
 
     def unit(self, channel: str) -> str:
         """Return the unit of one of `INPUT_CHANNELS`."""

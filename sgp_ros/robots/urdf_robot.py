@@ -136,6 +136,9 @@ def _joints(tree: Tree, gains: Mapping[str, float], problems: list[str]) -> tupl
             kind='prismatic' if tree.is_prismatic[i] else 'revolute',
             is_actuated=bool(tree.is_actuated[i]),
             effort_gain=gains.get(name, 1.0),
+            lower=float(tree.lower[i]),
+            upper=float(tree.upper[i]),
+            velocity_limit=float(tree.velocity_limit[i]),
         )
         for i, name in enumerate(tree.moving_names)
     )

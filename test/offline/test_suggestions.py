@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +13,7 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.offline.excitation import JointRange, judge_excitation, structural_base
 from sgp_ros.offline.suggestions import suggest_motions
 from sgp_ros.robots.registry import ROBOTS
-from sgp_ros.robots.robot import Motion
+from sgp_ros.robots.robot import Joint, Motion
 from test.offline.chains import chain, recorded_motion, states
 
 
@@ -57,6 +60,36 @@ def test_suggestions_name_the_joint_that_stood_still():
         if s.joint == 'j2':
             assert s.amplitude * s.frequency <= 1.0
             assert s.amplitude * s.frequency**2 <= 3.0
+
+
+def test_suggestions_stay_within_the_limits_of_the_file():
+    """Positions and speeds of every moving and every held joint; open limits turn once around."""
+    robot = chain([(0, 0, 1), (0, 1, 0)], [(0, 0, 0), (0.3, 0, 0.1)])
+    limited = replace(robot.joints[0], lower=0.2, upper=0.5, velocity_limit=0.3)
+    robot = replace(robot, joints=(limited, robot.joints[1]))
+    recorded = RegressorFactor.nothing(len(robot.coefficients))
+    for suggestion in suggest_motions(robot, recorded, np.random.default_rng(0), limit=5):
+        assert 0.2 <= suggestion.held.get(limited.name, 0.3) <= 0.5
+        for s in suggestion.moving:
+            if s.joint == limited.name:
+                assert 0.2 <= s.centre - s.amplitude < s.centre + s.amplitude <= 0.5
+                assert s.amplitude * s.frequency <= 0.3
+    assert JointRange.of(robot.joints[1]) == JointRange()
+
+
+@pytest.mark.parametrize(
+    ('limits', 'expected'),
+    [
+        ((-1.0, math.inf), (-1.0, math.pi)),
+        ((5.0, math.inf), (5.0, 5.0 + math.pi)),
+        ((-math.inf, -5.0), (-5.0 - math.pi, -5.0)),
+        ((0.0, 0.0), (-math.pi, math.pi)),
+    ],
+)
+def test_half_open_limits_leave_room_and_zeros_are_none(limits, expected):
+    joint = Joint('j', lower=limits[0], upper=limits[1])
+    found = JointRange.of(joint)
+    assert (found.lower, found.upper) == expected
 
 
 def test_a_forward_model_gets_no_suggestions():
