@@ -164,7 +164,7 @@ def _add_identify(commands: Any) -> None:
     parser.add_argument('--cutoff', type=float, default=None, metavar='HZ',
                         help='of the low-pass (default: chosen from the data)')  # fmt: skip
     parser.add_argument('--inputs', nargs='+', metavar='NAME', default=None,
-                        help='what Z sees, such as own:velocity')  # fmt: skip
+                        help='what Z sees, such as own:velocity or every:velocity')  # fmt: skip
     parser.add_argument('--effort', choices=('auto', 'state', 'command'), default='auto',
                         help='where efforts come from (default: %(default)s)')  # fmt: skip
     parser.add_argument('--joint-states', metavar='TOPIC', help='topic of the states')

@@ -181,7 +181,7 @@ class Robot:
             spec: `('default',)` for the robot's own choice, `('all',)` for the state and the
                 other input, `('own',)` for position and velocity of the joint itself, or names
                 such as `velocity:pole`, which then hold for every joint; `own:direction` is the
-                direction of the joint itself.
+                direction of the joint itself, `every:velocity` stands for those of all joints.
 
         Raises:
             ConfigError: a name that is no input of this robot.
@@ -193,8 +193,9 @@ class Robot:
         elif tuple(spec) == ('all',):
             named = (self._input_names()[: -len(self.joints)],) * len(self.joints)
         else:
+            whole = [each for name in spec for each in _of_every_joint(name, self.joint_names)]
             named = tuple(
-                tuple(_of_own_joint(name, joint) for name in spec) for joint in self.joint_names
+                tuple(_of_own_joint(name, joint) for name in whole) for joint in self.joint_names
             )
         return tuple(tuple(self._column(name) for name in names) for names in named)
 
@@ -260,6 +261,11 @@ class Robot:
             )
         channel, joint = name.split(':', 1)
         return INPUT_CHANNELS.index(channel) * len(self.joints) + self.joint_names.index(joint)
+
+
+def _of_every_joint(name: str, joints: Sequence[str]) -> list[str]:
+    channel = name.removeprefix('every:')
+    return [name] if channel == name else [f'{channel}:{joint}' for joint in joints]
 
 
 def _of_own_joint(name: str, joint: str) -> str:

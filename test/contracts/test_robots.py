@@ -127,6 +127,15 @@ def test_residual_inputs_resolve(name, spec):
 
 
 @pytest.mark.parametrize('name', NAMES)
+@pytest.mark.parametrize('channel', ['velocity', 'direction'])
+def test_an_input_of_every_joint_is_that_of_each_by_name(name, channel):
+    """And every joint sees all of them."""
+    robot = ROBOTS[name]
+    each = tuple(f'{channel}:{joint}' for joint in robot.joint_names)
+    assert robot.residual_columns((f'every:{channel}',)) == robot.residual_columns(each)
+
+
+@pytest.mark.parametrize('name', NAMES)
 def test_renaming_joints_changes_names_alone(name):
     """Columns, inputs and units follow the new names."""
     robot = ROBOTS[name]
