@@ -17,7 +17,7 @@ import json
 import os
 import tempfile
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import rclpy
@@ -45,6 +45,7 @@ NODE = 'sgp_ros.ros.sgp_node'
 WALL_S = 20.0
 """Longest stretch that is played [s of the clock on the wall]."""
 _START_LIMIT_S, _QUIET_S = 30.0, 2.5
+_SECOND_NS = 1_000_000_000
 DOUBLE = 'dfki_double_pendulum/design_{}__sys_id__trajectory_00.npz'
 SIMPLE = 'dfki_simple_pendulum/{}.csv'
 
@@ -92,17 +93,21 @@ CASES = {
 
 def _bag(case, folder):
     """Return the recording as a bag, imported where it is a table."""
-    source = DATA / case.file
     if not case.mapping:
-        return source
-    mapping = ROOT / 'config' / 'import' / f'{case.mapping}.yaml'
-    if sgp(['import', str(source), '--map', str(mapping), '--out', str(folder)]):
-        raise SystemExit(f'{source} cannot be imported')
-    bag = folder / f'{source.stem}.mcap'
-    return bag if case.seconds is None else _cut(bag, case.seconds)
+        return DATA / case.file
+    bag = imported(case.file, case.mapping, folder)
+    return bag if case.seconds is None else cut_bag(bag, case.seconds)
 
 
-def _cut(bag, seconds):
+def imported(file, name_of_map, folder):
+    """Return a table of the shared data as a bag."""
+    mapping = ROOT / 'config' / 'import' / f'{name_of_map}.yaml'
+    if sgp(['import', str(DATA / file), '--map', str(mapping), '--out', str(folder)]):
+        raise SystemExit(f'{file} cannot be imported')
+    return folder / f'{Path(file).stem}.mcap'
+
+
+def cut_bag(bag, seconds):
     """Return a bag of the first seconds of another one."""
     events = list(open_recording(bag).events())
     cut = bag.with_name(f'{bag.stem}_{seconds:g}s.mcap')
@@ -161,13 +166,14 @@ def _play(case, bag, record, graph):
 def _publish(publisher, events, speed):
     states = (event for event in events if isinstance(event, JointSample))
     first = next(states)
+    shift = _SECOND_NS if first.stamp_ns == 0 else 0  # a stamp of zero says that there is none
     began, count = time.monotonic(), 0
     for sample in itertools.chain([first], states):
         due = began + 1e-9 * (sample.stamp_ns - first.stamp_ns) / speed
         if due - began > WALL_S:
             break
         time.sleep(max(0.0, due - time.monotonic()))
-        publisher.publish(joint_state(sample))
+        publisher.publish(joint_state(replace(sample, stamp_ns=sample.stamp_ns + shift)))
         count += 1
     return count
 

@@ -98,7 +98,7 @@ def test_numbers_in_the_page_of_pendulums_are_the_measured_ones():
             assert f'| {" | ".join(cells)} |' in text
 
 
-@pytest.mark.parametrize('name', ['reproduction', 'recordings'])
+@pytest.mark.parametrize('name', ['reproduction', 'recordings', 'pendulums'])
 def test_generated_pages_are_those_of_the_results(name):
     """Mend with `python docs/generate_<name>.py`."""
     path = ROOT / 'docs' / f'generate_{name}.py'
