@@ -72,10 +72,10 @@ FORWARD = Robot(
 """`a = effort / J - (G sin(q) + Fv v + Fc sign(v) + offset) / J`, linear in other coefficients."""
 
 
-def _online(robot, events, window):
+def _online(robot, events, window, velocity_source):
     """Coefficients and scores of the physics alone, as the node would find them."""
     settings = {
-        'filter.window': window, 'filter.hop': HOP, 'filter.velocity': 'position',
+        'filter.window': window, 'filter.hop': HOP, 'filter.velocity': velocity_source,
         'model.method': 'PR', 'learning.initial': 20,
     }  # fmt: skip
     engine = Engine(robot, EngineConfig.from_mapping(settings, robot))
@@ -90,9 +90,9 @@ def _online(robot, events, window):
     }
 
 
-def _windows(robot, bag):
+def _windows(robot, bag, velocity_source='position'):
     events = list(open_recording(bag).events())
-    return {f'{window:g}': _online(robot, events, window) for window in WINDOWS}
+    return {f'{window:g}': _online(robot, events, window, velocity_source) for window in WINDOWS}
 
 
 def _methods(robot, bags):
@@ -125,6 +125,7 @@ def main() -> None:
             bags[name] = cut_bag(bag, seconds)
             windows[name] = {
                 'inverse': _windows(SIMPLE_PENDULUM, bags[name]),
+                'inverse, measured velocity': _windows(SIMPLE_PENDULUM, bags[name], 'measured'),
                 'forward': _windows(FORWARD, bags[name]),
             }
         for robot in (SIMPLE_PENDULUM, FORWARD):

@@ -27,7 +27,8 @@ def _simple(windows, rollouts):
         if 'forward' not in found:
             continue
         known = rollouts[name]['whole']['offset']['parameters']
-        for kind, cell in (('inverse', _inverse), ('forward', _forward)):
+        for kind in found:
+            cell = _forward if kind == 'forward' else _inverse
             cells = [cell(found[kind][w]['parameters']) for w in widths]
             cells.append(f'{known["J"]["value"]:.3f}, {known["G"]["value"]:.2f}')
             lines.append(f'| {name}, {kind} | {" | ".join(cells)} |')
