@@ -55,6 +55,10 @@ COMMANDS = {
     'panda_5hz': (
         'panda_exciting.mcap', '--robot', 'panda.yaml', '--share', '0.4', '--cutoff', '5',
     ),
+    'panda_every_velocity': (
+        'panda_exciting.mcap', '--robot', 'panda.yaml', '--share', '0.4',
+        '--inputs', 'every:velocity',
+    ),
 }  # fmt: skip
 """Arguments of `sgp identify` per recording, files by their names alone."""
 
@@ -69,7 +73,7 @@ def _found(argument: str, folder: Path) -> str:
 
 def run(name: str, folder: Path) -> dict:
     """Import and identify one recording."""
-    machine = name.removesuffix('_5hz')
+    machine = name.removesuffix('_5hz').removesuffix('_every_velocity')
     name_of_map, files = IMPORTED.get(machine, ('', ()))
     for file in files:
         mapping = ROOT / 'config' / 'import' / f'{name_of_map}.yaml'

@@ -11,89 +11,7 @@ RESULTS = ROOT / 'benchmarks' / 'results'
 PUBLISHED = {'M': 95.1089, 'Fv': 203.5034, 'Fc': 20.3935, 'offset': -3.1648}
 """Janot, Gautier, Brunot 2019."""
 
-PAGE = """# Real recordings
-
-Written by `python docs/generate_recordings.py` from what `python -m benchmarks.recordings` measured,
-{environment}. The recordings are those of their authors (sources in each section); `sgp import` with
-the maps in `config/import/` turns them into MCAP, where they are not already. Every method learns from
-the same rows and is scored on rows that none has seen: nMSE is the mean squared error over the variance
-of the target, both behind the low-pass that the recording itself chose; coverage is the share inside
-the 95 % interval. Near and far are the halves of the held-out rows that lie closer to and further from
-the states learned from.
-
-## EMPS: a linear axis
-
-A ball-screw axis with a DC motor at 1 kHz (Janot, Gautier, Brunot 2019). Learned from the identification
-record, scored on the one with disturbance pulses.
-
-```bash
-{emps_command}
-```
-
-| parameter | found | 95 % interval | published |
-|---|---|---|---|
-{emps_parameters}
-
-Relative error of the force, root of the summed squares: identification record {emps_train_pr} physics alone,
-{emps_train_sgp} with Z (published: 4.08 %); validation record {emps_val_pr} and {emps_val_sgp} (published:
-5.98 %). The published errors are of unfiltered data, ours behind a low-pass of {emps_cutoff} Hz.
-
-{emps_table}
-
-What SGP buys: the friction of this axis is asymmetric and not quite linear, which the four columns cannot
-say; Z takes up half of what they leave, near and far alike. What it does not: intervals of a model frozen and
-taken to the other record cover {emps_cover}, those of the physics alone {emps_cover_pr}: Z takes what it learned for
-what is true of the other record too.
-
-## Panda: seven joints with torque sensors
-
-Exciting trajectory of Gaz, Cognetti, Oliva, Robuffo Giordano and De Luca (RA-L 2019), 21 s at 1 kHz; the first 60 %
-learned from, the last 40 % held out.
-
-```bash
-{panda_command}
-```
-
-{panda_table}
-
-Mean nMSE {panda_pr} parametric, {panda_sgp} with Z behind {panda_cutoff} Hz; behind 5 Hz {panda5_pr} and {panda5_sgp}. Those who
-collected the recordings found 0.0049 with the same structure, behind a low-pass they do not state. The published sigmoid friction with refitted rigid part
-reaches 0.0076 (low-passed likewise; computed by those who collected the recordings). Joint 7 decides the
-mean: its torque is hardly more than friction. A trap of this recording: the path repeats after 13.35 s, so
-most of what is held out is a second pass over what was learned. The score tells of repeatability and
-noise; of motions of another kind the far half tells a little more. GP alone fails even so where the second pass
-differs.
-
-## TIAGo: four joints of an arm, from motor currents
-
-A run of PAL's TIAGo from the figaroh examples, 80 s at 100 Hz with stamps that jitter; efforts are motor
-currents. Alternate stretches of 6 s held out.
-
-```bash
-{tiago_command}
-```
-
-{tiago_table}
-
-All joints stacked: {tiago_pr} parametric, {tiago_sgp} with Z, behind the {tiago_cutoff} Hz that the recording chose; the
-currents carry noise and steps above a few hertz that no model can know, so the number depends on the
-cut-off: behind 5 Hz (`--cutoff 5`) it is {tiago5_pr} and {tiago5_sgp}. The 0.058 of those who collected the
-recordings was found with alternate stretches too, behind a low-pass that they do not state. What the
-physics leaves is not white (correlation {tiago_white} from row to row): gears, cables and a current that
-is no torque.
-
-## Double pendulum through inverse regression
-
-DFKI's double pendulum, designs A.0 and C.0: one run learned from and one held out. It is the wrong tool for this
-machine, whose torques are small differences of large terms, and coverage says so; fitted by roll-outs
-instead it does well: [pendulums.md](pendulums.md).
-
-{double_tables}
-
-## What the choice of the filter looked like
-
-{filters}
-"""
+PAGE = (Path(__file__).parent / 'templates' / 'recordings.txt').read_text(encoding='utf-8')
 
 
 def _load(name):
@@ -141,6 +59,119 @@ def _filters(results):
     return '\n'.join(lines)
 
 
+def _cutoffs(rows, key):
+    lines = ['| cut-off [Hz] | ' + ' | '.join(f'{r["cutoff_hz"]:g}' for r in rows[::2]) + ' |']
+    lines.append('|---' * (len(rows) // 2 + 1) + '|')
+    for name in ('white', 'dense'):
+        cells = [f'{r[key]:.2g}' for r in rows if r['rows'] == name]
+        lines.append(f'| {name} | ' + ' | '.join(cells) + ' |')
+    return '\n'.join(lines)
+
+
+def _inputs(inputs, key):
+    lines = ['| Z sees | new motion | held out | of each joint, held out |', '|---|---|---|---|']
+    for name, found in inputs.items():
+        each = ' '.join(f'{x:.2g}' for x in found['held_out']['joints'])
+        cells = (f'{found[region][key]:.3g}' for region in ('new_motion', 'held_out'))
+        lines.append(f'| {name} | {" | ".join(cells)} | {each} |')
+    return '\n'.join(lines)
+
+
+def _passes(arm):
+    passes = arm['passes']
+    lines = ['| nMSE, second pass | ' + ' | '.join(str(i + 1) for i in range(len(arm['joints'])))]
+    lines[0] += ' |'
+    lines.append('|---' * (len(arm['joints']) + 1) + '|')
+    for title, key in (('physics alone', 'physics'), ('not repeatable', 'not_repeatable')):
+        lines.append(
+            f'| {title} | ' + ' | '.join(f'{x:.2g}' for x in passes[key]['joints']) + ' |'
+        )
+    return '\n'.join(lines)
+
+
+def _coefficients(fits):
+    names = list(next(iter(fits.values())))
+    lines = ['| fitted to | ' + ' | '.join(names) + ' |', '|---' * (len(names) + 1) + '|']
+    for name, fit in fits.items():
+        cells = (f'{c["value"]:.4g} ({c["std"]:.2g})' for c in fit.values())
+        lines.append(f'| {name} | {" | ".join(cells)} |')
+    return '\n'.join(lines)
+
+
+def _calibration(sets):
+    lines = ['| Z sees | own record | other record | coverage there | widened |', '|---' * 5 + '|']
+    for name, found in sets.items():
+        shares = (_percent(found[key]) for key in ('coverage95', 'widened'))
+        cells = (f'{found["inside"]:.2f}', f'{found["outside"]:.2f}', *shares)
+        lines.append(f'| {name} | {" | ".join(cells)} |')
+    return '\n'.join(lines)
+
+
+def _shares(values):
+    return ', '.join(f'{x:.2g}' for x in values)
+
+
+def _live(recordings):
+    titles = ('recording', 'states live, refused', 'numbers that differ', 'joint')
+    titles += ('acceleration, replay', 'live', 'effort, replay', 'live')
+    lines = [f'| {" | ".join(titles)} |', '|---' * len(titles) + '|']
+    for name, found in recordings.items():
+        samples, same = found['live']['samples'], found['live_equals_replay']
+        taken = f'{samples["read"]} of {found["live"]["published"]}, '
+        taken += str(sum(samples['refused'].values()))
+        different = f'{same["numbers_different"]} of {same["numbers_compared"]}'
+        for i, joint in enumerate(found['replay']['joints']):
+            first = (name, taken, different) if i == 0 else ('', '', '')
+            cells = [
+                f'{score["nmse"]:.2g}, {_percent(score["coverage95"])}'
+                for channel in ('acceleration', 'effort')
+                for side in ('replay', 'live')
+                for score in [found[side]['joints'][joint][channel]]
+            ]
+            lines.append(f'| {" | ".join((*first, joint, *cells))} |')
+    return '\n'.join(lines)
+
+
+def _evidence():
+    """Return what the page says of residuals and of the live runs."""
+    residuals, live = (
+        json.loads((RESULTS / f'{name}.json').read_text(encoding='utf-8'))
+        for name in ('residuals', 'live_recordings')
+    )
+    panda, tiago = residuals['arms']['panda'], residuals['arms']['tiago']
+    sessions = residuals['emps_sessions']
+    one, other = (sessions['coefficients'][name]['M'] for name in ('emps_id', 'emps_val_pulses'))
+    apart = abs(one['value'] - other['value']) / (one['std'] ** 2 + other['std'] ** 2) ** 0.5
+    near = {name: arm['noise_share']['median_distance'] for name, arm in residuals['arms'].items()}
+    every = _load('panda_every_velocity')['findings']
+    return {
+        'mass_apart': f'{apart:.1f}',
+        'emps_coefficients': _coefficients(sessions['coefficients']),
+        'emps_calibration': _calibration(sessions['calibration']),
+        'pass_distance': f'{panda["passes"]["largest_distance_rad"]:.2g}',
+        'panda_far': f'{max(near["panda"]["all"]):.2g}',
+        'tiago_near': f'{max(near["tiago"]["own"]):.2g}',
+        'tiago_far': f'{max(near["tiago"]["all"]):.2g}',
+        'panda_cutoffs': _cutoffs(panda['cutoffs'], 'mean'),
+        'tiago_cutoffs': _cutoffs(tiago['cutoffs'], 'stacked'),
+        'period': f'{panda["passes"]["period_s"]:.2f}',
+        'pass_pr': f'{panda["passes"]["physics"]["mean"]:.4f}',
+        'pass_floor': f'{panda["passes"]["not_repeatable"]["mean"]:.4f}',
+        'panda_passes': _passes(panda),
+        'panda_inputs': _inputs(panda['inputs'], 'mean'),
+        'tiago_inputs': _inputs(tiago['inputs'], 'stacked'),
+        'every_pr': f'{_score(every, "PR", "mean_nmse"):.4f}',
+        'every_sgp': f'{_score(every, "SGP", "mean_nmse"):.4f}',
+        'panda_own': _shares(panda['noise_share']['share']['own']),
+        'panda_all': _shares(panda['noise_share']['share']['all']),
+        'tiago_own': _shares(tiago['noise_share']['share']['own']),
+        'tiago_all': _shares(tiago['noise_share']['share']['all']),
+        'tiago_best': f'{tiago["inputs"]["own position, direction"]["held_out"]["stacked"]:.3f}',
+        'wall': f'{live["wall_s"]:g}',
+        'live': _live(live['recordings']),
+    }  # fmt: skip
+
+
 def text():
     """Return the page."""
     results = {name: _load(name) for name in ('emps', 'panda', 'tiago')}
@@ -185,6 +216,7 @@ def text():
             for name, found in doubles.items()
         ),
         filters=_filters(results),
+        **_evidence(),
     )
 
 
