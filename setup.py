@@ -54,7 +54,10 @@ setup(
     extras_require={
         # rclpy from PyPI for machines without ROS; apt users have it already.
         'wheels': ['ros-rclpy[fastrtps]==7.1.6', 'ros-jazzy-common-interfaces==5.3.6'],
+        # The dynamics of URDF robots in `sgp simulate`.
+        'simulate': ['mujoco>=3.2'],
         'test': [
+            'mujoco>=3.2',
             'pytest>=8',
             'pytest-cov>=5',
             'hypothesis>=6.100',

@@ -1,4 +1,4 @@
-"""One BLAS thread, profiles of Hypothesis, and what is left out where Pinocchio is not at hand."""
+"""One BLAS thread, profiles of Hypothesis, and what is left out where a library is not at hand."""
 
 from __future__ import annotations
 
@@ -15,21 +15,27 @@ settings.register_profile('dev', deadline=None)
 settings.register_profile('ci', deadline=None, derandomize=True)
 settings.load_profile(os.environ.get('HYPOTHESIS_PROFILE', 'dev'))
 
-collect_ignore = (
-    []
-    if find_spec('pinocchio')
-    else [
-        f'{folder}/test_{name}.py'
-        for folder, names in {
-            'contracts': ('robots',),
-            'offline': ('excitation', 'suggestions', 'real_arms'),
-            'robots': (
-                'inertial', 'pendulums', 'ready_robots', 'rigid_body', 'tree', 'urdf_robot',
-                'urdf_writer',
-            ),
-            'simulation': ('random_tree', 'serial_arm'),
-        }.items()
-        for name in names
-    ]
-)  # fmt: skip
-"""No wheel of Pinocchio 3 goes with NumPy 1.26, the oldest that is tested."""
+_NEEDED = {
+    'pinocchio': {
+        'contracts': ('robots',),
+        'offline': ('excitation', 'identification', 'real_arms', 'suggestions'),
+        'robots': (
+            'effect_terms', 'effects', 'effects/test_stated', 'inertial', 'pendulums',
+            'ready_robots', 'rigid_body', 'tree', 'urdf_robot', 'urdf_writer',
+        ),
+        'simulation': ('random_tree', 'serial_arm', 'tree'),
+    },
+    'mujoco': {
+        'experiments': ('concealed', 'simulation'),
+        'simulation': ('effect_laws', 'tree'),
+    },
+}  # fmt: skip
+"""No wheel of Pinocchio 3 goes with NumPy 1.26, the oldest that is tested; MuJoCo is optional."""
+
+collect_ignore = [
+    f'{folder}/{name}.py' if '/' in name else f'{folder}/test_{name}.py'
+    for library, folders in _NEEDED.items()
+    if not find_spec(library)
+    for folder, names in folders.items()
+    for name in names
+]

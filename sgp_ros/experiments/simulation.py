@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import json
+from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sgp_ros.engine.samples import CommandSample, JointSample
-from sgp_ros.recordings.writer import RecordingWriter
-from sgp_ros.report.files import write_text
-from sgp_ros.simulation.assembly import make_simulation
+from sgp_ros.errors import ConfigError
+from sgp_ros.experiments.simulated_files import write_simulated, write_truth
+from sgp_ros.simulation.assembly import find_simulator, make_simulation
 from sgp_ros.simulation.effect_text import parse_physical
 from sgp_ros.simulation.recording import simulate
+from sgp_ros.simulation.sensor_text import parse_sensors
+from sgp_ros.simulation.tree_simulator import tree_simulator
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from pathlib import Path
 
-    from sgp_ros.simulation.recording import SimulatedRecording
+    from sgp_ros.simulation.simulator import Simulator
 
 START_NS = 1_700_000_000_000_000_000
 """Stamp of the first sample: a fixed one, since a recording is a function of its seed."""
@@ -33,11 +34,12 @@ def run_simulation(
     controller: str | None = None,
     effects: Sequence[str] = (),
     physical: Sequence[str] = (),
+    sensors: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """Simulate a robot and write `<robot>.mcap` and `truth.json` into `out`.
+    """Simulate a robot and write `<robot>.mcap`, `truth.json` and `truth.npz` into `out`.
 
     Args:
-        robot: name of a simulated robot.
+        robot: name of a simulated robot, or a URDF file.
         out: folder of the results.
         progress: called with the share that is done.
         duration_s: length [s].
@@ -46,44 +48,45 @@ def run_simulation(
         controller: name; None for the usual one.
         effects: texts such as `coulomb_friction:joint=pole,level=0.01`.
         physical: texts such as `pole_viscosity=0.01`.
+        sensors: texts such as `bits=14`.
 
     Raises:
         ConfigError: a robot, controller, effect or value that does not exist.
     """
+    simulator, name = _simulator(robot)
+    chosen, transport = parse_sensors(sensors, simulator.sensors, simulator.joints)
     simulation = make_simulation(
-        robot,
+        simulator,
         seed=seed,
         rate_hz=rate_hz,
         controller=controller,
         effects=effects,
+        sensors=chosen,
         physical=parse_physical(physical),
         start_ns=START_NS,
     )
     recording = simulate(simulation, duration_s, progress)
+    recording.truth['transport'] = asdict(transport)
     out.mkdir(parents=True, exist_ok=True)
-    path = out / f'{robot}.mcap'
-    _write(recording, path)
-    truth = out / 'truth.json'
-    write_text(truth, json.dumps(recording.truth, indent=1, allow_nan=False) + '\n')
+    path = out / f'{name}.mcap'
+    write_simulated(recording, path, transport, seed=seed)
+    truth, motion = write_truth(recording, out)
     n = len(recording.stamps_ns)
     print(f'{n} samples of {", ".join(recording.joint_names)} in {path}, the truth in {truth}')
-    return {'recording': str(path), 'truth': str(truth), 'samples': n, 'seed': seed}
+    return {
+        'recording': str(path), 'truth': str(truth), 'motion': str(motion), 'samples': n,
+        'seed': seed,
+    }  # fmt: skip
 
 
-def _write(recording: SimulatedRecording, path: Path) -> None:
-    """Write commands and states; a robot without commands has none."""
-    velocity = recording.velocity
-    with RecordingWriter(path) as writer:
-        for i, stamp in enumerate(recording.stamps_ns):
-            if recording.command_joints:
-                writer.write_event(
-                    CommandSample(int(recording.command_stamps_ns[i]), recording.command[i])
-                )
-            writer.write_event(
-                JointSample(
-                    int(stamp),
-                    recording.joint_names,
-                    recording.position[i],
-                    None if velocity is None else velocity[i],
-                )
-            )
+def _simulator(robot: str) -> tuple[Simulator, str]:
+    """Return the simulator of a name or of a URDF file, and the name for its recording."""
+    path = Path(robot)
+    if path.suffix != '.urdf':
+        return find_simulator(robot), robot
+    if not path.is_file():
+        raise ConfigError(f'no file {path}', 'a URDF')
+    try:
+        return tree_simulator(path.read_text(encoding='utf-8-sig')), path.stem
+    except UnicodeDecodeError as error:
+        raise ConfigError(f'URDF {path} is not UTF-8 ({error})', 'a URDF in UTF-8') from error

@@ -89,17 +89,24 @@ class RecordingWriter:
         self._writer.start(profile='ros2', library='sgp_ros')
         _prepare(command_type)
 
-    def write_event(self, event: Event) -> None:
-        """Write one event with its stamp as log time.
+    def write_event(self, event: Event, log_ns: int | None = None) -> None:
+        """Write one event.
+
+        Args:
+            event: what happened.
+            log_ns: log time [ns]; None for the stamp of the event.
 
         Raises:
             ValueError: a command that the command type cannot hold.
         """
         if isinstance(event, JointSample):
-            self.write_joint_state(self._joint_states_topic, event)
+            self._write(
+                self._joint_states_topic, JOINT_STATE, event.stamp_ns, joint_state_message(event),
+                log_ns,
+            )  # fmt: skip
         elif isinstance(event, CommandSample):
             message = command_message(self._command_type, event)
-            self._write(self._command_topic, self._command_type, event.stamp_ns, message)
+            self._write(self._command_topic, self._command_type, event.stamp_ns, message, log_ns)
         else:
             message = text_message(change_to_text(event))
             self._write(self._changes_topic, TEXT, event.stamp_ns, message)
@@ -168,9 +175,12 @@ class RecordingWriter:
             self._file.close()
             self._growing.unlink(missing_ok=True)
 
-    def _write(self, topic: str, kind: str, stamp_ns: int, message: Message) -> None:
+    def _write(
+        self, topic: str, kind: str, stamp_ns: int, message: Message, log_ns: int | None = None
+    ) -> None:
         channel = self._channels.get((topic, kind)) or self._register(topic, kind)
-        self._writer.add_message(channel, stamp_ns, serialize(kind, message), stamp_ns)
+        logged = stamp_ns if log_ns is None else log_ns
+        self._writer.add_message(channel, logged, serialize(kind, message), stamp_ns)
 
     def _register(self, topic: str, kind: str) -> int:
         if kind not in self._schemas:

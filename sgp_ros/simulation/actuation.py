@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
-from sgp_ros.simulation.effects import Action, EffectKind, EffectParameter
+from sgp_ros.simulation.effects import Action, EffectKind, EffectParameter, Place
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -12,33 +13,133 @@ if TYPE_CHECKING:
     from sgp_ros.simulation.effects import Moment, ParameterValue
     from sgp_ros.simulation.mechanism import SimulatedJoint
 
+_CONTACT_DAMPING = 0.7
+
 
 def _delay(
-    joint: int, _description: SimulatedJoint, values: Mapping[str, ParameterValue]
-) -> Action:
-    return Action(joint, delay_s=float(values['delay']))
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    return (Action(joint, delay_s=float(values['delay'])),)
 
 
-def _lag(joint: int, _description: SimulatedJoint, values: Mapping[str, ParameterValue]) -> Action:
+def _dead_zone(
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    width = float(values['width'])
+
+    def current(moment: Moment) -> float:
+        u = float(moment.drive[joint])
+        return u - min(max(u, -width), width)
+
+    return (Action(joint, current=current),)
+
+
+def _lag(
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
     time_constant = float(values['time_constant'])
 
     def rate(moment: Moment) -> tuple[float]:
         return ((float(moment.drive[joint]) - float(moment.state[0])) / time_constant,)
 
-    return Action(
-        joint, drive=lambda moment: float(moment.state[0]), initial_state=(0.0,), state_rate=rate
+    return (
+        Action(
+            joint,
+            current=lambda moment: float(moment.state[0]),
+            start=lambda _q, _v: (0.0,),
+            state_rate=rate,
+            substep_s=0.5 * time_constant,
+        ),
+    )
+
+
+def _saturation(
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    limit = float(values['limit'])
+    return (Action(joint, current=lambda m: min(max(float(m.drive[joint]), -limit), limit)),)
+
+
+def _gain(
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    gain = float(values['gain'])
+    return (Action(joint, drive=lambda moment: gain * float(moment.drive[joint])),)
+
+
+def _backlash(
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    half, inertia = 0.5 * float(values['gap']), float(values['motor_inertia'])
+    rate = 2.0 * math.pi * float(values['contact_hz'])
+    stiffness, damping = inertia * rate**2, 2.0 * _CONTACT_DAMPING * inertia * rate
+
+    def contact(moment: Moment) -> float:
+        twist = float(moment.state[0]) - float(moment.position[joint])
+        spin = float(moment.state[1]) - float(moment.velocity[joint])
+        if twist > half:
+            return max(stiffness * (twist - half) + damping * spin, 0.0)
+        if twist < -half:
+            return min(stiffness * (twist + half) + damping * spin, 0.0)
+        return 0.0
+
+    def motor(moment: Moment) -> tuple[float, float]:
+        force = float(moment.drive[joint]) - contact(moment)
+        return float(moment.state[1]), force / inertia
+
+    return (
+        Action(
+            joint,
+            drive=contact,
+            inertia=-inertia,
+            sense=lambda moment: (float(moment.state[0]), float(moment.state[1])),
+            start=lambda q, v: (q, v),
+            state_rate=motor,
+            substep_s=0.1 / rate,
+        ),
     )
 
 
 COMMAND_DELAY = EffectKind(
-    'command_delay', (EffectParameter('delay', 's', low=0.0),), _delay, needs_motor=True
+    'command_delay',
+    (EffectParameter('delay', 's', low=0.0),),
+    _delay,
+    Place.MOTOR,
+    takes_all=True,
 )
 """The command arrives later by exactly `delay`, also between two steps of the control."""
 
+DEAD_ZONE = EffectKind(
+    'dead_zone', (EffectParameter('width', 'N m', low=0.0),), _dead_zone, Place.MOTOR
+)
+"""The motor gives `u - clip(u, -width, width)`."""
+
 ACTUATOR_LAG = EffectKind(
-    'actuator_lag',
-    (EffectParameter('time_constant', 's', low=1e-3),),
-    _lag,
-    needs_motor=True,
+    'actuator_lag', (EffectParameter('time_constant', 's', low=1e-3),), _lag, Place.MOTOR
 )
 """First-order lag between the force that the motor should give and the one it gives."""
+
+SATURATION = EffectKind(
+    'saturation', (EffectParameter('limit', 'N m', low=0.0),), _saturation, Place.MOTOR
+)
+"""The motor gives `clip(u, -limit, limit)`."""
+
+TORQUE_GAIN = EffectKind('torque_gain', (EffectParameter('gain'),), _gain, Place.MOTOR)
+"""The motor gives `gain u`; its current does not show that."""
+
+BACKLASH = EffectKind(
+    'backlash',
+    (
+        EffectParameter('gap', 'rad', low=0.0),
+        EffectParameter('motor_inertia', 'kg m2', low=1e-12),
+        EffectParameter('contact_hz', 'Hz', low=1.0, default=60.0),
+    ),
+    _backlash,
+    Place.MOTOR,
+)
+"""Play between motor and link, both with their own motion; the encoder is on the motor.
+
+`motor_inertia` is part of the robot's own inertia, so the link keeps the rest. Where motor and
+link touch, a spring and a damper act that never pull; the motor alone would swing on that spring
+at `contact_hz`, with 0.7 of critical damping.
+"""

@@ -9,14 +9,14 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.simulation.effect_text import parse_effect
 from sgp_ros.simulation.mechanism import with_physical
 from sgp_ros.simulation.registry import SIMULATORS
-from sgp_ros.simulation.scenario import Scenario, effect_action
+from sgp_ros.simulation.scenario import Scenario, effect_actions, with_effects
 from sgp_ros.simulation.simulator import Simulator
 from sgp_ros.simulation.stepping import Simulation
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from sgp_ros.simulation.effects import ChosenEffect
+    from sgp_ros.simulation.effects import Action, ChosenEffect
     from sgp_ros.simulation.sensors import Sensors
 
 _LOWEST_RATE_HZ, _HIGHEST_RATE_HZ = 0.1, 1e5
@@ -35,6 +35,7 @@ def make_simulation(
     position: Sequence[float] | None = None,
     velocity: Sequence[float] | None = None,
     start_ns: int = 0,
+    unlisted: Iterable[Action] = (),
 ) -> Simulation:
     """Return a simulation at its start; what is None is as usual for the robot.
 
@@ -50,11 +51,12 @@ def make_simulation(
         position: (k,) at the start [rad or m].
         velocity: (k,) at the start [rad/s or m/s].
         start_ns: stamp of the first sample [ns].
+        unlisted: what acts beside the effects that have a name.
 
     Raises:
         ConfigError: what does not exist for this robot or has an impossible value.
     """
-    simulator = robot if isinstance(robot, Simulator) else _simulator(robot)
+    simulator = robot if isinstance(robot, Simulator) else find_simulator(robot)
     name = next(iter(simulator.controllers)) if controller is None else controller
     if name not in simulator.controllers:
         raise ConfigError(
@@ -68,11 +70,11 @@ def make_simulation(
         raise ConfigError(f'seed {seed}', 'an integer of at least 0')
     chosen = tuple(parse_effect(e) if isinstance(e, str) else e for e in effects)
     for effect in chosen:
-        effect_action(simulator, effect)
+        effect_actions(simulator, effect)
     start = simulator.controllers[name]
     scenario = Scenario(
         simulator=simulator,
-        mechanism=with_physical(simulator.mechanism, physical or {}),
+        mechanism=with_effects(with_physical(simulator.mechanism, physical or {}), chosen),
         effects=chosen,
         sensors=(sensors or simulator.sensors).checked(len(simulator.joints), 1.0 / rate),
         controller=name,
@@ -82,13 +84,19 @@ def make_simulation(
         torque_noise=_per_joint(simulator, 'torque_noise', torque_noise, simulator.torque_noise),
         position=_per_joint(simulator, 'position', position, start.position),
         velocity=_per_joint(simulator, 'velocity', velocity, start.velocity),
+        unlisted=tuple(unlisted),
     )
     return Simulation(scenario)
 
 
-def _simulator(name: str) -> Simulator:
+def find_simulator(name: str) -> Simulator:
+    """Return a built-in simulator.
+
+    Raises:
+        ConfigError: an unknown name.
+    """
     if name not in SIMULATORS:
-        raise ConfigError(f'no simulated robot {name!r}', f'one of {list(SIMULATORS)}')
+        raise ConfigError(f'no simulated robot {name!r}', f'one of {list(SIMULATORS)} or a .urdf')
     return SIMULATORS[name]
 
 

@@ -24,7 +24,7 @@ def friction_at_rest(
 ) -> np.ndarray:
     """Return the friction forces of s joints at rest, (s,) [N m or N].
 
-    Projected Gauss-Seidel, exact after one sweep for one joint; O(s^2) a sweep.
+    In closed form for one joint, else by projected Gauss-Seidel, O(s^2) a sweep.
 
     Args:
         A: (s, s) block of the inverse mass matrix, positive definite.
@@ -32,6 +32,8 @@ def friction_at_rest(
         level_up: (s,) level of friction against a start in the positive direction.
         level_down: (s,) the same in the negative direction.
     """
+    if len(acceleration) == 1:
+        return np.minimum(np.maximum(-acceleration / A[0], -level_up), level_down)
     r = np.zeros(len(acceleration))
     for _ in range(_SWEEPS):
         before = r.copy()
@@ -66,6 +68,11 @@ def hold_still(
     """Return the accelerations (k,) once the joints `stuck` are held at rest."""
     if not stuck:
         return acceleration
+    if len(stuck) == 1:
+        column = inverse_mass[:, stuck[0]]
+        alone: np.ndarray = acceleration - column * (acceleration[stuck[0]] / column[stuck[0]])
+        alone[stuck[0]] = 0.0
+        return alone
     columns = inverse_mass[:, stuck]
     reaction = np.linalg.solve(columns[stuck, :], acceleration[stuck])
     held: np.ndarray = acceleration - columns @ reaction

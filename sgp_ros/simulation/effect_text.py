@@ -9,7 +9,7 @@ import math
 from typing import TYPE_CHECKING
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.simulation.effects import ChosenEffect
+from sgp_ros.simulation.effects import ChosenEffect, Place
 from sgp_ros.simulation.registry import EFFECTS
 
 if TYPE_CHECKING:
@@ -38,12 +38,13 @@ def parse_effect(text: str) -> ChosenEffect:
             problems.append(f'{key} is given twice')
         else:
             words[key] = value
-    joint = words.pop('joint', None)
+    place = kind.place.value if kind.place in {Place.BASE, Place.TOOL} else None
+    joint = words.pop('joint', place)
     if joint is None:
         problems.append('joint is missing')
     known = {parameter.name: parameter for parameter in kind.parameters}
     values = {key: _value(known.get(key), word) for key, word in words.items()}
-    _refuse(problems + _problems(kind, values), text, kind)
+    _refuse(problems + _problems(kind, {**_defaults(kind), **values}), text, kind)
     return ChosenEffect(kind.name, str(joint), values)
 
 
@@ -54,7 +55,11 @@ def checked_effect(effect: ChosenEffect) -> EffectKind:
         ConfigError: as `parse_effect`.
     """
     kind = _kind(effect.name, effect.name)
-    _refuse(_problems(kind, effect.parameters), f'{effect.name} on {effect.joint}', kind)
+    _refuse(
+        _problems(kind, {**_defaults(kind), **effect.parameters}),
+        f'{effect.name} on {effect.joint}',
+        kind,
+    )
     return kind
 
 
@@ -93,13 +98,19 @@ def _number(word: str) -> float | None:
 
 def _value(parameter: EffectParameter | None, word: str) -> ParameterValue:
     number = _number(word)
-    return word if number is None or (parameter and parameter.choices) else number
+    is_word = parameter is not None and (bool(parameter.choices) or parameter.is_joint)
+    return word if number is None or is_word else number
+
+
+def _defaults(kind: EffectKind) -> dict[str, ParameterValue]:
+    return {p.name: p.default for p in kind.parameters if p.default is not None}
 
 
 def _problems(kind: EffectKind, values: Mapping[str, ParameterValue]) -> list[str]:
-    known = {parameter.name for parameter in kind.parameters}
+    wanted = [p for p in kind.parameters if p.only_kind in {'', values.get('kind')}]
+    known = {parameter.name for parameter in wanted}
     problems = [f'there is no parameter {name}' for name in values if name not in known]
-    for parameter in kind.parameters:
+    for parameter in wanted:
         if parameter.name not in values:
             problems.append(f'{parameter.name} is missing')
         elif not _suits(parameter, values[parameter.name]):
@@ -114,6 +125,8 @@ def _problems(kind: EffectKind, values: Mapping[str, ParameterValue]) -> list[st
 def _suits(parameter: EffectParameter, value: ParameterValue) -> bool:
     if parameter.choices:
         return value in parameter.choices
+    if parameter.is_joint:
+        return isinstance(value, str)
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     return is_number and math.isfinite(float(value)) and float(value) >= parameter.low
 
@@ -129,5 +142,9 @@ def _refuse(problems: list[str], text: str, kind: EffectKind) -> None:
 def _description(parameter: EffectParameter) -> str:
     if parameter.choices:
         return f'{parameter.name} = ' + ' or '.join(parameter.choices)
+    if parameter.is_joint:
+        return f'{parameter.name} = another joint'
     limit = f' >= {parameter.low:g}' if math.isfinite(parameter.low) else ''
-    return f'{parameter.name}{limit} [{parameter.unit}]'
+    kind = f' for {parameter.only_kind}' if parameter.only_kind else ''
+    usual = '' if parameter.default is None else f', usually {parameter.default:g}'
+    return f'{parameter.name}{limit} [{parameter.unit or "1"}]{kind}{usual}'

@@ -8,11 +8,13 @@ are those of a generalised force: `M a + h = tau + tau_x`, `tau_x` being what th
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     import numpy as np
 
@@ -21,7 +23,8 @@ if TYPE_CHECKING:
 ParameterValue = float | str
 
 _LINEAR_UNIT = {
-    'N m': 'N', 'N m s/rad': 'N s/m', 'rad': 'm', 'rad/s': 'm/s', '1/revolution': '1/m'
+    'N m': 'N', 'N m s/rad': 'N s/m', 'N m s2/rad2': 'N s2/m2', 'N m/rad': 'N/m', 'rad': 'm',
+    'rad/s': 'm/s', '1/revolution': '1/m', 'kg m2': 'kg',
 }  # fmt: skip
 
 
@@ -51,23 +54,47 @@ class Action:
     Attributes:
         joint: index of the joint it acts on.
         delay_s: the command of the joint arrives this much later [s].
-        drive: force that leaves the motor in place of `moment.drive[joint]` [N m or N].
+        current: force that the motor's current stands for, in place of `moment.drive[joint]`
+            [N m or N].
+        drive: force that reaches the joint in place of `moment.drive[joint]`, behind the motor's
+            current [N m or N].
         force: smooth force on the joint [N m or N].
         dry_level: magnitude of the dry friction when sliding in direction +1 or -1 [N m or N];
             at rest it holds up to this magnitude.
-        sense: position and velocity that the sensor sees.
-        initial_state: (s,) memory at the start.
+        inertia: added to the joint's own [kg m^2 or kg].
+        sense: position and velocity that the encoder has.
+        sense_velocity: velocity that is measured in place of the encoder's [rad/s or m/s].
+        start: memory at the start, (s,), from position and velocity of the joint.
         state_rate: time derivative of the memory, (s,).
+        substep_s: steps of the integration that it stands are at most this long [s].
     """
 
     joint: int
     delay_s: float = 0.0
+    current: Callable[[Moment], float] | None = None
     drive: Callable[[Moment], float] | None = None
     force: Callable[[Moment], float] | None = None
     dry_level: Callable[[Moment, int], float] | None = None
+    inertia: float = 0.0
     sense: Callable[[Moment], tuple[float, float]] | None = None
-    initial_state: tuple[float, ...] = ()
+    sense_velocity: Callable[[Moment], float] | None = None
+    start: Callable[[float, float], tuple[float, ...]] | None = None
     state_rate: Callable[[Moment], tuple[float, ...]] | None = None
+    substep_s: float = math.inf
+
+
+class Place(Enum):
+    """What an effect may be put on."""
+
+    JOINT = 'a joint'
+    MOTOR = 'a motor'
+    LAST = 'the last link of a URDF'
+    BASE = 'base'
+    TOOL = 'tool'
+
+
+EVERY_MOTOR = 'all'
+"""Joint of an effect that acts on every motor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +107,9 @@ class EffectParameter:
         low: smallest value.
         choices: the only values of a parameter that is a word; empty for a number.
         unit_by_kind: other units, by the value of the parameter `kind`.
+        default: value where none is given; None where one must be.
+        only_kind: the parameter belongs to this value of the parameter `kind`; empty for all.
+        is_joint: whether the value is the name of another joint.
     """
 
     name: str
@@ -87,6 +117,9 @@ class EffectParameter:
     low: float = -math.inf
     choices: tuple[str, ...] = ()
     unit_by_kind: Mapping[str, str] = field(default_factory=dict)
+    default: float | None = None
+    only_kind: str = ''
+    is_joint: bool = False
 
     def unit_on(self, joint: SimulatedJoint, kind: ParameterValue) -> str:
         """Return the unit on this joint for this value of the parameter `kind`."""
@@ -94,23 +127,35 @@ class EffectParameter:
         return _LINEAR_UNIT.get(unit, unit) if joint.is_prismatic else unit
 
 
+Build = Callable[
+    [tuple['SimulatedJoint', ...], int, 'Mapping[str, ParameterValue]'], tuple[Action, ...]
+]
+"""From all joints, the index of one and the values to what the effect does."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class EffectKind:
     """A kind of effect, before it has a joint and values.
 
+    It either acts by what `build` returns or changes physical parameters of the mechanism.
+
     Attributes:
         name: as in the text.
-        parameters: all of them are required.
-        build: from joint index, joint and values to the action.
-        needs_motor: whether the joint must have a command.
+        parameters: those without a default are required.
+        build: the actions; None for an effect that changes physical parameters.
+        place: what it may be put on.
         ordered: two parameters of which the first must be the smaller; empty for none.
+        physical: physical parameter of the mechanism by parameter of the effect, to be added to.
+        takes_all: whether it may be put on every motor at once.
     """
 
     name: str
     parameters: tuple[EffectParameter, ...]
-    build: Callable[[int, SimulatedJoint, Mapping[str, ParameterValue]], Action]
-    needs_motor: bool = False
+    build: Build | None = None
+    place: Place = Place.JOINT
     ordered: tuple[str, ...] = ()
+    physical: Mapping[str, str] = field(default_factory=dict)
+    takes_all: bool = False
 
 
 @dataclass(frozen=True, slots=True)

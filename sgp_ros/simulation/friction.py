@@ -1,11 +1,11 @@
-"""Kinds of friction that can be added to a joint."""
+"""Kinds of friction that are the same everywhere and at all times."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING
 
-from sgp_ros.simulation.effects import Action, EffectKind, EffectParameter
+from sgp_ros.simulation.effects import Action, EffectKind, EffectParameter, Place
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -15,33 +15,58 @@ if TYPE_CHECKING:
 
 
 def _viscous(
-    joint: int, _description: SimulatedJoint, values: Mapping[str, ParameterValue]
-) -> Action:
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
     b = float(values['b'])
-    return Action(joint, force=lambda moment: -b * float(moment.velocity[joint]))
+    return (Action(joint, force=lambda moment: -b * float(moment.velocity[joint])),)
 
 
 def _coulomb(
-    joint: int, _description: SimulatedJoint, values: Mapping[str, ParameterValue]
-) -> Action:
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
     level = float(values['level'])
-    return Action(joint, dry_level=lambda _moment, _direction: level)
+    return (Action(joint, dry_level=lambda _moment, _direction: level),)
 
 
-def _position(
-    joint: int, description: SimulatedJoint, values: Mapping[str, ParameterValue]
-) -> Action:
-    amplitude, lo, hi = (float(values[name]) for name in ('amplitude', 'lo', 'hi'))
+def _stribeck(
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    coulomb, static = float(values['coulomb']), float(values['static'])
+    scale = float(values['stribeck_velocity'])
 
-    def strength(moment: Moment) -> float:
-        q = float(moment.position[joint])
-        if description.is_continuous:
-            q = (q + math.pi) % (2.0 * math.pi) - math.pi
-        return amplitude if lo <= q <= hi else 0.0
+    def level(moment: Moment, _direction: int) -> float:
+        slowness = math.exp(-((float(moment.velocity[joint]) / scale) ** 2))
+        return coulomb + (static - coulomb) * slowness
 
-    if values['kind'] == 'viscous':
-        return Action(joint, force=lambda m: -strength(m) * float(m.velocity[joint]))
-    return Action(joint, dry_level=lambda moment, _direction: strength(moment))
+    return (Action(joint, dry_level=level),)
+
+
+def _quadratic(
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    c = float(values['c'])
+
+    def force(moment: Moment) -> float:
+        v = float(moment.velocity[joint])
+        return -c * abs(v) * v
+
+    return (Action(joint, force=force),)
+
+
+def _asymmetric(
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    up, down = float(values['level_pos']), float(values['level_neg'])
+    return (Action(joint, dry_level=lambda _moment, direction: up if direction > 0 else down),)
+
+
+def _load(
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    level, mu = float(values['level']), float(values['mu'])
+    return (
+        Action(joint, dry_level=lambda m, _direction: level + mu * abs(float(m.drive[joint]))),
+    )
 
 
 VISCOUS_FRICTION = EffectKind(
@@ -54,15 +79,37 @@ COULOMB_FRICTION = EffectKind(
 )
 """`tau_x = -level sign(v)`, holding up to `level` at rest."""
 
-POSITION_FRICTION = EffectKind(
-    'position_friction',
+STRIBECK_FRICTION = EffectKind(
+    'stribeck_friction',
     (
-        EffectParameter('amplitude', 'N m', low=0.0, unit_by_kind={'viscous': 'N m s/rad'}),
-        EffectParameter('lo', 'rad'),
-        EffectParameter('hi', 'rad'),
-        EffectParameter('kind', choices=('coulomb', 'viscous')),
+        EffectParameter('coulomb', 'N m', low=0.0),
+        EffectParameter('static', 'N m', low=0.0),
+        EffectParameter('stribeck_velocity', 'rad/s', low=1e-9),
     ),
-    _position,
-    ordered=('lo', 'hi'),
+    _stribeck,
+    ordered=('coulomb', 'static'),
 )
-"""Coulomb or viscous friction where `lo <= q <= hi`, on every turn of a continuous joint."""
+"""`tau_x = -(coulomb + (static - coulomb) exp(-(v / stribeck_velocity)^2)) sign(v)`."""
+
+QUADRATIC_DRAG = EffectKind(
+    'quadratic_drag', (EffectParameter('c', 'N m s2/rad2', low=0.0),), _quadratic
+)
+"""`tau_x = -c |v| v`."""
+
+ASYMMETRIC_COULOMB = EffectKind(
+    'asymmetric_coulomb',
+    (
+        EffectParameter('level_pos', 'N m', low=0.0),
+        EffectParameter('level_neg', 'N m', low=0.0),
+    ),
+    _asymmetric,
+)
+"""`tau_x = -level_pos` for `v > 0`, `level_neg` for `v < 0`."""
+
+LOAD_FRICTION = EffectKind(
+    'load_friction',
+    (EffectParameter('level', 'N m', low=0.0), EffectParameter('mu', '', low=0.0)),
+    _load,
+    Place.MOTOR,
+)
+"""`tau_x = -(level + mu |force of the motor|) sign(v)`."""

@@ -29,12 +29,12 @@ class HeldCommands:
     def hold(self, time_ns: int, command: np.ndarray) -> None:
         """Give a command (m,) that holds from `time_ns`, not earlier than the one before."""
         self._entries.append((time_ns, command))
+
+    def arrived(self, time_ns: int) -> np.ndarray:
+        """Return the command that is in force at `time_ns`, (m,); time never runs backwards."""
         oldest = time_ns - max(self._delays_ns, default=0)
         while len(self._entries) > 1 and self._entries[1][0] <= oldest:
             del self._entries[0]
-
-    def arrived(self, time_ns: int) -> np.ndarray:
-        """Return the command that is in force at `time_ns`, (m,)."""
         command = np.zeros(len(self._delays_ns))
         for channel, delay_ns in enumerate(self._delays_ns):
             for given_ns, values in self._entries:

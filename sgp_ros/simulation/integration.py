@@ -34,6 +34,8 @@ def integrate(plant: Plant, time_s: float, y: np.ndarray, h: float, inputs: Inpu
         h: length of the step [s].
         inputs: constant over the step.
     """
+    if not plant.dry_joints:
+        return _Flow(plant, time_s, y, inputs, ()).after(h)
     rest = h
     for _ in range(_MOST_SWITCHES):
         directions = plant.directions(time_s, y, inputs)

@@ -26,13 +26,14 @@ class LinearAxis:
     coulomb: float = quantity(20.39, 'N', 'Fc')
     offset: float = quantity(-3.165, 'N', 'force that the motor needs in addition')
 
-    def inverse_mass(self, position: np.ndarray) -> np.ndarray:  # noqa: ARG002 - constant here
-        """Return 1 / M, (1, 1) [1/kg]."""
-        return np.array([[1.0 / self.mass]])
-
-    def force(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:  # noqa: ARG002 - no spring
-        """Return viscous friction and offset, (1,) [N]."""
-        return np.array([-self.viscosity * velocity[0] - self.offset])
+    def dynamics(
+        self,
+        position: np.ndarray,  # noqa: ARG002 - constant here
+        velocity: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return 1 / M, (1, 1) [1/kg], and viscous friction with offset, (1,) [N]."""
+        force = np.array([-self.viscosity * velocity[0] - self.offset])
+        return np.array([[1.0 / self.mass]]), force
 
     def drive(self, command: np.ndarray, velocity: np.ndarray) -> np.ndarray:  # noqa: ARG002 - a force source
         """Return the force `command` (1,) itself, (1,) [N]."""

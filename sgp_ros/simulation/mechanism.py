@@ -29,11 +29,22 @@ class SimulatedJoint:
         name: as in the recording.
         is_prismatic: [m] and [N] in place of [rad] and [N m].
         is_continuous: the position counts turns; effects that depend on it see [-pi, pi].
+        lower: least position [rad or m].
+        upper: greatest position [rad or m].
+        effort: greatest force of the motor [N m or N].
     """
 
     name: str
     is_prismatic: bool = False
     is_continuous: bool = False
+    lower: float = -math.inf
+    upper: float = math.inf
+    effort: float = math.inf
+
+    @property
+    def turn(self) -> float:
+        """Angle per unit of position in effects that are periodic: 1, or 2 pi per metre."""
+        return 2.0 * math.pi if self.is_prismatic else 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,11 +67,13 @@ class Mechanism(Protocol):
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
 
-    def inverse_mass(self, position: np.ndarray) -> np.ndarray:
-        """Return the inverse of the mass matrix, (k, k) [1/(kg m^2) or 1/kg]."""
+    def dynamics(
+        self, position: np.ndarray, velocity: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return inverse mass matrix and forces of gravity, inertia and viscosity.
 
-    def force(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Return gravity, gyroscopic and viscous forces, (k,) [N m or N]."""
+        The first is (k, k) [1/(kg m^2) or 1/kg], the second (k,) [N m or N].
+        """
 
     def drive(self, command: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return the forces of the motors under `command` (m,), (k,) [N m or N]."""
@@ -95,6 +108,7 @@ def physical_parameters(mechanism: Mechanism) -> dict[str, dict[str, float | str
             'description': f.metadata['description'],
         }
         for f in fields(mechanism)
+        if f.metadata
     }
 
 
@@ -104,7 +118,7 @@ def with_physical(mechanism: Mechanism, changes: Mapping[str, float]) -> Mechani
     Raises:
         ConfigError: unknown names, or values that are not finite or not positive where they must.
     """
-    known = {f.name: f for f in fields(mechanism)}
+    known = {f.name: f for f in fields(mechanism) if f.metadata}
     problems = [f'no physical parameter {name!r}' for name in changes if name not in known]
     for name, value in changes.items():
         if not math.isfinite(value):

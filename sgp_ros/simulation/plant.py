@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.errors import NumericalError
 from sgp_ros.simulation.dry_friction import directions_from_rest, hold_still
 from sgp_ros.simulation.effects import Moment
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
     from sgp_ros.simulation.effects import Action
     from sgp_ros.simulation.mechanism import Mechanism
+
+_SHORT_S = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,30 +37,58 @@ class Inputs:
     noise: np.ndarray
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Shown:
+    """What the robot's sensors would show without noise, k joints.
+
+    Attributes:
+        position: (k,) of the encoders [rad or m].
+        velocity: (k,) of the encoders [rad/s or m/s].
+        acceleration: (k,) of the encoders, without the noise of the surroundings.
+        measured_velocity: (k,) as it is measured [rad/s or m/s].
+        effort: (k,) that the currents of the motors stand for [N m or N].
+    """
+
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    measured_velocity: np.ndarray
+    effort: np.ndarray
+
+
 class Plant:
     """True dynamics of a robot with its effects.
 
     Args:
         mechanism: the equation of motion.
         k: number of joints.
-        actions: the effects; those in the drive act in this order.
+        actions: the effects; those on the current, then those behind it act in this order.
     """
 
     def __init__(self, mechanism: Mechanism, k: int, actions: Iterable[Action]) -> None:
         self.mechanism = mechanism
         self.k = k
         ends = 2 * k
-        ordered: list[tuple[Action, slice]] = []
-        for action in sorted(actions, key=lambda action: action.drive is None):
-            ordered.append((action, slice(ends, ends + len(action.initial_state))))
-            ends += len(action.initial_state)
-        self._actions = tuple(ordered)
-        self._dry = tuple(pair for pair in ordered if pair[0].dry_level is not None)
+        pairs: list[tuple[Action, slice]] = []
+        for action in sorted(actions, key=_place):
+            size = len(action.start(0.0, 0.0)) if action.start else 0
+            pairs.append((action, slice(ends, ends + size)))
+            ends += size
+        self._actions = tuple(pairs)
+        self._currents = tuple(x for x in pairs if x[0].current)
+        self._behind = tuple(x for x in pairs if not x[0].current)
+        self._dry = tuple(x for x in pairs if x[0].dry_level is not None)
+        self._inertias = tuple((x.joint, x.inertia) for x, _ in pairs if x.inertia)
         self.dry_joints = tuple(sorted({action.joint for action, _ in self._dry}))
 
     def initial(self, position: Sequence[float], velocity: Sequence[float]) -> np.ndarray:
         """Return the state at the start, (2 k + s,)."""
-        memories = [x for action, _ in self._actions for x in action.initial_state]
+        memories = [
+            x
+            for action, _ in self._actions
+            if action.start
+            for x in action.start(position[action.joint], velocity[action.joint])
+        ]
         return np.array([*position, *velocity, *memories], dtype=np.float64)
 
     def derivative(
@@ -74,29 +105,31 @@ class Plant:
             y: (2 k + s,) state.
             inputs: in force.
             directions: (k,) of sliding; used for joints with dry friction only.
+
+        Raises:
+            NumericalError: an effect that takes more inertia from a joint than it has.
         """
         rate = np.empty_like(y)
         rate[: self.k] = y[self.k : 2 * self.k]
-        force, drive = self._smooth(time_s, y, inputs.command, rate)
-        force += inputs.noise
+        inverse_mass, force, drive = self._smooth(time_s, y, inputs, rate)
         for action, part in self._dry:
             direction = directions[action.joint]
             if direction:
-                force[action.joint] -= direction * self._level(
-                    action, self._moment(time_s, y, drive, part), direction
-                )
-        inverse_mass = self.mechanism.inverse_mass(y[: self.k])
-        stuck = [joint for joint in self.dry_joints if directions[joint] == 0]
-        rate[self.k : 2 * self.k] = hold_still(inverse_mass, inverse_mass @ force, stuck)
+                moment = self._moment(time_s, y, drive, part)
+                force[action.joint] -= direction * self._level(action, moment, direction)
+        acceleration = inverse_mass @ force
+        if self._dry:
+            stuck = [joint for joint in self.dry_joints if directions[joint] == 0]
+            acceleration = hold_still(inverse_mass, acceleration, stuck)
+        rate[self.k : 2 * self.k] = acceleration
         return rate
 
     def directions(self, time_s: float, y: np.ndarray, inputs: Inputs) -> tuple[int, ...]:
         """Return the directions of sliding from now on, (k,); 0 where dry friction holds."""
-        found = [int(np.sign(v)) for v in y[self.k : 2 * self.k]]
+        found = [(v > 0.0) - (v < 0.0) for v in y[self.k : 2 * self.k].tolist()]
         resting = [joint for joint in self.dry_joints if found[joint] == 0]
         if resting:
-            force, drive = self._smooth(time_s, y, inputs.command, np.empty_like(y))
-            force += inputs.noise
+            inverse_mass, force, drive = self._smooth(time_s, y, inputs, np.empty_like(y))
             up, down = np.zeros(self.k), np.zeros(self.k)
             for action, part in self._dry:
                 moment, joint = self._moment(time_s, y, drive, part), action.joint
@@ -105,7 +138,6 @@ class Plant:
                 else:
                     up[joint] += self._level(action, moment, 1)
                     down[joint] += self._level(action, moment, -1)
-            inverse_mass = self.mechanism.inverse_mass(y[: self.k])
             block = inverse_mass[np.ix_(resting, resting)]
             starts = directions_from_rest(
                 block, (inverse_mass @ force)[resting], up[resting], down[resting]
@@ -114,41 +146,77 @@ class Plant:
                 found[joint] = start
         return tuple(found)
 
-    def acceleration(self, time_s: float, y: np.ndarray, command: np.ndarray) -> np.ndarray:
-        """Return the accelerations (k,) from now on, without noise [rad/s^2 or m/s^2]."""
+    def shown(self, time_s: float, y: np.ndarray, command: np.ndarray) -> Shown:
+        """Return what sensors without noise show from now on under `command` (m,)."""
         inputs = Inputs(command, np.zeros(self.k))
         rate = self.derivative(time_s, y, inputs, self.directions(time_s, y, inputs))
-        return rate[self.k : 2 * self.k]
+        effort = self.mechanism.drive(command, y[self.k : 2 * self.k])
+        effort = self._through(self._currents, time_s, y, effort, None)
+        q, v = self._encoders(time_s, y, effort)
+        acceleration, measured = rate[self.k : 2 * self.k].copy(), v.copy()
+        for action, part in self._actions:
+            joint = action.joint
+            if action.sense is not None:
+                later = self._encoders(time_s + _SHORT_S, y + _SHORT_S * rate, effort)[1]
+                earlier = self._encoders(time_s - _SHORT_S, y - _SHORT_S * rate, effort)[1]
+                acceleration[joint] = (later[joint] - earlier[joint]) / (2.0 * _SHORT_S)
+            if action.sense_velocity is not None:
+                measured[joint] = action.sense_velocity(self._moment(time_s, y, effort, part))
+        return Shown(q, v, acceleration, measured, effort)
 
-    def seen(
-        self, time_s: float, y: np.ndarray, command: np.ndarray
+    def _encoders(
+        self, time_s: float, y: np.ndarray, drive: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return position and velocity (k,) as effects in the sensors show them."""
         position, velocity = y[: self.k].copy(), y[self.k : 2 * self.k].copy()
         for action, part in self._actions:
             if action.sense is not None:
-                drive = self.mechanism.drive(command, velocity)
                 moment = Moment(time_s, position, velocity, drive, y[part])
                 position[action.joint], velocity[action.joint] = action.sense(moment)
         return position, velocity
 
     def _smooth(
-        self, time_s: float, y: np.ndarray, command: np.ndarray, rate: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return all smooth forces and those of the drive; fill the rates of the memories."""
+        self, time_s: float, y: np.ndarray, inputs: Inputs, rate: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return inverse mass, all smooth forces and the drive; fill the rates of the memories."""
         q, v = y[: self.k], y[self.k : 2 * self.k]
-        drive = self.mechanism.drive(command, v)
-        extra = np.zeros(self.k)
-        for action, part in self._actions:
-            moment = self._moment(time_s, y, drive, part)
-            if action.state_rate is not None:
-                rate[part] = action.state_rate(moment)
+        inverse_mass, force = self.mechanism.dynamics(q, v)
+        for joint, inertia in self._inertias:  # one term of rank one each (Sherman, Morrison 1950)
+            column = inverse_mass[:, joint]
+            share = 1.0 + inertia * column[joint]
+            if share <= 0.0:
+                raise NumericalError(
+                    f'{-inertia:g} kg m^2 or kg taken from the inertia of joint {joint}',
+                    f'less than the {1.0 / column[joint]:g} that it has',
+                )
+            scale = inertia / share
+            inverse_mass = inverse_mass - scale * np.outer(column, column)
+        drive = self.mechanism.drive(inputs.command, v)
+        drive = self._through(self._currents, time_s, y, drive, rate)
+        drive = self._through(self._behind, time_s, y, drive, rate)
+        force = force + drive + inputs.noise
+        for action, part in self._behind:
             if action.force is not None:
-                extra[action.joint] += action.force(moment)
-            if action.drive is not None:
+                force[action.joint] += action.force(self._moment(time_s, y, drive, part))
+        return inverse_mass, force, drive
+
+    def _through(
+        self,
+        pairs: Iterable[tuple[Action, slice]],
+        time_s: float,
+        y: np.ndarray,
+        drive: np.ndarray,
+        rate: np.ndarray | None,
+    ) -> np.ndarray:
+        """Return the drive behind effects; fill the rates of their memories."""
+        for action, part in pairs:
+            replaced = action.current or action.drive
+            if rate is not None and action.state_rate is not None:
+                rate[part] = action.state_rate(self._moment(time_s, y, drive, part))
+            if replaced is not None:
+                moment = self._moment(time_s, y, drive, part)
                 drive = drive.copy()
-                drive[action.joint] = action.drive(moment)
-        return self.mechanism.force(q, v) + drive + extra, drive
+                drive[action.joint] = replaced(moment)
+        return drive
 
     def _moment(self, time_s: float, y: np.ndarray, drive: np.ndarray, part: slice) -> Moment:
         return Moment(time_s, y[: self.k], y[self.k : 2 * self.k], drive, y[part])
@@ -157,3 +225,8 @@ class Plant:
     def _level(action: Action, moment: Moment, direction: int) -> float:
         assert action.dry_level is not None
         return action.dry_level(moment, direction)
+
+
+def _place(action: Action) -> int:
+    """Return the rank of an action in the chain from the command to the joint."""
+    return 0 if action.current else 1 if action.drive else 2

@@ -61,15 +61,18 @@ class ReactionWheel:
         """G: torque of gravity with the pole horizontal [N m]."""
         return (self.pole_mass / 2.0 + self.wheel_mass) * self.pole_length * self.gravity
 
-    def inverse_mass(self, position: np.ndarray) -> np.ndarray:  # noqa: ARG002 - constant here
-        """Return the inverse of [[J_p + J_w, J_w], [J_w, J_w]], (2, 2) [1/(kg m^2)]."""
-        pole = 1.0 / self.pole_inertia
-        return np.array([[pole, -pole], [-pole, pole + 1.0 / self.wheel_inertia]])
+    def dynamics(
+        self, position: np.ndarray, velocity: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return inverse mass matrix and forces of gravity and bearings.
 
-    def force(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Return gravity and bearing viscosity, (2,) [N m]."""
-        pole = self.gravity_torque * math.sin(position[0]) - self.pole_viscosity * velocity[0]
-        return np.array([pole, -self.wheel_viscosity * velocity[1]])
+        The first is the inverse of [[J_p + J_w, J_w], [J_w, J_w]], (2, 2) [1/(kg m^2)], the
+        second (2,) [N m].
+        """
+        x = 1.0 / self.pole_inertia
+        torque = self.gravity_torque * math.sin(position[0]) - self.pole_viscosity * velocity[0]
+        inverse_mass = np.array([[x, -x], [-x, x + 1.0 / self.wheel_inertia]])
+        return inverse_mass, np.array([torque, -self.wheel_viscosity * velocity[1]])
 
     def drive(self, command: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return the motor torque under the voltage `command` (1,), (2,) [N m]."""

@@ -30,7 +30,11 @@ class SimulatedRecording:
         command: (n, m) [unit of the command].
         true_position: (n, k) [rad or m].
         true_velocity: (n, k) [rad/s or m/s].
-        true_acceleration: (n, k), without the noise of the surroundings [rad/s^2 or m/s^2].
+        true_acceleration: (n, k) of the encoders, without the noise of the surroundings
+            [rad/s^2 or m/s^2].
+        shown_position: (n, k) of the encoders before noise and quantisation [rad or m].
+        shown_velocity: (n, k) of the encoders before noise [rad/s or m/s].
+        effort: (n, k) measured [N m or N]; None when it is not.
         truth: what is true of the simulation, in a form that JSON can hold.
     """
 
@@ -44,6 +48,9 @@ class SimulatedRecording:
     true_position: np.ndarray
     true_velocity: np.ndarray
     true_acceleration: np.ndarray
+    shown_position: np.ndarray
+    shown_velocity: np.ndarray
+    effort: np.ndarray | None
     truth: dict[str, object]
 
 
@@ -69,18 +76,21 @@ def simulate(
         if progress is not None:
             progress((i + 1) / count)
     velocities = [s.velocity for s in samples if s.velocity is not None]
-    stamps_ns = _frozen([s.stamp_ns for s in samples])
+    efforts = [s.effort for s in samples if s.effort is not None]
     return SimulatedRecording(
         simulation.joint_names,
         simulation.command_joints,
-        stamps_ns,
+        _frozen([s.stamp_ns for s in samples]),
         _frozen([s.position for s in samples]),
         _frozen(velocities) if velocities else None,
-        stamps_ns,
+        _frozen([s.command_stamp_ns for s in samples]),
         _frozen([s.command for s in samples]),
         _frozen([s.true_position for s in samples]),
         _frozen([s.true_velocity for s in samples]),
         _frozen([s.true_acceleration for s in samples]),
+        _frozen([s.shown_position for s in samples]),
+        _frozen([s.shown_velocity for s in samples]),
+        _frozen(efforts) if efforts else None,
         simulation.truth(),
     )
 

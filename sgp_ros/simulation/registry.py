@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sgp_ros.simulation.actuation import ACTUATOR_LAG, COMMAND_DELAY
-from sgp_ros.simulation.friction import COULOMB_FRICTION, POSITION_FRICTION, VISCOUS_FRICTION
+from sgp_ros.simulation import actuation, friction, loads, measurement, varying_friction
 from sgp_ros.simulation.linear_axis import LINEAR_AXIS
-from sgp_ros.simulation.measurement import ENCODER_ECCENTRICITY
 from sgp_ros.simulation.reaction_wheel import REACTION_WHEEL
 from sgp_ros.simulation.toy_pendulum import TOY_PENDULUM
 
@@ -22,11 +20,33 @@ SIMULATORS: dict[str, Simulator] = {
 EFFECTS: dict[str, EffectKind] = {
     kind.name: kind
     for kind in (
-        VISCOUS_FRICTION,
-        COULOMB_FRICTION,
-        POSITION_FRICTION,
-        COMMAND_DELAY,
-        ACTUATOR_LAG,
-        ENCODER_ECCENTRICITY,
+        friction.VISCOUS_FRICTION,
+        friction.COULOMB_FRICTION,
+        friction.STRIBECK_FRICTION,
+        friction.QUADRATIC_DRAG,
+        friction.ASYMMETRIC_COULOMB,
+        friction.LOAD_FRICTION,
+        varying_friction.POSITION_FRICTION,
+        varying_friction.LIMIT_FRICTION,
+        varying_friction.FRICTION_DRIFT,
+        varying_friction.HYSTERESIS,
+        loads.SPRING,
+        loads.CONSTANT_LOAD,
+        loads.COGGING,
+        loads.END_STOP,
+        loads.JOINT_COUPLING,
+        loads.ARMATURE,
+        loads.GRAVITY_TILT,
+        loads.PAYLOAD,
+        loads.TIP_FORCE,
+        actuation.COMMAND_DELAY,
+        actuation.DEAD_ZONE,
+        actuation.ACTUATOR_LAG,
+        actuation.SATURATION,
+        actuation.TORQUE_GAIN,
+        actuation.BACKLASH,
+        measurement.ENCODER_ECCENTRICITY,
+        measurement.VELOCITY_FILTER_LAG,
     )
 }
+"""Several effects in a motor act in this order, from the command to the joint."""

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.simulation.effect_text import checked_effect
+from sgp_ros.simulation.effects import EVERY_MOTOR, Place
+from sgp_ros.simulation.registry import EFFECTS
 
 if TYPE_CHECKING:
-    from sgp_ros.simulation.effects import Action, ChosenEffect
+    from collections.abc import Iterable
+
+    from sgp_ros.simulation.effects import Action, ChosenEffect, EffectKind, ParameterValue
     from sgp_ros.simulation.mechanism import Mechanism
     from sgp_ros.simulation.sensors import Sensors
     from sgp_ros.simulation.simulator import Simulator
@@ -31,6 +35,7 @@ class Scenario:
         torque_noise: (k,) density [N m s^0.5 or N s^0.5].
         position: (k,) at the start [rad or m].
         velocity: (k,) at the start [rad/s or m/s].
+        unlisted: what acts beside the effects that have a name.
     """
 
     simulator: Simulator
@@ -44,25 +49,65 @@ class Scenario:
     torque_noise: tuple[float, ...]
     position: tuple[float, ...]
     velocity: tuple[float, ...]
+    unlisted: tuple[Action, ...] = ()
 
     def actions(self) -> tuple[Action, ...]:
         """Return what the built-in and the added effects do."""
         chosen = (*self.mechanism.built_in(), *self.effects)
-        return tuple(effect_action(self.simulator, effect) for effect in chosen)
+        order = list(EFFECTS)
+        return (
+            tuple(
+                action
+                for effect in sorted(chosen, key=lambda effect: order.index(effect.name))
+                for action in effect_actions(self.simulator, effect)
+            )
+            + self.unlisted
+        )
 
 
-def effect_action(simulator: Simulator, effect: ChosenEffect) -> Action:
-    """Return what an effect does to a robot.
+def effect_actions(simulator: Simulator, effect: ChosenEffect) -> tuple[Action, ...]:
+    """Return what an effect does to a robot; nothing if it changes physical parameters.
 
     Raises:
         ConfigError: an effect, joint or value that does not exist or suit.
     """
     kind = checked_effect(effect)
-    able = simulator.command_joints if kind.needs_motor else simulator.joint_names
+    able = places(simulator, kind)
     if effect.joint not in able:
+        lacking = kind.place if kind.place in {Place.JOINT, Place.MOTOR} else Place.LAST
         raise ConfigError(
             f'effect {effect.name} on joint {effect.joint!r} of robot {simulator.name}',
-            f'one of {list(able)}' if able else 'a robot with a motor',
+            f'one of {list(able)}' if able else f'a robot with {lacking.value}',
         )
-    index = simulator.joint_names.index(effect.joint)
-    return kind.build(index, simulator.joints[index], effect.parameters)
+    if kind.build is None:
+        return ()
+    usual = {p.name: p.default for p in kind.parameters if p.default is not None}
+    values: dict[str, ParameterValue] = {**usual, **effect.parameters}
+    names = simulator.command_joints if effect.joint == EVERY_MOTOR else (effect.joint,)
+    return tuple(
+        action
+        for name in names
+        for action in kind.build(simulator.joints, simulator.joint_names.index(name), values)
+    )
+
+
+def places(simulator: Simulator, kind: EffectKind) -> tuple[str, ...]:
+    """Return the joints of a robot that an effect may be put on."""
+    last = () if simulator.last_joint is None else (simulator.last_joint,)
+    every = (EVERY_MOTOR,) if kind.takes_all and simulator.command_joints else ()
+    return {
+        Place.JOINT: simulator.joint_names,
+        Place.MOTOR: simulator.command_joints + every,
+        Place.LAST: last,
+        Place.BASE: (Place.BASE.value,) if last else (),
+        Place.TOOL: (Place.TOOL.value,) if last else (),
+    }[kind.place]
+
+
+def with_effects(mechanism: Mechanism, effects: Iterable[ChosenEffect]) -> Mechanism:
+    """Return the mechanism with the physical parameters that effects add to."""
+    for effect in effects:
+        for name, physical in checked_effect(effect).physical.items():
+            value = getattr(mechanism, physical) + float(effect.parameters[name])
+            mechanism = replace(mechanism, **{physical: value})
+    return mechanism

@@ -26,6 +26,8 @@ class Sensors:
         velocity_noise: per joint, standard deviation [rad/s or m/s].
         jitter_s: a state is taken up to this much earlier or later than the clock says, uniformly;
             its stamp is right all the same [s].
+        measures_effort: whether the currents of the motors are measured.
+        command_latency_s: from a state to the command that answers it [s].
     """
 
     resolution: tuple[float, ...] = (0.0,)
@@ -33,6 +35,8 @@ class Sensors:
     measures_velocity: bool = False
     velocity_noise: tuple[float, ...] = (0.0,)
     jitter_s: float = 0.0
+    measures_effort: bool = False
+    command_latency_s: float = 0.0
 
     def checked(self, k: int, period_s: float) -> Sensors:
         """Return these sensors if they suit k joints sampled every `period_s`.
@@ -47,10 +51,13 @@ class Sensors:
                 problems.append(f'{name} = {numbers}')
         if not 0.0 <= self.jitter_s < 0.5 * period_s:
             problems.append(f'jitter_s = {self.jitter_s}')
+        if not 0.0 <= self.command_latency_s < period_s:
+            problems.append(f'command_latency_s = {self.command_latency_s}')
         if problems:
             raise ConfigError(
                 'sensors with ' + ', '.join(problems),
-                f'1 or {k} finite numbers of at least 0, jitter_s below {0.5 * period_s:g} s',
+                f'1 or {k} finite numbers of at least 0, jitter_s below {0.5 * period_s:g} s, '
+                f'command_latency_s below {period_s:g} s',
             )
         return self
 

@@ -32,6 +32,9 @@ class Simulator:
         same_physics: effects that only change a physical parameter, as
             `{(effect, joint): (parameter of the effect, physical parameter)}`.
         description: one sentence.
+        last_joint: that of the last link, for robots whose links are known; else None.
+        longest_substep_s: steps of the integration are at most this long [s]; effects may need
+            shorter ones.
     """
 
     name: str
@@ -45,6 +48,8 @@ class Simulator:
     rate_hz: float = 100.0
     same_physics: Mapping[tuple[str, str], tuple[str, str]] = field(default_factory=dict)
     description: str = ''
+    last_joint: str | None = None
+    longest_substep_s: float = 1e-3
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -13,18 +13,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.errors import NumericalError
 from sgp_ros.simulation.held_commands import HeldCommands
 from sgp_ros.simulation.integration import integrate
-from sgp_ros.simulation.plant import Inputs, Plant
+from sgp_ros.simulation.plant import Inputs, Plant, Shown
 from sgp_ros.simulation.truth import describe_truth
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from sgp_ros.simulation.scenario import Scenario
-
-LONGEST_SUBSTEP_NS = 1_000_000
-"""Steps of the integration are at most this long [ns]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,8 +36,13 @@ class SimulatedSample:
         command: (m,) given at this sample [unit of the command].
         true_position: (k,) [rad or m].
         true_velocity: (k,) [rad/s or m/s].
-        true_acceleration: (k,) right after the command was given, without the noise of the
-            surroundings: what a perfect model predicts [rad/s^2 or m/s^2].
+        true_acceleration: (k,) of the encoders under the command that has arrived, without the
+            noise of the surroundings: what a perfect model predicts [rad/s^2 or m/s^2].
+        shown_position: (k,) of the encoders before noise and quantisation [rad or m].
+        shown_velocity: (k,) of the encoders before noise [rad/s or m/s].
+        effort: (k,) that the currents of the motors stand for [N m or N]; None when it is not
+            measured.
+        command_stamp_ns: time from which the command holds [ns].
     """
 
     stamp_ns: int
@@ -49,6 +52,10 @@ class SimulatedSample:
     true_position: np.ndarray
     true_velocity: np.ndarray
     true_acceleration: np.ndarray
+    shown_position: np.ndarray
+    shown_velocity: np.ndarray
+    effort: np.ndarray | None
+    command_stamp_ns: int
 
 
 class Simulation:
@@ -73,6 +80,9 @@ class Simulation:
         choice = simulator.controllers[scenario.controller]
         self._control = choice.build(scenario.mechanism, controlling, 1e-9 * scenario.period_ns)
         self._y = self._plant.initial(scenario.position, scenario.velocity)
+        steps_s = (simulator.longest_substep_s, *(action.substep_s for action in actions))
+        self._longest_ns = round(1e9 * min(steps_s))
+        self._latency_ns = round(1e9 * scenario.sensors.command_latency_s)
         self._time_ns = 0
         self._tick_ns = 0
         self._last: SimulatedSample | None = None
@@ -101,7 +111,7 @@ class Simulation:
         if values.shape != (len(self.command_joints),) or not np.all(np.isfinite(values)):
             raise ValueError(f'command {values} for the joints {self.command_joints}')
         values.setflags(write=False)
-        self._commands.hold(self._time_ns, values)
+        self._commands.hold(self._time_ns + self._latency_ns, values)
 
     def advance(self, elapsed_ns: int) -> None:
         """Let time pass under the command that holds; O(elapsed time).
@@ -111,6 +121,7 @@ class Simulation:
 
         Raises:
             ValueError: time that runs backwards.
+            NumericalError: a motion that ends in infinity.
         """
         if elapsed_ns < 0:
             raise ValueError(f'elapsed time {elapsed_ns} ns is negative')
@@ -132,12 +143,17 @@ class Simulation:
             self.advance(elapsed_ns)
         elif self._last is not None:
             self._advance_period()
-        position, velocity = self._read()
+        shown = self._shown()
+        position, velocity = self.scenario.sensors.read(
+            shown.position, shown.measured_velocity, self._sensing
+        )
         if self._control is not None:
             self.hold(
                 self._control(1e-9 * self._time_ns, position, self._rate(position, velocity))
             )
-        self._last = self._sample(position, velocity)
+            if not self._latency_ns:
+                shown = self._shown()
+        self._last = self._sample(shown, position, velocity)
         return self._last
 
     def _advance_period(self) -> None:
@@ -149,7 +165,7 @@ class Simulation:
 
     def _advance_under(self, command: np.ndarray, end_ns: int) -> None:
         length_ns = end_ns - self._time_ns
-        count = -(-length_ns // LONGEST_SUBSTEP_NS)
+        count = -(-length_ns // self._longest_ns)
         if count:
             h = 1e-9 * length_ns / count
             scale = np.divide(self.scenario.torque_noise, math.sqrt(h))
@@ -159,12 +175,18 @@ class Simulation:
                 inputs = Inputs(command, noise[i])
                 self._y = integrate(self._plant, time_s, self._y, h, inputs)
         self._time_ns = end_ns
+        if not np.all(np.isfinite(self._y)):
+            raise NumericalError(
+                f'the motion of {self.scenario.simulator.name} is not finite after '
+                f'{1e-9 * end_ns:.3f} s',
+                'a stable motion',
+                'choose another controller, rate or effect',
+            )
 
-    def _read(self) -> tuple[np.ndarray, np.ndarray | None]:
-        seen = self._plant.seen(
+    def _shown(self) -> Shown:
+        return self._plant.shown(
             1e-9 * self._time_ns, self._y, self._commands.arrived(self._time_ns)
         )
-        return self.scenario.sensors.read(*seen, self._sensing)
 
     def _rate(self, position: np.ndarray, velocity: np.ndarray | None) -> np.ndarray:
         """Return the velocity as the controller knows it: measured, or a backward difference."""
@@ -176,17 +198,22 @@ class Simulation:
         rate: np.ndarray = (position - self._last.position) / (1e-9 * max(elapsed_ns, 1))
         return rate
 
-    def _sample(self, position: np.ndarray, velocity: np.ndarray | None) -> SimulatedSample:
-        k, time_s = len(self.joint_names), 1e-9 * self._time_ns
-        arrived = self._commands.arrived(self._time_ns)
+    def _sample(
+        self, shown: Shown, position: np.ndarray, velocity: np.ndarray | None
+    ) -> SimulatedSample:
+        k, now_ns = len(self.joint_names), self.scenario.start_ns + self._time_ns
         sample = SimulatedSample(
-            self.scenario.start_ns + self._time_ns,
+            now_ns,
             position,
             velocity,
             self._commands.latest,
             self._y[:k].copy(),
             self._y[k : 2 * k].copy(),
-            self._plant.acceleration(time_s, self._y, arrived),
+            shown.acceleration,
+            shown.position,
+            shown.velocity,
+            shown.effort if self.scenario.sensors.measures_effort else None,
+            now_ns + self._latency_ns,
         )
         for array in (sample.true_position, sample.true_velocity, sample.true_acceleration):
             array.setflags(write=False)

@@ -32,13 +32,14 @@ class ToyPendulum:
     friction_lo: float = quantity(2.0, 'rad', 'start of the interval')
     friction_hi: float = quantity(2.5, 'rad', 'end of the interval')
 
-    def inverse_mass(self, position: np.ndarray) -> np.ndarray:  # noqa: ARG002 - constant here
-        """Return 1 / (m l^2), (1, 1) [1/(kg m^2)]."""
-        return np.array([[1.0 / (self.mass * self.length**2)]])
-
-    def force(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:  # noqa: ARG002 - no viscosity
-        """Return gravity, (1,) [N m]."""
-        return np.array([self.mass * self.gravity * self.length * math.sin(position[0])])
+    def dynamics(
+        self,
+        position: np.ndarray,
+        velocity: np.ndarray,  # noqa: ARG002 - no viscosity
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return 1 / (m l^2), (1, 1) [1/(kg m^2)], and the torque of gravity, (1,) [N m]."""
+        torque = self.mass * self.gravity * self.length * math.sin(position[0])
+        return np.array([[1.0 / (self.mass * self.length**2)]]), np.array([torque])
 
     def drive(self, command: np.ndarray, velocity: np.ndarray) -> np.ndarray:  # noqa: ARG002 - no motor
         """Return no torque, (1,) [N m]."""

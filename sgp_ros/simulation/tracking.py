@@ -1,4 +1,4 @@
-"""Tracking of a smooth reference by a single axis with proportional and derivative action."""
+"""Tracking of smooth references by proportional and derivative action."""
 
 from __future__ import annotations
 
@@ -7,14 +7,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.simulation.multisine import Multisine, random_multisine
+
 if TYPE_CHECKING:
-    from sgp_ros.simulation.controllers import Controller
-    from sgp_ros.simulation.mechanism import Mechanism
+    from sgp_ros.simulation.controllers import Controller, ControllerBuild
+    from sgp_ros.simulation.mechanism import Mechanism, SimulatedJoint
 
 _COUNT = 5
 _LOWEST_HZ, _HIGHEST_HZ = 0.1, 0.8
 _RMS_M = 0.08
 _BANDWIDTH = 15.0
+_JOINT_BANDWIDTH = 8.0
+_LARGEST_SPAN = 1.2
+_SHARE_OF_RANGE = 0.35
 
 
 def pd_reference(
@@ -36,3 +41,69 @@ def pd_reference(
         return np.array([stiffness * (position - q[0]) + damping * (velocity - v[0])])
 
     return control
+
+
+def computed_force(
+    nominal: Mechanism,
+    joints: tuple[SimulatedJoint, ...],
+    motors: tuple[int, ...],
+    reference: Multisine,
+    bandwidth: float = _JOINT_BANDWIDTH,
+    damping_ratio: float = 0.8,
+) -> Controller:
+    """Return the computed force that makes the motor joints follow a reference.
+
+    With `a = A (u + h)`, A and h of the nominal robot at the reference of the motor joints and at
+    the measured state of the passive ones, u is such that the motor joints accelerate by
+    `a_ref + 2 zeta w (v_ref - v) + w^2 (q_ref - q)` (partial feedback linearisation, Spong 1994).
+    It is clipped at the limits of the motors.
+
+    Args:
+        nominal: what the controller knows of the robot; its commands are forces.
+        joints: k of them.
+        motors: index of the joint that each of the m commands drives.
+        reference: of the m motor joints.
+        bandwidth: w [rad/s].
+        damping_ratio: zeta.
+    """
+    index = list(motors)
+    limit = np.array([joints[j].effort for j in index])
+
+    def control(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        q_ref, v_ref, a_ref = reference.at(t)
+        position, velocity = q.copy(), v.copy()
+        position[index], velocity[index] = q_ref, v_ref
+        inverse_mass, force = nominal.dynamics(position, velocity)
+        wanted = a_ref + 2.0 * damping_ratio * bandwidth * (v_ref - v[index])
+        wanted = wanted + bandwidth**2 * (q_ref - q[index])
+        lacking = wanted - (inverse_mass @ force)[index]
+        u = np.linalg.solve(inverse_mass[np.ix_(index, index)], lacking)
+        return np.clip(u, -limit, limit)
+
+    return control
+
+
+def multisine_tracking(
+    joints: tuple[SimulatedJoint, ...], motors: tuple[int, ...]
+) -> ControllerBuild:
+    """Build the tracking of a random reference about the middle of each motor joint's range."""
+    centre, reach = middle_and_reach(joints)
+
+    def build(
+        mechanism: Mechanism, rng: np.random.Generator, _period_s: float
+    ) -> Controller | None:
+        index = list(motors)
+        reference = random_multisine(rng, centre[index], reach[index])
+        return computed_force(mechanism, joints, motors, reference)
+
+    return build
+
+
+def middle_and_reach(joints: tuple[SimulatedJoint, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the middle of each joint's range and how far a reference goes from it, (k,) each."""
+    middle, reach = np.zeros(len(joints)), np.full(len(joints), _LARGEST_SPAN)
+    for i, joint in enumerate(joints):
+        if math.isfinite(joint.lower + joint.upper):
+            middle[i] = 0.5 * (joint.lower + joint.upper)
+            reach[i] = min(_SHARE_OF_RANGE * (joint.upper - joint.lower), _LARGEST_SPAN)
+    return middle, reach

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from sgp_ros.simulation.effect_text import checked_effect
-from sgp_ros.simulation.mechanism import physical_parameters
+from sgp_ros.simulation.mechanism import SimulatedJoint, physical_parameters
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -68,11 +68,15 @@ def _coefficients(scenario: Scenario) -> dict[str, dict[str, float | str]]:
 def _described(simulator: Simulator, effects: Iterable[ChosenEffect]) -> list[dict[str, object]]:
     described: list[dict[str, object]] = []
     for effect in effects:
-        joint = simulator.joints[simulator.joint_names.index(effect.joint)]
+        joint = next(
+            (j for j in simulator.joints if j.name == effect.joint), SimulatedJoint(effect.joint)
+        )
         parameters: dict[str, dict[str, object]] = {}
         for parameter in checked_effect(effect).parameters:
+            if parameter.name not in effect.parameters:
+                continue
             entry: dict[str, object] = {'value': effect.parameters[parameter.name]}
-            if not parameter.choices:
+            if not parameter.choices and not parameter.is_joint:
                 entry['unit'] = parameter.unit_on(joint, effect.parameters.get('kind', ''))
             parameters[parameter.name] = entry
         described.append({'effect': effect.name, 'joint': effect.joint, 'parameters': parameters})

@@ -53,7 +53,7 @@ def test_joint_must_exist_and_have_a_motor_where_needed():
     """Whether a joint exists depends on the robot, so the simulation refuses."""
     with pytest.raises(ConfigError, match=r"'elbow'.*\['pole', 'wheel'\]"):
         make_simulation('reaction_wheel', effects=['coulomb_friction:joint=elbow,level=1'])
-    with pytest.raises(ConfigError, match=r"'pole'.*\['wheel'\]"):
+    with pytest.raises(ConfigError, match=r"'pole'.*\['wheel', 'all'\]"):
         make_simulation('reaction_wheel', effects=['command_delay:joint=pole,delay=0.01'])
     with pytest.raises(ConfigError, match='a robot with a motor'):
         make_simulation('toy_pendulum', effects=['command_delay:joint=hinge,delay=0.01'])

@@ -1,0 +1,163 @@
+"""A robot from a URDF as a mechanism: its rigid-body dynamics by MuJoCo.
+
+MuJoCo gives the mass matrix (composite rigid bodies, Featherstone 2008, chapter 6) and the forces
+of gravity, inertia and joint damping (Newton and Euler); contacts, limits and its own friction are
+off. It is a second opinion on what the package's own model of a tree computes, and shares nothing
+with it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sgp_ros.errors import ConfigError
+from sgp_ros.simulation.effects import ChosenEffect
+from sgp_ros.simulation.mechanism import quantity
+from sgp_ros.simulation.tree_text import TreeText, plain_tree, read_tree, tree_link
+
+if TYPE_CHECKING:
+    from sgp_ros.simulation.mechanism import TrueCoefficient
+
+GRAVITY = 9.81
+"""Acceleration of gravity [m/s^2]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tree:
+    """Equation of motion of the joints of a URDF, in the order of the file.
+
+    Attributes:
+        urdf: text of the file.
+        base_roll: of the base in the world, whose orientation is `Ry(pitch) Rx(roll)` [rad].
+        base_pitch: likewise [rad].
+        payload_mass: point mass on the last link [kg].
+        payload_x: where it is in the frame of that link [m]; `payload_y`, `payload_z` likewise.
+        tip_fx: force at the origin of the tool in the axes of the root [N]; `tip_fy`, `tip_fz`
+            likewise.
+        text: what the URDF says of its joints.
+    """
+
+    urdf: str
+    base_roll: float = quantity(0.0, 'rad', 'roll of the base')
+    base_pitch: float = quantity(0.0, 'rad', 'pitch of the base')
+    payload_mass: float = quantity(0.0, 'kg', 'point mass on the last link')
+    payload_x: float = quantity(0.0, 'm', 'where the payload is on the last link')
+    payload_y: float = quantity(0.0, 'm', 'where the payload is on the last link')
+    payload_z: float = quantity(0.0, 'm', 'where the payload is on the last link')
+    tip_fx: float = quantity(0.0, 'N', 'force at the tool')
+    tip_fy: float = quantity(0.0, 'N', 'force at the tool')
+    tip_fz: float = quantity(0.0, 'N', 'force at the tool')
+    text: TreeText = field(init=False)
+    _library: Any = field(init=False, repr=False)
+    _model: Any = field(init=False, repr=False)
+    _data: Any = field(init=False, repr=False)
+    _order: np.ndarray | slice = field(init=False, repr=False)
+    _unit: np.ndarray = field(init=False, repr=False)
+    _motors: np.ndarray = field(init=False, repr=False)
+    _tool: int = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Compile the tree.
+
+        Raises:
+            ConfigError: a URDF that is no tree of bodies with inertia, or MuJoCo is missing.
+        """
+        library, text = _library(), read_tree(self.urdf)
+        payload = (self.payload_mass, self.payload_x, self.payload_y, self.payload_z)
+        try:
+            model = library.MjModel.from_xml_string(plain_tree(self.urdf, text, payload))
+        except ValueError as error:
+            problem = ' '.join(str(error).split())
+            raise ConfigError(
+                f'URDF of {text.name!r}: {problem}',
+                'a tree whose moving links have mass and inertia',
+            ) from error
+        off = library.mjtDisableBit
+        for bit in (off.mjDSBL_CONSTRAINT, off.mjDSBL_CONTACT, off.mjDSBL_EQUALITY):
+            model.opt.disableflags |= int(bit)
+        model.opt.gravity[:] = _gravity(self.base_roll, self.base_pitch)
+        names = [joint.name for joint in text.joints]
+        motors = np.zeros((len(names), len(text.command_joints)))
+        for column, name in enumerate(text.command_joints):
+            motors[names.index(name), column] = 1.0
+        built = {
+            'text': text,
+            '_library': library,
+            '_model': model,
+            '_data': library.MjData(model),
+            '_order': _order([int(model.joint(name).dofadr[0]) for name in names]),
+            '_unit': np.eye(len(names)),
+            '_motors': motors,
+            '_tool': int(model.body(tree_link(text.tool_link)).id),
+        }
+        for name, value in built.items():
+            object.__setattr__(self, name, value)
+
+    def dynamics(
+        self, position: np.ndarray, velocity: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the inverse mass matrix (k, k) and the forces of the tree (k,), O(k^3)."""
+        library, model, data, order = self._library, self._model, self._data, self._order
+        data.qpos[order] = position
+        data.qvel[order] = velocity
+        library.mj_fwdPosition(model, data)
+        library.mj_fwdVelocity(model, data)
+        inverse_mass = np.empty_like(self._unit)
+        library.mj_solveM(model, data, inverse_mass, self._unit)
+        force = data.qfrc_passive - data.qfrc_bias
+        tip = (self.tip_fx, self.tip_fy, self.tip_fz)
+        if any(tip):
+            jacobian = np.empty((3, len(self._unit)))
+            library.mj_jac(model, data, jacobian, None, data.xpos[self._tool], self._tool)
+            force = force + jacobian.T @ tip
+        if isinstance(order, slice):
+            return inverse_mass, force
+        return inverse_mass[order[:, np.newaxis], order], force[order]
+
+    def drive(self, command: np.ndarray, velocity: np.ndarray) -> np.ndarray:  # noqa: ARG002 - force sources
+        """Return the forces of the motors, (k,); the command (m,) is in N m or N."""
+        force: np.ndarray = self._motors @ command
+        return force
+
+    def built_in(self) -> tuple[ChosenEffect, ...]:
+        """Return the dry friction that the URDF states."""
+        return tuple(
+            ChosenEffect('coulomb_friction', joint.name, {'level': level})
+            for joint, level in zip(self.text.joints, self.text.friction, strict=True)
+            if level > 0.0
+        )
+
+    def coefficients(self) -> tuple[TrueCoefficient, ...]:
+        """Return nothing: the truth about a tree is its URDF."""
+        return ()
+
+
+def _order(places: list[int]) -> np.ndarray | slice:
+    """Return the index that puts the library's joints into the order of the file."""
+    return slice(None) if places == sorted(places) else np.array(places)
+
+
+def _gravity(roll: float, pitch: float) -> tuple[float, float, float]:
+    """Return gravity in the axes of a base that stands as `Ry(pitch) Rx(roll)` [m/s^2]."""
+    level = math.cos(pitch)
+    return (
+        GRAVITY * math.sin(pitch),
+        -GRAVITY * level * math.sin(roll),
+        -GRAVITY * level * math.cos(roll),
+    )
+
+
+def _library() -> Any:
+    try:
+        return import_module('mujoco')
+    except ImportError as error:
+        raise ConfigError(
+            f'MuJoCo, which simulates URDF robots, is missing ({error})',
+            'the package mujoco',
+            "pip install 'sgp_ros[simulate]'",
+        ) from error

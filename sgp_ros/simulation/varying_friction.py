@@ -1,0 +1,145 @@
+"""Kinds of friction that change with position, time or the path that was travelled."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from sgp_ros.errors import ConfigError
+from sgp_ros.simulation.effects import Action, EffectKind, EffectParameter
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from sgp_ros.simulation.effects import Moment, ParameterValue
+    from sgp_ros.simulation.mechanism import SimulatedJoint
+
+
+_STIFF_S = 1e-3
+
+
+def _of_kind(
+    joint: int, kind: ParameterValue, strength: Callable[[Moment], float]
+) -> tuple[Action, ...]:
+    """Return viscous or Coulomb friction of a strength that changes."""
+    if kind == 'viscous':
+        return (Action(joint, force=lambda m: -strength(m) * float(m.velocity[joint])),)
+    return (Action(joint, dry_level=lambda moment, _direction: strength(moment)),)
+
+
+def _position(
+    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    amplitude, lo, hi = (float(values[name]) for name in ('amplitude', 'lo', 'hi'))
+    is_continuous, edge = joints[joint].is_continuous, float(values['edge'])
+
+    def strength(moment: Moment) -> float:
+        q = float(moment.position[joint])
+        if is_continuous:
+            q = (q + math.pi) % (2.0 * math.pi) - math.pi
+        if edge == 0.0:
+            return amplitude if lo <= q <= hi else 0.0
+        inside = min(q - lo, hi - q) / edge + 0.5
+        return amplitude * min(max(inside, 0.0), 1.0)
+
+    return _of_kind(joint, values['kind'], strength)
+
+
+def _limit(
+    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    amplitude, onset = float(values['amplitude']), float(values['onset'])
+    lower, upper = joints[joint].lower, joints[joint].upper
+    limit = upper if onset >= 0.5 * (lower + upper) else lower
+    if not math.isfinite(limit) or not lower < onset < upper:
+        raise ConfigError(
+            f'limit_friction with onset {onset:g} on joint {joints[joint].name!r}',
+            f'a joint with limits and an onset between them, here {lower:g} and {upper:g}',
+        )
+
+    def level(moment: Moment, _direction: int) -> float:
+        return amplitude * max((float(moment.position[joint]) - onset) / (limit - onset), 0.0)
+
+    return (Action(joint, dry_level=level),)
+
+
+def _drift(
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    start, end = float(values['start']), float(values['end'])
+    time_constant = float(values['time_constant'])
+
+    def strength(moment: Moment) -> float:
+        return end + (start - end) * math.exp(-moment.time_s / time_constant)
+
+    return _of_kind(joint, values['kind'], strength)
+
+
+def _hysteresis(
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    level, presliding = float(values['level']), float(values['presliding'])
+
+    def rate(moment: Moment) -> tuple[float]:
+        v, z = float(moment.velocity[joint]), float(moment.state[0])
+        return ((v - abs(v) * z) / presliding,)
+
+    return (
+        Action(
+            joint,
+            force=lambda moment: -level * float(moment.state[0]),
+            start=lambda _q, _v: (0.0,),
+            state_rate=rate,
+            substep_s=_STIFF_S,
+        ),
+    )
+
+
+_KIND = EffectParameter('kind', choices=('coulomb', 'viscous'))
+_VISCOUS = {'viscous': 'N m s/rad'}
+
+POSITION_FRICTION = EffectKind(
+    'position_friction',
+    (
+        EffectParameter('amplitude', 'N m', low=0.0, unit_by_kind=_VISCOUS),
+        EffectParameter('lo', 'rad'),
+        EffectParameter('hi', 'rad'),
+        _KIND,
+        EffectParameter('edge', 'rad', low=0.0, default=0.0),
+    ),
+    _position,
+    ordered=('lo', 'hi'),
+)
+"""Coulomb or viscous friction where `lo <= q <= hi`, on every turn of a continuous joint.
+
+It rises from 0 to `amplitude` over the length `edge`, half way at `lo` and `hi`.
+"""
+
+LIMIT_FRICTION = EffectKind(
+    'limit_friction',
+    (EffectParameter('amplitude', 'N m', low=0.0), EffectParameter('onset', 'rad')),
+    _limit,
+)
+"""Dry friction that rises linearly from 0 at `onset` to `amplitude` at the limit on that side."""
+
+FRICTION_DRIFT = EffectKind(
+    'friction_drift',
+    (
+        EffectParameter('start', 'N m', low=0.0, unit_by_kind=_VISCOUS),
+        EffectParameter('end', 'N m', low=0.0, unit_by_kind=_VISCOUS),
+        EffectParameter('time_constant', 's', low=1e-3),
+        _KIND,
+    ),
+    _drift,
+)
+"""Friction of the strength `end + (start - end) exp(-t / time_constant)`."""
+
+HYSTERESIS = EffectKind(
+    'hysteresis',
+    (
+        EffectParameter('level', 'N m', low=0.0),
+        EffectParameter('presliding', 'rad', low=1e-9),
+    ),
+    _hysteresis,
+)
+"""`tau_x = -level z` with `dz/dt = (v - |v| z) / presliding` (Dahl 1968)."""
