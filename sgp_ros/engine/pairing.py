@@ -37,7 +37,11 @@ class CommandHistory:
         return None if index == 0 else stamp_ns - self.stamps_ns[index - 1]
 
     def average(
-        self, first_ns: int, last_ns: int, cumulative: Callable[[np.ndarray], np.ndarray]
+        self,
+        first_ns: int,
+        last_ns: int,
+        cumulative: Callable[[np.ndarray], np.ndarray],
+        acting: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
     ) -> np.ndarray:
         """Integrate the held commands against a kernel, exactly.
 
@@ -45,6 +49,8 @@ class CommandHistory:
             first_ns: start of the kernel's support, where a command is in force [ns].
             last_ns: its end [ns].
             cumulative: integral of the kernel from `first_ns` to times given in seconds after it.
+            acting: from held commands (pieces, k) and the middles of their times (pieces,) [s
+                after `first_ns`] to what acts; None for the commands themselves.
 
         Returns:
             (k,) [unit of the commands].
@@ -54,7 +60,10 @@ class CommandHistory:
         changes = [first_ns, *self.stamps_ns[start + 1 : stop], last_ns]
         seconds = np.array([stamp - first_ns for stamp in changes]) * 1e-9
         shares = np.diff(cumulative(seconds))  # (pieces,)
-        return shares @ np.array(self.efforts[start:stop])
+        held = np.array(self.efforts[start:stop])  # (pieces, k)
+        if acting is not None:
+            held = acting(held, 0.5 * (seconds[1:] + seconds[:-1]))
+        return shares @ held
 
     def forget_before(self, stamp_ns: int) -> None:
         """Drop commands that ended before `stamp_ns`."""

@@ -139,17 +139,31 @@ class WindowFilter:
                 weights.values @ position,
                 velocity,
                 (weights.form.weights @ source)[None],
-                self._effort(window, weights.form, commands)[None],
+                self._effort(window, velocity, weights.form, commands)[None],
             ),
         )
 
-    def _effort(self, window: list[State], form: WeakForm, commands: CommandHistory) -> np.ndarray:
+    def _effort(
+        self, window: list[State], velocity: np.ndarray, form: WeakForm, commands: CommandHistory
+    ) -> np.ndarray:
         if not any(joint.is_actuated for joint in self._robot.joints):
             return np.zeros(len(self._robot.joints))
+        effort_map = self._robot.effort_map
         if all(state.effort is not None for state in window):
             measured = np.array([state.effort for state in window])
+            if effort_map is not None:
+                measured = effort_map(measured, velocity, is_measured=True)
             return form.averaging @ measured
-        return commands.average(window[0].stamp_ns, window[-1].stamp_ns, form.cumulative)
+        span = window[0].stamp_ns, window[-1].stamp_ns
+        if effort_map is None:
+            return commands.average(*span, form.cumulative)
+
+        def acting(held: np.ndarray, seconds: np.ndarray) -> np.ndarray:
+            offsets = form.times - form.times[0]
+            v = np.column_stack([np.interp(seconds, offsets, column) for column in velocity.T])
+            return effort_map(held, v, is_measured=False)
+
+        return commands.average(*span, form.cumulative, acting)
 
     def _assemble(
         self, window: list[State], at: int, weights: _Weights, motion: Motion

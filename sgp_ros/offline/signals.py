@@ -11,7 +11,7 @@ other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from sgp_ros.engine.samples import Event
+    from sgp_ros.robots.effect_terms import EffortMap
     from sgp_ros.robots.robot import Robot
 
 SHORTEST_SEGMENT = 16
@@ -99,6 +100,9 @@ def collect_signals(
     steps = np.concatenate([np.diff(accepted.stamps_ns[rows]) for rows in used])
     step = 1e-9 * float(np.median(steps))
     parts = [_Part.of(accepted, rows, step) for rows in used]
+    if robot.effort_map is not None:
+        parts = [part.acting(robot.effort_map, is_measured=accepted.effort is not None)
+                 for part in parts]  # fmt: skip
     ends = np.cumsum([len(part.time) for part in parts])
     starts = [0, *ends[:-1]]
     return Signals(
@@ -143,6 +147,18 @@ class _Part:
         assert effort is not None
         start = (int(stamps[0]) - int(accepted.stamps_ns[0])) * 1e-9
         return cls(start + np.arange(n) * step, position, velocity, effort, command)
+
+    def acting(self, effort_map: EffortMap, *, is_measured: bool) -> _Part:
+        """Return the segment with the efforts that act in place of the recorded ones."""
+        v = self.velocity
+        if v is None:
+            v = np.gradient(self.position, self.time, axis=0)
+        command = self.command
+        if command is not None:
+            command = effort_map(command, v, is_measured=False)
+        return replace(
+            self, effort=effort_map(self.effort, v, is_measured=is_measured), command=command
+        )
 
 
 def _linear(grid: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:

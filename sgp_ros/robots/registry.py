@@ -46,7 +46,7 @@ ROBOTS: dict[str, Robot] = {
 _KEYS = {'schema', 'robot', 'joints', 'parameters'}
 _URDF_KEYS = {
     'schema', 'urdf', 'name', 'joints', 'locked', 'passive', 'effort_gain', 'payload', 'terms',
-    'coulomb_width', 'stribeck_velocity', 'prior', 'residual_inputs', 'parameters',
+    'coulomb_width', 'stribeck_velocity', 'prior', 'residual_inputs', 'effects', 'parameters',
 }  # fmt: skip
 
 

@@ -18,6 +18,8 @@ from sgp_ros.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from sgp_ros.robots.effect_terms import EffortMap
+
 CHANNELS = ('position', 'velocity', 'acceleration', 'effort')
 """The four quantities of a joint."""
 INPUT_CHANNELS = (*CHANNELS, 'direction')
@@ -126,6 +128,7 @@ class Robot:
         residual_inputs: per joint, the names (`velocity:pole`) of what its Z sees.
         description: one sentence with the source of the model.
         source: the entries of a robot YAML that build this robot; empty for a built-in one.
+        effort_map: from recorded efforts to those that act on the joints; None for the same.
     """
 
     name: str
@@ -135,6 +138,7 @@ class Robot:
     residual_inputs: tuple[tuple[str, ...], ...]
     description: str = ''
     source: Mapping[str, object] = field(default_factory=dict, compare=False)
+    effort_map: EffortMap | None = None
 
     @property
     def joint_names(self) -> tuple[str, ...]:

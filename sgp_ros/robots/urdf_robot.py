@@ -15,6 +15,9 @@ A robot YAML with the key `urdf` says which joints move and which physics is ass
     stribeck_velocity: 0.1      # rad/s or m/s
     prior: {inertial: {spread: 0.3}}   # about the values of the URDF; flat if not said
     residual_inputs: own        # or all, or a list such as [velocity:j1]
+    effects:                    # physics beside the terms, in the words of a diagnosis
+      - {effect: spring, joint: j1, parameters: {stiffness: {value: 2.9, std: 0.1},
+                                                 rest: {value: 0.4, std: 0.01}}}
 
 Only `schema` and `urdf` must be there. The model predicts efforts; where accelerations are wanted,
 as on joints without effort, the engine solves the same equation of motion for them.
@@ -27,17 +30,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.robots.effect_terms import changed_tree, effect_terms, effort_map
 from sgp_ros.robots.entries import Entries
 from sgp_ros.robots.inertial import inertial_term
 from sgp_ros.robots.joint_terms import JOINT_TERMS, Shape, joint_term
 from sgp_ros.robots.nominal_prior import inertial_prior, joint_prior
 from sgp_ros.robots.robot import Joint, Robot
+from sgp_ros.robots.stated_effects import read_effects
 from sgp_ros.robots.tree import Payload, Tree, read_urdf
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from sgp_ros.robots.robot import Term
+    from sgp_ros.robots.stated_effects import StatedEffect
 
 DEFAULT_TERMS: Mapping[str, str] = dict.fromkeys(
     ('inertial', 'viscous', 'coulomb', 'offset'), 'all'
@@ -64,7 +70,12 @@ def build_urdf_robot(
     if tree is None:
         return None
     joints = _joints(tree, entries.numbers('effort_gain'), problems)
-    terms = tuple(_terms(tree, joints, entries))
+    effects = read_effects(document.get('effects'), tree, problems)
+    width = entries.positive('coulomb_width', Shape().coulomb_width)
+    terms = (
+        *_terms(changed_tree(tree, effects), joints, entries),
+        *effect_terms(tree, effects, width),
+    )
     names = tree.moving_names
     robot = Robot(
         name=entries.text('name', tree.name),
@@ -72,9 +83,10 @@ def build_urdf_robot(
         target='effort',
         terms=terms,
         residual_inputs=tuple((f'position:{name}', f'velocity:{name}') for name in names),
-        description=f'Rigid-body tree of {tree.size} joints from {path.name}',
+        description=_description(tree, path, effects),
         source={k: v for k, v in document.items() if k not in {'schema', 'urdf', 'parameters'}}
         | {'urdf': str(path.resolve())},
+        effort_map=effort_map(tree, effects, width),
     )
     return _with_inputs(robot, document.get('residual_inputs', 'own'), problems)
 
@@ -94,6 +106,24 @@ def nominal_robot(robot: Robot) -> Robot:
     if nominal is None or problems:
         raise ConfigError(f'URDF {source["urdf"]}: ' + ' | '.join(problems), 'as it was before')
     return nominal
+
+
+def nominal_tree(robot: Robot) -> Tree:
+    """Return the kinematic tree of a robot from a URDF, with the file's inertias and damping.
+
+    Raises:
+        ConfigError: the robot has no URDF, or it is no longer what it was.
+    """
+    if 'urdf' not in robot.source:
+        raise ConfigError(
+            f'robot {robot.name} has no URDF', 'a .urdf, or a robot YAML with the key urdf'
+        )
+    problems: list[str] = []
+    source = str(robot.source['urdf'])
+    tree = _read_tree(Entries(robot.source, problems), Path(source))
+    if tree is None:
+        raise ConfigError(f'URDF {source}: ' + ' | '.join(problems), 'as it was before')
+    return tree
 
 
 def _read_tree(entries: Entries, path: Path) -> Tree | None:
@@ -122,6 +152,14 @@ def _payload(entries: Entries) -> Payload | None:
         inner.vector('com', 3),
         inner.vector('inertia', 6),
     )
+
+
+def _description(tree: Tree, path: Path, effects: Sequence[StatedEffect]) -> str:
+    text = f'Rigid-body tree of {tree.size} joints from {path.name}'
+    for is_online, lead in ((True, 'with'), (False, 'not modelled online:')):
+        named = [f'{e.name} of {e.joint}' for e in effects if e.is_online == is_online]
+        text += f'; {lead} {", ".join(named)}' if named else ''
+    return text
 
 
 def _joints(tree: Tree, gains: Mapping[str, float], problems: list[str]) -> tuple[Joint, ...]:

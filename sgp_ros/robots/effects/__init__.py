@@ -1,0 +1,1 @@
+"""Physics that a nominal robot may lack, as data: one `Effect` for each kind."""

@@ -1,0 +1,159 @@
+"""Effects with memory and of the sensors: hysteresis, backlash, eccentric encoders."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numba import njit
+
+from sgp_ros.robots.effects.effect import (
+    Effect,
+    Place,
+    Quantity,
+    always,
+    every_joint,
+    every_motor,
+    is_positive,
+)
+from sgp_ros.robots.effects.loads import per_turn, wave
+
+if TYPE_CHECKING:
+    from sgp_ros.robots.effects.effect import Fitted
+    from sgp_ros.robots.effects.observed_motion import ObservedMotion
+
+
+def _hysteresis(motion: ObservedMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+    q = motion.position[:, place.joint]
+    return -_bristle(q, float(shape[0]))[:, None]
+
+
+@njit(cache=True)
+def _bristle(q: np.ndarray, presliding: float) -> np.ndarray:
+    """Return z of `dz/dt = (v - |v| z) / presliding`, exact for a steady direction per step."""
+    z = np.zeros(len(q))
+    for i in range(1, len(q)):
+        way = q[i] - q[i - 1]
+        sign = 1.0 if way > 0.0 else -1.0
+        z[i] = sign + (z[i - 1] - sign) * np.exp(-abs(way) / presliding)
+    return z
+
+
+def _ways(motion: ObservedMotion, place: Place) -> np.ndarray:
+    q = motion.position[:, place.joint]
+    span = np.quantile(q, 0.95) - np.quantile(q, 0.05)
+    return span * np.array([0.003, 0.01, 0.03, 0.07, 0.15, 0.3, 0.6])[:, None]
+
+
+def _eccentric(motion: ObservedMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+    """Return the change of the nominal efforts per amplitude of sine and cosine, (n, k, 2).
+
+    The encoder shows `q + e(q)`, so that the true motion is, to first order, `q - e(q)`.
+    """
+    j = place.joint
+    rate = shape[0] * per_turn(motion, j)
+    q, v, a = motion.position[:, j], motion.velocity[:, j], motion.acceleration[:, j]
+    angle = rate * q
+    by_q, by_v, by_a = motion.effort_slopes(j)
+    columns = []
+    for wave_, slope in ((np.sin, np.cos), (np.cos, lambda x: -np.sin(x))):
+        e = wave_(angle)
+        de = rate * slope(angle) * v
+        dde = rate * slope(angle) * a - rate**2 * e * v**2
+        columns.append(by_q * e[:, None] + by_v * de[:, None] + by_a * dde[:, None])
+    return np.stack(columns, axis=2)
+
+
+def _turns(motion: ObservedMotion, place: Place) -> np.ndarray:
+    if motion.tree.is_prismatic[place.joint]:
+        span = float(np.ptp(motion.position[:, place.joint]))
+        return np.arange(1.0, 9.0)[:, None] / max(span, 1e-9)
+    return np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])[:, None]
+
+
+def _is_monotonic(f: Fitted) -> bool:
+    """Return whether the encoder's error changes by less than half of the way."""
+    slope = np.hypot(*f.coefficients) * f.shape[0] * per_turn(f.motion, f.place.joint)
+    return bool(slope < 0.5)
+
+
+def _backlash(motion: ObservedMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+    """Return the force that play seems to exert, (n, 1).
+
+    Encoder and damping sit on the motor, of inertia `share M`. Where it leads the link by delta,
+    the nominal model asks for `(1 - share) M d^2 delta/dt^2` too much. In contact the force
+    between them is `(1 - share) tau + share h`; when it changes its sign, the two fly freely to
+    the other side, with the relative acceleration `tau / (share M) + h / ((1 - share) M)`.
+    """
+    j = place.joint
+    share = shape[0]
+    inertia = motion.mass_diagonal[:, j]
+    damped = motion.tree.damping[j] * motion.velocity[:, j]
+    link = motion.nominal_effort[:, j] - inertia * motion.acceleration[:, j] - damped
+    pressed = (1.0 - share) * (motion.effort[:, j] - damped) + share * link
+    relative = pressed / np.maximum(share * (1.0 - share) * inertia, 1e-12)
+    lead = _play(pressed, relative, float(shape[1]), motion.step)
+    return ((1.0 - share) * inertia * _second_difference(lead, motion.step))[:, None]
+
+
+@njit(cache=True)
+def _play(needed: np.ndarray, relative: np.ndarray, gap: float, step: float) -> np.ndarray:
+    """Return how far the motor leads the link, between half a gap to either side, (n,)."""
+    n = len(needed)
+    lead = np.zeros(n)
+    x = 0.5 * gap if needed[0] > 0.0 else -0.5 * gap
+    v = 0.0
+    for i in range(n):
+        at_high, at_low = x >= 0.5 * gap, x <= -0.5 * gap
+        if (at_high and needed[i] >= 0.0) or (at_low and needed[i] <= 0.0):
+            v = 0.0
+        else:
+            v += relative[i] * step
+            x += v * step
+            if x >= 0.5 * gap:
+                x, v = 0.5 * gap, 0.0
+            elif x <= -0.5 * gap:
+                x, v = -0.5 * gap, 0.0
+        lead[i] = x
+    return lead
+
+
+def _second_difference(x: np.ndarray, step: float) -> np.ndarray:
+    return np.diff(np.pad(x, 1, mode='edge'), 2) / step**2
+
+
+def _gaps(motion: ObservedMotion, place: Place) -> np.ndarray:
+    span = float(np.ptp(motion.position[:, place.joint]))
+    widths = np.geomspace(0.0005, 0.04, 7) * span
+    shares = (0.06, 0.12, 0.18, 0.24, 0.3, 0.37, 0.45, 0.55, 0.7)
+    return np.array([[share, width] for share in shares for width in widths])
+
+
+HYSTERESIS = Effect(
+    'hysteresis', (Quantity('level', 'N m'), Quantity('presliding', 'rad')), _hysteresis,
+    every_joint, _ways,
+    lambda f: {'level': float(f.coefficients[0]), 'presliding': float(f.shape[0])},
+    is_positive, 'tau_x = -level z, dz/dt = (v - |v| z) / presliding',
+    bounds=lambda motion, place: (
+        _ways(motion, place)[0] / 5.0, _ways(motion, place)[-1] * 3.0
+    ),
+)  # fmt: skip
+ENCODER_ECCENTRICITY = Effect(
+    'encoder_eccentricity',
+    (Quantity('amplitude', 'rad'), Quantity('periods', '1/revolution'), Quantity('phase', 'rad')),
+    _eccentric, every_joint, _turns, wave, _is_monotonic,
+    'encoder shows q + amplitude sin(periods q + phase)', uses_bodies=True,
+    bounds=lambda motion, place: (
+        _turns(motion, place)[0] * 0.9, _turns(motion, place)[-1] * 1.5
+    ),
+)  # fmt: skip
+BACKLASH = Effect(
+    'backlash', (Quantity('gap', 'rad'),), _backlash, every_motor, _gaps,
+    lambda f: {'gap': float(f.shape[1])}, always,
+    'motor and link play freely within gap; the encoder sits on the motor', is_given=True,
+    uses_bodies=True,
+    bounds=lambda motion, place: (
+        np.array([0.01, 1e-9]),
+        np.array([0.95, float(np.ptp(motion.position[:, place.joint]))]),
+    ),
+)  # fmt: skip
