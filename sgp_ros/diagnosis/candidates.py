@@ -1,0 +1,266 @@
+"""Candidate models: effects at places with shapes, fitted jointly with the inertial parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.diagnosis.regression import Frame
+from sgp_ros.diagnosis.suspects import Columns, Suspect, dry_joints, shape_bounds, with_shapes
+from sgp_ros.robots.effects.effect import Fitted
+
+if TYPE_CHECKING:
+    from sgp_ros.diagnosis.equations import Equations
+    from sgp_ros.robots.effects.effect import Place
+
+FLOOR_SHARE = 1e-5
+"""Errors of signals and filters that no model explains, as a share of the mean square."""
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A fitted hypothesis.
+
+    Attributes:
+        suspects: effects with their shapes.
+        coefficients: linear coefficients per suspect.
+        w: (p,) inertial parameters' changes in standard deviations.
+        sigma: (k,) root mean square of the residual with its floor.
+        score: log likelihood less penalties [nats].
+        residual: (N, k) [N m or N].
+        forces: filtered force of each suspect, (N, k).
+    """
+
+    suspects: tuple[Suspect, ...]
+    coefficients: tuple[np.ndarray, ...]
+    w: np.ndarray
+    sigma: np.ndarray
+    score: float
+    residual: np.ndarray
+    forces: tuple[np.ndarray, ...]
+    frame: Frame = field(repr=False)
+
+    @property
+    def key(self) -> frozenset[tuple[str, Place]]:
+        """Effects and places, without their order."""
+        return frozenset(s.key for s in self.suspects)
+
+    @property
+    def is_free(self) -> bool:
+        """Whether inertial parameters may differ from the nominal ones."""
+        return self.frame.is_free
+
+    @property
+    def mean_square(self) -> np.ndarray:
+        """Mean squares of the residual, (k,)."""
+        return np.asarray((self.residual**2).mean(axis=0))
+
+    @property
+    def size(self) -> int:
+        """Number of fitted parameters of the suspects."""
+        return sum(
+            len(s.shape) + (0 if s.effect.is_given else len(c))
+            for s, c in zip(self.suspects, self.coefficients, strict=True)
+        )
+
+    @property
+    def cost(self) -> float:
+        """What the freedom of the model costs [nats]."""
+        return _cost(self.frame, self.size)
+
+    @property
+    def likelihood(self) -> float:
+        """Score before its freedom is paid for [nats]."""
+        return self.score + self.cost
+
+    def is_possible(self) -> bool:
+        """Return whether every effect has signs and sizes that it can have."""
+        motion = self.frame.equations.motion
+        return all(
+            s.effect.is_possible(Fitted(motion, s.place, s.shape, c))
+            for s, c in zip(self.suspects, self.coefficients, strict=True)
+        )
+
+    @property
+    def freedom(self) -> int:
+        """Number of parameters of effects and bodies that the data determine."""
+        return self.size + self.frame.determined
+
+    @property
+    def net_share(self) -> float:
+        """Share that all effects together have of the mean squared effort, over all joints."""
+        net = sum(self.forces, np.zeros_like(self.residual))
+        return float(((net**2).mean(axis=0) / self.frame.equations.power).sum())
+
+    def share(self, index: int) -> float:
+        """Return the greatest share that an effect has of the mean squared effort of a joint."""
+        squares = (self.forces[index] ** 2).mean(axis=0)
+        return float((squares / self.frame.equations.power).max())
+
+
+def floors(equations: Equations) -> np.ndarray:
+    """Return the least variance of a residual, (k,)."""
+    return FLOOR_SHARE * equations.power + equations.model_error + 1e-300
+
+
+def fit(
+    columns: Columns,
+    suspects: tuple[Suspect, ...],
+    sigma: np.ndarray,
+    *,
+    is_free: bool = True,
+    w: np.ndarray | None = None,
+    rounds: int = 3,
+    steps: int = 12,
+) -> Model:
+    """Fit shapes, coefficients and inertial parameters; the scale of each joint by iteration.
+
+    Args:
+        columns: of the recording.
+        suspects: effects with the shapes to start from.
+        sigma: (k,) scale to start from [N m or N].
+        is_free: whether inertial parameters may differ.
+        w: (p,) their change to start from; None for none.
+        rounds: iterations.
+        steps: of the search in the first.
+    """
+    equations = columns.equations(dry_joints(suspects))
+    frame = Frame.of(equations, sigma, is_free=is_free)
+    model = None
+    for _ in range(rounds):
+        suspects = _searched(frame, columns, suspects, steps, w)
+        model = _solved(frame, columns, suspects, w)
+        w = model.w if is_free else None
+        frame = Frame.of(equations, model.sigma, is_free=is_free)
+        steps = max(steps // 2, 4)
+    assert model is not None
+    return _solved(frame, columns, suspects, w)
+
+
+def split(
+    frame: Frame, columns: Columns, suspects: tuple[Suspect, ...], w: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray, list[int]]:
+    """Return target less given effects, free columns (projected), and their widths."""
+    y = frame.y
+    free, widths = [], []
+    for suspect in suspects:
+        x = frame.projected(columns.of(suspect, frame.equations, w))
+        if suspect.effect.is_given:
+            y = y - x[:, 0]
+            widths.append(0)
+        else:
+            free.append(x)
+            widths.append(x.shape[1])
+    A = np.concatenate(free, axis=1) if free else np.zeros((len(y), 0))
+    return y, A, widths
+
+
+def _least(A: np.ndarray, y: np.ndarray) -> np.ndarray:
+    if not A.shape[1]:
+        return np.zeros(0)
+    scale = np.sqrt((A * A).sum(axis=0)) + 1e-300
+    c = np.linalg.lstsq(A / scale, y, rcond=1e-7)[0]
+    return c / scale
+
+
+def residual_of(
+    frame: Frame, columns: Columns, suspects: tuple[Suspect, ...], w: np.ndarray | None = None
+) -> np.ndarray:
+    """Return the scaled residual, (N k + p,)."""
+    y, A, _ = split(frame, columns, suspects, w)
+    return y - A @ _least(A, y)
+
+
+def _searched(
+    frame: Frame,
+    columns: Columns,
+    suspects: tuple[Suspect, ...],
+    steps: int,
+    w: np.ndarray | None,
+) -> tuple[Suspect, ...]:
+    """Improve the shapes by Levenberg-Marquardt within bounds."""
+    low, high = shape_bounds(frame.equations, suspects)
+    if not len(low):
+        return suspects
+    x = np.clip(np.concatenate([s.shape for s in suspects]), low, high)
+    span = np.maximum(high - low, 1e-12)
+    r = residual_of(frame, columns, with_shapes(suspects, x), w)
+    cost, damping = float(r @ r), 1e-2
+    for _ in range(steps):
+        J = np.empty((len(r), len(x)))
+        for i in range(len(x)):
+            h = 2e-4 * span[i] if x[i] + 2e-4 * span[i] <= high[i] else -2e-4 * span[i]
+            moved = x.copy()
+            moved[i] += h
+            J[:, i] = (residual_of(frame, columns, with_shapes(suspects, moved), w) - r) / (
+                h / span[i]
+            )
+        H, g = J.T @ J, J.T @ r
+        improved = False
+        for _ in range(6):
+            step = -np.linalg.solve(
+                H + damping * (np.diag(np.diag(H)) + 1e-12 * np.eye(len(x))), g
+            )
+            trial = np.clip(x + np.clip(step, -0.2, 0.2) * span, low, high)
+            r1 = residual_of(frame, columns, with_shapes(suspects, trial), w)
+            c1 = float(r1 @ r1)
+            if c1 < cost:
+                gain = (cost - c1) / cost
+                x, r, cost, improved = trial, r1, c1, True
+                damping = max(damping / 5.0, 1e-8)
+                break
+            damping *= 6.0
+        if not improved or gain < 1e-6:
+            break
+    return with_shapes(suspects, x)
+
+
+def _rotors(
+    suspects: tuple[Suspect, ...], coefficients: list[np.ndarray], equations: Equations
+) -> np.ndarray:
+    """Return the inertia that suspects add to each joint, (k,) [kg m^2 or kg]."""
+    added = np.zeros(equations.d.shape[1])
+    for s, c in zip(suspects, coefficients, strict=True):
+        if s.effect.name == 'armature':
+            added[s.place.joint] += c[0]
+    return added
+
+
+def _cost(frame: Frame, size: int) -> float:
+    """Return what the freedom of a model costs [nats]."""
+    return 0.5 * size * float(np.log(len(frame.equations.d))) + frame.occam
+
+
+def _solved(
+    frame: Frame, columns: Columns, suspects: tuple[Suspect, ...], w_before: np.ndarray | None
+) -> Model:
+    equations = frame.equations
+    y, A, widths = split(frame, columns, suspects, w_before)
+    c = _least(A, y)
+    coefficients, forces, at = [], [], 0
+    for s, m in zip(suspects, widths, strict=True):
+        x = columns.of(s, equations, w_before)
+        own = np.ones(1) if s.effect.is_given else c[at : at + m]
+        at += m
+        coefficients.append(own)
+        forces.append(x @ own)
+    left = equations.d - sum(forces, np.zeros_like(equations.d))
+    w = frame.parameters(left)
+    residual = left - equations.base @ w
+    mean = (residual**2).mean(axis=0)
+    heavier = equations.log_inertia(w, _rotors(suspects, coefficients, equations))
+    # what is measured is the motion: the floor is one of accelerations
+    variance = mean + floors(equations) * np.exp(2.0 * max(heavier, -50.0) / len(mean))
+    N = len(residual)
+    size = sum(len(s.shape) for s in suspects) + len(c)
+    score = (
+        -0.5 * N * float(np.log(variance).sum())
+        + N * heavier
+        - 0.5 * float(w @ w)
+        - _cost(frame, size)
+    )
+    return Model(
+        suspects, tuple(coefficients), w, np.sqrt(variance), score, residual, tuple(forces), frame
+    )

@@ -1,0 +1,144 @@
+"""What the competition of models lets us assert.
+
+Statistical significance is not enough: the schema calls physics what makes at least 0.4 % of the
+mean squared effort of some joint. A model is adequate when what it leaves is small against what it
+explains. Among adequate models of nearly the same residual the one with the fewest parameters is
+asserted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.diagnosis.candidates import FLOOR_SHARE
+
+if TYPE_CHECKING:
+    from sgp_ros.diagnosis.candidates import Model
+    from sgp_ros.diagnosis.equations import Equations
+    from sgp_ros.diagnosis.hypotheses import Competition
+
+LEAST_SHARE = 0.004
+"""Share of the mean squared effort below which nothing counts as physics (schema)."""
+SHARE_TOLERANCE = 0.6
+"""An estimated share may be this much smaller than the least one."""
+NATS = 10.0
+"""Evidence that an effect must have beside practical weight."""
+ADEQUATE_REST = 0.025
+"""Greatest rest of an adequate model, relative to what it explains."""
+SLIGHT_REST = 0.1 * LEAST_SHARE
+"""A rest below this share of the mean squared effort is adequate in any case."""
+ROWS = 100.0
+"""Rows that count as independent when rests are compared: the shape of a column is only nearly
+right, and what is wrong with it repeats in every row.
+"""
+SHAPE_ERROR = 0.001
+"""Part of the discrepancy that the right column may leave for the same reason."""
+PER_EFFECT, PER_PARAMETER = 15.0, 5.0
+"""What an effect, and each number that the data determine, must be worth [nats]."""
+MOST_OPPOSED = 5.0
+"""Greatest ratio of the effects' mean squares, added up, to that of their sum, or of all there is
+to explain.
+"""
+FILTER_ERRORS = 1.0
+"""Multiple of the measured errors of smoothing that a perfect model may leave."""
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """The verdict and the models behind it.
+
+    Attributes:
+        verdict: as in the schema.
+        model: that is asserted; for `unexplained` the inertial parameters alone.
+        rivals: models that were not asserted, best first.
+        rest: of the best model, relative to what it explains.
+        worst: index of the joint where most is left.
+        tentative: best model where nothing is adequate.
+        against: score of the best model without effects [nats].
+    """
+
+    verdict: str
+    model: Model
+    rivals: tuple[Model, ...]
+    rest: float
+    worst: int
+    tentative: Model | None = None
+    against: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """What mean squares are measured against.
+
+    Attributes:
+        power: (k,) mean squared efforts.
+        error: (k,) what filters and smoothing leave of a perfect model, as mean squares.
+        base: rest of the best model without effects, (k,) shares.
+        nominal: discrepancy of the nominal robot, (k,) shares.
+    """
+
+    power: np.ndarray
+    error: np.ndarray
+    base: np.ndarray
+    nominal: np.ndarray
+
+    @classmethod
+    def of(cls, equations: Equations, competition: Competition) -> Scale:
+        """Return the scale of a recording."""
+        power, error = equations.power, FILTER_ERRORS * equations.model_error
+        base = np.maximum(competition.base.mean_square - error, 0.0) / power
+        return cls(power, error, base, competition.nominal.mean_square / power)
+
+    def shares(self, model: Model) -> np.ndarray:
+        """Return what a model leaves beyond the errors of the filters, (k,) shares."""
+        return np.maximum(model.mean_square - self.error, 0.0) / self.power
+
+    def explained(self, model: Model) -> float:
+        """Return the size of what is to explain.
+
+        That is the rest of the parameters, or the effects where changed parameters could imitate
+        them, but never more than the nominal robot leaves.
+        """
+        effects = min(model.net_share, float(self.nominal.sum()))
+        return max(float(self.base.sum()), effects, 1e-12)
+
+    def rest(self, model: Model) -> float:
+        """Return the rest of a model relative to what it explains."""
+        return float(self.shares(model).sum()) / self.explained(model)
+
+    def counts(self, model: Model) -> bool:
+        """Return whether effects are large enough and do not cancel each other, or the bodies."""
+        shares = [model.share(i) for i in range(len(model.suspects))]
+        there = max(min(model.net_share, float(self.nominal.sum())), 1e-12)
+        return min(shares) > SHARE_TOLERANCE * LEAST_SHARE and sum(shares) < MOST_OPPOSED * there
+
+    def worth(self, model: Model) -> float:
+        """Return the tempered log evidence of a model, less the price of its freedom [nats]."""
+        floor = FLOOR_SHARE + SHAPE_ERROR * self.nominal + self.error / self.power
+        fit = -0.5 * ROWS * float(np.log(model.mean_square / self.power + floor).sum())
+        price = PER_EFFECT * len(model.suspects) + PER_PARAMETER * model.freedom
+        return fit - price - 0.5 * float(model.w @ model.w)
+
+
+def decide(equations: Equations, competition: Competition) -> Decision:
+    """Return the verdict on a recording."""
+    scale, base = Scale.of(equations, competition), competition.base
+    models = (*competition.singles, *competition.pairs, *competition.more)
+    able = [m for m in models if scale.counts(m) and m.score > base.score + NATS]
+    ranked = sorted(able, key=scale.worth, reverse=True)
+    worst = int(np.argmax(scale.base))
+    left = float(scale.shares(competition.parameters).max())
+    if ranked and scale.worth(ranked[0]) > scale.worth(base):
+        best, rivals = ranked[0], tuple(ranked[1:])
+        rest = scale.rest(best)
+        if rest < ADEQUATE_REST or float(scale.shares(best).max()) < SLIGHT_REST:
+            return Decision('missing_physics', best, rivals, rest, worst, against=base.score)
+        if left > SHARE_TOLERANCE * LEAST_SHARE:
+            return Decision('unexplained', base, tuple(ranked), rest, worst, best, base.score)
+    elif left > LEAST_SHARE:
+        return Decision('unexplained', base, tuple(ranked), 1.0, worst, against=base.score)
+    verdict = 'parameters_only' if base.is_free else 'no_mismatch'
+    return Decision(verdict, base, tuple(ranked), 1.0, worst, against=base.score)

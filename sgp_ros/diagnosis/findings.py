@@ -1,0 +1,170 @@
+"""Fitted models in the words of the schema."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.diagnosis.result import Finding, Location, Parameter, ParameterError
+from sgp_ros.diagnosis.uncertainty import reported_std
+from sgp_ros.robots.effects.effect import Fitted, Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sgp_ros.diagnosis.candidates import Model
+    from sgp_ros.diagnosis.certainty import Probabilities
+    from sgp_ros.diagnosis.decision import Decision
+    from sgp_ros.diagnosis.equations import Equations
+    from sgp_ros.diagnosis.remainder import Remainder
+    from sgp_ros.diagnosis.suspects import Columns
+    from sgp_ros.diagnosis.velocity_sensor import SensorLag
+    from sgp_ros.robots.effects.effect import Value
+    from sgp_ros.robots.effects.observed_motion import ObservedMotion
+
+PLACES = {-1: 'base', -2: 'tool', -3: 'all'}
+MODEL_ERROR = 0.003
+"""Relative standard deviation that approximations of the signals add to every number."""
+MOST_ALTERNATIVES = 8
+
+
+def joint_name(motion: ObservedMotion, joint: int) -> str:
+    """Return the name of a joint as in the schema."""
+    return PLACES.get(joint) or motion.tree.joint_names[joint]
+
+
+def asserted(
+    equations: Equations,
+    decision: Decision,
+    columns: Columns,
+    lags: Sequence[SensorLag],
+    remainders: Sequence[Remainder],
+    chances: Probabilities,
+) -> tuple[tuple[Finding, ...], tuple[np.ndarray, ...]]:
+    """Return the findings of a verdict, most probable first, and the force of each (N, k)."""
+    findings: list[Finding] = []
+    forces = list(decision.model.forces) if decision.verdict == 'missing_physics' else []
+    if decision.verdict == 'missing_physics':
+        std = reported_std(decision.model, columns)
+        findings = [
+            _finding(decision, decision.model, i, std[i], chances)
+            for i in range(len(decision.model.suspects))
+        ]
+    if decision.verdict == 'unexplained':
+        findings.append(_unknown(equations, decision, remainders, chances))
+    names = equations.motion.tree.joint_names
+    for lag in lags:
+        unit = Parameter(lag.time_constant, max(lag.std, MODEL_ERROR * lag.time_constant), 's')
+        findings.append(
+            Finding(
+                names[lag.joint], 'velocity_filter_lag', {'time_constant': unit}, Location(),
+                lag.nats, 0.9 * (1.0 - min(lag.rest, 1.0)), lag.share,
+                'the velocity field is the velocity behind a first-order low-pass',
+            )
+        )  # fmt: skip
+    forces += [np.zeros_like(equations.d)] * (len(findings) - len(forces))
+    order = sorted(range(len(findings)), key=lambda i: -findings[i].probability)
+    return tuple(findings[i] for i in order), tuple(forces[i] for i in order)
+
+
+def alternatives(decision: Decision, chances: Probabilities) -> tuple[Finding, ...]:
+    """Return the rivals of the asserted findings, best first."""
+    taken = {s.key for s in decision.model.suspects}
+    found: list[Finding] = []
+    for model in decision.rivals:
+        for i, suspect in enumerate(model.suspects):
+            if suspect.key in taken or len(found) >= MOST_ALTERNATIVES:
+                continue
+            taken.add(suspect.key)
+            found.append(_finding(decision, model, i, {}, chances, why=chances.why(model)))
+    return tuple(found)
+
+
+def _finding(
+    decision: Decision,
+    model: Model,
+    index: int,
+    std: dict[str, float],
+    chances: Probabilities,
+    why: str = '',
+) -> Finding:
+    suspect, c = model.suspects[index], model.coefficients[index]
+    motion = model.frame.equations.motion
+    fitted = Fitted(motion, suspect.place, suspect.shape, c)
+    values = suspect.effect.report(fitted)
+    units = {q.name: q for q in suspect.effect.quantities}
+    prismatic = suspect.place.joint >= 0 and bool(motion.tree.is_prismatic[suspect.place.joint])
+    parameters = {
+        name: _parameter(
+            value, std.get(name), units.get(name), suspect.place.kind, prismatic=prismatic
+        )
+        for name, value in values.items()
+    }
+    location = Location()
+    if suspect.effect.interval is not None:
+        variable, intervals = suspect.effect.interval(fitted)
+        location = Location((variable,), {variable: intervals})
+    return Finding(
+        joint_name(motion, suspect.place.joint), suspect.effect.name, parameters, location,
+        float(model.score - decision.against), chances.of(model, index), model.share(index),
+        suspect.effect.formula, why,
+    )  # fmt: skip
+
+
+def _parameter(
+    value: Value, std: float | None, quantity: Quantity | None, kind: str, *, prismatic: bool
+) -> Parameter:
+    if isinstance(value, str):
+        return Parameter(value)
+    unit = '' if quantity is None else quantity.unit_on(is_prismatic=prismatic)
+    if kind == 'viscous' and unit in {'N m', 'N'}:
+        unit = Quantity('', 'N m s/rad').unit_on(is_prismatic=prismatic)
+    if std is not None:
+        std = float(np.hypot(std, MODEL_ERROR * abs(value)))
+    return Parameter(value, std, unit)
+
+
+def _unknown(
+    equations: Equations,
+    decision: Decision,
+    remainders: Sequence[Remainder],
+    chances: Probabilities,
+) -> Finding:
+    names = equations.motion.tree.joint_names
+    seen = [r for r in remainders if r.joint == decision.worst]
+    on = f'it depends on {", ".join(seen[0].inputs)}' if seen else 'no function of the motion'
+    share = float(decision.model.mean_square[decision.worst] / equations.power[decision.worst])
+    return Finding(
+        names[decision.worst], 'unknown', {}, Location(), 0.0, chances.unknown, share, '', on
+    )
+
+
+def parameter_errors(equations: Equations, model: Model) -> tuple[ParameterError, ...]:
+    """Return masses and centres that differ by more than two standard deviations."""
+    tree = equations.motion.tree
+    if not model.is_free:
+        return ()
+    C = np.linalg.inv(model.frame.R.T @ model.frame.R)
+    change = (model.w @ equations.directions).reshape(-1, 10)
+    D = equations.directions.reshape(len(model.w), -1, 10)
+    found = []
+    for body, link in enumerate(tree.link_names):
+        before, after = tree.parameters[body], tree.parameters[body] + change[body]
+        if after[0] <= 0.0 or before[0] <= 0.0:
+            continue
+        slopes = {'mass': D[:, body, 0]}
+        for axis, name in enumerate('xyz'):
+            slopes[f'com_{name}'] = (
+                D[:, body, 1 + axis] - after[1 + axis] / after[0] * D[:, body, 0]
+            ) / after[0]
+        values = {'mass': (after[0], before[0], 'kg')} | {
+            f'com_{n}': (after[1 + i] / after[0], before[1 + i] / before[0], 'm')
+            for i, n in enumerate('xyz')
+        }
+        for name, (now, then, unit) in values.items():
+            std = float(np.sqrt(max(float(slopes[name] @ C @ slopes[name]), 0.0)))
+            std = float(np.hypot(std, MODEL_ERROR * abs(now - then)))
+            if abs(now - then) > 2.0 * std and abs(now - then) > 1e-9:
+                found.append(ParameterError(link, name, float(now), std, float(then), unit))
+    return tuple(found)

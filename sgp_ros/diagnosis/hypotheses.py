@@ -1,0 +1,162 @@
+"""The models that compete: inertial parameters alone, single effects, pairs of effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.diagnosis.candidates import Model, fit, floors
+from sgp_ros.diagnosis.colour import correlation_factor
+from sgp_ros.diagnosis.screening import screen
+from sgp_ros.diagnosis.suspects import Columns, Suspect
+from sgp_ros.robots.effects.catalogue import EFFECTS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from sgp_ros.diagnosis.equations import Equations
+
+FIRST, SECOND, PARENTS = 12, 5, 6
+"""Screened suspects that are fitted alone; as a second effect; first effects that get a second."""
+
+THIRD = 3
+"""Suspects that are fitted as a third, fourth, ... effect."""
+LEFT_SHARE = 0.0024
+"""Share of the mean squared effort that calls for one more effect."""
+GAIN = 10.0
+"""Evidence that it must have [nats]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Competition:
+    """All fitted models.
+
+    Attributes:
+        nominal: the nominal robot as it is.
+        parameters: wrong inertial parameters alone.
+        singles, pairs: best first.
+        more: with three effects, four, and so on.
+    """
+
+    nominal: Model
+    parameters: Model
+    singles: tuple[Model, ...]
+    pairs: tuple[Model, ...]
+    more: tuple[Model, ...] = ()
+
+    @property
+    def base(self) -> Model:
+        """The better of the two models without effects."""
+        return self.nominal if self.nominal.score >= self.parameters.score else self.parameters
+
+
+def compete(equations: Equations, progress: Callable[[float], None]) -> Competition:
+    """Fit the models that could explain the discrepancy.
+
+    Every model comes in two variants: with bodies as the nominal robot has them, and with bodies
+    that may differ. The freedom of the second has its price in evidence.
+    """
+    columns = Columns(equations)
+    start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
+    bases = [fit(columns, (), start, is_free=is_free) for is_free in (False, True)]
+    progress(0.05)
+    effects = tuple(EFFECTS.values())
+    singles: list[Model] = []
+    for number, base in enumerate(bases):
+        first = _distinct(screen(columns, base, effects), FIRST)
+        singles += [fit(columns, (s,), base.sigma, is_free=base.is_free, w=base.w) for s in first]
+        progress(0.05 + 0.2 * (number + 1))
+    singles = _ranked(singles)
+    pairs: list[Model] = []
+    parents = _varied(singles)
+    for number, single in enumerate(parents):
+        second = _distinct(screen(columns, single, effects), SECOND)
+        pairs += [
+            fit(columns, (*single.suspects, s), single.sigma, is_free=single.is_free, w=single.w,
+                rounds=2, steps=8)
+            for s in second
+        ]  # fmt: skip
+        progress(0.45 + 0.55 * (number + 1) / len(parents))
+    ranked = _ranked(pairs)
+    best = max([*singles, *ranked], key=lambda m: m.score, default=None)
+    more = [] if best is None else _extended(columns, best)
+    return Competition(bases[0], bases[1], tuple(singles), tuple(ranked), tuple(more))
+
+
+def _extended(columns: Columns, model: Model) -> list[Model]:
+    """Return models with more than two effects, for robots that lack some at several joints.
+
+    As long as a joint has fewer than two and leaves what counts as physics, the best effect on
+    such joints is added. Rows that are correlated in time count as fewer.
+    """
+    found: list[Model] = []
+    power = columns.equations(frozenset()).power
+    k = len(power)
+    while len(model.suspects) < 2 * k:
+        held = [sum(s.place.joint == j for s in model.suspects) for j in range(k)]
+        left = model.mean_square / power
+        open_ = [j for j in range(k) if left[j] > LEFT_SHARE and held[j] < 2]
+        if not open_:
+            break
+        second = [s for _, s in screen(columns, model, EFFECTS.values()) if s.place.joint in open_]
+        trials = [
+            fit(columns, (*model.suspects, s), model.sigma, is_free=model.is_free, w=model.w,
+                rounds=2, steps=4)
+            for s in second[:THIRD]
+        ]  # fmt: skip
+        gains = _gains(model, _ranked(trials))
+        if not gains or max(gains.values()) < GAIN:
+            break
+        best = max(gains, key=lambda m: gains[m])
+        model = best
+        found.append(model)
+    return [m for m in found if len(m.suspects) > 2]
+
+
+def _gains(model: Model, trials: list[Model]) -> dict[Model, float]:
+    """Return what each trial gains on a model with one effect less [nats].
+
+    The residual of real robots is correlated in time. Only the trial that leaves least tells how
+    much, for what is missing is correlated too.
+    """
+    factors: dict[int, float] = {}
+    for trial in trials:
+        j = max(trial.suspects[-1].place.joint, 0)
+        factors[j] = min(factors.get(j, np.inf), correlation_factor(trial.residual[:, j]))
+    return {
+        trial: (trial.likelihood - model.likelihood)
+        / factors[max(trial.suspects[-1].place.joint, 0)]
+        - trial.cost + model.cost
+        for trial in trials
+    }  # fmt: skip
+
+
+def _varied(singles: list[Model]) -> list[Model]:
+    """Return the first effects that get a second one: the best of each variant."""
+    chosen = []
+    for is_free in (False, True):
+        chosen += [m for m in singles if m.is_free == is_free][: PARENTS // 2]
+    return chosen
+
+
+def _distinct(found: list[tuple[float, Suspect]], count: int) -> list[Suspect]:
+    """Return the best `count` effects at places, with both of their shapes."""
+    keys: list[object] = []
+    for _, suspect in found:
+        if suspect.key not in keys:
+            keys.append(suspect.key)
+    kept = set(keys[:count])
+    return [suspect for _, suspect in found if suspect.key in kept]
+
+
+def _ranked(models: Iterable[Model]) -> list[Model]:
+    best: dict[object, Model] = {}
+    for model in models:
+        if not model.is_possible() or not np.isfinite(model.score):
+            continue
+        key = model.key, model.is_free
+        if key not in best or model.score > best[key].score:
+            best[key] = model
+    return sorted(best.values(), key=lambda model: -model.score)

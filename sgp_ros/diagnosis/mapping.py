@@ -1,0 +1,93 @@
+"""A diagnosis as the content of diagnosis.json."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sgp_ros.diagnosis.result import Diagnosis, Finding, Parameter, Proof
+
+
+def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
+    """Return the content of diagnosis.json; no number is infinite or NaN."""
+    fit: dict[str, Any] = {'target': 'torque'}
+    fit |= {stem: _proof(proof) for stem, proof in found.proofs.items()}
+    fit['predictions'] = {stem: f'pred_{stem}.csv' for stem in found.predictions}
+    return {
+        'schema': 1,
+        'verdict': found.verdict,
+        'certainty': _finite(found.certainty),
+        'findings': [_finding(f) for f in found.findings],
+        'alternatives': [_finding(f) for f in found.alternatives],
+        'parameter_errors': [
+            {
+                'link': e.link, 'parameter': e.parameter, 'value': _finite(e.value),
+                'std': _finite(e.std), 'nominal': _finite(e.nominal), 'unit': e.unit,
+            }
+            for e in found.parameter_errors
+        ],
+        'fit': fit,
+        'dependence': [
+            {'joint': d.joint, 'share': _finite(d.share),
+             'scores': {k: _finite(v) for k, v in d.scores.items()}}
+            for d in found.dependences
+        ],
+        'settings': {
+            'robot': found.robot, 'joints': list(found.joints), 'cutoff_hz': found.cutoff_hz,
+            'rate_hz': found.rate_hz, 'rows': found.rows, 'refused': dict(found.refused),
+            'remarks': list(found.remarks),
+        },
+    }  # fmt: skip
+
+
+def _finding(f: Finding) -> dict[str, Any]:
+    return {
+        'joint': f.joint,
+        'effect': f.effect,
+        'parameters': {name: _parameter(p) for name, p in f.parameters.items()},
+        'location': {
+            'variables': list(f.location.variables),
+            'intervals': {k: [list(i) for i in v] for k, v in f.location.intervals.items()},
+            'time': [list(i) for i in f.location.time],
+        },
+        'log_bayes_factor': _finite(f.log_bayes_factor),
+        'probability': _finite(f.probability),
+        'share': _finite(f.share),
+        'formula': f.formula,
+        'why': f.why,
+    }
+
+
+def _parameter(p: Parameter) -> dict[str, Any]:
+    if isinstance(p.value, str):
+        return {'value': p.value}
+    entry: dict[str, Any] = {'value': _finite(p.value)}
+    if p.std is not None and math.isfinite(p.std):
+        entry['std'] = p.std
+    return entry | {'unit': p.unit}
+
+
+def _proof(p: Proof) -> dict[str, Any]:
+    numbers: dict[str, Mapping[str, float] | float] = {
+        'nmse_before': p.nmse_before,
+        'nmse_after': p.nmse_after,
+        'acceleration_nmse_before': p.acceleration_before,
+        'acceleration_nmse_after': p.acceleration_after,
+        'nlpd_before': p.nlpd_before,
+        'nlpd_after': p.nlpd_after,
+        'rollout_nmse_before': p.rollout_before,
+        'rollout_nmse_after': p.rollout_after,
+    }
+    return {
+        name: {joint: _finite(x) for joint, x in value.items()}
+        if not isinstance(value, float)
+        else _finite(value)
+        for name, value in numbers.items()
+    }
+
+
+def _finite(x: float) -> float | None:
+    return float(x) if math.isfinite(x) else None

@@ -1,0 +1,71 @@
+"""One symmetric low-pass for the target and every column, thinned out in the same pass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import signal
+
+
+@dataclass(frozen=True)
+class ParallelFilter:
+    """A Kaiser-windowed low-pass of linear phase that keeps every `decimation`-th row.
+
+    Attributes:
+        rate: of the rows that come in [Hz].
+        cutoff: half of the gain [Hz].
+        segments: stretches of rows without a pause.
+    """
+
+    rate: float
+    cutoff: float
+    segments: tuple[slice, ...]
+
+    @property
+    def decimation(self) -> int:
+        """Rows in per row out: about two and a half rows per period of the cut-off stay."""
+        return max(1, int(self.rate / (2.5 * self.cutoff)))
+
+    @cached_property
+    def taps(self) -> np.ndarray:
+        """Symmetric weights, (2 m + 1,), of unit sum."""
+        half = max(2, round(1.6 * self.rate / self.cutoff))
+        if self.cutoff >= 0.45 * self.rate:
+            return np.ones(1)
+        return np.asarray(
+            signal.firwin(2 * half + 1, self.cutoff, window=('kaiser', 5.0), fs=self.rate)
+        )
+
+    @cached_property
+    def kept(self) -> tuple[np.ndarray, ...]:
+        """Rows in the middle of the filter for each row out, a part per segment."""
+        half = len(self.taps) // 2 + 4
+        return tuple(
+            np.arange(s.start + half, s.stop - half, self.decimation) for s in self.segments
+        )
+
+    @property
+    def rows(self) -> np.ndarray:
+        """All kept rows, (N,)."""
+        return np.concatenate(self.kept)
+
+    def __call__(self, x: np.ndarray) -> np.ndarray:
+        """Return x (n, ...) filtered and thinned out, (N, ...)."""
+        flat = x.reshape(len(x), -1)
+        half = len(self.taps) // 2
+        parts = []
+        for kept in self.kept:
+            if not len(kept):
+                continue
+            piece = flat[kept[0] - half : kept[-1] + half + 1]
+            parts.append(_decimated(self.taps, piece, self.decimation, len(kept)))
+        joined = np.concatenate(parts) if parts else np.zeros((0, flat.shape[1]))
+        return joined.reshape(len(joined), *x.shape[1:])
+
+
+def _decimated(taps: np.ndarray, x: np.ndarray, step: int, count: int) -> np.ndarray:
+    """Return the weighted sums of every `step`-th window of x, (count, m)."""
+    windows = np.lib.stride_tricks.sliding_window_view(x, len(taps), axis=0)[::step][:count]
+    return windows @ taps

@@ -1,0 +1,121 @@
+"""The whole chain: compare, locate, explain, decide, model, prove."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.diagnosis.bodies import diagnosed_bodies
+from sgp_ros.diagnosis.certainty import certainty_of, probabilities
+from sgp_ros.diagnosis.decision import Decision, decide
+from sgp_ros.diagnosis.dependence import dependences
+from sgp_ros.diagnosis.equations import make_equations
+from sgp_ros.diagnosis.final_model import FinalModel
+from sgp_ros.diagnosis.findings import alternatives, asserted, parameter_errors
+from sgp_ros.diagnosis.hypotheses import compete
+from sgp_ros.diagnosis.remainder import learn_remainder
+from sgp_ros.diagnosis.result import Diagnosis, Traces
+from sgp_ros.diagnosis.suspects import Columns
+from sgp_ros.diagnosis.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.velocity_sensor import sensor_lags
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    from sgp_ros.diagnosis.candidates import Model
+    from sgp_ros.diagnosis.equations import Equations
+    from sgp_ros.diagnosis.hypotheses import Competition
+    from sgp_ros.diagnosis.remainder import Remainder
+    from sgp_ros.engine.samples import Event
+    from sgp_ros.robots.robot import Robot
+    from sgp_ros.robots.tree import Tree
+
+
+def diagnose(
+    events: Iterable[Event],
+    robot: Robot,
+    tree: Tree,
+    tests: Mapping[str, Iterable[Event]],
+    *,
+    progress: Callable[[float], None] = lambda _share: None,
+) -> Diagnosis:
+    """Say what a recording has that the nominal robot lacks.
+
+    Args:
+        events: of the training recording.
+        robot: names, actuated joints and gains.
+        tree: nominal robot.
+        tests: events of held-out recordings, by stem.
+        progress: called with the share that is done.
+
+    Raises:
+        RecordingError: too little motion, or none of the joints.
+    """
+    raw = collect(events, robot)
+    held = {stem: collect(recording, robot) for stem, recording in tests.items()}
+    bandwidth = choose_bandwidth(raw, tree)
+    equations = make_equations(raw, tree, bandwidth)
+    competition = compete(equations, lambda share: progress(0.05 + 0.75 * share))
+    decision = decide(equations, competition)
+    lags = [lag for lag in sensor_lags(raw, equations) if lag.is_physics]
+    final = FinalModel(
+        decision.model, competition.nominal, equations, _remainders(equations, decision)
+    )
+    progress(0.9)
+    columns = Columns(equations)
+    proofs = {stem: final.prove(part, tree) for stem, part in {'train': raw, **held}.items()}
+    predictions = {stem: final.predict(part, tree) for stem, part in held.items()}
+    chances = probabilities(equations, competition, decision)
+    findings, forces = asserted(equations, decision, columns, lags, final.remainders, chances)
+    verdict = 'missing_physics' if lags and decision.verdict in _CALM else decision.verdict
+    progress(1.0)
+    prismatic = tree.is_prismatic[: tree.size]
+    return Diagnosis(
+        robot=robot.name,
+        joints=tree.moving_names,
+        units=tuple('N' if p else 'N m' for p in prismatic),
+        verdict=verdict,
+        certainty=certainty_of(findings, decision, equations, competition),
+        findings=findings,
+        alternatives=alternatives(decision, chances),
+        parameter_errors=parameter_errors(equations, decision.model),
+        proofs=proofs,
+        predictions=predictions,
+        dependences=dependences(equations, competition.parameters.residual),
+        traces=_traces(equations, competition, decision.model, final.remainders, forces),
+        cutoff_hz=bandwidth.cutoff,
+        rate_hz=1.0 / (raw.step * equations.filter.decimation),
+        rows=len(equations.d),
+        refused={reason: count for reason, count in raw.refused.items() if count},
+        bodies=diagnosed_bodies(equations, decision.model),
+    )
+
+
+_CALM = ('no_mismatch', 'parameters_only')
+
+
+def _remainders(equations: Equations, decision: Decision) -> tuple[Remainder, ...]:
+    if decision.verdict != 'unexplained':
+        return ()
+    left = decision.model.mean_square / equations.power
+    joints = [j for j in np.argsort(-left) if left[j] > 0.2 * left.max()]
+    found = [learn_remainder(equations, decision.model.residual, int(j)) for j in joints[:2]]
+    return tuple(r for r in found if r is not None)
+
+
+def _traces(
+    equations: Equations,
+    competition: Competition,
+    model: Model,
+    remainders: tuple[Remainder, ...],
+    forces: tuple[np.ndarray, ...],
+) -> Traces:
+    motion, low = equations.motion, equations.filter
+    after = model.residual.copy()
+    for r in remainders:
+        after[:, r.joint] -= low(r.force(motion))
+    return Traces(
+        equations.time, low(motion.position), low(motion.velocity), low(motion.effort),
+        equations.d, competition.parameters.residual, after, equations.noise, forces,
+    )  # fmt: skip

@@ -1,0 +1,212 @@
+"""What a diagnosis found, as data for files, reports and nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import numpy as np
+
+VERDICTS = ('no_mismatch', 'parameters_only', 'missing_physics', 'unexplained')
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One number, or word, of a finding.
+
+    Attributes:
+        value: [unit].
+        std: standard deviation; None for words and where it is not known.
+        unit: SI; empty for words.
+    """
+
+    value: float | str
+    std: float | None = None
+    unit: str = ''
+
+
+@dataclass(frozen=True, slots=True)
+class Location:
+    """The region an effect is confined to; empty where it acts everywhere.
+
+    Attributes:
+        variables: of `position`, `velocity`, `effort`, `time`.
+        intervals: by variable, `[lo, hi]` each.
+        time: `[t0, t1]` in the training recording [s].
+    """
+
+    variables: tuple[str, ...] = ()
+    intervals: Mapping[str, list[list[float]]] = field(default_factory=dict)
+    time: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """An effect that is asserted, or an alternative that is not.
+
+    Attributes:
+        joint: name; `base`, `tool` or `all` as in the schema.
+        effect: name in the schema; `unknown`.
+        parameters: by name.
+        location: region.
+        log_bayes_factor: of the model it belongs to, against the best one without effects [nats].
+        probability: that joint and effect are right, calibrated on simulated worlds.
+        share: of the mean squared effort of the joint.
+        formula: of the effect.
+        why: one sentence; for an alternative why it lost, for `unknown` what it depends on.
+    """
+
+    joint: str
+    effect: str
+    parameters: Mapping[str, Parameter]
+    location: Location
+    log_bayes_factor: float
+    probability: float
+    share: float
+    formula: str = ''
+    why: str = ''
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterError:
+    """An inertial parameter that differs from the nominal one.
+
+    Attributes:
+        link: name.
+        parameter: `mass`, `com_x` and so on.
+        value: found [unit].
+        std: of it.
+        nominal: [unit].
+        unit: SI.
+    """
+
+    link: str
+    parameter: str
+    value: float
+    std: float
+    nominal: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """How well the nominal and the final model explain one recording.
+
+    Attributes:
+        nmse_before, nmse_after: mean squared error of the effort over the variance of the
+            commanded effort, by joint.
+        acceleration_before, acceleration_after: the same of the accelerations.
+        nlpd_before, nlpd_after: mean negative log predictive density of the effort [nats].
+        rollout_before, rollout_after: error of 0.3 s roll-outs over the variance of the
+            position, by joint; empty where none were made.
+    """
+
+    nmse_before: Mapping[str, float]
+    nmse_after: Mapping[str, float]
+    acceleration_before: Mapping[str, float]
+    acceleration_after: Mapping[str, float]
+    nlpd_before: float
+    nlpd_after: float
+    rollout_before: Mapping[str, float] = field(default_factory=dict)
+    rollout_after: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Dependence:
+    """What the discrepancy of a joint depends on.
+
+    Attributes:
+        joint: name.
+        share: of the mean squared effort that the nominal robot leaves.
+        scores: share of what is left that each variable explains on held-out stretches, by name.
+    """
+
+    joint: str
+    share: float
+    scores: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Traces:
+    """Filtered signals of the training recording, for pictures.
+
+    Attributes:
+        time: (N,) [s].
+        position, velocity, effort: (N, k).
+        before: (N, k) what the nominal robot leaves of the effort [N m or N].
+        parameters: (N, k) what wrong inertial parameters alone leave.
+        after: (N, k) what the final model leaves.
+        noise: (k,) expected from the encoders.
+        forces: by finding, (N, k) force on each joint.
+    """
+
+    time: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    effort: np.ndarray
+    before: np.ndarray
+    parameters: np.ndarray
+    after: np.ndarray
+    noise: np.ndarray
+    forces: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Predictions:
+    """Accelerations that the final model predicts on a recording.
+
+    Attributes:
+        time: (n,) since the first state [s].
+        acceleration: (n, k) [rad/s^2 or m/s^2].
+    """
+
+    time: np.ndarray
+    acceleration: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Diagnosis:
+    """Everything that `sgp diagnose` found.
+
+    Attributes:
+        robot: its name.
+        joints: (k,) names.
+        units: (k,) of the efforts.
+        verdict: one of `VERDICTS`.
+        certainty: probability that the verdict is right.
+        findings: asserted, most probable first.
+        alternatives: not asserted, best first.
+        parameter_errors: of the final model; those beyond two standard deviations.
+        proofs: by stem of the recording; `train` first.
+        predictions: by stem of the held-out recordings.
+        dependences: per joint.
+        traces: for pictures.
+        cutoff_hz, rate_hz: of the filtered rows.
+        rows: number of them.
+        refused: states by reason, of the training recording.
+        remarks: for the user.
+        bodies: (b, 10) inertial parameters of the final model, of bodies that can exist, in the
+            order of the tree; None for the nominal ones.
+    """
+
+    robot: str
+    joints: tuple[str, ...]
+    units: tuple[str, ...]
+    verdict: str
+    certainty: float
+    findings: tuple[Finding, ...]
+    alternatives: tuple[Finding, ...]
+    parameter_errors: tuple[ParameterError, ...]
+    proofs: Mapping[str, Proof]
+    predictions: Mapping[str, Predictions]
+    dependences: tuple[Dependence, ...]
+    traces: Traces
+    cutoff_hz: float
+    rate_hz: float
+    rows: int
+    refused: Mapping[str, int]
+    remarks: tuple[str, ...] = ()
+    bodies: np.ndarray | None = None
