@@ -20,8 +20,8 @@ for _name in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS'):
     os.environ.setdefault(_name, '1')
 
 from sgp_ros import __version__  # noqa: E402 - the environment above comes first
+from sgp_ros import commands as run  # noqa: E402 - the environment above comes first
 from sgp_ros.errors import SgpError  # noqa: E402 - the environment above comes first
-from sgp_ros.report.progress import Progress  # noqa: E402 - the environment above comes first
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -65,6 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_simulate(commands)
     _add_replay(commands)
     _add_identify(commands)
+    _add_diagnose(commands)
     _add_import(commands)
     _add_reproduce(commands)
     return parser
@@ -73,14 +74,14 @@ def _parser() -> argparse.ArgumentParser:
 def _add(
     commands: Any,
     name: str,
-    run: Callable[[argparse.Namespace], Result],
+    called: Callable[[argparse.Namespace], Result],
     summary: str,
     example: str,
 ) -> argparse.ArgumentParser:
     parser: argparse.ArgumentParser = commands.add_parser(
         name, help=summary, description=summary, epilog=f'example: {example}'
     )
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=called)
     parser.add_argument(
         '--out', metavar='DIR', type=Path, default=Path('out') / name,
         help='folder of the results (default: %(default)s)',
@@ -93,7 +94,7 @@ def _add(
 
 def _add_demo(commands: Any) -> None:
     parser = _add(
-        commands, 'demo', _demo,
+        commands, 'demo', run.demo,
         'Identify a simulated reaction wheel live over DDS, then prove that a replay agrees.',
         'sgp demo --duration 20 --out out/demo',
     )  # fmt: skip
@@ -103,11 +104,11 @@ def _add_demo(commands: Any) -> None:
 
 def _add_simulate(commands: Any) -> None:
     parser = _add(
-        commands, 'simulate', _simulate,
-        'Write a recording of a simulated robot and the truth about it.',
-        'sgp simulate reaction_wheel --effect coulomb_friction:joint=pole,level=0.01',
+        commands, 'simulate', run.simulate,
+        'Write a recording of a simulated robot, built-in or from a URDF, and the truth about it.',
+        'sgp simulate arm.urdf --effect coulomb_friction:joint=elbow,level=0.3 --sensor bits=14',
     )  # fmt: skip
-    parser.add_argument('robot', metavar='ROBOT', help='a built-in robot')
+    parser.add_argument('robot', metavar='ROBOT', help='a built-in robot or a URDF')
     parser.add_argument('--duration', type=float, default=20.0, metavar='S', help='length [s]')
     parser.add_argument('--rate', type=float, default=None, metavar='HZ', help='sampling rate')
     parser.add_argument('--seed', type=int, default=0, metavar='N', help='seed')
@@ -120,11 +121,15 @@ def _add_simulate(commands: Any) -> None:
         '--physical', action='append', default=[], metavar='NAME=VALUE',
         help='another value of a physical parameter; may be repeated',
     )  # fmt: skip
+    parser.add_argument(
+        '--sensor', action='append', default=[], metavar='NAME=VALUE',
+        help='such as bits=14, velocity=no, jitter=0.001, drop=0.005; may be repeated',
+    )  # fmt: skip
 
 
 def _add_replay(commands: Any) -> None:
     parser = _add(
-        commands, 'replay', _replay,
+        commands, 'replay', run.replay,
         'Run a recording through the online engine and report what it learned.',
         'sgp replay robot.mcap --robot linear_axis --out out/replay',
     )  # fmt: skip
@@ -145,7 +150,7 @@ def _add_replay(commands: Any) -> None:
 
 def _add_identify(commands: Any) -> None:
     parser = _add(
-        commands, 'identify', _identify,
+        commands, 'identify', run.identify,
         'Identify a robot from a whole recording, offline: filters, parameters, URDF, roll-outs.',
         'sgp identify arm.mcap --robot arm.urdf --test other.mcap --out out/identify',
     )  # fmt: skip
@@ -172,9 +177,26 @@ def _add_identify(commands: Any) -> None:
                         help='topic of the commands')  # fmt: skip
 
 
+def _add_diagnose(commands: Any) -> None:
+    parser = _add(
+        commands, 'diagnose', run.diagnose,
+        'Locate, name and model the physics that the nominal robot lacks.',
+        'sgp diagnose real.mcap --robot robot.urdf --test real_test.mcap --out out/diagnose',
+    )  # fmt: skip
+    parser.add_argument('bag', metavar='REAL', help='.mcap file, rosbag2 directory or ROS 1 .bag')
+    parser.add_argument('--robot', required=True, metavar='ROBOT',
+                        help='a URDF, or a robot YAML with one')  # fmt: skip
+    parser.add_argument('--sim', metavar='SIM', help='recording of the nominal simulation')
+    parser.add_argument('--test', action='append', default=[], metavar='BAG',
+                        help='held-out recording for the proof; may be repeated')  # fmt: skip
+    parser.add_argument('--joint-states', metavar='TOPIC', help='topic of the states')
+    parser.add_argument('--command', metavar='TOPIC', dest='command_topic',
+                        help='topic of the commands')  # fmt: skip
+
+
 def _add_import(commands: Any) -> None:
     parser = _add(
-        commands, 'import', _import,
+        commands, 'import', run.import_recording,
         'Turn a CSV, NPZ or MAT recording into MCAP.',
         'sgp import emps_id.csv --map config/import/emps.yaml --out out/import',
     )  # fmt: skip
@@ -184,7 +206,7 @@ def _add_import(commands: Any) -> None:
 
 def _add_reproduce(commands: Any) -> None:
     parser = _add(
-        commands, 'reproduce', _reproduce,
+        commands, 'reproduce', run.reproduce,
         'Run the experiments of the paper, with every method through one interface.',
         'sgp reproduce toy --seeds 20 --out out/reproduce',
     )  # fmt: skip
@@ -193,90 +215,6 @@ def _add_reproduce(commands: Any) -> None:
     parser.add_argument('--seeds', type=int, default=None, metavar='N',
                         help='worlds per experiment (default: 20)')  # fmt: skip
     parser.add_argument('--quick', action='store_true', help='few seeds, under two minutes')
-
-
-def _reproduce(arguments: argparse.Namespace) -> Result:
-    from sgp_ros.experiments.reproduction.command import run_reproduction
-
-    return run_reproduction(
-        arguments.experiment,
-        arguments.seeds,
-        arguments.out,
-        Progress('reproduce'),
-        is_quick=arguments.quick,
-    )
-
-
-def _demo(arguments: argparse.Namespace) -> Result:
-    from sgp_ros.experiments.demo import run_demo
-
-    return run_demo(arguments.duration, arguments.seed, arguments.out, Progress('demo'))
-
-
-def _simulate(arguments: argparse.Namespace) -> Result:
-    from sgp_ros.experiments.simulation import run_simulation
-
-    return run_simulation(
-        arguments.robot,
-        arguments.out,
-        Progress('simulate'),
-        duration_s=arguments.duration,
-        rate_hz=arguments.rate,
-        seed=arguments.seed,
-        controller=arguments.controller,
-        effects=arguments.effect,
-        physical=arguments.physical,
-    )
-
-
-def _replay(arguments: argparse.Namespace) -> Result:
-    from sgp_ros.experiments.replay import ReplayOptions, run_replay
-
-    options = ReplayOptions(
-        joint_states=arguments.joint_states,
-        command=arguments.command_topic,
-        model=arguments.model,
-        is_learning=not arguments.frozen,
-        truth=arguments.truth,
-    )
-    return run_replay(
-        arguments.bag,
-        arguments.robot,
-        arguments.params,
-        arguments.out,
-        options,
-        progress=Progress('replay'),
-    )
-
-
-def _identify(arguments: argparse.Namespace) -> Result:
-    from sgp_ros.experiments.identify import IdentifyOptions, run_identify
-    from sgp_ros.offline.identification import IdentificationOptions
-
-    options = IdentifyOptions(
-        tests=arguments.test,
-        joint_states=arguments.joint_states,
-        command=arguments.command_topic,
-        effort_source=arguments.effort,
-        identification=IdentificationOptions(
-            residual_inputs=None if arguments.inputs is None else tuple(arguments.inputs),
-            holdout=arguments.holdout,
-            share=arguments.share,
-            stretch_s=arguments.stretch,
-            cutoff=arguments.cutoff,
-        ),
-    )
-    return run_identify(
-        arguments.bag, arguments.robot, arguments.out, options, progress=Progress('identify')
-    )
-
-
-def _import(arguments: argparse.Namespace) -> Result:
-    from sgp_ros.recordings.tables import import_table
-
-    summary = import_table(arguments.file, arguments.map, arguments.out)
-    print(f'{summary.samples} states of {", ".join(summary.joints)} in {summary.path}')
-    return summary.to_mapping()
 
 
 if __name__ == '__main__':

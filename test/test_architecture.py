@@ -20,7 +20,7 @@ LAYERS = {
     'errors': set(),
     'core': NUMERIC | {'clarabel', 'numba', 'errors'},
     'robots': {'numpy', 'numba', 'pinocchio', 'yaml', 'errors'},
-    'simulation': NUMERIC | {'errors'},
+    'simulation': NUMERIC | {'mujoco', 'errors'},
     'engine': {'numpy', 'core', 'robots', 'errors'},
     'offline': NUMERIC | {'numba', 'core', 'robots', 'engine.samples', 'errors'},
     'recordings': {
@@ -39,7 +39,12 @@ LAYERS = {
         'numpy', 'matplotlib', 'yaml', 'core', 'robots', 'simulation', 'engine', 'recordings',
         'diagnosis', 'report', 'offline', 'errors',
     },
+    'commands': {
+        'core', 'robots', 'simulation', 'engine', 'recordings', 'diagnosis', 'report',
+        'experiments', 'offline', 'errors',
+    },
     'cli': {
+        'commands',
         'core', 'robots', 'simulation', 'engine', 'recordings', 'diagnosis', 'report',
         'experiments', 'offline', 'errors',
     },

@@ -1,0 +1,273 @@
+"""Figures of a diagnosis over the motion: where, when, after which law."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from sgp_ros.diagnosis.decision import LEAST_SHARE
+from sgp_ros.report.diagnosis_charts import draw_dependence, draw_proof
+from sgp_ros.report.diagnosis_text import effect_name, scored_joints, worst_joint
+from sgp_ros.report.figures import BAND, GREY, MEASURED, PREDICTED
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import QuadMesh
+
+    from sgp_ros.diagnosis.result import Diagnosis, Finding
+
+FORCES = (PREDICTED, '#009E73', '#CC79A7')
+"""One colour for each finding (Okabe and Ito 2008)."""
+_CELLS = 24
+_LARGE, _IMPORTANT = 3, 0.1
+_ZOOM_S = 4.0
+_SMALL_COLUMNS = 6
+LAWS = {
+    'viscous_friction': 'velocity', 'coulomb_friction': 'velocity',
+    'stribeck_friction': 'velocity', 'quadratic_drag': 'velocity',
+    'asymmetric_coulomb': 'velocity', 'load_friction': 'velocity', 'hysteresis': 'velocity',
+    'torque_gain': 'effort', 'dead_zone': 'effort', 'saturation': 'effort',
+    'friction_drift': 'time', 'actuator_lag': 'time', 'command_delay': 'time',
+    'backlash': 'time', 'armature': 'acceleration',
+}  # fmt: skip
+"""Variable over which the force of an effect is drawn; the position for all others."""
+_MEMORY = ('actuator_lag', 'command_delay', 'backlash')
+"""Effects whose force is no function of the state: drawn over a few seconds."""
+
+
+def important_joints(found: Diagnosis) -> list[int]:
+    """Return the joints that deserve large pictures, at most three, in order of the robot."""
+    proof = found.proofs['train']
+    worst = worst_joint(proof)
+    if found.verdict == 'no_mismatch':
+        return [found.joints.index(worst)]
+    named = {f.joint for f in found.findings}
+    least = max(_IMPORTANT * proof.nmse_before[worst], _IMPORTANT * LEAST_SHARE)
+    rank = {
+        j: (name in named) + min(proof.nmse_before[name] / max(least, 1e-300), 1e9) * 1e-9
+        for j, name in enumerate(found.joints)
+        if name in named or (name in scored_joints(proof) and proof.nmse_before[name] >= least)
+    }
+    best = sorted(rank, key=lambda j: -rank[j])[:_LARGE]
+    return sorted(best) or [found.joints.index(worst)]
+
+
+def draw_diagnosis(found: Diagnosis) -> dict[str, Figure]:
+    """Return the figures of a diagnosis by file stem; those without content are left out."""
+    figures = {'location': draw_location(found), 'time': draw_time(found)}
+    if len(important_joints(found)) < len(found.joints):
+        figures['others'] = draw_others(found)
+    if any(f.effect != 'unknown' for f, _ in _forces(found)):
+        figures['law'] = draw_laws(found)
+    if found.findings:
+        large = {found.joints[j] for j in important_joints(found)}
+        figures['dependence'] = draw_dependence(found, large)
+    for f in found.findings:
+        if f.effect == 'unknown' and f.joint in found.joints:
+            figures['shape'] = draw_shape(found, f)
+    figures['proof'] = draw_proof(found)
+    return figures
+
+
+def draw_location(found: Diagnosis) -> Figure:
+    """Draw what nominal robot and final model leave over position and velocity, on one scale."""
+    joints = important_joints(found)
+    left = [('left by the nominal robot', found.traces.before)]
+    if found.verdict != 'no_mismatch':
+        left.append(('left by the final model', found.traces.after))
+    figure = Figure(figsize=(1.0 + 4.5 * len(left), 0.3 + 3.2 * len(joints)), layout='constrained')
+    grid = figure.subplots(len(joints), len(left), squeeze=False, sharex='row', sharey='row')
+    for row, j in zip(grid, joints, strict=True):
+        reach = _reach(found, j)
+        for axes, (title, values) in zip(row, left, strict=True):
+            mesh = _map(axes, found, j, values[:, j], reach)
+            axes.set_title(f'{found.joints[j]}: {title}', fontsize='medium')
+            axes.set_xlabel(f'position [{_unit(found, j)}]')
+            _mark(axes, found, j)
+        row[0].set_ylabel(f'velocity [{_unit(found, j)}/s]')
+        figure.colorbar(mesh, ax=row, label=f'mean effort left [{found.units[j]}]')
+    return figure
+
+
+def draw_others(found: Diagnosis) -> Figure:
+    """Draw the maps of the other joints small, on the scale of the largest discrepancy."""
+    large = important_joints(found)
+    others = [j for j in range(len(found.joints)) if j not in large]
+    scale = _scale(found)
+    share = max(_reach(found, j) / scale[j] for j in large)
+    columns = min(len(others), _SMALL_COLUMNS)
+    rows = -(-len(others) // columns)
+    figure = Figure(figsize=(0.4 + 1.9 * columns, 0.5 + 1.7 * rows), layout='constrained')
+    for i, j in enumerate(others):
+        axes = figure.add_subplot(rows, columns, i + 1)
+        _map(axes, found, j, found.traces.before[:, j], share * scale[j])
+        axes.set_title(found.joints[j], fontsize='small')
+        axes.tick_params(labelsize='x-small')
+    return figure
+
+
+def draw_time(found: Diagnosis) -> Figure:
+    """Draw the discrepancy over time, the noise, the forces of the findings, what is left."""
+    joints = important_joints(found)
+    figure = Figure(figsize=(10, 0.5 + 2.6 * len(joints)), layout='constrained')
+    grid = figure.subplots(len(joints), 2, squeeze=False, width_ratios=(3, 2))
+    for row, j in zip(grid, joints, strict=True):
+        for axes, shown in zip(row, (slice(None), _zoom(found, j)), strict=True):
+            _trace(axes, found, j, shown)
+        row[0].set_ylabel(f'{found.joints[j]} [{found.units[j]}]')
+    for axes in grid[-1]:
+        axes.set_xlabel('time [s]')
+    grid[0][0].set_title('whole recording', fontsize='medium')
+    grid[0][1].set_title('where most is left', fontsize='medium')
+    handles, labels = grid[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc='outside lower center', ncols=5, fontsize='small')
+    return figure
+
+
+def draw_laws(found: Diagnosis) -> Figure:
+    """Draw each finding's force over what it depends on, and the data without all else."""
+    shown = [(f, force) for f, force in _forces(found) if f.effect != 'unknown'][:_LARGE]
+    figure = Figure(figsize=(10 if len(shown) > 1 else 6.5, 3.6), layout='constrained')
+    for i, (finding, force) in enumerate(shown):
+        axes = figure.add_subplot(1, len(shown), i + 1)
+        j = _strongest(found, finding, force)
+        x, label = _abscissa(found, finding, j)
+        law, measured = force[:, j], found.traces.after[:, j] + force[:, j]
+        style = '.'
+        if finding.effect in _MEMORY:
+            zoom, style = _zoom(found, j), '-'
+            x, law, measured = x[zoom], law[zoom], measured[zoom]
+        elif finding.effect == 'friction_drift':
+            law, measured = np.abs(law), np.abs(measured)
+        colour = FORCES[i % len(FORCES)]
+        axes.plot(x, measured, style, ms=6, lw=3.5, color=MEASURED, label='measured')
+        axes.plot(x, law, style, ms=1.8, lw=1.2, color=colour, label='the law')
+        axes.axhline(0.0, color=GREY, lw=0.6)
+        axes.set(xlabel=label, ylabel=f'force on {found.joints[j]} [{found.units[j]}]')
+        axes.set_title(effect_name(finding), fontsize='medium')
+        if 'position' in label:
+            _mark(axes, found, j)
+        axes.legend(fontsize='small', markerscale=2)
+    return figure
+
+
+def draw_shape(found: Diagnosis, unknown: Finding) -> Figure:
+    """Draw an unexplained discrepancy over what it depends on most, for both directions."""
+    j = found.joints.index(unknown.joint)
+    scores = next(d.scores for d in found.dependences if d.joint == unknown.joint)
+    own = [name for name in ('position', 'velocity', 'effort') if name in scores]
+    best = max(own, key=lambda name: scores[name])
+    x, label = _abscissa(found, unknown, j, best)
+    figure = Figure(figsize=(6.5, 3.6), layout='constrained')
+    axes = figure.add_subplot()
+    forward = found.traces.velocity[:, j] > 0.0
+    for rows, colour, text in ((forward, FORCES[0], 'forward'), (~forward, FORCES[2], 'backward')):
+        axes.plot(x[rows], found.traces.parameters[rows, j], '.', ms=3, color=colour, label=text)
+    axes.axhline(0.0, color=GREY, lw=0.6)
+    axes.set(xlabel=label, ylabel=f'left on {unknown.joint} [{found.units[j]}]')
+    axes.legend(fontsize='small', markerscale=3)
+    return figure
+
+
+def _map(axes: Axes, found: Diagnosis, j: int, values: np.ndarray, reach: float) -> QuadMesh:
+    q, v = _position(found, j), found.traces.velocity[:, j]
+    edges = [np.linspace(x.min(), x.max() + 1e-12, _CELLS + 1) for x in (q, v)]
+    count = np.histogram2d(q, v, edges)[0]
+    total = np.histogram2d(q, v, edges, weights=values)[0]
+    mean = np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
+    axes.set_facecolor('#D4D4D4')
+    return axes.pcolormesh(*edges, mean.T, cmap='RdBu_r', vmin=-reach, vmax=reach)
+
+
+def _mark(axes: Axes, found: Diagnosis, j: int) -> None:
+    """Draw the limits of the region that a finding on this joint is confined to."""
+    for f in found.findings:
+        if f.joint == found.joints[j]:
+            for lo, hi in f.location.intervals.get('position', []):
+                axes.axvspan(lo, hi, fill=False, ec='black', ls='--', lw=1.2)
+            for lo, hi in f.location.intervals.get('velocity', []):
+                axes.axhspan(lo, hi, fill=False, ec='black', ls='--', lw=1.2)
+
+
+def _trace(axes: Axes, found: Diagnosis, j: int, shown: slice) -> None:
+    traces = found.traces
+    time = traces.time[shown]
+    half = 2.0 * float(traces.noise[j])
+    axes.plot(time, traces.before[shown, j], color=MEASURED, lw=3.5, label='nominal robot leaves')
+    for i, (finding, force) in enumerate(_forces(found)):
+        if np.abs(force[:, j]).max() > 0.0:
+            label = effect_name(finding)
+            axes.plot(time, force[shown, j], color=FORCES[i % len(FORCES)], lw=1.1, label=label)
+    if found.verdict != 'no_mismatch':
+        left = traces.after[shown, j]
+        axes.plot(time, left, color='#D55E00', lw=0.9, label='final model leaves')
+    axes.axhspan(-half, half, color=BAND, lw=0, zorder=0, label='noise (2 std)')
+    axes.margins(x=0.01)
+
+
+def _forces(found: Diagnosis) -> list[tuple[Finding, np.ndarray]]:
+    """Return the findings that exert forces, with these."""
+    exerting = [f for f in found.findings if f.effect not in {'velocity_filter_lag', 'unknown'}]
+    return list(zip(exerting, found.traces.forces, strict=False))
+
+
+def _strongest(found: Diagnosis, finding: Finding, force: np.ndarray) -> int:
+    if finding.joint in found.joints:
+        return found.joints.index(finding.joint)
+    return int(np.argmax((force**2).mean(axis=0) / _scale(found) ** 2))
+
+
+def _abscissa(
+    found: Diagnosis, finding: Finding, j: int, name: str | None = None
+) -> tuple[np.ndarray, str]:
+    name, unit = name or LAWS.get(finding.effect, 'position'), _unit(found, j)
+    traces = found.traces
+    words = {key: p.value for key, p in finding.parameters.items()}
+    if words.get('kind') == 'torque' and words.get('source_joint') in found.joints:
+        source = found.joints.index(str(words['source_joint']))
+        return traces.effort[:, source], f'effort of {found.joints[source]}'
+    curves = {
+        'time': (traces.time, 'time [s]'),
+        'velocity': (traces.velocity[:, j], f'velocity [{unit}/s]'),
+        'effort': (traces.effort[:, j], f'commanded effort [{found.units[j]}]'),
+        'acceleration': (
+            np.gradient(traces.velocity[:, j], traces.time), f'acceleration [{unit}/s^2]',
+        ),
+        'position': (_position(found, j), f'position [{unit}]'),
+    }  # fmt: skip
+    return curves[name]
+
+
+def _position(found: Diagnosis, j: int) -> np.ndarray:
+    """Return the position, wrapped where the joint made more than a turn [rad or m]."""
+    q = found.traces.position[:, j]
+    if _unit(found, j) == 'rad' and np.ptp(q) > 2.2 * np.pi:
+        return (q + np.pi) % (2 * np.pi) - np.pi
+    return q
+
+
+def _unit(found: Diagnosis, j: int) -> str:
+    return 'm' if found.units[j] == 'N' else 'rad'
+
+
+def _scale(found: Diagnosis) -> np.ndarray:
+    """Return the effort that the errors of each joint are measured by, (k,) [N m or N]."""
+    left = np.sqrt((found.traces.before**2).mean(axis=0))
+    nmse = np.array([found.proofs['train'].nmse_before[name] for name in found.joints])
+    return np.maximum(left, 1e-300) / np.sqrt(np.maximum(nmse, 1e-300))
+
+
+def _reach(found: Diagnosis, j: int) -> float:
+    """Return where the colours end: never below the least that counts as physics [N m or N]."""
+    largest = float(np.quantile(np.abs(found.traces.before[:, j]), 0.98))
+    return max(largest, float(np.sqrt(LEAST_SHARE) * _scale(found)[j]))
+
+
+def _zoom(found: Diagnosis, j: int) -> slice:
+    """Return the rows of the few seconds in which the nominal robot leaves most."""
+    length = int(np.clip(_ZOOM_S * found.rate_hz, 2, len(found.traces.time)))
+    energy = np.convolve(found.traces.before[:, j] ** 2, np.ones(length), 'valid')
+    first = int(np.argmax(energy))
+    return slice(first, first + length)

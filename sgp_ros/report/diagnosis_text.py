@@ -1,0 +1,262 @@
+"""What a diagnosis found, in plain sentences for the terminal and the top of the page."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.core.scores import INTERVAL_95
+from sgp_ros.diagnosis.result import Parameter
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sgp_ros.diagnosis.result import Diagnosis, Finding, ParameterError, Proof
+
+EFFECT_NAMES = {
+    'viscous_friction': 'viscous friction',
+    'coulomb_friction': 'Coulomb friction',
+    'stribeck_friction': 'Stribeck friction',
+    'quadratic_drag': 'quadratic drag',
+    'position_friction': 'friction in a part of the range',
+    'limit_friction': 'friction that rises towards the limit',
+    'asymmetric_coulomb': 'Coulomb friction that differs with direction',
+    'spring': 'a spring',
+    'gravity_tilt': 'a base that is not level',
+    'payload': 'a payload',
+    'cogging': 'cogging',
+    'torque_gain': 'a wrong torque constant',
+    'dead_zone': 'a dead zone of the drive',
+    'saturation': 'an early saturation of the drive',
+    'actuator_lag': 'a lag of the drive',
+    'command_delay': 'a delay of the command',
+    'backlash': 'backlash',
+    'hysteresis': 'hysteresis (presliding friction)',
+    'armature': 'rotor inertia',
+    'joint_coupling': 'a coupling between joints',
+    'encoder_eccentricity': 'an eccentric encoder',
+    'velocity_filter_lag': 'a lag of the measured velocity',
+    'friction_drift': 'friction that drifts with time',
+    'constant_load': 'a constant load',
+    'tip_force': 'a constant force on the tool',
+    'load_friction': 'friction that grows with the load',
+    'end_stop': 'an end stop',
+    'unknown': 'an unknown effect',
+}
+_PLACES = {'base': 'at the base', 'tool': 'at the tool', 'all': 'on all joints'}
+_ENTRIES = {f'com_{axis}': f'{axis} of the centre' for axis in 'xyz'}
+_MEANINGLESS = 1e6
+"""Error over variance that only a constant effort gives."""
+_SIMILAR_NATS = 20.0
+_MOST_ERRORS, _MOST_VARIABLES = 3, 2
+
+
+def verdict_sentence(found: Diagnosis) -> str:
+    """Return the finding in one sentence; `+-` is half of a 95 % interval."""
+    if found.verdict == 'missing_physics':
+        return _missing(found)
+    if found.verdict == 'parameters_only':
+        return (
+            'No physics is missing, only parameters of bodies are wrong: '
+            f'{parameter_errors_text(found.parameter_errors)} (certainty {found.certainty:.2f}); '
+            f'correcting them explains {percent(explained(found))} of what the nominal robot '
+            'leaves.'
+        )
+    if found.verdict == 'no_mismatch':
+        return _calm(found)
+    return _unexplained(found)
+
+
+def held_out_sentence(found: Diagnosis) -> str:
+    """Say how the error of the effort changes on recordings that nothing was fitted to."""
+    parts = []
+    for stem, proof in found.proofs.items():
+        if stem == 'train':
+            continue
+        joint = worst_joint(proof)
+        before, after = percent(proof.nmse_before[joint]), percent(proof.nmse_after[joint])
+        change = before if found.verdict == 'no_mismatch' else f'{before} before, {after} after'
+        parts.append(f'{change} on {stem} ({joint})')
+    if not parts:
+        return 'No recording was held out: nothing here shows how far the finding carries.'
+    return 'Left of the variance of the effort on what was held out: ' + '; '.join(parts) + '.'
+
+
+def scored_joints(proof: Proof) -> list[str]:
+    """Return the joints with a meaningful score: an effort that never changes gives none."""
+    return [
+        name
+        for name, before in proof.nmse_before.items()
+        if before < _MEANINGLESS and math.isfinite(proof.nmse_after[name])
+    ] or list(proof.nmse_before)
+
+
+def worst_joint(proof: Proof) -> str:
+    """Return the joint of which the nominal robot leaves most."""
+    return max(scored_joints(proof), key=lambda name: proof.nmse_before[name])
+
+
+def explained(found: Diagnosis) -> float:
+    """Return the share of what the nominal robot leaves that the final model takes away.
+
+    Mean squares of the training recording, relative to the effort of each joint, summed.
+    """
+    proof = found.proofs['train']
+    joints = scored_joints(proof)
+    before = sum(proof.nmse_before[name] for name in joints)
+    return 1.0 - sum(proof.nmse_after[name] for name in joints) / max(before, 1e-300)
+
+
+def phrase(finding: Finding) -> str:
+    """Return an effect in plain words, with its interval and parameters."""
+    return ', '.join([effect_name(finding), *numbers(finding)])
+
+
+def effect_name(finding: Finding) -> str:
+    """Return the plain name of an effect and of its variant."""
+    words = {name: p.value for name, p in finding.parameters.items() if isinstance(p.value, str)}
+    name = EFFECT_NAMES.get(finding.effect, finding.effect.replace('_', ' '))
+    kind = str(words.get('kind', ''))
+    if 'source_joint' in words:
+        return f'{name} ({kind} from {words["source_joint"]})'
+    return f'{"Coulomb" if kind == "coulomb" else kind} {name}'.strip()
+
+
+def place(finding: Finding) -> str:
+    """Return where an effect acts, in plain words."""
+    return _PLACES.get(finding.joint, f'on {finding.joint}')
+
+
+def numbers(finding: Finding) -> list[str]:
+    """Return the parameters of an effect, its interval first."""
+    shown = dict(finding.parameters)
+    if {'lo', 'hi'} <= shown.keys():
+        lo, hi = shown.pop('lo'), shown.pop('hi')
+        interval = [f'from {quantity(lo, is_short=True)} to {quantity(hi)}']
+    else:
+        interval = []
+    numbers = [
+        f'{name.replace("_", " ")} {quantity(p)}'
+        for name, p in shown.items()
+        if not isinstance(p.value, str)
+    ]
+    return [*interval, *numbers]
+
+
+def quantity(p: Parameter, *, is_short: bool = False) -> str:
+    """Return a number as `0.317 +- 0.002 N m`; the digits end where its interval does.
+
+    Args:
+        p: value, standard deviation and unit.
+        is_short: leave out interval and unit.
+    """
+    if isinstance(p.value, str):
+        return p.value
+    unit = '' if p.unit in {'', '1'} else f' {p.unit}'
+    half = INTERVAL_95 * p.std if p.std is not None and math.isfinite(p.std) else 0.0
+    if half <= 0.0:
+        return f'{p.value:.3g}' if is_short else f'{p.value:.3g}{unit}'
+    places = int(np.clip(1 - math.floor(math.log10(half)), 0, 12))
+    if is_short:
+        return f'{p.value:.{places}f}'
+    return f'{p.value:.{places}f} +- {half:.{places}f}{unit}'
+
+
+def percent(share: float) -> str:
+    """Return a share as per cent, without promising all of it."""
+    if not math.isfinite(share) or share > _MEANINGLESS:
+        return 'an unknown share'
+    if 0.999 < share < 1.0:
+        return 'more than 99.9 %'
+    if 0.0 < share < 1e-5:
+        return 'less than 0.001 %'
+    return f'{100.0 * share:.2g} %' if share < 0.1 else f'{100.0 * share:.3g} %'
+
+
+def parameter_errors_text(errors: Sequence[ParameterError]) -> str:
+    """Return the surest wrong parameters, such as `mass of fore 1.59 kg instead of 1.17 kg`."""
+    if not errors:
+        return 'combinations of masses, centres and inertias that this motion does not separate'
+    surest = sorted(errors, key=lambda e: -abs(e.value - e.nominal) / max(e.std, 1e-300))
+    parts = [_error(e) for e in surest[:_MOST_ERRORS]]
+    more = len(surest) - len(parts)
+    return ', '.join(parts) + (f' and {more} more' if more else '')
+
+
+def why_it_lost(rival: Finding, best: Finding | None) -> str:
+    """Return why an alternative is not asserted."""
+    if best is None:
+        return rival.why
+    gap = rival.log_bayes_factor - best.log_bayes_factor
+    count, fewer = _count(rival), _count(best)
+    if gap > 0.0:
+        return 'fits hardly better, with more parameters'
+    if gap > -_SIMILAR_NATS and count > fewer:
+        return f'fits no better, with {count} numbers instead of {fewer}'
+    return rival.why
+
+
+def _count(finding: Finding) -> int:
+    return sum(not isinstance(p.value, str) for p in finding.parameters.values())
+
+
+def _missing(found: Diagnosis) -> str:
+    first = found.findings[0]
+    text = f'Missing {place(first)}: {phrase(first)} (probability {first.probability:.2f})'
+    for f in found.findings[1:]:
+        where = '' if f.joint == first.joint else f'{place(f)}: '
+        text += f'; and {where}{phrase(f)} (probability {f.probability:.2f})'
+    if any(f.effect != 'velocity_filter_lag' for f in found.findings):
+        subject = 'it explains' if len(found.findings) == 1 else 'together they explain'
+        if found.parameter_errors:
+            subject = 'with corrected bodies it explains'
+            if len(found.findings) > 1:
+                subject = 'with corrected bodies they explain'
+        text += f'; {subject} {percent(explained(found))} of what the nominal robot leaves'
+    return text + '.'
+
+
+def _calm(found: Diagnosis) -> str:
+    proof = found.proofs['train']
+    name = worst_joint(proof)
+    j = found.joints.index(name)
+    left = float(np.sqrt((found.traces.before[:, j] ** 2).mean()))
+    noise, unit = float(found.traces.noise[j]), found.units[j]
+    text = (
+        f'No mismatch: the nominal robot leaves {percent(proof.nmse_before[name])} of the '
+        f'variance of the effort, {left:.2g} {unit} rms on {name}'
+    )
+    if left <= 2.0 * noise:
+        text += f', as much as the noise of the encoder ({noise:.2g} {unit})'
+    else:
+        text += ', too little to be physics'
+    return f'{text} (certainty {found.certainty:.2f}).'
+
+
+def _unexplained(found: Diagnosis) -> str:
+    named = [f for f in found.findings if f.effect == 'unknown']
+    joint = named[0].joint if named else found.joints[0]
+    certainty = named[0].probability if named else found.certainty
+    share = named[0].share if named else explained(found)
+    text = (
+        f'Unexplained on {joint}: {percent(share)} of the mean squared effort '
+        f'(certainty {certainty:.2f})'
+    )
+    scores = next((d.scores for d in found.dependences if d.joint == joint), {})
+    leading = sorted(scores, key=lambda name: -scores[name])[:_MOST_VARIABLES]
+    on = [f'{name} ({percent(scores[name])})' for name in leading if scores[name] > 0.05]
+    text += f'; it depends on {" and ".join(on)}' if on else '; no variable alone explains it'
+    if not found.alternatives:
+        return f'{text}; no effect of the list fits.'
+    top = found.alternatives[0]
+    nearest = [f for f in found.alternatives if f.log_bayes_factor == top.log_bayes_factor]
+    names = ' with '.join(dict.fromkeys(EFFECT_NAMES.get(f.effect, f.effect) for f in nearest))
+    return f'{text}; no effect of the list fits: the nearest, {names}, {top.why.split(", ")[0]}.'
+
+
+def _error(e: ParameterError) -> str:
+    now = quantity(Parameter(e.value, e.std, e.unit))
+    name = _ENTRIES.get(e.parameter, e.parameter.replace('_', ' '))
+    return f'{name} of {e.link} {now} instead of {e.nominal:.3g} {e.unit}'

@@ -1,0 +1,139 @@
+"""`robot_diagnosed.yaml`: what it says, that it loads, and that it predicts better."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from sgp_ros.diagnosis.result import Diagnosis, Finding, Location, Parameter
+from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.replay import replay
+from sgp_ros.experiments.diagnosed_robot import URDF_NAME, YAML_NAME, write_diagnosed
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.tree import read_urdf
+from sgp_ros.robots.urdf_robot import nominal_tree
+from test.robots.effects.test_stated import URDF
+
+PRACTICE = Path(__file__).parents[2].parent / 'shared' / 'practice'
+needs_cases = pytest.mark.skipif(not PRACTICE.exists(), reason='needs the practice cases')
+
+
+def _finding(effect, joint, values, location=None):
+    parameters = {
+        name: Parameter(x) if isinstance(x, str) else Parameter(float(x), 0.02 * abs(x) + 1e-3)
+        for name, x in values.items()
+    }
+    return Finding(joint, effect, parameters, location or Location(), 50.0, 0.9, 0.1)
+
+
+def _diagnosis(findings=(), bodies=None):
+    empty = {f.name: () for f in fields(Diagnosis)}
+    return Diagnosis(**(empty | {'findings': tuple(findings), 'bodies': bodies}))
+
+
+def _written(folder, urdf, findings=(), bodies=None, yaml_text=''):
+    (folder / 'nominal.urdf').write_text(urdf)
+    (folder / 'nominal.yaml').write_text(f'schema: 1\nurdf: nominal.urdf\n{yaml_text}')
+    name = 'nominal.yaml' if yaml_text else 'nominal.urdf'
+    out = folder / 'out'
+    out.mkdir()
+    write_diagnosed(out, load_robot(str(folder / name)), _diagnosis(findings, bodies))
+    return out
+
+
+def _scores(robot_file, bag):
+    """Prequential nMSE of the physics alone, by channel and joint."""
+    robot = load_robot(str(robot_file))
+    engine = Engine(robot, EngineConfig.from_mapping({'model.method': 'PR'}, robot))
+    replay(engine, open_recording(bag).events(), lambda _: None)
+    return {
+        (channel, joint): score.nmse
+        for joint, channels in engine.scores().items()
+        for channel, score in channels.items()
+    }
+
+
+@needs_cases
+@pytest.mark.parametrize('number', ['05', '45', '32'])
+def test_the_diagnosed_robot_predicts_better_than_the_nominal_one(tmp_path, number):
+    """With the same terms, on a recording that nobody fitted; the effects are the true ones."""
+    case = PRACTICE / 'cases' / f'case_{number}'
+    answer = json.loads((PRACTICE / 'answers' / f'case_{number}.json').read_text())
+    findings = [_finding(e['effect'], e['joint'], e['parameters']) for e in answer['effects']]
+    for name, found in (('diagnosed', findings), ('nominal', [])):
+        (tmp_path / name).mkdir()
+        _written(tmp_path / name, (case / 'robot.urdf').read_text(), found)
+    before, after = (
+        _scores(tmp_path / name / 'out' / YAML_NAME, case / 'real_test.mcap')
+        for name in ('nominal', 'diagnosed')
+    )
+    for channel in ('effort', 'acceleration'):
+        # bodies that adapt may hide a discrepancy of one joint at the cost of another
+        worst = [max(x[channel, j] for j in answer['joints']) for x in (before, after)]
+        assert worst[1] < 0.1 * worst[0]
+        assert all(after[channel, j] < 1.1 * before[channel, j] for j in answer['joints'])
+
+
+@pytest.mark.parametrize('side', ['lower', 'upper'])
+def test_the_side_of_an_effect_is_written_from_its_region(tmp_path, side):
+    """The onset alone does not say towards which limit the friction rises."""
+    region = [0.4, 2.0] if side == 'upper' else [-1.0, 0.4]
+    location = Location(('position',), {'position': [region]})
+    finding = _finding('limit_friction', 'shoulder', {'amplitude': 0.5, 'onset': 0.4}, location)
+    out = _written(tmp_path, URDF, [finding])
+    (effect,) = yaml.safe_load((out / YAML_NAME).read_text())['effects']
+    assert effect['parameters']['side'] == {'value': side}
+    load_robot(str(out / YAML_NAME))
+
+
+def test_findings_come_back_with_values_and_spreads(tmp_path):
+    """Into the prior of the next run; what is unknown has no place in a model."""
+    findings = [
+        _finding('coulomb_friction', 'elbow', {'level': 0.3}),
+        _finding('unknown', 'elbow', {}),
+        _finding('velocity_filter_lag', 'elbow', {'time_constant': 0.01}),
+    ]
+    findings = [
+        Finding(f.joint, f.effect, {
+            n: Parameter(p.value, p.std, {'level': 'N m'}.get(n, 's'))
+            for n, p in f.parameters.items()
+        }, f.location, 1.0, 0.9, 0.1)
+        for f in findings
+    ]  # fmt: skip
+    robot = load_robot(str(_written(tmp_path, URDF, findings) / YAML_NAME))
+    (c,) = [c for c in robot.coefficients if 'coulomb_friction' in c.name]
+    assert (c.prior_mean, c.prior_std) == (0.3, pytest.approx(0.007))
+    assert 'not modelled online: velocity_filter_lag of elbow' in robot.description
+    assert 'unknown' not in robot.description
+
+
+def test_the_urdf_has_the_bodies_that_were_found(tmp_path):
+    tree = read_urdf(URDF)
+    bodies = 1.2 * tree.parameters
+    bodies[bodies[:, 0] <= 0.0, 0] = 0.01
+    bodies[:, [4, 6, 9]] += 1e-3
+    out = _written(tmp_path, URDF, bodies=bodies)
+    again = read_urdf(out / URDF_NAME)
+    np.testing.assert_allclose(again.parameters, bodies, atol=1e-9)
+    assert again.damping.tolist() == tree.damping.tolist()
+
+
+@pytest.mark.parametrize('text', ['locked: {elbow: 0.2}\n', 'payload: {link: tool0, mass: 0.5}\n'])
+def test_a_urdf_that_cannot_hold_the_bodies_stays_as_it_is(tmp_path, text):
+    """Behind a locked joint a body is more than its link; a payload would count twice."""
+    (tmp_path / 'nominal.urdf').write_text(URDF)
+    (tmp_path / 'nominal.yaml').write_text(f'schema: 1\nurdf: nominal.urdf\n{text}')
+    tree = nominal_tree(load_robot(str(tmp_path / 'nominal.yaml')))
+    bodies = 1.2 * tree.parameters
+    bodies[bodies[:, 0] <= 0.0, 0] = 0.01
+    out = _written(tmp_path, URDF, bodies=bodies, yaml_text=text)
+    assert (out / URDF_NAME).read_text() == URDF
+    assert yaml.safe_load((out / YAML_NAME).read_text()).items() >= yaml.safe_load(text).items()
+    load_robot(str(out / YAML_NAME))

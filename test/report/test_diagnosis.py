@@ -1,0 +1,244 @@
+"""Laws of the page and the sentences of a diagnosis."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sgp_ros.diagnosis.decision import LEAST_SHARE
+from sgp_ros.diagnosis.result import Parameter
+from sgp_ros.report.diagnosis import render, write_diagnosis
+from sgp_ros.report.diagnosis_charts import draw_proof
+from sgp_ros.report.diagnosis_figures import (
+    draw_diagnosis,
+    draw_laws,
+    draw_location,
+    important_joints,
+)
+from sgp_ros.report.diagnosis_text import (
+    EFFECT_NAMES,
+    explained,
+    held_out_sentence,
+    percent,
+    quantity,
+    verdict_sentence,
+    why_it_lost,
+)
+from sgp_ros.robots.effects.catalogue import EFFECTS
+from test.report.diagnoses import (
+    ASYMMETRIC,
+    COULOMB,
+    LOCAL,
+    MASS,
+    NOISE,
+    SPRING,
+    UNKNOWN,
+    diagnosis,
+)
+
+SIX = ('base_yaw', 'shoulder', 'elbow', 'wrist_1', 'wrist_2', 'wrist_3')
+
+
+def test_missing_physics_is_said_with_joint_name_interval_probability_and_gain():
+    """All an engineer asks for first, in one sentence."""
+    assert verdict_sentence(diagnosis('missing_physics', [COULOMB])) == (
+        'Missing on elbow: Coulomb friction, level 0.3170 +- 0.0020 N m (probability 0.99); '
+        'it explains more than 99.9 % of what the nominal robot leaves.'
+    )
+
+
+def test_both_effects_of_a_pair_are_said_with_their_joints():
+    """On one joint it is not repeated; corrected bodies share the credit."""
+    two = verdict_sentence(diagnosis('missing_physics', [COULOMB, SPRING]))
+    assert 'on elbow: Coulomb friction' in two
+    assert 'on shoulder: a spring' in two
+    assert 'together they explain' in two
+    same = verdict_sentence(diagnosis('missing_physics', [COULOMB, LOCAL], errors=[MASS]))
+    assert same.count('on elbow') == 1
+    assert 'viscous friction in a part of the range, from -0.400 to 0.100 +- 0.020 rad' in same
+    assert 'with corrected bodies they explain' in same
+
+
+def test_wrong_parameters_are_said_beside_the_nominal_ones():
+    """Which body, how much, instead of what; and that nothing else is missing."""
+    text = verdict_sentence(diagnosis('parameters_only', errors=[MASS]))
+    assert 'No physics is missing' in text
+    assert 'mass of fore 1.300 +- 0.039 kg instead of 1 kg' in text
+    without = verdict_sentence(diagnosis('parameters_only'))
+    assert 'combinations' in without
+
+
+def test_no_mismatch_is_said_with_the_size_of_what_is_left():
+    """As much as the encoder's noise, where that is so."""
+    text = verdict_sentence(diagnosis('no_mismatch'))
+    assert text.startswith('No mismatch: the nominal robot leaves')
+    assert 'N m rms on' in text
+    assert 'as much as the noise of the encoder (0.004 N m)' in text
+
+
+def test_the_unexplained_is_said_with_what_it_depends_on_and_the_nearest_effect():
+    """Nobody is left to think that something was named."""
+    text = verdict_sentence(diagnosis('unexplained', [UNKNOWN], alternatives=[ASYMMETRIC]))
+    assert text.startswith('Unexplained on elbow: 10 % of the mean squared effort')
+    assert 'it depends on velocity (90 %) and position (10 %)' in text
+    assert 'no effect of the list fits: the nearest, ' + EFFECT_NAMES['asymmetric_coulomb'] in text
+
+
+@pytest.mark.parametrize('name', [*EFFECTS, 'velocity_filter_lag', 'unknown'])
+def test_every_effect_has_a_plain_name(name):
+    """Nothing of the schema's spelling reaches the reader."""
+    assert '_' not in EFFECT_NAMES[name]
+
+
+@given(value=st.floats(-1e6, 1e6), std=st.floats(1e-9, 1e6))
+def test_printed_digits_keep_a_number_well_inside_its_interval(value, std):
+    """Rounding moves neither the value nor the half width by more than 5.1 % of the interval."""
+    shown, half = quantity(Parameter(value, std, 'N m')).removesuffix(' N m').split(' +- ')
+    allowed = max(0.051 * 1.96 * std, 0.5 if std > 5.0 else 0.0) + 1e-9 * abs(value)
+    assert abs(float(shown) - value) <= allowed
+    assert abs(float(half) - 1.96 * std) <= allowed
+
+
+@given(share=st.floats(0.0, 1.0, exclude_max=True))
+def test_a_share_below_one_is_never_called_all(share):
+    """Something is always left."""
+    assert percent(share) != '100 %'
+
+
+def test_a_rival_that_fits_as_well_lost_by_its_parameters():
+    """Otherwise by what it leaves, as the diagnosis says."""
+    assert 'with 2 numbers instead of 1' in why_it_lost(ASYMMETRIC, COULOMB)
+    far = replace(ASYMMETRIC, log_bayes_factor=100.0)
+    assert why_it_lost(far, COULOMB) == ASYMMETRIC.why
+
+
+def test_without_held_out_recordings_the_page_promises_nothing(tmp_path):
+    """What was learned from proves little."""
+    found = diagnosis('missing_physics', [COULOMB], held=False)
+    write_diagnosis(tmp_path, found)
+    assert held_out_sentence(found) in (tmp_path / 'report.html').read_text()
+    assert 'No recording was held out' in held_out_sentence(found)
+
+
+def test_the_page_opens_with_the_sentence_and_needs_no_other_file(tmp_path):
+    """Verdict, then pictures, rivals, proof and refusals; every picture also stands alone."""
+    found = diagnosis('missing_physics', [COULOMB], alternatives=[ASYMMETRIC], errors=[MASS])
+    write_diagnosis(tmp_path, found)
+    page = (tmp_path / 'report.html').read_text()
+    order = (
+        verdict_sentence(found).replace('+-', '±'), '<h2>Where', '<h2>What', COULOMB.formula,
+        'why they lost', '<h2>How much better', '3 states refused',
+    )  # fmt: skip
+    at = [page.index(text) for text in order]
+    assert at == sorted(at)
+    assert 'http' not in page.replace('http-equiv', '')
+    stems = {path.stem for path in tmp_path.glob('*.png')}
+    assert stems == {'location', 'others', 'time', 'law', 'dependence', 'proof'}
+    assert page.count('src="data:image/png;base64,') == len(stems)
+    assert not list(tmp_path.glob('*.part'))
+
+
+@pytest.mark.parametrize(
+    ('verdict', 'findings'),
+    [('parameters_only', ()), ('no_mismatch', ()), ('unexplained', (UNKNOWN,))],
+)
+def test_no_law_is_drawn_where_none_was_found(verdict, findings):
+    """An unknown effect has no formula, a calm robot no force."""
+    found = diagnosis(verdict, findings)
+    figures = draw_diagnosis(found)
+    assert 'law' not in figures
+    assert {'location', 'time', 'proof'} <= figures.keys()
+
+
+def test_the_unexplained_is_drawn_over_what_it_depends_on_most():
+    """Every row once, forward and backward apart, so that an engineer can guess the law."""
+    found = diagnosis('unexplained', [UNKNOWN])
+    (axes,) = draw_diagnosis(found)['shape'].axes
+    assert axes.get_xlabel().startswith('velocity')
+    forward, backward = (line.get_xdata() for line in axes.lines[:2])
+    assert (forward > 0.0).all()
+    assert len(forward) + len(backward) == len(found.traces.time)
+
+
+def test_texts_from_outside_bring_no_markup():
+    """Names of joints, remarks and formulas are escaped."""
+    found = diagnosis('missing_physics', [COULOMB], joints=('<script>', 'elbow'))
+    assert '<script>' not in render(found, {})
+
+
+def test_before_and_after_share_one_scale():
+    """Otherwise noise would look like physics."""
+    figure = draw_location(diagnosis('missing_physics', [COULOMB]))
+    before, after = (axes.collections[0].get_clim() for axes in figure.axes[:2])
+    assert before == after
+    assert before[0] == -before[1]
+
+
+def test_noise_is_not_drawn_as_physics():
+    """Where nothing is missing, colours end at the least that would count."""
+    found = diagnosis('no_mismatch')
+    (low, high) = draw_location(found).axes[0].collections[0].get_clim()
+    assert high == pytest.approx(LEAST_SHARE**0.5)  # the effort of this robot has unit size
+    assert abs(found.traces.before).max() < 0.5 * high
+    assert low == -high
+
+
+def test_the_region_of_a_finding_is_drawn_in():
+    """Its limits stand at the interval, on both maps."""
+    figure = draw_location(diagnosis('missing_physics', [LOCAL]))
+    for axes in figure.axes[:2]:
+        (box,) = axes.patches
+        assert (box.get_x(), box.get_x() + box.get_width()) == pytest.approx((-0.4, 0.1))
+
+
+@pytest.mark.parametrize('name', EFFECTS)
+def test_every_effect_is_drawn_over_what_it_depends_on(name):
+    """Measurement and law, whatever the schema can name."""
+    values = {q.name: Parameter(1.0, 0.1, q.unit) for q in EFFECTS[name].quantities}
+    finding = replace(COULOMB, effect=name, parameters=values)
+    (axes,) = draw_laws(diagnosis('missing_physics', [finding])).axes
+    measured, law = (line.get_ydata() for line in axes.lines[:2])
+    assert len(measured) == len(law) > 0
+    assert abs(measured - law).max() < 6.0 * NOISE
+
+
+def test_a_lag_of_the_velocity_claims_no_force():
+    """The sensor is wrong, not the motion: nothing is explained by it, no law is drawn."""
+    lag = replace(
+        COULOMB, effect='velocity_filter_lag', parameters={'time_constant': Parameter(0.01, 1e-3)}
+    )
+    found = replace(diagnosis('no_mismatch'), verdict='missing_physics', findings=(lag,))
+    assert 'explain' not in verdict_sentence(found)
+    assert 'law' not in draw_diagnosis(found)
+    assert 'of the variance of the velocity' in render(found, {})
+
+
+def test_a_joint_that_is_never_driven_hides_no_finding():
+    """Its error over the variance of its effort is no number; the other joints still speak."""
+    found = diagnosis('missing_physics', [COULOMB])
+    proof = found.proofs['train']
+    wild = replace(
+        proof,
+        nmse_before=proof.nmse_before | {'shoulder': 1e290},
+        nmse_after=proof.nmse_after | {'shoulder': math.nan},
+    )
+    found = replace(found, proofs={'train': wild, 'real_test': wild})
+    assert explained(found) > 0.99
+    assert important_joints(found) == [1]
+    assert 'shoulder' not in held_out_sentence(found)
+    assert len(draw_diagnosis(found)) == 6
+
+
+def test_many_joints_stay_readable():
+    """Large pictures go to the joint concerned; all others are small and named."""
+    found = diagnosis('missing_physics', [COULOMB], joints=SIX)
+    assert important_joints(found) == [SIX.index('elbow')]
+    figures = draw_diagnosis(found)
+    assert len(figures['others'].axes) == len(SIX) - 1
+    assert all(figure.get_figheight() < 8.0 for figure in figures.values())
+    labels = [text.get_text() for text in draw_proof(found).axes[0].get_yticklabels()]
+    assert set(labels) == set(SIX)
