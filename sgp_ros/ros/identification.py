@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ from rclpy.qos import (
 )
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64, Float64MultiArray
+from std_msgs.msg import Float64, Float64MultiArray, String
 from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import JointTrajectory
 
@@ -33,6 +34,8 @@ from sgp_ros.recordings.messages import (
     joint_sample,
 )
 from sgp_ros.recordings.predictions import PredictionTopics
+from sgp_ros.ros.diagnosing import Diagnosing
+from sgp_ros.ros.diagnosis_process import DiagnosisFailed
 from sgp_ros.ros.node_settings import NO_COMMAND
 from sgp_ros.ros.parameter_status import parameter_statuses
 from sgp_ros.ros.parameters import from_ros, to_ros
@@ -77,6 +80,11 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
         self._reported = self._steady.now()
         self._advertise()
         self._session = Session(engine, self._open_record())
+        self._diagnosing = Diagnosing(
+            engine.robot,
+            str(self._settings['robot']),
+            float(self.get_parameter('diagnosis.window').value),
+        )
         self._offer_services()
         self._start_timers()
         self.add_on_set_parameters_callback(self._on_set_parameters)
@@ -88,6 +96,9 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
         session: Session | None = getattr(self, '_session', None)
         if session is not None:
             session.close()
+        diagnosing: Diagnosing | None = getattr(self, '_diagnosing', None)
+        if diagnosing is not None:
+            diagnosing.close()
         super().destroy_node()
 
     def _advertise(self) -> None:
@@ -96,6 +107,7 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
         self._overlay = self.create_publisher(JointState, '~/predicted_joint_states', 10)
         kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._parameters_out = self.create_publisher(DiagnosticArray, '~/parameters', kept)
+        self._diagnosis = self.create_publisher(String, '~/diagnosis', kept)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._joint_states = self.resolve_topic_name('joint_states')
         self._command = self.resolve_topic_name('command')
@@ -157,6 +169,7 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
         except MessageError as error:
             self._session.health.note_unreadable(error)
             return
+        self._diagnosing.take(event)
         was_ready = self._session.engine.is_ready
         for output in self._session.take(event):
             self._publish(output)
@@ -176,6 +189,15 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
             self.get_logger().warning(warning)
         if self._session.engine.counts.refits != refits:
             self._write_back()
+        self._tell_verdict()
+
+    def _tell_verdict(self) -> None:
+        outcome = self._diagnosing.poll()
+        if isinstance(outcome, DiagnosisFailed):
+            self.get_logger().error(f'no diagnosis: {outcome.reason}')
+        elif outcome is not None:
+            self._diagnosis.publish(String(data=json.dumps(outcome.content, allow_nan=False)))
+            self.get_logger().info(f'diagnosis: {outcome.content["verdict"]}')
 
     def _publish_parameters(self) -> None:
         statuses = parameter_statuses(self._session.engine)
@@ -200,6 +222,7 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
             elif status.level >= ERROR:
                 self.get_logger().error(status.message, throttle_duration_sec=_QUIET_S)
         now_ns = self.get_clock().now().nanoseconds
+        statuses += self._diagnosing.statuses(self.get_name())
         self._diagnostics.publish(diagnostics(now_ns, statuses))
 
     def _on_set_parameters(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
@@ -251,7 +274,9 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
         return response
 
     def _diagnose(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success, response.message = False, 'not available in this version'
+        response.success, response.message = self._diagnosing.start(
+            self._session.engine.config.command_joints
+        )
         return response
 
     def _learn(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:

@@ -40,6 +40,11 @@ NODE_SETTINGS = (
         unit='s', low=0.1, high=3600.0, read_only=True,
     ),
     Setting(
+        'diagnosis.window', 'float', 60.0,
+        'How much of the past is kept for service diagnose.',
+        unit='s', low=1.0, high=3600.0, read_only=True,
+    ),
+    Setting(
         'parameters.period', 'float', 1.0, 'Time between two messages on ~/parameters.',
         unit='s', low=0.02, high=3600.0, read_only=True,
     ),

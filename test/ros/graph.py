@@ -90,16 +90,18 @@ class Graph:
         self._processes.append(NodeProcess(module, arguments, errors))
         return self._processes[-1]
 
-    def wait_until(self, condition: Callable[[], Any], what: str) -> Any:
+    def wait_until(
+        self, condition: Callable[[], Any], what: str, deadline_s: float = DEADLINE_S
+    ) -> Any:
         """Let messages pass until `condition` holds, and return what it returned."""
-        end = time.monotonic() + DEADLINE_S
+        end = time.monotonic() + deadline_s
         while time.monotonic() < end:
             found = condition()
             if found:
                 return found
             self.turn()
         errors = ' | '.join(process.stderr[-2000:] for process in self._processes)
-        message = f'waited {DEADLINE_S} s for {what}; statuses {self._statuses}; stderr: {errors}'
+        message = f'waited {deadline_s} s for {what}; statuses {self._statuses}; stderr: {errors}'
         raise AssertionError(message)
 
     def turn(self, timeout_s: float = _TURN_S) -> None:

@@ -1,0 +1,123 @@
+"""The diagnoses of a node: what it remembers for them, the one that runs, the last verdict."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from sgp_ros.diagnosis.trajectory import SHORTEST_ROWS
+from sgp_ros.engine.samples import CommandSample, JointSample
+from sgp_ros.recordings.writer import Status
+from sgp_ros.ros.diagnosis_process import (
+    DiagnosisDone,
+    DiagnosisFailed,
+    DiagnosisProcess,
+    DiagnosisRequest,
+)
+from sgp_ros.ros.verdict import ERROR, OK, WARN
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sgp_ros.engine.samples import Event
+    from sgp_ros.robots.robot import Robot
+
+MOST_EVENTS = 200_000
+"""Remembered at most, whatever the window: a minute of states and commands at 1.6 kHz each."""
+
+
+class Diagnosing:
+    """Remembers the recent past of a robot and has it diagnosed elsewhere.
+
+    Args:
+        robot: what the node identifies.
+        path: the robot YAML or URDF it was read from.
+        window_s: how much of the past is kept [s].
+    """
+
+    def __init__(self, robot: Robot, path: str, window_s: float) -> None:
+        self._robot = robot
+        self._path = path
+        self._window_ns = round(window_s * 1e9)
+        self._events: deque[Event] = deque(maxlen=MOST_EVENTS)
+        self._process: DiagnosisProcess | None = None
+        self._outcome: DiagnosisDone | DiagnosisFailed | None = None
+
+    def take(self, event: Event) -> None:
+        """Remember a state or command, forget what is older than the window."""
+        if not isinstance(event, (JointSample, CommandSample)):
+            return
+        self._events.append(event)
+        while event.stamp_ns - self._events[0].stamp_ns > self._window_ns:
+            self._events.popleft()
+
+    def start(self, command_joints: tuple[str, ...]) -> tuple[bool, str]:
+        """Start a diagnosis of the recent past.
+
+        Args:
+            command_joints: order of a command without names; `('',)` for the actuated joints.
+
+        Returns:
+            Whether it was started, and one sentence.
+        """
+        states = sum(isinstance(event, JointSample) for event in self._events)
+        if self._process is not None:
+            return False, 'a diagnosis is already running; /diagnostics tells its outcome'
+        if 'urdf' not in self._robot.source:
+            return False, f'robot {self._robot.name} has no URDF; give one as parameter robot'
+        if states < SHORTEST_ROWS:
+            return False, f'too few states: {states}, at least {SHORTEST_ROWS} are needed'
+        events = tuple(_named(event, command_joints) for event in self._events)
+        self._process = DiagnosisProcess(DiagnosisRequest(self._path, events))
+        return True, f'started on {states} states'
+
+    def poll(self) -> DiagnosisDone | DiagnosisFailed | None:
+        """Return the outcome of a diagnosis that has just ended."""
+        outcome = None if self._process is None else self._process.poll()
+        if outcome is not None:
+            self.close()
+            self._outcome = outcome
+        return outcome
+
+    def statuses(self, node: str) -> list[Status]:
+        """Return the last verdict with a status for each finding; empty before the first call."""
+        name, robot = f'{node}: diagnosis', self._robot.name
+        if self._process is not None:
+            return [Status(name, OK, 'a diagnosis is running', robot, {'state': 'running'})]
+        if isinstance(self._outcome, DiagnosisFailed):
+            return [Status(name, ERROR, self._outcome.reason, robot, {'state': 'failed'})]
+        if self._outcome is None:
+            return []
+        content = self._outcome.content
+        verdict, findings = str(content['verdict']), content['findings']
+        values = {
+            'state': 'done', 'verdict': verdict, 'certainty': str(content['certainty']),
+            'findings': str(len(findings)),
+        }  # fmt: skip
+        level = WARN if findings else OK
+        return [
+            Status(name, level, verdict, robot, values),
+            *(_status(f'{name} {i + 1}', robot, finding) for i, finding in enumerate(findings)),
+        ]
+
+    def close(self) -> None:
+        """Kill a diagnosis that runs."""
+        if self._process is not None:
+            self._process.close()
+        self._process = None
+
+
+def _named(event: Event, joints: tuple[str, ...]) -> Event:
+    """Return a command without names with those that the settings give it."""
+    if not isinstance(event, CommandSample) or event.names is not None or joints == ('',):
+        return event
+    return replace(event, names=joints) if len(joints) == len(event.effort) else event
+
+
+def _status(name: str, robot: str, finding: Mapping[str, Any]) -> Status:
+    values = {key: str(finding[key]) for key in ('joint', 'effect', 'probability')}
+    for parameter, entry in finding['parameters'].items():
+        values[parameter] = str(entry['value'])
+        values |= {f'{parameter}.{k}': str(entry[k]) for k in ('std', 'unit') if k in entry}
+    return Status(name, WARN, f'{finding["effect"]} of {finding["joint"]}', robot, values)

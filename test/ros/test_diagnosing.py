@@ -1,0 +1,50 @@
+"""What the node keeps for a diagnosis, without a graph."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sgp_ros.engine.samples import CommandSample, JointSample, Reset, frozen_array
+from sgp_ros.robots.registry import load_robot
+from sgp_ros.ros.diagnosing import MOST_EVENTS, Diagnosing, _named
+
+
+def _diagnosing(window_s: float) -> Diagnosing:
+    return Diagnosing(load_robot('reaction_wheel'), 'reaction_wheel', window_s)
+
+
+def _state(stamp_ns: int) -> JointSample:
+    return JointSample(stamp_ns, ('pole', 'wheel'), frozen_array([0.0, 0.0]))
+
+
+def test_the_memory_of_events_ends_at_the_window() -> None:
+    """By stamps, not by the clock: what is older than the newest by more is gone."""
+    kept = _diagnosing(1.0)
+    for i in range(500):
+        kept.take(_state(i * 10**7))
+    kept.take(Reset(10**18))
+    stamps = [event.stamp_ns for event in kept._events]
+    assert (stamps[0], stamps[-1], len(stamps)) == (399 * 10**7, 499 * 10**7, 101)
+
+
+def test_the_memory_of_events_is_bounded_where_stamps_stand_still() -> None:
+    kept = _diagnosing(3600.0)
+    state = _state(0)
+    for _ in range(MOST_EVENTS + 10):
+        kept.take(state)
+    assert len(kept._events) == MOST_EVENTS
+
+
+def test_a_robot_without_urdf_is_refused_with_the_reason() -> None:
+    started, message = _diagnosing(1.0).start(('',))
+    assert not started
+    assert 'reaction_wheel has no URDF' in message
+
+
+def test_commands_without_names_get_those_of_the_settings() -> None:
+    """The order of an array is a setting of the engine; a diagnosis must read it alike."""
+    bare = CommandSample(0, frozen_array([1.0, 2.0]))
+    assert _named(bare, ('b', 'a')).names == ('b', 'a')
+    assert _named(bare, ('',)) is bare
+    named = CommandSample(0, np.zeros(1), ('a',))
+    assert _named(named, ('b',)) is named
