@@ -1,0 +1,1 @@
+"""Worlds with concealed physics for `sgp diagnose`, drawn by the hundred."""

@@ -1,0 +1,120 @@
+"""Score a diagnosis against the sealed answer, as `DIAGNOSIS_SCHEMA.md` describes."""
+
+from __future__ import annotations
+
+import csv
+import math
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+_WIDTH_S, _RATE_HZ = 0.012, 200.0
+_RELATIVE_TO_RANGE = {'rest', 'position', 'onset'}
+
+
+def ranked(diagnosis):
+    """Return the findings, the top answer first."""
+    return sorted(diagnosis['findings'], key=lambda f: -(f['probability'] or 0.0))
+
+
+def is_right(answer, diagnosis):
+    """Return whether the top answer, or the verdict without one, is among the accepted ones."""
+    verdict, found = diagnosis['verdict'], ranked(diagnosis)
+    names = {(f['effect'], f['joint']) for f in found}
+    for accepted in answer['accepted']:
+        if accepted['verdict'] != verdict:
+            continue
+        if accepted['effect'] is None:
+            return True
+        needed = all((n, found[0]['joint']) in names for n in accepted.get('requires', []))
+        is_effect = found and needed and found[0]['effect'] == accepted['effect']
+        if is_effect and accepted['joint'] in {'*', found[0]['joint']}:
+            return True
+    return False
+
+
+def components(answer, diagnosis):
+    """Return how many of the concealed effects are among the findings."""
+    names = {(f['effect'], f['joint']) for f in diagnosis['findings']}
+    return sum((e['effect'], e['joint']) in names for e in answer['effects'])
+
+
+def overlap(answer, diagnosis):
+    """Return intersection over union of the localised effects; None without any."""
+    scores = []
+    for place in answer['location']:
+        variable = place['variables'][0]
+        is_time = variable == 'time'
+        true = place['time'] if is_time else place['intervals'][variable]
+        best = 0.0
+        for f in diagnosis['findings']:
+            location = f['location']
+            found = location['time'] if is_time else location['intervals'].get(variable, [])
+            if f['joint'] == place['joint'] and found:
+                best = max(best, _iou(found, true))
+        scores.append(best)
+    return float(np.mean(scores)) if scores else None
+
+
+def _iou(found, true):
+    shared = sum(max(0.0, min(a[1], b[1]) - max(a[0], b[0])) for a in found for b in true)
+    length = sum(b - a for a, b in (*found, *true))
+    return shared / max(length - shared, 1e-12)
+
+
+def parameter_scores(answer, diagnosis):
+    """Return relative error and whether the truth lies within two standard deviations."""
+    result = []
+    for effect in answer['effects']:
+        match = [
+            f for f in diagnosis['findings']
+            if (f['effect'], f['joint']) == (effect['effect'], effect['joint'])
+        ]  # fmt: skip
+        for name in effect['scored'] if match else []:
+            found = match[0]['parameters'].get(name)
+            if found is None:
+                continue
+            true, error = effect['parameters'][name], None
+            scale = _scale(name, effect, answer)
+            error = abs(found['value'] - true)
+            std = found.get('std')
+            covered = None if not std else bool(error <= 2.0 * std)
+            result.append({'name': f'{effect["effect"]}.{name}', 'error': error / scale,
+                           'covered': covered})  # fmt: skip
+    return result
+
+
+def _scale(name, effect, answer):
+    values = effect['parameters']
+    if name in _RELATIVE_TO_RANGE and effect['joint'] in answer['joint_range']:
+        low, high = answer['joint_range'][effect['joint']]
+        return max(high - low, 1e-9)
+    if name in {'roll', 'pitch'}:
+        return math.hypot(values['roll'], values['pitch'])
+    if name in {'fx', 'fy', 'fz'}:
+        return math.sqrt(sum(values[n] ** 2 for n in ('fx', 'fy', 'fz')))
+    return abs(values[name] - 1.0) if name == 'gain' else max(abs(values[name]), 1e-12)
+
+
+def improvement(answer, folder, truth, stem):
+    """Return the share of the best possible improvement of predicted accelerations, or None.
+
+    The best possible is a model without error. None where the effect hardly shows.
+    """
+    nominal = np.mean(list(answer['nmse'][stem]['acceleration_vs_truth']['nominal'].values()))
+    if nominal < 1e-3 or not answer['fit_scored']:
+        return None
+    with (folder / f'pred_{stem}.csv').open(encoding='utf-8') as file:
+        rows = [[float(x) for x in row] for row in list(csv.reader(file))[1:]]
+    table = np.array(rows)
+    t, a = truth[f'{stem}_t'], truth[f'{stem}_a'].astype(float)
+    low, high = max(t[0], table[0, 0]), min(t[-1], table[-1, 0])
+    grid = np.arange(low + 5 * _WIDTH_S, high - 5 * _WIDTH_S, 1.0 / _RATE_HZ)
+    true, found = _smoothed(grid, t, a), _smoothed(grid, table[:, 0], table[:, 1:])
+    error = float(np.mean(((true - found) ** 2).mean(axis=0) / true.var(axis=0)))
+    return float(np.clip((nominal - error) / nominal, -1.0, 1.0))
+
+
+def _smoothed(grid, t, x):
+    even = np.column_stack([np.interp(grid, t, column) for column in x.T])
+    return gaussian_filter1d(even, _WIDTH_S * _RATE_HZ, axis=0, mode='nearest')
