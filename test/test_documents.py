@@ -30,7 +30,15 @@ def test_commands_in_documents_exist(path):
     targets = set(re.findall(r'^(\w+):', makefile, re.MULTILINE))
     for block in re.findall(r'```(?:bash|console)\n(.*?)```', text, re.DOTALL):
         for name in re.findall(r'^\s*(?:\$ )?(?:\S*/)?sgp (\w+)', block, re.MULTILINE):
-            assert name in {'demo', 'simulate', 'replay', 'identify', 'import', 'reproduce'}, name
+            assert name in {
+                'demo',
+                'diagnose',
+                'identify',
+                'import',
+                'replay',
+                'reproduce',
+                'simulate',
+            }, name
         for name in re.findall(r'^\s*(?:\$ )?make (\w+)', block, re.MULTILINE):
             assert name in targets, name
 
@@ -39,6 +47,15 @@ def test_the_page_of_settings_is_that_of_the_code():
     """Mend with `python docs/generate_settings.py`."""
     path = ROOT / 'docs' / 'generate_settings.py'
     spec = importlib.util.spec_from_file_location('generate_settings', path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.TARGET.read_text(encoding='utf-8') == module.text()
+
+
+def test_the_page_of_diagnosis_is_that_of_the_results():
+    """Mend with `python docs/generate_diagnosis.py`."""
+    path = ROOT / 'docs' / 'generate_diagnosis.py'
+    spec = importlib.util.spec_from_file_location('generate_diagnosis', path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     assert module.TARGET.read_text(encoding='utf-8') == module.text()
@@ -98,7 +115,7 @@ def test_numbers_in_the_page_of_pendulums_are_the_measured_ones():
             assert f'| {" | ".join(cells)} |' in text
 
 
-@pytest.mark.parametrize('name', ['reproduction', 'recordings', 'pendulums'])
+@pytest.mark.parametrize('name', ['reproduction', 'recordings', 'pendulums', 'diagnosis_real'])
 def test_generated_pages_are_those_of_the_results(name):
     """Mend with `python docs/generate_<name>.py`."""
     path = ROOT / 'docs' / f'generate_{name}.py'
