@@ -116,9 +116,10 @@ def test_predictions_have_a_column_for_each_joint_and_come_often_enough(finished
 
 
 def test_no_half_written_file_is_left(finished):
-    """Pictures, numbers and page only."""
+    """Pictures, numbers, page, and the diagnosed robot with its URDF."""
     _, out, _ = finished
-    assert {path.suffix for path in out.iterdir()} == {'.json', '.html', '.png', '.csv'}
+    suffixes = {path.suffix for path in out.iterdir()}
+    assert suffixes == {'.json', '.html', '.png', '.csv', '.yaml', '.urdf'}
 
 
 @pytest.fixture(scope='module')
