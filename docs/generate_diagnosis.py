@@ -65,6 +65,15 @@ TAIL = """
 * **More than two effects at one joint** are not searched for.
 * **Backlash** is modelled with a hard contact; the gap is right to a few per cent, single impacts are not.
 * **Probabilities** are tempered odds among the models that were fitted; the table above says how well they hold.
+* **The thresholds** of step 6 come from the size of the filters' errors and from the schema, not from a
+  simulated null; the rows without missing physics above are all that is known of their false alarms.
+* **Z as referee** looks at the measured effort too, so it may explain an effort by itself; it locates, and does
+  not decide.
+* **Proof** compares efforts and accelerations sample by sample; it makes no roll-outs, and without `--test` it
+  has nothing held out to show.
+* **The paper's own three concealments** are not among these worlds.
+* **A diagnosed robot** can be replayed and predicted with, but diagnosing it once more, or simulating it, leaves
+  out the effects that it states.
 * `--sim` is accepted and checked, but the nominal values of the URDF are the reference.
 """
 
