@@ -72,8 +72,8 @@ def _play(graph: Graph, seconds: float) -> int:
                 velocity=velocity,
             ))  # fmt: skip
             sent += 1
-            if sent % 100 == 0:
-                graph.wait_until(lambda n=sent: graph.count('read') > n - 300, 'the node to read')
+            if sent % 25 == 0:  # a burst could let states overtake their commands
+                graph.wait_until(lambda n=sent: graph.count('read') > n - 50, 'the node to read')
     return sent
 
 
