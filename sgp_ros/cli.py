@@ -92,6 +92,12 @@ def _add(
     return parser
 
 
+def _add_topics(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('--joint-states', metavar='TOPIC', help='topic of the states')
+    parser.add_argument('--command', metavar='TOPIC', dest='command_topic',
+                        help='topic of the commands')  # fmt: skip
+
+
 def _add_demo(commands: Any) -> None:
     parser = _add(
         commands, 'demo', run.demo,
@@ -140,9 +146,7 @@ def _add_replay(commands: Any) -> None:
     parser.add_argument(
         '--params', metavar='YAML', help="ROS 2 parameter file (default: the robot's own)"
     )
-    parser.add_argument('--joint-states', metavar='TOPIC', help='topic of the states')
-    parser.add_argument('--command', metavar='TOPIC', dest='command_topic',
-                        help='topic of the commands')  # fmt: skip
+    _add_topics(parser)
     parser.add_argument('--model', metavar='NPZ', help='continue from a saved model')
     parser.add_argument('--frozen', action='store_true', help='predict and score, do not learn')
     parser.add_argument('--truth', metavar='JSON', help='truth.json to compare with')
@@ -172,9 +176,7 @@ def _add_identify(commands: Any) -> None:
                         help='what Z sees, such as own:velocity or every:velocity')  # fmt: skip
     parser.add_argument('--effort', choices=('auto', 'state', 'command'), default='auto',
                         help='where efforts come from (default: %(default)s)')  # fmt: skip
-    parser.add_argument('--joint-states', metavar='TOPIC', help='topic of the states')
-    parser.add_argument('--command', metavar='TOPIC', dest='command_topic',
-                        help='topic of the commands')  # fmt: skip
+    _add_topics(parser)
 
 
 def _add_diagnose(commands: Any) -> None:
@@ -189,9 +191,7 @@ def _add_diagnose(commands: Any) -> None:
     parser.add_argument('--sim', metavar='SIM', help='recording of the nominal simulation')
     parser.add_argument('--test', action='append', default=[], metavar='BAG',
                         help='held-out recording for the proof; may be repeated')  # fmt: skip
-    parser.add_argument('--joint-states', metavar='TOPIC', help='topic of the states')
-    parser.add_argument('--command', metavar='TOPIC', dest='command_topic',
-                        help='topic of the commands')  # fmt: skip
+    _add_topics(parser)
 
 
 def _add_import(commands: Any) -> None:
