@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -146,7 +147,7 @@ def draw_laws(found: Diagnosis) -> Figure:
         axes.plot(x, law, style, ms=1.8, lw=1.2, color=colour, label='the law')
         axes.axhline(0.0, color=GREY, lw=0.6)
         axes.set(xlabel=label, ylabel=f'force on {found.joints[j]} [{found.units[j]}]')
-        axes.set_title(effect_name(finding), fontsize='medium')
+        axes.set_title(fill(effect_name(finding), 26), fontsize='medium')
         if 'position' in label:
             _mark(axes, found, j)
         axes.legend(fontsize='small', markerscale=2)
