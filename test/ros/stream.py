@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from test.ros.graph import Graph
 
 START_NS = 1_700_000_000_000_000_000
-_UNHEARD = 5
 
 
 class Stream:
@@ -28,6 +27,7 @@ class Stream:
         self.states = graph.client.create_publisher(JointState, 'joint_states', 1000)
         self.commands = graph.client.create_publisher(JointState, 'command', 1000)
         graph.wait_until(self._is_heard, 'a listener')
+        graph.wait_until(lambda: graph.status('samples'), 'diagnostics')
 
     def state(self) -> JointState:
         """Publish the next command and return the state that belongs to it."""
@@ -51,12 +51,21 @@ class Stream:
         return states
 
     def publish_until_read(self, count: int) -> None:
-        """Publish until the node has read this many more states."""
+        """Publish this many samples, and more until the node has read as many.
+
+        A publisher may find a listener before the listener finds it; what it sends meanwhile is
+        lost.
+        """
         before = self._graph.count('read')
+
+        def are_read() -> bool:
+            found = self._graph.count('read') >= before + count
+            if not found:
+                self.publish(1)
+            return found
+
         self.publish(count)
-        self._graph.wait_until(
-            lambda: self._graph.count('read') >= before + count - _UNHEARD, 'states read'
-        )
+        self._graph.wait_until(are_read, 'states read')
 
     def _is_heard(self) -> bool:
         publishers = (self.states, self.commands)

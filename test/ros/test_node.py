@@ -107,7 +107,6 @@ def test_predictions_carry_stamp_and_names_of_their_samples(graph: Graph) -> Non
 def test_joint_order_of_each_message_is_irrelevant(graph: Graph) -> None:
     _start(graph)
     stream, rng = Stream(graph), np.random.default_rng(3)
-    graph.wait_until(lambda: graph.status('samples'), 'diagnostics')
     for _ in range(200):
         stream.states.publish(shuffled(stream.state(), rng))
         graph.turn(0.001)
