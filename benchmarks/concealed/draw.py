@@ -116,7 +116,7 @@ def _largest_error(rng, tier, wanted, names):
     return 0.3 if rng.random() < 0.5 else 0.1
 
 
-def _draw_transport(rng, tier):
+def draw_transport(rng, tier):
     if tier == 'A':
         return _PERFECT
     return Transport(
@@ -148,7 +148,7 @@ def _write(seed, tier, wanted, out, rng, world, concealed, recordings, motion, r
     folder = out / 'cases' / case
     folder.mkdir(exist_ok=True)
     (folder / 'robot.urdf').write_text(urdf(world.family, world.bodies), encoding='utf-8')
-    transport = _draw_transport(rng, tier)
+    transport = draw_transport(rng, tier)
     for number, (name, recording) in enumerate(recordings.items()):
         write_simulated(
             recording, folder / f'{name}.mcap', _PERFECT if name == 'sim' else transport,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -94,10 +95,25 @@ class Model:
         net = sum(self.forces, np.zeros_like(self.residual))
         return float(((net**2).mean(axis=0) / self.frame.equations.power).sum())
 
-    def share(self, index: int) -> float:
-        """Return the greatest share that an effect has of the mean squared effort of a joint."""
-        squares = (self.forces[index] ** 2).mean(axis=0)
-        return float((squares / self.frame.equations.power).max())
+    @property
+    def filtered_shares(self) -> list[float]:
+        """Greatest shares that the filtered effects have of the mean squared effort of a joint."""
+        power = self.frame.equations.power
+        return [float(((force**2).mean(axis=0) / power).max()) for force in self.forces]
+
+    @cached_property
+    def shares(self) -> list[float]:
+        """Greatest shares that the effects have of the mean squared effort of a joint.
+
+        Before any filter, as the schema has it: what lies above the cut-off counts.
+        """
+        equations = self.frame.equations
+        found = []
+        for s, c in zip(self.suspects, self.coefficients, strict=True):
+            force = s.effect.columns(equations.motion, s.place, s.shape) @ c
+            power = equations.power if force.ndim == 2 else equations.power[s.place.joint]
+            found.append(float(((force**2).mean(axis=0) / power).max()))
+        return found
 
 
 def floors(equations: Equations) -> np.ndarray:

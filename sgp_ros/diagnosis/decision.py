@@ -111,23 +111,28 @@ class Scale:
 
     def counts(self, model: Model) -> bool:
         """Return whether effects are large enough and do not cancel each other, or the bodies."""
-        shares = [model.share(i) for i in range(len(model.suspects))]
         there = max(min(model.net_share, float(self.nominal.sum())), 1e-12)
-        return min(shares) > SHARE_TOLERANCE * LEAST_SHARE and sum(shares) < MOST_OPPOSED * there
+        return (
+            sum(model.filtered_shares) < MOST_OPPOSED * there
+            and min(model.shares) > SHARE_TOLERANCE * LEAST_SHARE
+        )
+
+    def fit(self, model: Model) -> float:
+        """Return the tempered log likelihood of a model, less that of its bodies' change [nats]."""
+        floor = FLOOR_SHARE + SHAPE_ERROR * self.nominal + self.error / self.power
+        likelihood = -0.5 * ROWS * float(np.log(model.mean_square / self.power + floor).sum())
+        return likelihood - 0.5 * float(model.w @ model.w)
 
     def worth(self, model: Model) -> float:
-        """Return the tempered log evidence of a model, less the price of its freedom [nats]."""
-        floor = FLOOR_SHARE + SHAPE_ERROR * self.nominal + self.error / self.power
-        fit = -0.5 * ROWS * float(np.log(model.mean_square / self.power + floor).sum())
-        price = PER_EFFECT * len(model.suspects) + PER_PARAMETER * model.freedom
-        return fit - price - 0.5 * float(model.w @ model.w)
+        """Return the fit of a model, less the price of its freedom [nats]."""
+        return self.fit(model) - PER_EFFECT * len(model.suspects) - PER_PARAMETER * model.freedom
 
 
 def decide(equations: Equations, competition: Competition) -> Decision:
     """Return the verdict on a recording."""
     scale, base = Scale.of(equations, competition), competition.base
     models = (*competition.singles, *competition.pairs, *competition.more)
-    able = [m for m in models if scale.counts(m) and m.score > base.score + NATS]
+    able = [m for m in models if m.score > base.score + NATS and scale.counts(m)]
     ranked = sorted(able, key=scale.worth, reverse=True)
     worst = int(np.argmax(scale.base))
     left = float(scale.shares(competition.parameters).max())

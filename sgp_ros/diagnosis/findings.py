@@ -107,7 +107,7 @@ def _finding(
         location = Location((variable,), {variable: intervals})
     return Finding(
         joint_name(motion, suspect.place.joint), suspect.effect.name, parameters, location,
-        float(model.score - decision.against), chances.of(model, index), model.share(index),
+        float(model.score - decision.against), chances.of(model, index), model.shares[index],
         suspect.effect.formula, why,
     )  # fmt: skip
 

@@ -66,7 +66,7 @@ def test_viscous_friction_is_found_with_its_size(equations_for, viscous):
     assert model.mean_square[0] < 2e-5 * equations.power[0]
     assert model.size == 1
     assert model.is_possible()
-    assert model.share(0) == pytest.approx(model.net_share)
+    assert model.filtered_shares == [pytest.approx(model.net_share)]
     np.testing.assert_allclose(equations.d, model.forces[0] + model.residual, atol=1e-12)
 
 
