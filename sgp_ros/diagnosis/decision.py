@@ -118,7 +118,7 @@ class Scale:
         )
 
     def fit(self, model: Model) -> float:
-        """Return the tempered log likelihood of a model, less that of its bodies' change [nats]."""
+        """Return the tempered log likelihood, with the prior of the bodies' change [nats]."""
         floor = FLOOR_SHARE + SHAPE_ERROR * self.nominal + self.error / self.power
         likelihood = -0.5 * ROWS * float(np.log(model.mean_square / self.power + floor).sum())
         return likelihood - 0.5 * float(model.w @ model.w)

@@ -22,6 +22,14 @@ def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
         'certainty': _finite(found.certainty),
         'findings': [_finding(f) for f in found.findings],
         'alternatives': [_finding(f) for f in found.alternatives],
+        'equivalents': [
+            {
+                'effects': [{'joint': joint, 'effect': effect} for joint, effect in e.effects],
+                'separating_motion': e.motion,
+                'contrast': _finite(e.contrast),
+            }
+            for e in found.equivalents
+        ],
         'parameter_errors': [
             {
                 'link': e.link, 'parameter': e.parameter, 'value': _finite(e.value),

@@ -11,6 +11,7 @@ from sgp_ros.diagnosis.certainty import certainty_of, probabilities
 from sgp_ros.diagnosis.decision import Decision, decide
 from sgp_ros.diagnosis.dependence import dependences
 from sgp_ros.diagnosis.equations import make_equations
+from sgp_ros.diagnosis.equivalence import equivalents
 from sgp_ros.diagnosis.final_model import FinalModel
 from sgp_ros.diagnosis.findings import alternatives, asserted, parameter_errors
 from sgp_ros.diagnosis.hypotheses import compete
@@ -89,6 +90,7 @@ def diagnose(
         rows=len(equations.d),
         refused={reason: count for reason, count in raw.refused.items() if count},
         bodies=diagnosed_bodies(equations, decision.model),
+        equivalents=equivalents(equations, competition, decision),
     )
 
 

@@ -71,6 +71,21 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
+class Equivalent:
+    """Another explanation that fits the recording as well as the asserted one.
+
+    Attributes:
+        effects: joint and effect, one or more; empty for wrong parameters of bodies.
+        motion: that would tell the two apart; empty where none that was tried does.
+        contrast: mean squared difference of their efforts there, relative to the recording.
+    """
+
+    effects: tuple[tuple[str, str], ...]
+    motion: str
+    contrast: float
+
+
+@dataclass(frozen=True, slots=True)
 class ParameterError:
     """An inertial parameter that differs from the nominal one.
 
@@ -188,6 +203,7 @@ class Diagnosis:
         rows: number of them.
         refused: states by reason, of the training recording.
         remarks: for the user.
+        equivalents: what this motion cannot tell from the findings, best first.
         bodies: (b, 10) inertial parameters of the final model, of bodies that can exist, in the
             order of the tree; None for the nominal ones.
     """
@@ -210,3 +226,4 @@ class Diagnosis:
     refused: Mapping[str, int]
     remarks: tuple[str, ...] = ()
     bodies: np.ndarray | None = None
+    equivalents: tuple[Equivalent, ...] = ()

@@ -18,6 +18,7 @@ from sgp_ros.recordings.reader import open_recording
 from sgp_ros.report.diagnosis import write_diagnosis
 from sgp_ros.report.diagnosis_predictions import write_predictions
 from sgp_ros.report.diagnosis_text import (
+    equivalence_sentence,
     parameter_errors_text,
     phrase,
     verdict_sentence,
@@ -166,6 +167,8 @@ def print_diagnosis(found: Diagnosis) -> None:
         for f in found.alternatives[:_RIVALS]:
             print(f'  not       p {f.probability:.2f}  {f.joint}: {phrase(f)}: '
                   f'{why_it_lost(f, best)}')  # fmt: skip
+    for e in found.equivalents:
+        print(f'  or        {equivalence_sentence(e)}')
     if found.parameter_errors:
         print(f'  bodies    {parameter_errors_text(found.parameter_errors)}')
     for stem, proof in found.proofs.items():

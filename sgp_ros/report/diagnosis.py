@@ -10,6 +10,7 @@ from sgp_ros.core.scores import INTERVAL_95
 from sgp_ros.report.diagnosis_figures import draw_diagnosis, important_joints
 from sgp_ros.report.diagnosis_text import (
     effect_name,
+    equivalence_sentence,
     explained,
     held_out_sentence,
     numbers,
@@ -71,6 +72,7 @@ def render(found: Diagnosis, figures: Mapping[str, bytes]) -> str:
         findings=[_finding(f) for f in found.findings],
         rivals=[_rival(f, best) for f in found.alternatives[:_SHOWN_RIVALS]],
         more_rivals=[_rival(f, best) for f in found.alternatives[_SHOWN_RIVALS:]],
+        equivalents=[equivalence_sentence(e) for e in found.equivalents],
         is_unexplained=found.verdict == 'unexplained',
         errors=[_error(e) for e in found.parameter_errors],
         proofs=[

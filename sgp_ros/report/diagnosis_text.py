@@ -13,7 +13,7 @@ from sgp_ros.diagnosis.result import Parameter
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sgp_ros.diagnosis.result import Diagnosis, Finding, ParameterError, Proof
+    from sgp_ros.diagnosis.result import Diagnosis, Equivalent, Finding, ParameterError, Proof
 
 EFFECT_NAMES = {
     'viscous_friction': 'viscous friction',
@@ -162,6 +162,21 @@ def quantity(p: Parameter, *, is_short: bool = False) -> str:
     if is_short:
         return f'{p.value:.{places}f}'
     return f'{p.value:.{places}f} +- {half:.{places}f}{unit}'
+
+
+def equivalence_sentence(found: Equivalent) -> str:
+    """Say what this motion cannot tell from the findings, and which motion would."""
+    parts = [
+        f'{EFFECT_NAMES.get(effect, effect)} {_PLACES.get(joint, f"on {joint}")}'
+        for joint, effect in found.effects
+    ]
+    text = (
+        f'On this motion {" with ".join(parts) or "other parameters of the bodies"} fits as well'
+    )
+    if not found.motion:
+        return f'{text}; no motion that was tried tells them apart: measure one of them by itself.'
+    factor = f'{found.contrast:.0f}' if found.contrast < 1e4 else 'more than 10000'
+    return f'{text}; {found.motion} tells them apart: their efforts differ {factor} times as much.'
 
 
 def percent(share: float) -> str:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sgp_ros.diagnosis.decision import LEAST_SHARE
-from sgp_ros.diagnosis.result import Parameter
+from sgp_ros.diagnosis.result import Equivalent, Parameter
 from sgp_ros.report.diagnosis import render, write_diagnosis
 from sgp_ros.report.diagnosis_charts import draw_proof
 from sgp_ros.report.diagnosis_figures import (
@@ -21,6 +21,7 @@ from sgp_ros.report.diagnosis_figures import (
 )
 from sgp_ros.report.diagnosis_text import (
     EFFECT_NAMES,
+    equivalence_sentence,
     explained,
     held_out_sentence,
     percent,
@@ -114,6 +115,19 @@ def test_a_rival_that_fits_as_well_lost_by_its_parameters():
     assert 'with 2 numbers instead of 1' in why_it_lost(ASYMMETRIC, COULOMB)
     far = replace(ASYMMETRIC, log_bayes_factor=100.0)
     assert why_it_lost(far, COULOMB) == ASYMMETRIC.why
+
+
+def test_what_cannot_be_told_is_said_with_the_motion_that_would(tmp_path):
+    told = Equivalent((('elbow', 'spring'), ('base', 'gravity_tilt')), 'a motion twice as wide', 7)
+    sentence = equivalence_sentence(told)
+    assert 'a spring on elbow with a base that is not level at the base fits as well' in sentence
+    assert 'a motion twice as wide tells them apart' in sentence
+    assert ' 7 times' in sentence
+    never = equivalence_sentence(Equivalent((), '', 1.0))
+    assert 'other parameters of the bodies fits as well; no motion that was tried' in never
+    found = replace(diagnosis('parameters_only'), equivalents=(told,))
+    write_diagnosis(tmp_path, found)
+    assert sentence in (tmp_path / 'report.html').read_text()
 
 
 def test_without_held_out_recordings_the_page_promises_nothing(tmp_path):

@@ -1,0 +1,112 @@
+"""What is asserted, and what is not although it fits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.candidates import fit, floors
+from sgp_ros.diagnosis.decision import LEAST_SHARE, NATS, SHARE_TOLERANCE, Scale, decide
+from sgp_ros.diagnosis.hypotheses import Competition, compete
+from sgp_ros.diagnosis.suspects import Columns, Suspect
+from sgp_ros.robots.effects.catalogue import EFFECTS
+from sgp_ros.robots.effects.effect import Place
+from test.diagnosis.worlds import CHAINS, simulate
+
+
+def _fitted(equations, *names, is_free=False):
+    suspects = tuple(
+        Suspect(EFFECTS[n], Place(0), EFFECTS[n].starts(equations.motion, Place(0))[0])
+        for n in names
+    )
+    start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
+    return fit(Columns(equations), suspects, start, is_free=is_free)
+
+
+def _competition(equations, *models):
+    bases = (_fitted(equations, is_free=f) for f in (False, True))
+    return Competition(*bases, tuple(m for m in models if m), ())
+
+
+@pytest.fixture(scope='module')
+def damped(equations_for, viscous):
+    return equations_for(viscous)[1]
+
+
+def test_an_effect_that_explains_all_is_asserted(damped):
+    right, wrong = _fitted(damped, 'viscous_friction'), _fitted(damped, 'spring')
+    decision = decide(damped, _competition(damped, wrong, right))
+    assert decision.verdict == 'missing_physics'
+    assert decision.model is right
+    assert wrong not in decision.rivals[:1] or decision.rest < 0.01
+
+
+def test_among_equal_fits_the_simpler_is_asserted(damped):
+    """The richer model leaves no more, and loses."""
+    simple = _fitted(damped, 'viscous_friction')
+    rich = _fitted(damped, 'viscous_friction', 'quadratic_drag')
+    assert rich.mean_square[0] <= simple.mean_square[0] * (1.0 + 1e-9)
+    assert decide(damped, _competition(damped, rich, simple)).model is simple
+
+
+def test_what_leaves_much_is_not_asserted(damped):
+    """A spring where friction is missing: nothing adequate is there, on joint 0."""
+    decision = decide(damped, _competition(damped, _fitted(damped, 'spring')))
+    assert decision.verdict == 'unexplained'
+    assert decision.worst == 0
+
+
+def test_an_effect_too_small_to_be_physics_is_not_asserted(equations_for):
+    """It is significant by far, and makes less than the schema counts."""
+    world = simulate(CHAINS[1], 3, 10.0, force=lambda t, q, v: (-0.02 * v[0],))
+    _, equations = equations_for(world)
+    small = _fitted(equations, 'viscous_friction')
+    competition = _competition(equations, small)
+    assert small.score > competition.base.score + NATS
+    assert small.shares[0] < SHARE_TOLERANCE * LEAST_SHARE
+    decision = decide(equations, competition)
+    assert decision.verdict in {'no_mismatch', 'parameters_only'}
+    assert decision.model is competition.base
+
+
+def test_effects_that_cancel_each_other_do_not_count(damped):
+    model = _fitted(damped, 'viscous_friction', 'quadratic_drag')
+    (net,) = [sum(model.forces)]
+    opposed = replace(model, forces=(10.0 * net, -9.0 * net))
+    agreeing = replace(model, forces=(0.5 * net, 0.5 * net))
+    scale = Scale.of(damped, _competition(damped))
+    opposed.__dict__['shares'] = agreeing.__dict__['shares'] = [1.0, 1.0]
+    assert opposed.net_share == pytest.approx(agreeing.net_share)
+    assert scale.counts(agreeing)
+    assert not scale.counts(opposed)
+
+
+def test_a_share_is_measured_before_the_filter(equations_for):
+    """A ripple above the cut-off is physics too."""
+    world = simulate(CHAINS[1], 6, 10.0, force=lambda t, q, v: (-0.3 * v[0],))
+    _, equations = equations_for(world)
+    at = EFFECTS['cogging'].starts(equations.motion, Place(0))[0]
+    start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
+    ripple = Suspect(EFFECTS['cogging'], Place(0), np.full_like(at, 150.0))
+    model = fit(Columns(equations), (ripple,), start, is_free=False, rounds=1, steps=1)
+    loud = replace(model, coefficients=(np.array([1.0, 0.0]),))
+    assert loud.shares[0] > 0.05
+    assert loud.filtered_shares[0] < 0.2 * loud.shares[0]
+
+
+def test_more_than_two_effects_are_found_where_joints_lack_several(equations_for):
+    """Three effects on two joints, each found by the extension of the best pair."""
+    world = simulate(
+        CHAINS[2], 7, 12.0,
+        force=lambda t, q, v: (-4.0 * (q[0] - 0.3) - 1.5 * v[0], -0.8 * v[1]),
+    )  # fmt: skip
+    _, equations = equations_for(world)
+    competition = compete(equations, lambda _share: None)
+    found = {(s.effect.name, s.place.joint) for m in competition.more for s in m.suspects}
+    decision = decide(equations, competition)
+    asserted = {(s.effect.name, s.place.joint) for s in decision.model.suspects}
+    truth = {('spring', 0), ('viscous_friction', 0), ('viscous_friction', 1)}
+    assert truth <= found
+    assert asserted == truth

@@ -1,0 +1,89 @@
+"""What a motion cannot tell apart is said, with the motion that would."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.candidates import fit, floors
+from sgp_ros.diagnosis.decision import Decision, decide
+from sgp_ros.diagnosis.equivalence import CLEARER, MOTIONS, equivalents, moved
+from sgp_ros.diagnosis.hypotheses import Competition, compete
+from sgp_ros.diagnosis.pipeline import diagnose
+from sgp_ros.diagnosis.suspects import Columns, Suspect
+from sgp_ros.robots.effects.catalogue import EFFECTS
+from sgp_ros.robots.effects.effect import Place
+from test.diagnosis.worlds import CHAINS, events_of, simulate
+
+
+def _fitted(equations, *names, is_free=False):
+    suspects = tuple(
+        Suspect(EFFECTS[n], Place(0), EFFECTS[n].starts(equations.motion, Place(0))[0])
+        for n in names
+    )
+    start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
+    return fit(Columns(equations), suspects, start, is_free=is_free)
+
+
+def _told(equations, best, rivals):
+    bases = _fitted(equations), _fitted(equations, is_free=True)
+    competition = Competition(*bases, (best, *rivals), ())
+    decision = Decision('missing_physics', best, tuple(rivals), 0.0, 0)
+    return equivalents(equations, competition, decision)
+
+
+@pytest.fixture(scope='module')
+def narrow(equations_for):
+    """One link with a spring that hardly leaves the middle: sin q is a straight line."""
+    world = simulate(CHAINS[1], 5, 10.0, force=lambda t, q, v: (-0.6 * q[0],), reach=0.2)
+    return equations_for(world)[1]
+
+
+def test_a_spring_seen_at_small_angles_may_be_a_wrong_body(narrow):
+    """The wider motion separates them, for the weight follows the sine."""
+    found = _told(narrow, _fitted(narrow, 'spring'), [])
+    assert [e.effects for e in found] == [()]
+    assert found[0].motion == 'a motion twice as wide'
+    assert found[0].contrast > CLEARER
+
+
+def test_a_spring_seen_at_large_angles_has_no_equivalent(equations_for):
+    world = simulate(CHAINS[1], 5, 10.0, force=lambda t, q, v: (-0.6 * q[0],), reach=3.0)
+    equations = equations_for(world)[1]
+    rivals = [_fitted(equations, name) for name in ('viscous_friction', 'armature')]
+    assert _told(equations, _fitted(equations, 'spring'), rivals) == ()
+
+
+def test_what_contains_the_finding_is_no_other_explanation(narrow):
+    spring, more = _fitted(narrow, 'spring'), _fitted(narrow, 'spring', 'viscous_friction')
+    found = _told(narrow, spring, [more, _fitted(narrow, 'spring', is_free=True)])
+    assert all(('joint0', 'spring') not in e.effects for e in found)
+
+
+def test_the_diagnosis_says_what_it_cannot_tell(robots):
+    """Whatever it asserts of a spring at small angles, the other explanation is named."""
+    world = simulate(CHAINS[1], 5, 10.0, force=lambda t, q, v: (-0.6 * q[0],), reach=0.2)
+    robot, tree = robots[1]
+    found = diagnose(events_of(world), robot, tree, {})
+    named = {f.effect for f in found.findings} or {'bodies'}
+    others = {effect for e in found.equivalents for _, effect in e.effects or (('', 'bodies'),)}
+    assert named | others >= {'spring', 'bodies'}
+
+
+def test_nothing_is_equivalent_to_what_is_unexplained(narrow):
+    competition = compete(narrow, lambda _share: None)
+    asserted = decide(narrow, competition)
+    unknown = Decision('unexplained', competition.base, asserted.rivals, 1.0, 0)
+    assert equivalents(narrow, competition, unknown) == ()
+
+
+@pytest.mark.parametrize('how', MOTIONS.values())
+def test_a_moved_motion_is_consistent(narrow, how):
+    """Velocity and acceleration are the slopes of position and velocity; it keeps its rows."""
+    motion = moved(narrow.motion, *how)
+    for signal, slope in (
+        (motion.position, motion.velocity), (motion.velocity, motion.acceleration),
+    ):  # fmt: skip
+        found = np.gradient(signal, motion.step, axis=0)[50:-50]
+        np.testing.assert_allclose(found, slope[50:-50], atol=0.02 * np.abs(slope).max())
+    np.testing.assert_allclose(np.diff(motion.time), motion.step)
