@@ -7,12 +7,14 @@ the number of rows. `benchmarks/concealed` measures how the probabilities keep w
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.diagnosis.decision import ADEQUATE_REST, Scale
+from sgp_ros.diagnosis.decision import ADEQUATE_REST, TEMPER, Scale
+from sgp_ros.diagnosis.equivalence import is_same_law
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,8 +25,8 @@ if TYPE_CHECKING:
     from sgp_ros.diagnosis.hypotheses import Competition
     from sgp_ros.diagnosis.result import Finding
 
-TEMPER = 0.3
-"""Weight of a nat of `Scale.worth` in the odds of rivals."""
+LEAST_ODDS = 0.01
+"""A rival below this, relative to the asserted model, is not looked at closely."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,10 +55,21 @@ class Probabilities:
 def probabilities(
     equations: Equations, competition: Competition, decision: Decision
 ) -> Probabilities:
-    """Return the tempered probabilities of all effects."""
-    scale = Scale.of(equations, competition)
+    """Return the tempered probabilities of all effects.
+
+    A richer law whose numbers make it the asserted one is no rival to it.
+    """
+    scale, asserted = Scale.of(equations, competition), decision.model
+    least = scale.worth(asserted) + math.log(LEAST_ODDS) / TEMPER
     models = [
-        m for m in (*competition.singles, *competition.pairs, *competition.more) if scale.counts(m)
+        m
+        for m in (*competition.singles, *competition.pairs, *competition.more)
+        if scale.counts(m)
+        and not (
+            m.key != asserted.key
+            and scale.worth(m) > least
+            and is_same_law(equations, asserted, m)
+        )
     ]
     adequate = 1.0 / (1.0 + (decision.rest / ADEQUATE_REST) ** 2) if models else 0.0
     by_key: dict[object, float] = {}

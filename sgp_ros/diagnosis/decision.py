@@ -38,6 +38,8 @@ SHAPE_ERROR = 0.001
 """Part of the discrepancy that the right column may leave for the same reason."""
 PER_EFFECT, PER_PARAMETER = 15.0, 5.0
 """What an effect, and each number that the data determine, must be worth [nats]."""
+TEMPER = 0.3
+"""Weight of a nat of `Scale.worth` in the odds of rivals."""
 MOST_OPPOSED = 5.0
 """Greatest ratio of the effects' mean squares, added up, to that of their sum, or of all there is
 to explain.
@@ -111,11 +113,12 @@ class Scale:
 
     def counts(self, model: Model) -> bool:
         """Return whether effects are large enough and do not cancel each other, or the bodies."""
+        return self.is_sound(model) and min(model.shares) > SHARE_TOLERANCE * LEAST_SHARE
+
+    def is_sound(self, model: Model) -> bool:
+        """Return whether effects do not merely cancel each other, or the bodies."""
         there = max(min(model.net_share, float(self.nominal.sum())), 1e-12)
-        return (
-            sum(model.filtered_shares) < MOST_OPPOSED * there
-            and min(model.shares) > SHARE_TOLERANCE * LEAST_SHARE
-        )
+        return sum(model.filtered_shares) < MOST_OPPOSED * there
 
     def fit(self, model: Model) -> float:
         """Return the tempered log likelihood, with the prior of the bodies' change [nats]."""
@@ -128,12 +131,25 @@ class Scale:
         return self.fit(model) - PER_EFFECT * len(model.suspects) - PER_PARAMETER * model.freedom
 
 
+def _ranked(competition: Competition, scale: Scale) -> list[Model]:
+    """Return the models that could be asserted, best first.
+
+    There are none where the best explanation of all is too small to be physics: a worse one that
+    is larger, because bodies undo most of it, is not to be preferred for that.
+    """
+    models = (*competition.singles, *competition.pairs, *competition.more)
+    least = competition.base.score + NATS
+    sound = [m for m in models if m.score > least and scale.is_sound(m)]
+    ranked = sorted(sound, key=scale.worth, reverse=True)
+    if ranked and max(ranked[0].shares) < SHARE_TOLERANCE * LEAST_SHARE:
+        return []
+    return [m for m in ranked if scale.counts(m)]
+
+
 def decide(equations: Equations, competition: Competition) -> Decision:
     """Return the verdict on a recording."""
     scale, base = Scale.of(equations, competition), competition.base
-    models = (*competition.singles, *competition.pairs, *competition.more)
-    able = [m for m in models if m.score > base.score + NATS and scale.counts(m)]
-    ranked = sorted(able, key=scale.worth, reverse=True)
+    ranked = _ranked(competition, scale)
     worst = int(np.argmax(scale.base))
     left = float(scale.shares(competition.parameters).max())
     if ranked and scale.worth(ranked[0]) > scale.worth(base):

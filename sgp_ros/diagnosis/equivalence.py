@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.diagnosis.certainty import TEMPER
-from sgp_ros.diagnosis.decision import Scale
+from sgp_ros.diagnosis.decision import LEAST_SHARE, TEMPER, Scale
 from sgp_ros.diagnosis.findings import joint_name
 from sgp_ros.diagnosis.prediction import imbalance
 from sgp_ros.diagnosis.result import Equivalent
@@ -35,13 +34,16 @@ CLEARER = 2.0
 LONGEST = 4000
 """Rows of the recording that are carried over to other motions."""
 MOTIONS = {
-    'a motion twice as wide': (2.0, 1.0, 0.0),
+    'a motion over the whole range of the joints': (np.inf, 1.0, 0.0),
     'a motion half as wide': (0.5, 1.0, 0.0),
     'a motion twice as fast': (1.0, 2.0, 0.0),
     'a motion half as fast': (1.0, 0.5, 0.0),
     'the same motion about another position': (1.0, 1.0, 1.5),
 }
-"""Width and speed relative to the recording, shift of the middle in standard deviations."""
+"""Width and speed relative to the recording, shift of the middle in standard deviations.
+
+A width without bound is what the limits of the joints allow, a turn where there are none.
+"""
 
 
 def equivalents(
@@ -65,7 +67,7 @@ def equivalents(
         is_alike = scale.fit(rival) > scale.fit(best) - ALIKE
         if len(found) < MOST and is_alike and not any(_contains(rival, m) for m in known):
             known.append(rival)
-            found.append(_told(equations, best, rival))
+            found += _told(equations, best, rival)
     return tuple(found)
 
 
@@ -74,18 +76,37 @@ def _contains(rival: Model, model: Model) -> bool:
     return model.key <= rival.key and (rival.is_free or not model.is_free)
 
 
-def _told(equations: Equations, best: Model, rival: Model) -> Equivalent:
-    here = _difference(equations, best, rival, moved(equations.motion, 1.0, 1.0, 0.0))
-    there = {
-        name: _difference(equations, best, rival, moved(equations.motion, *how)) / here
-        for name, how in MOTIONS.items()
-    }
+def _told(equations: Equations, best: Model, rival: Model) -> list[Equivalent]:
+    """Return what tells two models apart; nothing for the same law under another name."""
+    here, there = _contrasts(equations, best, rival)
     name = max(there, key=lambda n: there[n])
-    is_clear = there[name] > CLEARER
+    if max(here, there[name]) < LEAST_SHARE:
+        return []
     effects = tuple(
         (joint_name(equations.motion, s.place.joint), s.effect.name) for s in rival.suspects
     )
-    return Equivalent(effects, name if is_clear else '', there[name] if is_clear else 1.0)
+    if there[name] < CLEARER * here:
+        return [Equivalent(effects, '', 1.0)]
+    return [Equivalent(effects, name, there[name] / here)]
+
+
+def is_same_law(equations: Equations, one: Model, other: Model) -> bool:
+    """Return whether two models say the same on any motion, as far as physics counts.
+
+    So does a law with one parameter more whose value makes it the simpler one.
+    """
+    here, there = _contrasts(equations, one, other)
+    return max(here, *there.values()) < LEAST_SHARE
+
+
+def _contrasts(equations: Equations, one: Model, other: Model) -> tuple[float, dict[str, float]]:
+    """Return the difference of two models on the recorded motion, and on each other one."""
+    here = _difference(equations, one, other, moved(equations.motion, 1.0, 1.0, 0.0))
+    there = {
+        name: _difference(equations, one, other, moved(equations.motion, *how))
+        for name, how in MOTIONS.items()
+    }
+    return here, there
 
 
 def _difference(equations: Equations, one: Model, other: Model, motion: ObservedMotion) -> float:
@@ -105,20 +126,22 @@ def moved(motion: ObservedMotion, width: float, speed: float, shift: float) -> O
 
     Args:
         motion: given; its first stretch without a pause is used.
-        width: factor of the amplitudes.
+        width: factor of the amplitudes; infinite for the whole range of the joints.
         speed: factor of the speed.
         shift: of the middle in standard deviations of the position.
     """
     ends = [*motion.starts[1:], len(motion.time)]
     rows = slice(motion.starts[0], min(ends[0], motion.starts[0] + LONGEST))
     q = motion.position[rows]
-    middle = q.mean(axis=0)
+    middle, wide = q.mean(axis=0), np.full(q.shape[1], width)
+    if np.isinf(width):
+        middle, wide = _whole_range(motion, q)
     time = (motion.time[rows] - motion.time[rows][0]) / speed
     changed = replace(
         motion, time=time, step=motion.step / speed, starts=(0,), drive=None,
-        position=middle + shift * q.std(axis=0) + width * (q - middle),
-        velocity=width * speed * motion.velocity[rows],
-        acceleration=width * speed**2 * motion.acceleration[rows],
+        position=middle + shift * q.std(axis=0) + wide * (q - q.mean(axis=0)),
+        velocity=wide * speed * motion.velocity[rows],
+        acceleration=wide * speed**2 * motion.acceleration[rows],
         effort=np.zeros_like(q),
     )  # fmt: skip
     driven = motion.tree.is_actuated[: motion.tree.size]
@@ -127,3 +150,14 @@ def moved(motion: ObservedMotion, width: float, speed: float, shift: float) -> O
     if motion.drive is not None:
         drive = Drive(time, effort, ((0.0, len(time)),), changed.step)
     return replace(changed, effort=effort, drive=drive)
+
+
+def _whole_range(motion: ObservedMotion, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the middle of the range of each joint, and how much wider it is than a motion."""
+    k = motion.tree.size
+    lower, upper = motion.tree.lower[:k], motion.tree.upper[:k]
+    is_limited = np.isfinite(lower) & np.isfinite(upper)
+    low = np.where(is_limited, lower, q.mean(axis=0) - np.pi)
+    high = np.where(is_limited, upper, q.mean(axis=0) + np.pi)
+    wide = np.where(motion.moves, (high - low) / np.maximum(np.ptp(q, axis=0), 1e-12), 1.0)
+    return 0.5 * (low + high), np.maximum(wide, 1.0)

@@ -43,7 +43,7 @@ def test_a_spring_seen_at_small_angles_may_be_a_wrong_body(narrow):
     """The wider motion separates them, for the weight follows the sine."""
     found = _told(narrow, _fitted(narrow, 'spring'), [])
     assert [e.effects for e in found] == [()]
-    assert found[0].motion == 'a motion twice as wide'
+    assert found[0].motion == 'a motion over the whole range of the joints'
     assert found[0].contrast > CLEARER
 
 
