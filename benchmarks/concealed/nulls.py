@@ -40,7 +40,7 @@ NOTHING, PARAMETERS, SLIGHT = 'nothing', 'wrong parameters', 'slight unlisted ef
 KINDS = (NOTHING, PARAMETERS, SLIGHT)
 _SLIGHT = (2e-4, 3e-3)
 _TRIES = 40
-_KEPT = 6
+_KEPT = 3
 
 
 def main():
@@ -61,7 +61,7 @@ def main():
               f'{time.perf_counter() - begin:.0f} s', flush=True)  # fmt: skip
         report = {'schema': 1, 'tier': arguments.tier, 'seeds': arguments.seeds,
                   'environment': environment(), 'worlds': rows}  # fmt: skip
-        path.write_text(json.dumps(report, indent=1, allow_nan=False) + '\n', encoding='utf-8')
+        path.write_text(json.dumps(report, allow_nan=False) + '\n', encoding='utf-8')
 
 
 def drawn(seed, tier):
@@ -132,12 +132,11 @@ def _terms(scale, model):
         'effects': [s.effect.name for s in model.suspects],
         'is_free': bool(model.is_free),
         'freedom': int(model.freedom),
-        'fit': scale.fit(model),
-        'worth': scale.worth(model),
-        'score': model.score,
-        'shares': list(model.shares),
+        'fit': round(scale.fit(model), 2),
+        'worth': round(scale.worth(model), 2),
+        'shares': [round(share, 6) for share in model.shares],
         'counts': bool(model.suspects) and scale.counts(model),
-        'rest': scale.rest(model),
+        'rest': round(scale.rest(model), 5),
     }
 
 
