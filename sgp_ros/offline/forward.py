@@ -10,7 +10,7 @@ keeps the direction of its friction until its velocity is zero.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -26,6 +26,22 @@ if TYPE_CHECKING:
 _BESIDE_REST = 1e-200
 """A velocity so small that only its sign is felt."""
 _JUMP = 1e-100
+
+
+class ForcedMotion(Protocol):
+    """Equations of motion `M(q) a = drive(q, v, effort)` with dry friction in the drive.
+
+    What is called effort may hold more columns than there are joints: the functions below hand
+    its rows on and never look inside.
+    """
+
+    def equations(
+        self, q: np.ndarray, v: np.ndarray, effort: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return M, (m, k, k), and the drive, (m, k), of m states."""
+
+    def level_of_dry_friction(self, q: np.ndarray, effort: np.ndarray) -> np.ndarray:
+        """Return the level of dry friction of each joint, (m, k) [unit of the drive]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +118,7 @@ class DryFriction:
 
 
 def dry_friction(
-    dynamics: Dynamics, q: np.ndarray, v: np.ndarray, effort: np.ndarray
+    dynamics: ForcedMotion, q: np.ndarray, v: np.ndarray, effort: np.ndarray
 ) -> DryFriction:
     """Return which joints stick and which way friction points in the others.
 
@@ -136,7 +152,7 @@ def dry_friction(
 
 
 def acceleration_under(
-    dynamics: Dynamics, friction: DryFriction, q: np.ndarray, v: np.ndarray, effort: np.ndarray
+    dynamics: ForcedMotion, friction: DryFriction, q: np.ndarray, v: np.ndarray, effort: np.ndarray
 ) -> np.ndarray:
     """Return the acceleration with the given state of dry friction, (m, k).
 
@@ -177,7 +193,7 @@ def forward(
 
 
 def _equations(
-    dynamics: Dynamics, friction: DryFriction, q: np.ndarray, v: np.ndarray, effort: np.ndarray
+    dynamics: ForcedMotion, friction: DryFriction, q: np.ndarray, v: np.ndarray, effort: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mass matrix and drive with friction on the side it is on, (m, k, k) and (m, k)."""
     felt = np.where(v == 0.0, _BESIDE_REST * friction.side, v)

@@ -15,7 +15,7 @@ import numpy as np
 from sgp_ros.offline.forward import Dynamics, acceleration_under, dry_friction
 
 if TYPE_CHECKING:
-    from sgp_ros.offline.forward import DryFriction, Residual
+    from sgp_ros.offline.forward import DryFriction, ForcedMotion, Residual
     from sgp_ros.robots.robot import Robot
 
 
@@ -65,15 +65,26 @@ def roll_out(
         for i in range(n):
             state = q[:, i], v[:, i]
             for _ in range(substeps):
-                state = _step(dynamics, *state, effort[:, i], dt / substeps)
+                state = advance(dynamics, *state, effort[:, i], dt / substeps)
             q[:, i + 1], v[:, i + 1] = state
     return q, v
 
 
-def _step(
-    dynamics: Dynamics, q: np.ndarray, v: np.ndarray, effort: np.ndarray, h: float
+def advance(
+    dynamics: ForcedMotion, q: np.ndarray, v: np.ndarray, effort: np.ndarray, h: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """One step of length h, cut where joints with dry friction stop, 2 k times at most."""
+    """Take one step of m states, cut where joints with dry friction stop, 2 k times at most.
+
+    Args:
+        dynamics: of k joints.
+        q: (m, k) [rad or m].
+        v: (m, k) [rad/s or m/s].
+        effort: (m, ...), constant during the step.
+        h: length of the step [s].
+
+    Returns:
+        positions and velocities after it; those of rows that are not finite stay as they are.
+    """
     q, v = q.copy(), v.copy()
     left = np.full((len(q), 1), h)
     rows = np.flatnonzero(np.isfinite(q).all(axis=1) & np.isfinite(v).all(axis=1))
@@ -102,7 +113,7 @@ def _moment_of_stop(v: np.ndarray, v1: np.ndarray, side: np.ndarray) -> np.ndarr
 
 
 def _runge_kutta(
-    dynamics: Dynamics,
+    dynamics: ForcedMotion,
     friction: DryFriction,
     q: np.ndarray,
     v: np.ndarray,
