@@ -194,6 +194,23 @@ def test_units_on_a_slide_are_those_of_forces_and_ways_but_a_phase_is_an_angle(n
     assert Quantity('phase', 'rad').unit_on(is_prismatic=True) == 'rad'
 
 
+@pytest.mark.parametrize(('effect', 'place'), CONTRACT)
+def test_an_effect_without_memory_sees_each_sample_alone(effect, place):
+    """In any order of the rows the force is the same; with memory it must not be."""
+    order = np.random.default_rng(5).permutation(ROWS)
+    sliding = _motion(drive=effect.has_memory)
+    sliding.__dict__['direction'] = np.sign(sliding.velocity)
+    fields = ('time', 'position', 'velocity', 'acceleration', 'effort')
+    mixed = replace(sliding, **{name: getattr(sliding, name)[order] for name in fields})
+    mixed.__dict__['direction'] = sliding.direction[order]
+    starts = _starts(effect, place)
+    shape = starts[len(starts) // 2]
+    given, found = (effect.columns(m, place, shape) for m in (sliding, mixed))
+    scale = np.abs(given).max() + 1e-300
+    agree = np.abs(found - given[order]).max() < 1e-10 * scale
+    assert agree == (not effect.has_memory)
+
+
 def _q(j):
     return MOTION.position[:, j]
 

@@ -117,19 +117,22 @@ TORQUE_GAIN = Effect(
 DEAD_ZONE = Effect(
     'dead_zone', (Quantity('width', 'N m'),), _dead_zone, _commanded,
     _levels(0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7), shaped('width'), _is_some,
-    'motor torque = u - clip(u, -width, width)', is_given=True, bounds=_level_bounds,
+    'motor torque = u - clip(u, -width, width)', is_given=True, has_memory=True,
+    bounds=_level_bounds,
 )  # fmt: skip
 SATURATION = Effect(
     'saturation', (Quantity('limit', 'N m'),), _saturation, _commanded,
     _levels(0.3, 0.5, 0.65, 0.8, 0.88, 0.94, 0.97, 0.99), shaped('limit'), _is_some,
-    'motor torque = clip(u, -limit, limit)', is_given=True, bounds=_limit_bounds,
+    'motor torque = clip(u, -limit, limit)', is_given=True, has_memory=True, bounds=_limit_bounds,
 )  # fmt: skip
 ACTUATOR_LAG = Effect(
     'actuator_lag', (Quantity('time_constant', 's'),), _lag, _commanded, _times,
     shaped('time_constant'), _is_some, 'time_constant d tau/dt + tau = command',
-    is_given=True, bounds=_quarter,
+    is_given=True, has_memory=True,
+    bounds=_quarter,
 )  # fmt: skip
 COMMAND_DELAY = Effect(
     'command_delay', (Quantity('delay', 's'),), _delay, _delayed, _times, shaped('delay'),
-    _is_some, 'motor torque(t) = command(t - delay)', is_given=True, bounds=_quarter,
+    _is_some, 'motor torque(t) = command(t - delay)', is_given=True, has_memory=True,
+    bounds=_quarter,
 )  # fmt: skip

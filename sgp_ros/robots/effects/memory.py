@@ -133,7 +133,7 @@ HYSTERESIS = Effect(
     'hysteresis', (Quantity('level', 'N m'), Quantity('presliding', 'rad')), _hysteresis,
     every_joint, _ways,
     lambda f: {'level': float(f.coefficients[0]), 'presliding': float(f.shape[0])},
-    is_positive, 'tau_x = -level z, dz/dt = (v - |v| z) / presliding',
+    is_positive, 'tau_x = -level z, dz/dt = (v - |v| z) / presliding', has_memory=True,
     bounds=lambda motion, place: (
         _ways(motion, place)[0] / 5.0, _ways(motion, place)[-1] * 3.0
     ),
@@ -151,7 +151,7 @@ BACKLASH = Effect(
     'backlash', (Quantity('gap', 'rad'),), _backlash, every_motor, _gaps,
     lambda f: {'gap': float(f.shape[1])}, always,
     'motor and link play freely within gap; the encoder sits on the motor', is_given=True,
-    uses_bodies=True,
+    uses_bodies=True, has_memory=True,
     bounds=lambda motion, place: (
         np.array([0.01, 1e-9]),
         np.array([0.95, float(np.ptp(motion.position[:, place.joint]))]),
