@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
+from sgp_ros.diagnosis.rollouts import HORIZON_S
 
+if TYPE_CHECKING:
     from sgp_ros.diagnosis.result import Diagnosis, Finding, Parameter, Proof
 
 
@@ -79,22 +79,30 @@ def _parameter(p: Parameter) -> dict[str, Any]:
 
 
 def _proof(p: Proof) -> dict[str, Any]:
-    numbers: dict[str, Mapping[str, float] | float] = {
+    tables = {
         'nmse_before': p.nmse_before,
         'nmse_after': p.nmse_after,
         'acceleration_nmse_before': p.acceleration_before,
         'acceleration_nmse_after': p.acceleration_after,
-        'nlpd_before': p.nlpd_before,
-        'nlpd_after': p.nlpd_after,
         'rollout_nmse_before': p.rollout_before,
         'rollout_nmse_after': p.rollout_after,
     }
-    return {
-        name: {joint: _finite(x) for joint, x in value.items()}
-        if not isinstance(value, float)
-        else _finite(value)
-        for name, value in numbers.items()
-    }
+    entry: dict[str, Any] = {}
+    for name, table in tables.items():
+        entry[name] = {joint: _finite(x) for joint, x in table.items()}
+        intervals = p.intervals.get(name, {})
+        entry[f'{name}_interval'] = {joint: _ends(x) for joint, x in intervals.items()}
+    for name, value, interval in zip(
+        ('nlpd_before', 'nlpd_after'), (p.nlpd_before, p.nlpd_after), p.nlpd_intervals, strict=True
+    ):
+        entry[name] = _finite(value)
+        entry[f'{name}_interval'] = None if interval is None else _ends(interval)
+    counts = {'windows': p.rollouts, 'failed': p.failed, 'horizon_s': HORIZON_S}
+    return entry | {'rollouts': counts, 'distance_from_train': _finite(p.distance)}
+
+
+def _ends(interval: tuple[float, float]) -> list[float | None]:
+    return [_finite(x) for x in interval]
 
 
 def _finite(x: float) -> float | None:

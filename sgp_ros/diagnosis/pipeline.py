@@ -15,6 +15,7 @@ from sgp_ros.diagnosis.equivalence import equivalents
 from sgp_ros.diagnosis.final_model import FinalModel
 from sgp_ros.diagnosis.findings import alternatives, asserted, parameter_errors
 from sgp_ros.diagnosis.hypotheses import compete
+from sgp_ros.diagnosis.proof import prove
 from sgp_ros.diagnosis.remainder import learn_remainder
 from sgp_ros.diagnosis.result import Diagnosis, Traces
 from sgp_ros.diagnosis.suspects import Columns
@@ -60,22 +61,21 @@ def diagnose(
     competition = compete(equations, lambda share: progress(0.05 + 0.75 * share))
     decision = decide(equations, competition)
     lags = [lag for lag in sensor_lags(raw, equations) if lag.is_physics]
-    final = FinalModel(
-        decision.model, competition.nominal, equations, _remainders(equations, decision)
-    )
+    remainders = _remainders(equations, decision)
+    final = FinalModel(decision.model, competition.nominal, equations, remainders)
     progress(0.9)
     columns = Columns(equations)
-    proofs = {stem: final.prove(part, tree) for stem, part in {'train': raw, **held}.items()}
+    recordings = {'train': raw, **held}
+    proofs = {stem: prove(final, part, tree) for stem, part in recordings.items()}
     predictions = {stem: final.predict(part, tree) for stem, part in held.items()}
     chances = probabilities(equations, competition, decision)
-    findings, forces = asserted(equations, decision, columns, lags, final.remainders, chances)
+    findings, forces = asserted(equations, decision, columns, lags, remainders, chances)
     verdict = 'missing_physics' if lags and decision.verdict in _CALM else decision.verdict
     progress(1.0)
-    prismatic = tree.is_prismatic[: tree.size]
     return Diagnosis(
         robot=robot.name,
         joints=tree.moving_names,
-        units=tuple('N' if p else 'N m' for p in prismatic),
+        units=tuple('N' if p else 'N m' for p in tree.is_prismatic[: tree.size]),
         verdict=verdict,
         certainty=certainty_of(findings, decision, equations, competition),
         findings=findings,
@@ -84,7 +84,7 @@ def diagnose(
         proofs=proofs,
         predictions=predictions,
         dependences=dependences(equations, competition.parameters.residual),
-        traces=_traces(equations, competition, decision.model, final.remainders, forces),
+        traces=_traces(equations, competition, decision.model, remainders, forces),
         cutoff_hz=bandwidth.cutoff,
         rate_hz=1.0 / (raw.step * equations.filter.decimation),
         rows=len(equations.d),

@@ -115,8 +115,16 @@ class Proof:
             commanded effort, by joint.
         acceleration_before, acceleration_after: the same of the accelerations.
         nlpd_before, nlpd_after: mean negative log predictive density of the effort [nats].
-        rollout_before, rollout_after: error of 0.3 s roll-outs over the variance of the
-            position, by joint; empty where none were made.
+        rollout_before, rollout_after: mean squared error of the position over 0.3 s roll-outs
+            from measured states, over that of holding the position at their start, by joint;
+            empty where none were made.
+        intervals: 95 % intervals of all these, by their name in diagnosis.json and joint; absent
+            where a recording is too short for one.
+        nlpd_intervals: of `nlpd_before` and `nlpd_after`; None likewise.
+        rollouts: number of roll-outs.
+        failed: of them, where one of the models did not end; these are in no mean.
+        distance: median distance of the states from those learned from, in standard deviations
+            per coordinate.
     """
 
     nmse_before: Mapping[str, float]
@@ -127,6 +135,11 @@ class Proof:
     nlpd_after: float
     rollout_before: Mapping[str, float] = field(default_factory=dict)
     rollout_after: Mapping[str, float] = field(default_factory=dict)
+    intervals: Mapping[str, Mapping[str, tuple[float, float]]] = field(default_factory=dict)
+    nlpd_intervals: tuple[tuple[float, float] | None, tuple[float, float] | None] = (None, None)
+    rollouts: int = 0
+    failed: int = 0
+    distance: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

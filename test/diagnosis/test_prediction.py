@@ -8,8 +8,10 @@ import pytest
 from sgp_ros.diagnosis.candidates import Columns, Suspect, fit, floors
 from sgp_ros.diagnosis.final_model import FinalModel
 from sgp_ros.diagnosis.prediction import accelerations, extra_force, imbalance
+from sgp_ros.diagnosis.proof import prove
 from sgp_ros.robots.effects.catalogue import EFFECTS
 from sgp_ros.robots.effects.effect import Place
+from test.diagnosis.worlds import CHAINS, simulate
 
 INNER = slice(80, -80)
 
@@ -88,10 +90,51 @@ def test_the_proof_measures_what_an_effect_takes_away(robots, equations_for, vis
     raw, equations = equations_for(viscous)
     nominal = _fitted(equations)
     model = _fitted(equations, _suspect('viscous_friction', 0))
-    proof = FinalModel(model, nominal, equations, ()).prove(raw, robots[1][1])
+    proof = prove(FinalModel(model, nominal, equations, ()), raw, robots[1][1])
     before, after = proof.nmse_before['joint0'], proof.nmse_after['joint0']
     direct = (equations.d**2).mean() / equations.filter(equations.motion.effort).var()
     assert before == pytest.approx(direct, rel=0.02)
     assert after < 1e-4
     assert proof.acceleration_after['joint0'] < 0.01 * proof.acceleration_before['joint0']
     assert proof.nlpd_after < proof.nlpd_before
+
+
+def test_every_number_of_a_proof_comes_with_its_interval(robots, equations_for, viscous):
+    """Which holds it, and is narrow where the recording is long."""
+    raw, equations = equations_for(viscous)
+    model = _fitted(equations, _suspect('viscous_friction', 0))
+    proof = prove(FinalModel(model, _fitted(equations), equations, ()), raw, robots[1][1])
+    numbers = {
+        'nmse_before': proof.nmse_before, 'nmse_after': proof.nmse_after,
+        'acceleration_nmse_before': proof.acceleration_before,
+        'acceleration_nmse_after': proof.acceleration_after,
+        'rollout_nmse_before': proof.rollout_before, 'rollout_nmse_after': proof.rollout_after,
+    }  # fmt: skip
+    assert proof.intervals.keys() == numbers.keys()
+    for name, table in numbers.items():
+        low, high = proof.intervals[name]['joint0']
+        assert 0.0 < low < table['joint0'] < high < 10.0 * low
+    for value, (low, high) in zip(
+        (proof.nlpd_before, proof.nlpd_after), proof.nlpd_intervals, strict=True
+    ):
+        assert low < value < high
+
+
+def test_roll_outs_show_what_an_effect_takes_away(robots, equations_for, viscous):
+    """Of ten seconds, about thirty; all end."""
+    raw, equations = equations_for(viscous)
+    model = _fitted(equations, _suspect('viscous_friction', 0))
+    proof = prove(FinalModel(model, _fitted(equations), equations, ()), raw, robots[1][1])
+    assert 25 < proof.rollouts <= 33
+    assert proof.failed == 0
+    assert proof.rollout_after['joint0'] < 1e-3 * proof.rollout_before['joint0']
+
+
+def test_states_beyond_those_learned_from_are_far(robots, equations_for, perfect):
+    """What was learned from is no distance away."""
+    raw, equations = equations_for(perfect[1])
+    model = _fitted(equations)
+    final = FinalModel(model, model, equations, ())
+    assert prove(final, raw, robots[1][1]).distance < 0.01
+    wide, _ = equations_for(simulate(CHAINS[1], 5, 5.0, reach=6.0))
+    assert prove(final, wide, robots[1][1]).distance > 0.3
