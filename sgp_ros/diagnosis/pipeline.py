@@ -14,6 +14,7 @@ from sgp_ros.diagnosis.equations import make_equations
 from sgp_ros.diagnosis.equivalence import equivalents
 from sgp_ros.diagnosis.final_model import FinalModel
 from sgp_ros.diagnosis.findings import alternatives, asserted, parameter_errors
+from sgp_ros.diagnosis.held_out import keep_back
 from sgp_ros.diagnosis.hypotheses import compete
 from sgp_ros.diagnosis.proof import prove
 from sgp_ros.diagnosis.remainder import learn_remainder
@@ -40,6 +41,7 @@ def diagnose(
     tree: Tree,
     tests: Mapping[str, Iterable[Event]],
     *,
+    holds_out: bool = False,
     progress: Callable[[float], None] = lambda _share: None,
 ) -> Diagnosis:
     """Say what a recording has that the nominal robot lacks.
@@ -49,6 +51,8 @@ def diagnose(
         robot: names, actuated joints and gains.
         tree: nominal robot.
         tests: events of held-out recordings, by stem.
+        holds_out: whether blocks of the training recording are kept for the proof, as
+            `held_out`; everything is then learned from the rest.
         progress: called with the share that is done.
 
     Raises:
@@ -56,6 +60,7 @@ def diagnose(
     """
     raw = collect(events, robot)
     held = {stem: collect(recording, robot) for stem, recording in tests.items()}
+    raw, kept, remarks = keep_back(raw) if holds_out else (raw, {}, ())
     bandwidth = choose_bandwidth(raw, tree)
     equations = make_equations(raw, tree, bandwidth)
     competition = compete(equations, lambda share: progress(0.05 + 0.75 * share))
@@ -65,7 +70,7 @@ def diagnose(
     final = FinalModel(decision.model, competition.nominal, equations, remainders)
     progress(0.9)
     columns = Columns(equations)
-    recordings = {'train': raw, **held}
+    recordings = {'train': raw, **kept, **held}
     proofs = {stem: prove(final, part, tree) for stem, part in recordings.items()}
     predictions = {stem: final.predict(part, tree) for stem, part in held.items()}
     chances = probabilities(equations, competition, decision)
@@ -89,6 +94,7 @@ def diagnose(
         rate_hz=1.0 / (raw.step * equations.filter.decimation),
         rows=len(equations.d),
         refused={reason: count for reason, count in raw.refused.items() if count},
+        remarks=remarks,
         bodies=diagnosed_bodies(equations, decision.model),
         equivalents=equivalents(equations, competition, decision),
     )

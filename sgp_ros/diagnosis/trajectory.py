@@ -24,7 +24,7 @@ from sgp_ros.robots.effects.drive import Drive
 from sgp_ros.robots.effects.observed_motion import ObservedMotion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from sgp_ros.engine.samples import Event
     from sgp_ros.robots.robot import Robot
@@ -113,13 +113,19 @@ def collect(events: Iterable[Event], robot: Robot) -> RawTrajectory:
         np.concatenate(times), step, position,
         np.concatenate(velocities) if velocities else None,
         np.concatenate(efforts) if efforts else None,
-        drive, tuple(segments), dict(accepted.refused), _density(position, segments, step),
+        drive, tuple(segments), dict(accepted.refused), noise_density(position, segments, step),
         start_ns,
     )  # fmt: skip
 
 
-def _density(position: np.ndarray, segments: list[slice], step: float) -> np.ndarray:
-    """Return the level of the spectra where no robot moves: the upper third, (k,)."""
+def noise_density(position: np.ndarray, segments: Sequence[slice], step: float) -> np.ndarray:
+    """Return the level of the spectra where no robot moves: the upper third, (k,).
+
+    Args:
+        position: (n, k) [rad or m].
+        segments: stretches of rows without a pause; the longest is looked at.
+        step: of the grid [s].
+    """
     longest = max(segments, key=lambda s: s.stop - s.start)
     q = position[longest]
     window = np.hanning(len(q))[:, None]

@@ -100,7 +100,9 @@ def run_diagnose(
         remarks.append(f'Nothing can be said of joints that do not move: {", ".join(still)}.')
     tests = _held_out(options, remarks)
     try:
-        found = diagnose(events, robot, tree, tests, progress=progress)
+        found = diagnose(
+            events, robot, tree, tests, holds_out=not options.tests, progress=progress
+        )
     except np.linalg.LinAlgError as error:
         raise NumericalError(
             f'the equations of {Path(bag).name} have no solution ({error})',
