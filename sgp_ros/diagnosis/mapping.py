@@ -38,6 +38,7 @@ def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
             for e in found.parameter_errors
         ],
         'fit': fit,
+        'simulation': {name: _finite(x) for name, x in found.simulation.items()},
         'dependence': [
             {'joint': d.joint, 'share': _finite(d.share),
              'scores': {k: _finite(v) for k, v in d.scores.items()}}

@@ -215,6 +215,8 @@ class Diagnosis:
         cutoff_hz, rate_hz: of the filtered rows.
         rows: number of them.
         refused: states by reason, of the training recording.
+        simulation: share of the mean squared effort that the nominal robot leaves on the
+            recording of its simulation, by joint; empty without one.
         remarks: for the user.
         equivalents: what this motion cannot tell from the findings, best first.
         bodies: (b, 10) inertial parameters of the final model, of bodies that can exist, in the
@@ -237,6 +239,7 @@ class Diagnosis:
     rate_hz: float
     rows: int
     refused: Mapping[str, int]
+    simulation: Mapping[str, float] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
     bodies: np.ndarray | None = None
     equivalents: tuple[Equivalent, ...] = ()

@@ -11,6 +11,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
+from sgp_ros.diagnosis.simulation_check import disagreement, nominal_shares
 from sgp_ros.engine.samples import JointSample
 from sgp_ros.errors import ConfigError, NumericalError, RecordingError
 from sgp_ros.experiments.diagnosed_robot import write_diagnosed
@@ -50,7 +51,7 @@ class DiagnoseOptions:
     """What is read.
 
     Attributes:
-        sim: recording of the nominal simulation; None without.
+        sim: recording of the nominal simulation, which the robot is checked with; None without.
         tests: held-out recordings; a part of the training recording without any.
         joint_states: topic of the states; None for the one there is.
         command: topic of the commands; None for the one there is.
@@ -85,10 +86,8 @@ def run_diagnose(
             'a mass and inertias for every moving link of the URDF',
             'identify it first and give the robot_identified.urdf of sgp identify',
         )
-    if options.sim is not None:
-        open_recording(options.sim)
     remarks: list[str] = []
-    events = _events(bag, options, remarks)
+    events = _events(bag, robot, options, remarks)
     still = still_joints(events, tree.moving_names)
     if len(still) == tree.size:
         raise RecordingError(
@@ -98,7 +97,8 @@ def run_diagnose(
         )
     if still:
         remarks.append(f'Nothing can be said of joints that do not move: {", ".join(still)}.')
-    tests = _held_out(options, remarks)
+    tests = _held_out(robot, options, remarks)
+    simulation = _simulation(robot, tree, options, remarks)
     try:
         found = diagnose(
             events, robot, tree, tests, holds_out=not options.tests, progress=progress
@@ -109,10 +109,25 @@ def run_diagnose(
             'motion of every joint',
             f'joints that do not move: {", ".join(still) or "none"}',
         ) from error
-    return _written(out, robot, replace(found, remarks=(*found.remarks, *remarks)))
+    remarks = [*found.remarks, *remarks]
+    return _written(out, robot, replace(found, simulation=simulation, remarks=tuple(remarks)))
 
 
-def _held_out(options: DiagnoseOptions, remarks: list[str]) -> dict[str, list[Event]]:
+def _simulation(
+    robot: Robot, tree: Tree, options: DiagnoseOptions, remarks: list[str]
+) -> dict[str, float]:
+    """Return what the nominal robot leaves of its simulation, by joint; empty without one."""
+    if options.sim is None:
+        return {}
+    shares = nominal_shares(_events(options.sim, robot, options, remarks), robot, tree)
+    said = disagreement(shares, Path(options.sim).name)
+    remarks += [said] if said else []
+    return shares
+
+
+def _held_out(
+    robot: Robot, options: DiagnoseOptions, remarks: list[str]
+) -> dict[str, list[Event]]:
     tests: dict[str, list[Event]] = {}
     for test in options.tests:
         stem = Path(test).stem
@@ -120,7 +135,7 @@ def _held_out(options: DiagnoseOptions, remarks: list[str]) -> dict[str, list[Ev
             raise RecordingError(
                 f'two recordings with the name {stem!r}', 'different names', 'rename one'
             )
-        tests[stem] = _events(test, options, remarks)
+        tests[stem] = _events(test, robot, options, remarks)
     return tests
 
 
@@ -183,9 +198,17 @@ def print_diagnosis(found: Diagnosis) -> None:
         print(f'  remark    {remark}')
 
 
-def _events(bag: str, options: DiagnoseOptions, remarks: list[str]) -> list[Event]:
+def _events(bag: str, robot: Robot, options: DiagnoseOptions, remarks: list[str]) -> list[Event]:
+    """Return what a recording holds of a robot."""
     recording = open_recording(bag)
     events = list(recording.events(options.joint_states, options.command))
+    seen = {name for event in events if isinstance(event, JointSample) for name in event.names}
+    if seen and not seen & set(robot.joint_names):
+        raise RecordingError(
+            f'{Path(bag).name} shows the joints {sorted(seen)}',
+            f'states of the joints {list(robot.joint_names)} of {robot.name}',
+            'take a recording of this robot, or name its joints in a robot file',
+        )
     remarks += recording.remarks
     remarks += [
         f'{count} messages of {Path(bag).name} could not be read: {why}'

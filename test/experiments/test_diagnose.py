@@ -27,6 +27,7 @@ CASES = {
 }
 """Case to its verdict and what the sentence must name."""
 LEAST_RATE_HZ = 100.0
+BOTH = ('before', 'after')
 ENTRY = {
     'joint', 'effect', 'parameters', 'location', 'log_bayes_factor', 'probability', 'share',
     'formula', 'why',
@@ -170,6 +171,18 @@ def test_a_recording_that_tells_nothing_ends_in_one_line(
         ('case_05/real.mcap', 'case_01/robot.urdf', (), 'expected states of the joints'),
         ('case_05/real.mcap', None, (), 'has no URDF'),
         ('case_05/real.mcap', ROOT / 'config' / 'robots' / 'panda.yaml', (), 'is singular'),
+        (
+            'case_05/real.mcap',
+            'case_05/robot.urdf',
+            ('--sim', _case('01') / 'sim.mcap'),
+            "sim.mcap shows the joints ['hinge']",
+        ),
+        (
+            'case_05/real.mcap',
+            'case_05/robot.urdf',
+            ('--test', _case('01') / 'real_test.mcap'),
+            "real_test.mcap shows the joints ['hinge']",
+        ),
         ('nowhere.mcap', 'case_05/robot.urdf', (), 'no recording at'),
         ('case_05/real.mcap', 'nowhere.urdf', (), 'no built-in name and no file'),
         ('case_05/real.mcap', 'case_05/robot.urdf', ('--sim', 'nowhere.mcap'), 'nowhere.mcap'),
@@ -180,10 +193,33 @@ def test_a_recording_that_tells_nothing_ends_in_one_line(
 def test_bad_arguments_end_in_one_line(tmp_path, capsys, bag, robot, more, said):
     """Another robot, one without tree or inertias, missing files."""
     named = 'reaction_wheel' if robot is None else PRACTICE / 'cases' / robot
-    assert _diagnose(PRACTICE / 'cases' / bag, named, tmp_path / 'out', *more) == 2
+    assert _diagnose(PRACTICE / 'cases' / bag, named, tmp_path / 'out', *map(str, more)) == 2
     error = capsys.readouterr().err.strip()
     assert said in error
     assert '\n' not in error
+
+
+def test_without_a_test_a_part_is_held_out_and_a_wrong_simulation_is_told(tmp_path, capsys):
+    """An entry of its own in the file, intervals, roll-outs, and remarks with numbers."""
+    case, out = _case('05'), tmp_path / 'out'
+    sim = ('--sim', str(case / 'real_far.mcap'))
+    assert _diagnose(case / 'real.mcap', case / 'robot.urdf', out, *sim) == 0
+    printed = capsys.readouterr().out
+    content = json.loads((out / 'diagnosis.json').read_text())
+    fit = content['fit']
+    assert set(fit) == {'target', 'train', 'held_out', 'predictions'}
+    assert fit['predictions'] == {}
+    for name in ('nmse', 'acceleration_nmse', 'rollout_nmse'):
+        before, after = (fit['held_out'][f'{name}_{when}']['elbow'] for when in BOTH)
+        assert after < 0.01 * before
+        low, high = fit['held_out'][f'{name}_after_interval']['elbow']
+        assert low < after < high
+    assert fit['held_out']['rollouts']['failed'] == 0
+    share = content['simulation']['elbow']
+    remarks = ' '.join(content['settings']['remarks'])
+    assert f'{100.0 * share:.2g} % of the mean squared effort of elbow' in remarks
+    assert 'was held out (8.25 of 33 s)' in remarks
+    assert all(line in printed for line in content['settings']['remarks'])
 
 
 def test_an_encoder_that_flickers_does_not_move():
