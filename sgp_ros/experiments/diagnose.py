@@ -18,6 +18,7 @@ from sgp_ros.experiments.diagnosed_robot import write_diagnosed
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.report.diagnosis import write_diagnosis
 from sgp_ros.report.diagnosis_predictions import write_predictions
+from sgp_ros.report.diagnosis_proof import interval_text, tables
 from sgp_ros.report.diagnosis_text import (
     equivalence_sentence,
     parameter_errors_text,
@@ -33,7 +34,7 @@ from sgp_ros.robots.urdf_robot import nominal_tree
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from sgp_ros.diagnosis.result import Diagnosis
+    from sgp_ros.diagnosis.result import Diagnosis, Proof
     from sgp_ros.engine.samples import Event
     from sgp_ros.robots.robot import Robot
     from sgp_ros.robots.tree import Tree
@@ -189,13 +190,24 @@ def print_diagnosis(found: Diagnosis) -> None:
     if found.parameter_errors:
         print(f'  bodies    {parameter_errors_text(found.parameter_errors)}')
     for stem, proof in found.proofs.items():
-        each = ', '.join(
-            f'{joint} {before:.2g} -> {proof.nmse_after[joint]:.2g}'
-            for joint, before in proof.nmse_before.items()
-        )
-        print(f'  {stem:9s} nMSE of the effort: {each}')
+        _print_proof(stem, proof)
     for remark in found.remarks:
         print(f'  remark    {remark}')
+
+
+def _print_proof(stem: str, proof: Proof) -> None:
+    """Print the errors of effort and roll-outs before and after, with 95 % intervals."""
+    head = stem
+    for kind, what in (('nmse', 'nMSE of the effort'), ('rollout_nmse', 'nMSE of roll-outs')):
+        before, after = (tables(proof)[f'{kind}_{when}'] for when in ('before', 'after'))
+        each = []
+        for joint, x in before.items():
+            interval = interval_text(proof, f'{kind}_after', joint)
+            each.append(f'{joint} {x:.2g} -> {after[joint]:.2g}')
+            each[-1] += f' ({interval})' if interval else ''
+        if each:
+            print(f'  {head:9s} {what}: {", ".join(each)}')
+        head = ''
 
 
 def _events(bag: str, robot: Robot, options: DiagnoseOptions, remarks: list[str]) -> list[Event]:

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from sgp_ros.core.scores import INTERVAL_95
+from sgp_ros.diagnosis.held_out import HELD_OUT
 from sgp_ros.report.diagnosis_figures import draw_diagnosis, important_joints
+from sgp_ros.report.diagnosis_proof import (
+    densities,
+    near_and_far,
+    proof_rows,
+    rollouts_sentences,
+)
 from sgp_ros.report.diagnosis_text import (
     effect_name,
     equivalence_sentence,
@@ -30,7 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from sgp_ros.diagnosis.result import Diagnosis, Finding, ParameterError, Proof
+    from sgp_ros.diagnosis.result import Diagnosis, Finding, ParameterError
 
 _NAMED = ('kind', 'source_joint')
 """Parameters that are part of the name of an effect."""
@@ -75,15 +82,11 @@ def render(found: Diagnosis, figures: Mapping[str, bytes]) -> str:
         equivalents=[equivalence_sentence(e) for e in found.equivalents],
         is_unexplained=found.verdict == 'unexplained',
         errors=[_error(e) for e in found.parameter_errors],
-        proofs=[
-            _proof(stem, name, proof) for stem, proof in found.proofs.items()
-            for name in found.joints
-        ],
+        proofs=proof_rows(found),
         has_rollouts=any(p.rollout_before for p in found.proofs.values()),
-        densities=[
-            {'stem': stem, 'before': f'{p.nlpd_before:.3g}', 'after': f'{p.nlpd_after:.3g}'}
-            for stem, p in found.proofs.items()
-        ],
+        rollouts=rollouts_sentences(found),
+        near_and_far=near_and_far(found),
+        densities=densities(found),
         figures={name: embedded({name: content}, ('',))[0] for name, content in figures.items()},
         settings=_settings(found),
         refusals=[
@@ -113,7 +116,8 @@ def _cards(found: Diagnosis) -> list[dict[str, str]]:
             joint = worst_joint(proof)
             before, after = percent(proof.nmse_before[joint]), percent(proof.nmse_after[joint])
             value = before if is_calm else f'{before} → {after}'
-            label = f'of the variance of the effort of {joint} is left on {stem}, held out'
+            held = 'what was held out' if stem == HELD_OUT else f'{stem}, held out'
+            label = f'of the variance of the effort of {joint} is left on {held}'
             cards.append({'value': value, 'label': label})
     short = {'less than': '<', 'more than': '>'}
     for card in cards:
@@ -167,27 +171,17 @@ def _error(e: ParameterError) -> dict[str, str]:
     }
 
 
-def _proof(stem: str, joint: str, proof: Proof) -> dict[str, str]:
-    row = {'stem': 'learned from' if stem == 'train' else stem, 'joint': joint}
-    for key, table in (
-        ('before', proof.nmse_before),
-        ('after', proof.nmse_after),
-        ('a_before', proof.acceleration_before),
-        ('a_after', proof.acceleration_after),
-        ('r_before', proof.rollout_before),
-        ('r_after', proof.rollout_after),
-    ):
-        row[key] = f'{table[joint]:.2g}' if joint in table else ''
-    return row
-
-
 def _settings(found: Diagnosis) -> list[tuple[str, str]]:
-    return [
+    settings = [
         ('robot', found.robot),
         ('joints', ', '.join(found.joints)),
         ('cut-off of the low-pass', f'{found.cutoff_hz:.3g} Hz'),
         ('rows', f'{found.rows}, at {found.rate_hz:.3g} Hz'),
     ]
+    if found.simulation:
+        shares = ', '.join(f'{joint} {percent(x)}' for joint, x in found.simulation.items())
+        settings.append(('left of the effort of the simulation', shares))
+    return settings
 
 
 def _typeset(text: str) -> str:

@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from sgp_ros.report.diagnosis_proof import recording_name, tables
 from sgp_ros.report.figures import PREDICTED
 
 if TYPE_CHECKING:
-    from collections.abc import Container
+    from collections.abc import Container, Sequence
 
-    from sgp_ros.diagnosis.result import Diagnosis
+    from matplotlib.axes import Axes
+
+    from sgp_ros.diagnosis.result import Diagnosis, Proof
 
 BEFORE, AFTER = '#E69F00', PREDICTED
 _VARIABLES = 7
@@ -33,26 +36,53 @@ def draw_dependence(found: Diagnosis, joints: Container[str]) -> Figure:
 
 
 def draw_proof(found: Diagnosis) -> Figure:
-    """Draw the error of the effort of every joint before and after, for each recording."""
-    names = found.joints[::-1]
-    figure = Figure(figsize=(10, 1.0 + 0.42 * len(names)), layout='constrained')
-    grid = figure.subplots(1, len(found.proofs), squeeze=False, sharex=True, sharey=True)[0]
-    values = [
-        x for p in found.proofs.values() for m in (p.nmse_before, p.nmse_after) for x in m.values()
-    ]
-    values = [x for x in values if 0.0 < x < 1e6] or [1.0]
-    low, high = 0.5 * max(min(values), 1e-9), max(1.0, 2.0 * max(values))
-    for axes, (stem, proof) in zip(grid, found.proofs.items(), strict=True):
-        y = np.arange(len(names))
-        for shift, table, colour, label in (
-            (0.2, proof.nmse_before, BEFORE, 'nominal robot'),
-            (-0.2, proof.nmse_after, AFTER, 'final model'),
-        ):
-            width = [float(np.clip(np.nan_to_num(table[name]), low, high)) - low for name in names]
-            axes.barh(y + shift, width, 0.38, left=low, color=colour, label=label)
-        axes.set_yticks(y, names)
-        axes.set(xscale='log', xlabel='nMSE of the effort', xlim=(low, high))
-        axes.set_title(f'{stem} (learned from)' if stem == 'train' else stem, fontsize='medium')
-    handles, labels = grid[0].get_legend_handles_labels()
+    """Draw the errors of effort and roll-outs of every joint before and after, by recording.
+
+    Whiskers are 95 % intervals; all errors are on one scale.
+    """
+    kinds = [('nmse', 'nMSE of the effort')]
+    if any(p.rollout_before for p in found.proofs.values()):
+        kinds.append(('rollout_nmse', 'nMSE of roll-outs'))
+    height = 0.6 + len(kinds) * (0.55 + 0.36 * len(found.joints))
+    figure = Figure(figsize=(10, height), layout='constrained')
+    grid = figure.subplots(len(kinds), len(found.proofs), squeeze=False, sharex=True, sharey=True)
+    low, high = _reach(found)
+    for row, (kind, label) in zip(grid, kinds, strict=True):
+        for axes, proof in zip(row, found.proofs.values(), strict=True):
+            _bars(axes, found.joints[::-1], proof, kind, (low, high))
+            axes.set(xscale='log', xlabel=label, xlim=(low, high))
+    for axes, stem in zip(grid[0], found.proofs, strict=True):
+        axes.set_title(recording_name(stem), fontsize='medium')
+    handles, labels = grid[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc='outside lower center', ncols=2, fontsize='small')
     return figure
+
+
+def _reach(found: Diagnosis) -> tuple[float, float]:
+    """Return the ends of a scale for all errors of a proof."""
+    values = [
+        x
+        for proof in found.proofs.values()
+        for name, table in tables(proof).items()
+        for x in table.values()
+        if not name.startswith('acceleration') and 0.0 < x < 1e6
+    ] or [1.0]
+    return 0.5 * max(min(values), 1e-9), max(1.0, 2.0 * max(values))
+
+
+def _bars(
+    axes: Axes, joints: Sequence[str], proof: Proof, kind: str, ends: tuple[float, float]
+) -> None:
+    y, low = np.arange(len(joints)), ends[0]
+    for shift, when, colour, label in (
+        (0.2, 'before', BEFORE, 'nominal robot'),
+        (-0.2, 'after', AFTER, 'final model'),
+    ):
+        table = tables(proof)[f'{kind}_{when}']
+        shown = [float(np.clip(np.nan_to_num(table.get(name, 0.0)), *ends)) for name in joints]
+        axes.barh(y + shift, np.subtract(shown, low), 0.38, left=low, color=colour, label=label)
+        for i, name in enumerate(joints):
+            interval = proof.intervals.get(f'{kind}_{when}', {}).get(name)
+            if interval is not None:
+                axes.plot(np.clip(interval, *ends), [i + shift] * 2, color='#1c1c1c', lw=1.0)
+    axes.set_yticks(y, joints)

@@ -9,6 +9,7 @@ import numpy as np
 
 from sgp_ros.core.scores import INTERVAL_95
 from sgp_ros.diagnosis.result import Parameter
+from sgp_ros.report.diagnosis_proof import recording_name
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -78,7 +79,7 @@ def held_out_sentence(found: Diagnosis) -> str:
         joint = worst_joint(proof)
         before, after = percent(proof.nmse_before[joint]), percent(proof.nmse_after[joint])
         change = before if found.verdict == 'no_mismatch' else f'{before} before, {after} after'
-        parts.append(f'{change} on {stem} ({joint})')
+        parts.append(f'{change} on {recording_name(stem)} ({joint})')
     if not parts:
         return 'No recording was held out: nothing here shows how far the finding carries.'
     return 'Left of the variance of the effort on what was held out: ' + '; '.join(parts) + '.'

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from sgp_ros.diagnosis.result import (
@@ -70,11 +72,15 @@ def diagnosis(
         dict(zip(joints, left.tolist(), strict=True)),
         dict(zip(joints, final.tolist(), strict=True)),
         dict.fromkeys(joints, 0.2), dict.fromkeys(joints, 0.1), 1.0, -2.0,
+        dict.fromkeys(joints, 0.09), dict.fromkeys(joints, 4e-4),
+        {'rollout_nmse_after': dict.fromkeys(joints, (3e-4, 5e-4))},
+        ((0.9, 1.1), None), 40, 0, 0.0,
     )  # fmt: skip
+    far = replace(proof, distance=1.5, failed=3)
     scores = {'position': 0.1, 'velocity': 0.9, 'time': 0.0}
     return Diagnosis(
         'arm', tuple(joints), ('N m',) * k, verdict, 0.97, tuple(findings), tuple(alternatives),
-        tuple(errors), {'train': proof} | ({'real_test': proof} if held else {}), {},
+        tuple(errors), {'train': proof} | ({'real_test': far} if held else {}), {},
         tuple(Dependence(name, 0.1, scores) for name in joints),
         Traces(time, position, velocity, np.ones((N, k)), before, before, after,
                np.full(k, NOISE), tuple(force for f in findings if f is not UNKNOWN)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import pytest
@@ -256,3 +257,65 @@ def test_many_joints_stay_readable():
     assert all(figure.get_figheight() < 8.0 for figure in figures.values())
     labels = [text.get_text() for text in draw_proof(found).axes[0].get_yticklabels()]
     assert set(labels) == set(SIX)
+
+
+def _text(page):
+    """Return the text of a page with single spaces."""
+    return ' '.join(re.sub('<[^>]+>', ' ', page).split())
+
+
+def test_the_proof_tells_near_from_far_with_intervals_and_roll_outs():
+    """In plain words: by how much of the way each model misses, and what is in no mean."""
+    found = diagnosis('missing_physics', [COULOMB])
+    text = _text(render(found, {}))
+    assert 'median: real_test 1.5' in text
+    assert '0.0004 0.0003 to 0.0005' in text
+    assert 'On real_test, the nominal robot misses shoulder by 30 % of its way' in text
+    assert 'the final model by 2 % (root mean square)' in text
+    assert 'learned from 40, real_test 40 (3 left out' in text
+    assert 'real_test 1 (0.9 to 1.1) and -2 nat' in text
+
+
+def test_a_proof_without_roll_outs_has_no_column_for_them():
+    """And no sentence; the picture has one row less."""
+    found = diagnosis('missing_physics', [COULOMB])
+    bare = {
+        stem: replace(proof, rollout_before={}, rollout_after={})
+        for stem, proof in found.proofs.items()
+    }
+    page = render(replace(found, proofs=bare), {})
+    assert 'roll-out' not in page.lower()
+    assert 'nMSE of roll-outs' in render(found, {})
+    assert len(draw_proof(found).axes) == 2 * len(draw_proof(replace(found, proofs=bare)).axes)
+
+
+def test_whiskers_are_the_intervals_and_bars_end_at_the_errors():
+    """Of the roll-outs of the final model, on every recording; recordings are named once."""
+    figure = draw_proof(diagnosis('missing_physics', [COULOMB]))
+    top, bottom = figure.axes[:2], figure.axes[2:]
+    assert [axes.get_title() for axes in top] == ['learned from', 'real_test']
+    for axes in bottom:
+        assert all(tuple(line.get_xdata()) == (3e-4, 5e-4) for line in axes.get_lines())
+        assert len(axes.get_lines()) == 2
+        ends = [bar.get_x() + bar.get_width() for bar in axes.patches]
+        assert sorted(ends) == pytest.approx([4e-4, 4e-4, 0.09, 0.09])
+
+
+def test_the_part_that_was_held_out_is_called_so():
+    """It is no recording of its own."""
+    found = diagnosis('missing_physics', [COULOMB])
+    found = replace(
+        found, proofs={'train': found.proofs['train'], 'held_out': found.proofs['real_test']}
+    )
+    assert 'on the part held out (elbow)' in held_out_sentence(found)
+    text = _text(render(found, {}))
+    assert 'is left on what was held out' in text
+    assert 'held_out' not in text
+
+
+def test_what_the_simulation_lacks_stands_among_the_settings():
+    """Where one was given."""
+    found = diagnosis('missing_physics', [COULOMB])
+    assert 'simulation' not in _text(render(found, {}))
+    shown = replace(found, simulation={'shoulder': 2e-7, 'elbow': 0.12})
+    assert 'shoulder less than 0.001 %, elbow 12 %' in _text(render(shown, {}))
