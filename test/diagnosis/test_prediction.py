@@ -130,6 +130,22 @@ def test_roll_outs_show_what_an_effect_takes_away(robots, equations_for, viscous
     assert proof.rollout_after['joint0'] < 1e-3 * proof.rollout_before['joint0']
 
 
+def test_both_models_are_judged_on_the_roll_outs_that_both_finish(robots, equations_for, viscous):
+    """Where one runs away the other gains nothing: counted, and in neither mean."""
+    from dataclasses import replace
+
+    raw, equations = equations_for(viscous)
+    model = _fitted(equations, _suspect('quadratic_drag', 0))
+    mad = replace(model, coefficients=(np.array([-1e5]),))
+    proof = prove(FinalModel(model, mad, equations, ()), raw, robots[1][1])
+    assert proof.failed > 0
+    turned = prove(FinalModel(mad, model, equations, ()), raw, robots[1][1])
+    assert turned.failed == proof.failed
+    assert turned.rollout_before == proof.rollout_after
+    assert all(map(np.isfinite, proof.rollout_before.values()))
+    assert (not proof.rollout_after) == (proof.failed == proof.rollouts)
+
+
 def test_states_beyond_those_learned_from_are_far(robots, equations_for, perfect):
     """What was learned from is no distance away."""
     raw, equations = equations_for(perfect[1])

@@ -10,6 +10,7 @@ import pytest
 
 from sgp_ros.diagnosis import rollouts
 from sgp_ros.diagnosis.candidates import Columns, Suspect, fit, floors
+from sgp_ros.diagnosis.diagnosed_dynamics import dynamics_of
 from sgp_ros.diagnosis.rollouts import cut, roll_out
 from sgp_ros.robots.effects.catalogue import EFFECTS
 from sgp_ros.robots.effects.effect import Place
@@ -85,6 +86,24 @@ def test_dry_friction_holds_and_releases_in_a_roll_out(equations_for, dry):
     found = _errors(windows, *roll_out(windows, model, equations))
     assert found < 1e-3
     assert nominal > 0.1
+
+
+def test_a_joint_that_friction_holds_does_not_creep(equations_for, dry):
+    """Its level is the jump of the force; below it the joint stands, to the last digit."""
+    _, equations = equations_for(dry)
+    model = _model(equations, _suspect('coulomb_friction', 0), _suspect('viscous_friction', 0))
+    motion = equations.motion
+    dynamics = dynamics_of(model, equations, motion)
+    loads = np.column_stack([motion.effort, np.zeros_like(motion.effort), motion.time])
+    level = dynamics.level_of_dry_friction(motion.position, loads)
+    np.testing.assert_allclose(level, model.coefficients[0][0])
+    windows = cut(motion, TRIM, horizon=0.05)
+    q, _ = roll_out(windows, model, equations)
+    steps = np.abs(np.diff(q[:, :, 0], axis=1))
+    truly = np.array([(dry.velocity[rows, 0] == 0.0).all() for rows in windows.rows])
+    assert truly.sum() > 3
+    assert np.all(steps[truly, -1] == 0.0)
+    assert np.all(steps[~truly].max(axis=1) > 0.0)
 
 
 def test_what_remembers_commands_needs_no_iteration(equations_for, monkeypatch):
