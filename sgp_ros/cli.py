@@ -188,9 +188,11 @@ def _add_diagnose(commands: Any) -> None:
     parser.add_argument('bag', metavar='REAL', help='.mcap file, rosbag2 directory or ROS 1 .bag')
     parser.add_argument('--robot', required=True, metavar='ROBOT',
                         help='a URDF, or a robot YAML with one')  # fmt: skip
-    parser.add_argument('--sim', metavar='SIM', help='recording of the nominal simulation')
+    parser.add_argument('--sim', metavar='SIM',
+                        help='recording of the simulation, to check ROBOT with')  # fmt: skip
     parser.add_argument('--test', action='append', default=[], metavar='BAG',
-                        help='held-out recording for the proof; may be repeated')  # fmt: skip
+                        help='held-out recording for the proof; may be repeated; without any, '
+                        'a quarter of REAL is held out')  # fmt: skip
     _add_topics(parser)
 
 
