@@ -15,9 +15,12 @@ from sgp_ros.diagnosis.prediction import extra_force
 from sgp_ros.robots.effects.observed_motion import ObservedMotion
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from sgp_ros.diagnosis.candidates import Model
     from sgp_ros.diagnosis.equations import Equations
     from sgp_ros.diagnosis.remainder import Remainder
+    from sgp_ros.robots.effects.effect import Effect
     from sgp_ros.robots.tree import Tree
 
 _SMALL = 1e-6
@@ -60,12 +63,13 @@ class DiagnosedDynamics:
         a = np.repeat(np.vstack([np.zeros((1, k)), np.eye(k)]), m, axis=0)
         motion = self._motion(np.tile(q, (k + 1, 1)), np.tile(v, (k + 1, 1)), a, loads)
         needed = motion.effort_for(motion.position, motion.velocity, a)
-        e = (needed - motion.effort - extra_force(self.model, motion)).reshape(k + 1, m, k)
-        drive = loads[:, k : 2 * k] - e[0]
-        if self.remainders:
-            here = self._motion(q, v, np.zeros_like(q), loads)
-            for remainder in self.remainders:
-                drive[:, remainder.joint] += remainder.force(here)
+        inertial = extra_force(_part(self.model, lambda effect: effect.sees_acceleration), motion)
+        e = (needed - motion.effort - inertial).reshape(k + 1, m, k)
+        here = self._motion(q, v, np.zeros_like(q), loads)
+        others = extra_force(_part(self.model, lambda effect: not effect.sees_acceleration), here)
+        drive = loads[:, k : 2 * k] - e[0] + others
+        for remainder in self.remainders:
+            drive[:, remainder.joint] += remainder.force(here)
         return np.moveaxis(e[1:] - e[0], 0, 2), drive
 
     def level_of_dry_friction(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
@@ -129,16 +133,19 @@ def dynamics_of(
     """Return the dynamics of a model fitted on `equations` for the recording of a motion."""
     change = (model.w @ equations.directions).reshape(motion.tree.parameters.shape)
     tree = replace(motion.tree, parameters=motion.tree.parameters + change)
-    return DiagnosedDynamics(_part(model, has_memory=False), tree, motion.step, remainders)
+    local = _part(model, lambda effect: not effect.has_memory)
+    return DiagnosedDynamics(local, tree, motion.step, remainders)
 
 
 def remembered_force(model: Model, motion: ObservedMotion, tree: Tree) -> np.ndarray:
     """Return the force of the effects with memory along a motion, (n, k) [N m or N]."""
-    return extra_force(_part(model, has_memory=True), replace(motion, tree=tree))
+    remembering = _part(model, lambda effect: effect.has_memory)
+    return extra_force(remembering, replace(motion, tree=tree))
 
 
-def _part(model: Model, *, has_memory: bool) -> Model:
-    chosen = [i for i, s in enumerate(model.suspects) if s.effect.has_memory == has_memory]
+def _part(model: Model, is_in: Callable[[Effect], bool]) -> Model:
+    """Return a model of some of the effects."""
+    chosen = [i for i, s in enumerate(model.suspects) if is_in(s.effect)]
     return replace(
         model,
         suspects=tuple(model.suspects[i] for i in chosen),

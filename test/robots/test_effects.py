@@ -211,6 +211,15 @@ def test_an_effect_without_memory_sees_each_sample_alone(effect, place):
     assert agree == (not effect.has_memory)
 
 
+@pytest.mark.parametrize(('effect', 'place'), CONTRACT)
+def test_an_effect_says_whether_it_sees_the_acceleration(effect, place):
+    """Where it does not, its force at a state is one, however the robot accelerates there."""
+    other = replace(MOTION, acceleration=MOTION.acceleration + 3.0)
+    shape = _starts(effect, place)[-1]
+    given, found = (effect.columns(m, place, shape) for m in (MOTION, other))
+    assert np.array_equal(found, given) == (not effect.sees_acceleration)
+
+
 def _q(j):
     return MOTION.position[:, j]
 

@@ -97,6 +97,7 @@ class Effect:
         is_dry: it holds a joint at rest; where there are kinds, only `coulomb` does.
         is_inertial: proportional to the acceleration.
         uses_bodies: its columns depend on the inertial parameters of the robot.
+        sees_acceleration: its force depends on the acceleration.
         has_memory: its force at a time depends on other times too, of the motion or the commands.
         bounds: of the shape, (s,) each.
         interval: variable and intervals of the region it is confined to; None for everywhere.
@@ -114,6 +115,7 @@ class Effect:
     is_dry: bool = False
     is_inertial: bool = False
     uses_bodies: bool = False
+    sees_acceleration: bool = False
     has_memory: bool = False
     bounds: Callable[[ObservedMotion, Place], tuple[np.ndarray, np.ndarray]] | None = None
     interval: Callable[[Fitted], tuple[str, list[list[float]]]] | None = None

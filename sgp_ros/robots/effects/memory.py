@@ -143,6 +143,7 @@ ENCODER_ECCENTRICITY = Effect(
     (Quantity('amplitude', 'rad'), Quantity('periods', '1/revolution'), Quantity('phase', 'rad')),
     _eccentric, every_joint, _turns, wave, _is_monotonic,
     'encoder shows q + amplitude sin(periods q + phase)', uses_bodies=True,
+    sees_acceleration=True,
     bounds=lambda motion, place: (
         _turns(motion, place)[0] * 0.9, _turns(motion, place)[-1] * 1.5
     ),
@@ -151,7 +152,7 @@ BACKLASH = Effect(
     'backlash', (Quantity('gap', 'rad'),), _backlash, every_motor, _gaps,
     lambda f: {'gap': float(f.shape[1])}, always,
     'motor and link play freely within gap; the encoder sits on the motor', is_given=True,
-    uses_bodies=True, has_memory=True,
+    uses_bodies=True, sees_acceleration=True, has_memory=True,
     bounds=lambda motion, place: (
         np.array([0.01, 1e-9]),
         np.array([0.95, float(np.ptp(motion.position[:, place.joint]))]),
