@@ -1,8 +1,9 @@
 """The discrepancy of a recording from the nominal robot as filtered linear equations.
 
-For every joint `d = tau_nominal(q, v, a) - tau_commanded = sum tau_x - Y dpi + noise`: what the
-motion takes beyond what was commanded comes from effects tau_x, and from wrong inertial
-parameters. These have a prior: a body may have another mass, another centre, another inertia.
+For every joint `d = tau_nominal(q, v, a) - tau_stated - tau_commanded = sum tau_x - Y dpi +
+noise`: what the motion takes beyond what was commanded, and beyond the effects that the nominal
+robot states, comes from effects tau_x, and from wrong inertial parameters. These have a prior: a
+body may have another mass, another centre, another inertia.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ class Equations:
         power: (k,) mean squared effort that shares refer to [N^2 m^2 or N^2].
         noise: (k,) standard deviation that the encoders' noise gives d [N m or N].
         moving: (n, k) 0 where a joint rests that dry friction may hold, 1 elsewhere; all 1
-            unless the joint is supposed to have dry friction.
+            unless the joint has, or is supposed to have, dry friction.
         rests: (n, k) whether a joint rests.
         model_error: (k,) mean square by which d changes with the smoothing of the states: what
             filters leave of a perfect model where the motion is fast.
@@ -80,7 +81,7 @@ class Equations:
 
         While it does, it takes up whatever is needed: such rows ask nothing of anything else.
         """
-        held = [j for j in sorted(joints) if self.rests[:, j].any()]
+        held = [j for j in sorted(joints) if self.moving[self.rests[:, j], j].any()]
         if not held:
             return self
         motion, tree = self.motion, self.motion.tree
@@ -92,7 +93,8 @@ class Equations:
             v[:, j] = 0.0
             a[:, j] = 0.0
             needed = np.zeros(len(motion.time))
-            needed[rows] = motion.effort_for(q, v, a)[:, j] - motion.effort[rows, j]
+            acting = motion.effort[rows, j] + motion.stated_force[rows, j]
+            needed[rows] = motion.effort_for(q, v, a)[:, j] - acting
             d[:, j] -= self.filter(needed)
             Y = np.zeros((len(motion.time), len(self.directions)))
             Y[rows] = torque_regressor(tree, q, v, a)[:, j] @ self.directions.T
@@ -174,7 +176,9 @@ def _smoothing_error(
     """Return the mean square by which the nominal efforts depend on the light smoothing, (k,)."""
     less = replace(bandwidth, state_cutoff=0.7 * bandwidth.state_cutoff)
     other = observe(raw, motion.tree, less)
-    change = low(motion.nominal_effort - other.nominal_effort)
+    change = low(
+        (motion.nominal_effort - motion.stated_force) - (other.nominal_effort - other.stated_force)
+    )
     return np.asarray((change**2).mean(axis=0))
 
 
@@ -183,7 +187,7 @@ def make_equations(raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth) -> Equa
     motion = observe(raw, tree, bandwidth)
     low = parallel_filter(raw, bandwidth)
     k = tree.size
-    d = low(motion.nominal_effort - motion.effort) * motion.moves
+    d = low(motion.nominal_effort - motion.effort - motion.stated_force) * motion.moves
     directions = body_directions(tree)
     base = np.empty((len(d), k, len(directions)))
     Y = torque_regressor(tree, motion.position, motion.velocity, motion.acceleration)
@@ -197,8 +201,9 @@ def make_equations(raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth) -> Equa
     power = np.where(motion.moves & (power > 0.0), power, 1.0)
     inertia = motion.mass_diagonal.mean(axis=0)
     variance = inertia**2 * (2 * np.pi) ** 4 * raw.noise_density * bandwidth.cutoff**5 / 5.0
-    return Equations(
+    equations = Equations(
         motion, low, motion.time[low.rows], d, base, directions, power, np.sqrt(variance),
         np.ones(motion.position.shape), resting(raw, motion, bandwidth),
         _smoothing_error(raw, motion, low, bandwidth),
     )  # fmt: skip
+    return equations.with_dry_friction(motion.dry_joints)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sgp_ros.diagnosis.equations import resting
-from sgp_ros.diagnosis.prediction import accelerations, imbalance
+from sgp_ros.diagnosis.prediction import accelerations, held_joints, imbalance
 from sgp_ros.diagnosis.result import Predictions
 from sgp_ros.diagnosis.trajectory import Bandwidth, RawTrajectory, observe
 
@@ -50,6 +50,6 @@ class FinalModel:
     ) -> np.ndarray:
         """Return e of one of the models, (n, k); 0 where dry friction holds a joint [N m or N]."""
         e = imbalance(model, self.equations, motion, remainders)
-        for j in {s.place.joint for s in model.suspects if s.effect.holds(s.place)}:
+        for j in held_joints(model, motion):
             e[rests[:, j], j] = 0.0
         return e

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from sgp_ros.diagnosis.remainder import Remainder
     from sgp_ros.engine.samples import Event
     from sgp_ros.robots.robot import Robot
+    from sgp_ros.robots.stated_effects import StatedEffect
     from sgp_ros.robots.tree import Tree
 
 
@@ -41,6 +42,7 @@ def diagnose(
     tree: Tree,
     tests: Mapping[str, Iterable[Event]],
     *,
+    stated: tuple[StatedEffect, ...] = (),
     holds_out: bool = False,
     progress: Callable[[float], None] = lambda _share: None,
 ) -> Diagnosis:
@@ -51,6 +53,7 @@ def diagnose(
         robot: names, actuated joints and gains.
         tree: nominal robot.
         tests: events of held-out recordings, by stem.
+        stated: effects that the nominal robot has, beside those of its tree.
         holds_out: whether blocks of the training recording are kept for the proof, as
             `held_out`; everything is then learned from the rest.
         progress: called with the share that is done.
@@ -58,8 +61,8 @@ def diagnose(
     Raises:
         RecordingError: too little motion, or none of the joints.
     """
-    raw = collect(events, robot)
-    held = {stem: collect(recording, robot) for stem, recording in tests.items()}
+    raw = collect(events, robot, stated)
+    held = {stem: collect(recording, robot, stated) for stem, recording in tests.items()}
     raw, kept, remarks = keep_back(raw) if holds_out else (raw, {}, ())
     bandwidth = choose_bandwidth(raw, tree)
     equations = make_equations(raw, tree, bandwidth)

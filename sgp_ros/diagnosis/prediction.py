@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.diagnosis.suspects import dry_joints
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
 def extra_force(model: Model, motion: ObservedMotion) -> np.ndarray:
     """Return the force of all effects at the full rate, (n, k) [N m or N]."""
-    force = np.zeros(motion.position.shape)
+    force = motion.stated_force.copy()
     for suspect, c in zip(model.suspects, model.coefficients, strict=True):
         x = suspect.effect.columns(motion, suspect.place, suspect.shape) @ c
         if x.ndim == 2:
@@ -31,6 +33,11 @@ def extra_force(model: Model, motion: ObservedMotion) -> np.ndarray:
         else:
             force[:, suspect.place.joint] += x
     return force
+
+
+def held_joints(model: Model, motion: ObservedMotion) -> frozenset[int]:
+    """Return the joints that dry friction may hold, of the model or of the nominal robot."""
+    return motion.dry_joints | dry_joints(model.suspects)
 
 
 def imbalance(
@@ -76,7 +83,7 @@ def accelerations(
         slope[:, :, j] = imbalance(model, equations, replace(motion, acceleration=moved)) - plain
     e = imbalance(model, equations, motion, remainders) if remainders else plain
     a = motion.acceleration - np.linalg.solve(slope, e[:, :, None])[:, :, 0]
-    for j in sorted({s.place.joint for s in model.suspects if s.effect.holds(s.place)}):
+    for j in sorted(held_joints(model, motion)):
         rows = np.flatnonzero(rests[:, j])
         if len(rows):
             a[rows] = _held(model, motion, slope[rows], a[rows], rows, j)

@@ -18,21 +18,25 @@ if TYPE_CHECKING:
 
     from sgp_ros.engine.samples import Event
     from sgp_ros.robots.robot import Robot
+    from sgp_ros.robots.stated_effects import StatedEffect
     from sgp_ros.robots.tree import Tree
 
 
-def nominal_shares(events: Iterable[Event], robot: Robot, tree: Tree) -> dict[str, float]:
+def nominal_shares(
+    events: Iterable[Event], robot: Robot, tree: Tree, stated: tuple[StatedEffect, ...] = ()
+) -> dict[str, float]:
     """Return the share of the mean squared effort that the nominal robot leaves, by joint.
 
     Args:
         events: of the simulation.
         robot: names, actuated joints and gains.
         tree: nominal robot.
+        stated: effects that the nominal robot has, beside those of its tree.
 
     Raises:
         RecordingError: too little motion, or none of the joints.
     """
-    raw = collect(events, robot)
+    raw = collect(events, robot, stated)
     equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
     shares = (equations.d**2).mean(axis=0) / equations.power
     return dict(zip(tree.moving_names, map(float, shares), strict=True))

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from sgp_ros.engine.samples import Event
     from sgp_ros.robots.robot import Robot
+    from sgp_ros.robots.stated_effects import StatedEffect
     from sgp_ros.robots.tree import Tree
 
 LONGEST_PAUSE_S = 0.5
@@ -52,6 +53,7 @@ class RawTrajectory:
         refused: states by reason.
         noise_density: (k,) of the positions, one-sided [rad^2/Hz or m^2/Hz].
         start_ns: stamp of the first state of the recording.
+        stated: effects that the nominal robot has, beside those of its tree.
     """
 
     time: np.ndarray
@@ -64,10 +66,18 @@ class RawTrajectory:
     refused: dict[str, int]
     noise_density: np.ndarray
     start_ns: int
+    stated: tuple[StatedEffect, ...] = ()
 
 
-def collect(events: Iterable[Event], robot: Robot) -> RawTrajectory:
+def collect(
+    events: Iterable[Event], robot: Robot, stated: tuple[StatedEffect, ...] = ()
+) -> RawTrajectory:
     """Bring a recording to its uniform grid.
+
+    Args:
+        events: of the recording.
+        robot: names, actuated joints and gains.
+        stated: effects that the nominal robot has, beside those of its tree.
 
     Raises:
         RecordingError: too little is left.
@@ -114,7 +124,7 @@ def collect(events: Iterable[Event], robot: Robot) -> RawTrajectory:
         np.concatenate(velocities) if velocities else None,
         np.concatenate(efforts) if efforts else None,
         drive, tuple(segments), dict(accepted.refused), noise_density(position, segments, step),
-        start_ns,
+        start_ns, stated,
     )  # fmt: skip
 
 
@@ -190,7 +200,16 @@ def observe(raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth) -> ObservedMot
         effort = np.zeros((len(raw.time), k))
     starts = tuple(s.start for s in raw.segments)
     return ObservedMotion(
-        tree, raw.time, raw.step, position, velocity, acceleration, effort, raw.drive, starts
+        tree,
+        raw.time,
+        raw.step,
+        position,
+        velocity,
+        acceleration,
+        effort,
+        raw.drive,
+        starts,
+        raw.stated,
     )
 
 

@@ -14,10 +14,12 @@ import numpy as np
 from scipy import optimize, signal
 
 from sgp_ros.diagnosis.decision import LEAST_SHARE, NATS
+from sgp_ros.robots.effects.stated import VELOCITY_FILTER_LAG
 
 if TYPE_CHECKING:
     from sgp_ros.diagnosis.equations import Equations
     from sgp_ros.diagnosis.trajectory import RawTrajectory
+    from sgp_ros.robots.effects.observed_motion import ObservedMotion
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +60,15 @@ def lagged(v: np.ndarray, time_constant: float, step: float) -> np.ndarray:
     return np.asarray(signal.lfilter(b, [1.0, -decay], v, zi=start)[0])
 
 
+def known_lag(raw: RawTrajectory, motion: ObservedMotion, joint: int) -> np.ndarray:
+    """Return the velocity of a joint behind the lags that the nominal robot states, (n,)."""
+    v = motion.velocity[:, joint]
+    for effect in raw.stated:
+        if effect.name == VELOCITY_FILTER_LAG and effect.joint == motion.tree.joint_names[joint]:
+            v = lagged(v, effect.numbers['time_constant'], motion.step)
+    return v
+
+
 def sensor_lags(raw: RawTrajectory, equations: Equations) -> list[SensorLag]:
     """Return the lag of each joint's velocity, none without measured velocities."""
     if raw.velocity is None:
@@ -65,7 +76,7 @@ def sensor_lags(raw: RawTrajectory, equations: Equations) -> list[SensorLag]:
     motion, low = equations.motion, equations.filter
     found = []
     for j in range(motion.tree.size):
-        true, shown = motion.velocity[:, j], low(raw.velocity[:, j])
+        true, shown = known_lag(raw, motion, j), low(raw.velocity[:, j])
 
         def rest(T: float, true: np.ndarray = true, shown: np.ndarray = shown) -> float:
             return float(((shown - low(lagged(true, T, motion.step))) ** 2).mean())

@@ -27,15 +27,16 @@ from sgp_ros.report.diagnosis_text import (
     why_it_lost,
 )
 from sgp_ros.report.files import write_text
+from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.rigid_body import mass_matrix
-from sgp_ros.robots.urdf_robot import nominal_tree
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from sgp_ros.diagnosis.result import Diagnosis, Proof
     from sgp_ros.engine.samples import Event
+    from sgp_ros.robots.nominal import Nominal
     from sgp_ros.robots.robot import Robot
     from sgp_ros.robots.tree import Tree
 
@@ -79,15 +80,18 @@ def run_diagnose(
         RecordingError: nothing in the recording can be used, or nothing moves.
         NumericalError: the motion leaves the equations without a solution.
     """
-    robot = load_robot(robot_name)
-    tree = nominal_tree(robot)
+    nominal = nominal_model(load_robot(robot_name))
+    robot, tree = nominal.robot, nominal.tree
     if not has_inertia(tree):
         raise ConfigError(
             f'the mass matrix of the nominal robot {robot.name} is singular',
             'a mass and inertias for every moving link of the URDF',
             'identify it first and give the robot_identified.urdf of sgp identify',
         )
-    remarks: list[str] = []
+    remarks = [
+        f'{e.name} of {e.joint} is stated by too few numbers and so not part of the nominal robot.'
+        for e in nominal.left_out
+    ]
     events = _events(bag, robot, options, remarks)
     still = still_joints(events, tree.moving_names)
     if len(still) == tree.size:
@@ -99,11 +103,12 @@ def run_diagnose(
     if still:
         remarks.append(f'Nothing can be said of joints that do not move: {", ".join(still)}.')
     tests = _held_out(robot, options, remarks)
-    simulation = _simulation(robot, tree, options, remarks)
+    simulation = _simulation(nominal, options, remarks)
     try:
         found = diagnose(
-            events, robot, tree, tests, holds_out=not options.tests, progress=progress
-        )
+            events, robot, tree, tests, stated=nominal.stated, holds_out=not options.tests,
+            progress=progress,
+        )  # fmt: skip
     except np.linalg.LinAlgError as error:
         raise NumericalError(
             f'the equations of {Path(bag).name} have no solution ({error})',
@@ -111,16 +116,17 @@ def run_diagnose(
             f'joints that do not move: {", ".join(still) or "none"}',
         ) from error
     remarks = [*found.remarks, *remarks]
-    return _written(out, robot, replace(found, simulation=simulation, remarks=tuple(remarks)))
+    return _written(out, nominal, replace(found, simulation=simulation, remarks=tuple(remarks)))
 
 
 def _simulation(
-    robot: Robot, tree: Tree, options: DiagnoseOptions, remarks: list[str]
+    nominal: Nominal, options: DiagnoseOptions, remarks: list[str]
 ) -> dict[str, float]:
     """Return what the nominal robot leaves of its simulation, by joint; empty without one."""
     if options.sim is None:
         return {}
-    shares = nominal_shares(_events(options.sim, robot, options, remarks), robot, tree)
+    events = _events(options.sim, nominal.robot, options, remarks)
+    shares = nominal_shares(events, nominal.robot, nominal.tree, nominal.stated)
     said = disagreement(shares, Path(options.sim).name)
     remarks += [said] if said else []
     return shares
@@ -140,13 +146,14 @@ def _held_out(
     return tests
 
 
-def _written(out: Path, robot: Robot, found: Diagnosis) -> dict[str, Any]:
+def _written(out: Path, nominal: Nominal, found: Diagnosis) -> dict[str, Any]:
     """Write all files, print the findings and return the content of diagnosis.json."""
     out.mkdir(parents=True, exist_ok=True)
     write_predictions(out, found)
     content = diagnosis_mapping(found)
     write_text(out / 'diagnosis.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
-    write_diagnosed(out, robot, found)
+    bodies = nominal.without_stated(found.bodies)
+    write_diagnosed(out, nominal.robot, replace(found, bodies=bodies))
     write_diagnosis(out, found)
     print_diagnosis(found)
     print(f'report: {out / "report.html"}')

@@ -1,7 +1,7 @@
 """What a diagnosis leaves for the next run: robot_diagnosed.yaml beside its URDF.
 
 The YAML states the effects that were found in the words of diagnosis.json, with their standard
-deviations; the URDF has the bodies of the final model.
+deviations, behind those that the nominal robot states; the URDF has the bodies of the final model.
 """
 
 from __future__ import annotations
@@ -46,13 +46,15 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis) -> None:
     path = out / URDF_NAME
     if found.bodies is None or not _holds_bodies(path, text, robot, found.bodies):
         write_text(path, text)
+    known = robot.source.get('effects') or []
+    assert isinstance(known, list)
     document = {
         'schema': 1,
         'name': robot.name,
         **_physics(robot),
-        **{key: value for key, value in robot.source.items() if key != 'effects'},
+        **robot.source,
         'urdf': URDF_NAME,
-        'effects': stated_findings(found.findings),
+        'effects': [*known, *stated_findings(found.findings)],
     }
     write_text(out / YAML_NAME, yaml.safe_dump(document, sort_keys=False))
 

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from sgp_ros.robots.stated_effects import StatedEffect
     from sgp_ros.robots.tree import Tree
 
-_OF_TREE = ('gravity_tilt', 'payload')
+ON_TREE = ('gravity_tilt', 'payload')
+"""Effects that change the tree instead of adding a force."""
 _OF_COMMAND = ('dead_zone', 'saturation')
 """Of the drive's input: a measured effort lies behind them."""
 _OF_EFFORT = {
@@ -81,7 +82,7 @@ def effect_terms(
     seen: Counter[tuple[str, str]] = Counter()
     terms = []
     for stated in effects:
-        if not stated.is_online or stated.name in _OF_TREE or stated.place is None:
+        if not stated.is_online or stated.name in ON_TREE or stated.place is None:
             continue
         key = stated.name, stated.joint
         seen[key] += 1

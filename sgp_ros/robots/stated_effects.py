@@ -82,6 +82,28 @@ class StatedEffect:
         """Whether a model that sees one time at once can hold it."""
         return self.name not in NOT_ONLINE
 
+    @property
+    def is_holding(self) -> bool:
+        """Whether it can hold a joint at rest."""
+        effect = self.effect
+        return effect is not None and self.place is not None and effect.holds(self.place)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the stated numbers say what it does; of backlash they do not say enough."""
+        return bool(np.isfinite(self.shape).all() and np.isfinite(self.coefficients).all())
+
+    def force(self, motion: ObservedMotion) -> np.ndarray:
+        """Return what it exerts in a motion, (n, k) [N m or N]; nothing where it is no force."""
+        force = np.zeros(motion.position.shape)
+        if self.effect is None or self.place is None:
+            return force
+        x = self.effect.columns(motion, self.place, self.shape) @ self.coefficients
+        if x.ndim == 2:
+            return force + x
+        force[:, self.place.joint] = x
+        return force
+
 
 def read_effects(entry: object, tree: Tree, problems: list[str]) -> tuple[StatedEffect, ...]:
     """Return the effects that a robot YAML states; what is wrong is appended to `problems`.

@@ -119,14 +119,13 @@ def _diagnose(connection: Connection) -> None:
 def _outcome(request: DiagnosisRequest) -> DiagnosisDone | DiagnosisFailed:
     from sgp_ros.diagnosis.mapping import diagnosis_mapping
     from sgp_ros.diagnosis.pipeline import diagnose
+    from sgp_ros.robots.nominal import nominal_model
     from sgp_ros.robots.registry import load_robot
-    from sgp_ros.robots.urdf_robot import nominal_tree
 
     try:
-        robot = load_robot(request.robot)
-        return DiagnosisDone(
-            diagnosis_mapping(diagnose(request.events, robot, nominal_tree(robot), {}))
-        )
+        nominal = nominal_model(load_robot(request.robot))
+        found = diagnose(request.events, nominal.robot, nominal.tree, {}, stated=nominal.stated)
+        return DiagnosisDone(diagnosis_mapping(found))
     except SgpError as error:
         return DiagnosisFailed(' '.join(str(error).split()))
     except np.linalg.LinAlgError as error:

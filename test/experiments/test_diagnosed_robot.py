@@ -16,6 +16,7 @@ from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
 from sgp_ros.experiments.diagnosed_robot import URDF_NAME, YAML_NAME, write_diagnosed
 from sgp_ros.recordings.reader import open_recording
+from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.tree import read_urdf
 from sgp_ros.robots.urdf_robot import nominal_tree
@@ -112,6 +113,33 @@ def test_findings_come_back_with_values_and_spreads(tmp_path):
     assert (c.prior_mean, c.prior_std) == (0.3, pytest.approx(0.007))
     assert 'not modelled online: velocity_filter_lag of elbow' in robot.description
     assert 'unknown' not in robot.description
+
+
+def test_what_was_known_stays_known(tmp_path):
+    """Effects of the nominal robot come before those that were found, also of the same kind."""
+    known = '{effect: viscous_friction, joint: elbow, parameters: {b: {value: 0.1}}}'
+    found = _finding('viscous_friction', 'elbow', {'b': 0.2})
+    out = _written(tmp_path, URDF, [found], yaml_text=f'effects: [{known}]\n')
+    effects = yaml.safe_load((out / YAML_NAME).read_text())['effects']
+    assert [e['parameters']['b']['value'] for e in effects] == [0.1, 0.2]
+    load_robot(str(out / YAML_NAME))
+
+
+def test_a_stated_payload_is_no_part_of_the_bodies_that_are_written(tmp_path):
+    """It would count twice in the next run."""
+    entry = '{mass: {value: 0.5}, x: {value: 0.0}, y: {value: 0.0}, z: {value: -0.2}}'
+    (tmp_path / 'nominal.urdf').write_text(URDF)
+    path = tmp_path / 'nominal.yaml'
+    last = read_urdf(URDF).moving_names[-1]
+    path.write_text(f'schema: 1\nurdf: nominal.urdf\neffects: [{{effect: payload, joint: {last}, '
+                    f'parameters: {entry}}}]\n')  # fmt: skip
+    nominal = nominal_model(load_robot(str(path)))
+    assert nominal.tree.parameters[len(nominal.tree.moving_names) - 1, 0] == pytest.approx(
+        nominal.plain.parameters[len(nominal.tree.moving_names) - 1, 0] + 0.5
+    )
+    np.testing.assert_allclose(
+        nominal.without_stated(nominal.tree.parameters), nominal.plain.parameters, atol=1e-12
+    )
 
 
 def test_the_urdf_has_the_bodies_that_were_found(tmp_path):

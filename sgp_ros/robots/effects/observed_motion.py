@@ -16,6 +16,7 @@ from sgp_ros.robots.rigid_body import inverse_dynamics, mass_matrix, torque_regr
 
 if TYPE_CHECKING:
     from sgp_ros.robots.effects.drive import Drive
+    from sgp_ros.robots.stated_effects import StatedEffect
     from sgp_ros.robots.tree import Tree
 
 STILL = 1e-9
@@ -34,6 +35,7 @@ class ObservedMotion:
         effort: (n, k) commanded, or measured where there are no commands; 0 for passive joints.
         drive: what the drives receive; None where only efforts were measured.
         starts: rows at which the grid begins anew after a pause.
+        stated: effects that the nominal robot has, beside those that are part of the tree.
     """
 
     tree: Tree
@@ -45,6 +47,7 @@ class ObservedMotion:
     effort: np.ndarray
     drive: Drive | None
     starts: tuple[int, ...] = (0,)
+    stated: tuple[StatedEffect, ...] = ()
 
     @cached_property
     def direction(self) -> np.ndarray:
@@ -89,6 +92,19 @@ class ObservedMotion:
     def nominal_effort(self) -> np.ndarray:
         """Efforts that the nominal robot takes for this motion, (n, k) [N m or N]."""
         return self.effort_for(self.position, self.velocity, self.acceleration)
+
+    @cached_property
+    def stated_force(self) -> np.ndarray:
+        """Force of the effects that the nominal robot has, (n, k) [N m or N]."""
+        force = np.zeros(self.position.shape)
+        for effect in self.stated:
+            force += effect.force(self)
+        return force
+
+    @property
+    def dry_joints(self) -> frozenset[int]:
+        """Indices of the joints that the nominal robot's dry friction may hold."""
+        return frozenset(x.place.joint for x in self.stated if x.place and x.is_holding)
 
     @cached_property
     def gravity_columns(self) -> np.ndarray:
