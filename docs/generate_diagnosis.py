@@ -94,8 +94,9 @@ TAIL = """
 * **Blocks held out** lie between blocks learned from: they show less of a drift than another day would. Intervals
   speak of the recording at hand, not of other motions; a drift as long as the recording gets none.
 * **The paper's own three concealments** are not among these worlds.
-* **A diagnosed robot** can be replayed and predicted with, but diagnosing it once more, or simulating it, leaves
-  out the effects that it states.
+* **Stated backlash** is left out when a diagnosed robot is diagnosed or simulated again: its gap does not say how
+  much of the inertia sits on the motor. All other effects of a robot YAML belong to its nominal model, each as if
+  it were alone: a delay does not delay what a dead zone passes on.
 """
 
 

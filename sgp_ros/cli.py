@@ -114,7 +114,11 @@ def _add_simulate(commands: Any) -> None:
         'Write a recording of a simulated robot, built-in or from a URDF, and the truth about it.',
         'sgp simulate arm.urdf --effect coulomb_friction:joint=elbow,level=0.3 --sensor bits=14',
     )  # fmt: skip
-    parser.add_argument('robot', metavar='ROBOT', help='a built-in robot or a URDF')
+    parser.add_argument(
+        'robot',
+        metavar='ROBOT',
+        help='a built-in robot, a URDF, or a robot YAML of a URDF with effects',
+    )
     parser.add_argument('--duration', type=float, default=20.0, metavar='S', help='length [s]')
     parser.add_argument('--rate', type=float, default=None, metavar='HZ', help='sampling rate')
     parser.add_argument('--seed', type=int, default=0, metavar='N', help='seed')

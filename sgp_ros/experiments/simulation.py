@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sgp_ros.errors import ConfigError
 from sgp_ros.experiments.simulated_files import write_simulated, write_truth
-from sgp_ros.simulation.assembly import find_simulator, make_simulation
+from sgp_ros.experiments.simulated_robot import find_robot
+from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.effect_text import parse_physical
 from sgp_ros.simulation.recording import simulate
 from sgp_ros.simulation.sensor_text import parse_sensors
-from sgp_ros.simulation.tree_simulator import tree_simulator
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from pathlib import Path
 
-    from sgp_ros.simulation.simulator import Simulator
 
 START_NS = 1_700_000_000_000_000_000
 """Stamp of the first sample: a fixed one, since a recording is a function of its seed."""
@@ -39,7 +37,7 @@ def run_simulation(
     """Simulate a robot and write `<robot>.mcap`, `truth.json` and `truth.npz` into `out`.
 
     Args:
-        robot: name of a simulated robot, or a URDF file.
+        robot: name of a simulated robot, a URDF file, or a robot YAML of one with effects.
         out: folder of the results.
         progress: called with the share that is done.
         duration_s: length [s].
@@ -53,14 +51,15 @@ def run_simulation(
     Raises:
         ConfigError: a robot, controller, effect or value that does not exist.
     """
-    simulator, name = _simulator(robot)
+    found = find_robot(robot)
+    simulator, name = found.simulator, found.name
     chosen, transport = parse_sensors(sensors, simulator.sensors, simulator.joints)
     simulation = make_simulation(
         simulator,
         seed=seed,
         rate_hz=rate_hz,
         controller=controller,
-        effects=effects,
+        effects=[*found.effects, *effects],
         sensors=chosen,
         physical=parse_physical(physical),
         start_ns=START_NS,
@@ -77,16 +76,3 @@ def run_simulation(
         'recording': str(path), 'truth': str(truth), 'motion': str(motion), 'samples': n,
         'seed': seed,
     }  # fmt: skip
-
-
-def _simulator(robot: str) -> tuple[Simulator, str]:
-    """Return the simulator of a name or of a URDF file, and the name for its recording."""
-    path = Path(robot)
-    if path.suffix != '.urdf':
-        return find_simulator(robot), robot
-    if not path.is_file():
-        raise ConfigError(f'no file {path}', 'a URDF')
-    try:
-        return tree_simulator(path.read_text(encoding='utf-8-sig')), path.stem
-    except UnicodeDecodeError as error:
-        raise ConfigError(f'URDF {path} is not UTF-8 ({error})', 'a URDF in UTF-8') from error

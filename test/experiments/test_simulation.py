@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from sgp_ros.cli import main
+from sgp_ros.robots.nominal import nominal_model
+from sgp_ros.robots.registry import load_robot
 from test.simulation.trees import arm
 
 EFFECT = 'coulomb_friction:joint=elbow,level=0.3'
@@ -64,3 +66,70 @@ def test_what_the_robot_cannot_have_ends_in_one_line(urdf, tmp_path, capsys, mor
     """Exit status 2, one line on stderr."""
     assert main(['simulate', str(urdf), '--out', str(tmp_path / 'o'), *more]) == 2
     assert len(capsys.readouterr().err.strip().splitlines()) == 1
+
+
+STATED_LIMIT = (
+    'limit_friction, joint: elbow, parameters: {amplitude: {value: 0.5}, onset: {value: 0.4}, '
+    'side: {value: upper}}'
+)
+STATED = {
+    EFFECT: 'coulomb_friction, joint: elbow, parameters: {level: {value: 0.3}}',
+    'joint_coupling:joint=elbow,source_joint=shoulder,kind=torque,coefficient=0.2': (
+        'joint_coupling, joint: elbow, parameters: {source_joint: {value: shoulder}, '
+        'kind: {value: torque}, coefficient: {value: 0.2}}'
+    ),
+    'gravity_tilt:roll=0.1,pitch=-0.05': (
+        'gravity_tilt, joint: base, parameters: {roll: {value: 0.1}, pitch: {value: -0.05}}'
+    ),
+    'limit_friction:joint=elbow,amplitude=0.5,onset=0.4': STATED_LIMIT,
+}  # fmt: skip
+
+
+def _yaml(urdf, *effects, more=''):
+    path = urdf.with_name('stated.yaml')
+    listed = ', '.join(f'{{effect: {effect}}}' for effect in effects)
+    path.write_text(f'schema: 1\nurdf: {urdf.name}\n{more}effects: [{listed}]\n', encoding='utf-8')
+    return path
+
+
+@pytest.mark.parametrize('text', STATED)
+def test_a_stated_effect_moves_the_robot_as_that_of_the_command_line(urdf, tmp_path, text):
+    """The recordings are equal byte for byte."""
+    said = simulated(urdf, tmp_path / 'said', '--effect', text)
+    stated = simulated(_yaml(urdf, STATED[text]), tmp_path / 'stated')
+    assert (said / 'arm.mcap').read_bytes() == (stated / 'stated.mcap').read_bytes()
+    effects = [json.loads((x / 'truth.json').read_text())['effects'] for x in (said, stated)]
+    assert effects[0] == effects[1]
+
+
+def test_effects_of_the_command_line_come_beside_those_that_are_stated(urdf, tmp_path):
+    out = simulated(_yaml(urdf, STATED[EFFECT]), tmp_path / 'o', '--effect',
+                    'viscous_friction:joint=shoulder,b=0.1')  # fmt: skip
+    effects = json.loads((out / 'truth.json').read_text(encoding='utf-8'))['effects']
+    assert [e['effect'] for e in effects] == ['coulomb_friction', 'viscous_friction']
+
+
+@pytest.mark.parametrize(
+    ('effect', 'more', 'said'),
+    [
+        (STATED[EFFECT], 'locked: {shoulder: 0.1}\n', 'locked'),
+        ('backlash, joint: elbow, parameters: {gap: {value: 0.01}}', '', 'motor_inertia is miss'),
+        (STATED_LIMIT.replace('0.4', '-0.4'), '', 'farther end'),
+    ],
+)
+def test_what_a_simulation_cannot_take_from_a_yaml_ends_in_one_line(
+    urdf, tmp_path, capsys, effect, more, said
+):
+    path = _yaml(urdf, effect, more=more)
+    assert main(['simulate', str(path), '--out', str(tmp_path / 'o')]) == 2
+    error = capsys.readouterr().err.strip()
+    assert said in error
+    assert '\n' not in error
+
+
+def test_backlash_is_left_out_of_a_nominal_model_for_its_numbers_say_too_little(urdf):
+    """The share of the inertia on the side of the motor is not among them."""
+    path = _yaml(urdf, 'backlash, joint: elbow, parameters: {gap: {value: 0.01}}', STATED[EFFECT])
+    nominal = nominal_model(load_robot(str(path)))
+    assert [e.name for e in nominal.left_out] == ['backlash']
+    assert [e.name for e in nominal.stated] == ['coulomb_friction']
