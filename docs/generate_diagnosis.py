@@ -17,7 +17,18 @@ sgp diagnose real.mcap --robot robot.urdf --test real_test.mcap --test real_far.
 ```
 
 writes `diagnosis.json`, `report.html`, pictures, predicted accelerations of the held-out recordings, and
-`robot_diagnosed.yaml` with its URDF for the node and for `sgp replay`.
+`robot_diagnosed.yaml` with its URDF for the node, `sgp replay`, `sgp simulate`, and the next diagnosis.
+
+The robot may also be a robot YAML with `effects`, which then belong to the nominal model, or a built-in one:
+
+```bash
+sgp simulate toy_pendulum --out out/toy
+sgp diagnose out/toy/toy_pendulum.mcap --robot toy_pendulum --out out/diagnose
+```
+
+A built-in robot stands for the simplest bodies with its coefficients: those that its robot YAML states, else
+those of the simulated robot of that name. `simple_pendulum` and `double_pendulum` have no numbers of their own
+and need the YAML.
 
 ## How it decides
 1. **Compare.** The nominal robot's inverse dynamics of the measured motion, less the commanded effort, is the
@@ -94,6 +105,9 @@ TAIL = """
 * **Blocks held out** lie between blocks learned from: they show less of a drift than another day would. Intervals
   speak of the recording at hand, not of other motions; a drift as long as the recording gets none.
 * **The paper's own three concealments** are not among these worlds.
+* **The built-in reaction wheel** is commanded in volts. What is said in N m of its wheel takes the motor of the
+  simulation, 0.03 N m/V; back-EMF is part of the nominal damping, so a motor of another constant, or a dead zone
+  of the current, shows in both.
 * **Stated backlash** is left out when a diagnosed robot is diagnosed or simulated again: its gap does not say how
   much of the inertia sits on the motor. All other effects of a robot YAML belong to its nominal model, each as if
   it were alone: a delay does not delay what a dead zone passes on.

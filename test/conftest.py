@@ -21,7 +21,7 @@ _NEEDED = {
         'offline': ('excitation', 'identification', 'real_arms', 'suggestions'),
         'robots': (
             'effect_terms', 'effects', 'effects/test_stated', 'inertial', 'pendulums',
-            'ready_robots', 'rigid_body', 'tree', 'urdf_robot', 'urdf_writer',
+            'built_in_nominal', 'ready_robots', 'rigid_body', 'tree', 'urdf_robot', 'urdf_writer',
         ),
         'simulation': ('random_tree', 'serial_arm', 'tree'),
     },

@@ -76,7 +76,7 @@ def run_diagnose(
     """Diagnose a recording and write diagnosis.json, predictions and the report.
 
     Raises:
-        ConfigError: a robot without URDF or without inertias, or a file that is none.
+        ConfigError: a robot without nominal bodies or inertias, or a file that is none.
         RecordingError: nothing in the recording can be used, or nothing moves.
         NumericalError: the motion leaves the equations without a solution.
     """
@@ -88,10 +88,7 @@ def run_diagnose(
             'a mass and inertias for every moving link of the URDF',
             'identify it first and give the robot_identified.urdf of sgp identify',
         )
-    remarks = [
-        f'{e.name} of {e.joint} is stated by too few numbers and so not part of the nominal robot.'
-        for e in nominal.left_out
-    ]
+    remarks = list(nominal.remarks)
     events = _events(bag, robot, options, remarks)
     still = still_joints(events, tree.moving_names)
     if len(still) == tree.size:

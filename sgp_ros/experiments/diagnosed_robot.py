@@ -7,7 +7,6 @@ deviations, behind those that the nominal robot states; the URDF has the bodies 
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,11 +15,12 @@ import yaml
 from sgp_ros.errors import ConfigError
 from sgp_ros.report.files import write_text
 from sgp_ros.robots.effects.stated import SIDED, effect_names
-from sgp_ros.robots.urdf_robot import nominal_tree
+from sgp_ros.robots.urdf_robot import nominal_tree, urdf_text
 from sgp_ros.robots.urdf_writer import write_urdf
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+    from pathlib import Path
 
     from sgp_ros.diagnosis.result import Diagnosis, Finding, Parameter
     from sgp_ros.robots.robot import Robot
@@ -42,7 +42,7 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis) -> None:
     Raises:
         ConfigError: the URDF is no longer what it was.
     """
-    text = Path(str(robot.source['urdf'])).read_text(encoding='utf-8')
+    text = urdf_text(robot)
     path = out / URDF_NAME
     if found.bodies is None or not _holds_bodies(path, text, robot, found.bodies):
         write_text(path, text)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +12,8 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.report.files import write_text
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from sgp_ros.robots.robot import Robot
 
 
@@ -70,6 +71,7 @@ def robot_urdf(robot: Robot, values: np.ndarray) -> str:
     Raises:
         ConfigError: a mass is not positive, or the URDF is no longer what it was.
     """
+    from sgp_ros.robots.urdf_robot import urdf_text  # noqa: PLC0415 - loads Pinocchio
     from sgp_ros.robots.urdf_writer import write_urdf  # noqa: PLC0415 - as above
 
     names = [c.name for c in robot.coefficients]
@@ -83,5 +85,5 @@ def robot_urdf(robot: Robot, values: np.ndarray) -> str:
         joint: (named.get(f'{joint}.viscous', 0.0), named.get(f'{joint}.coulomb', 0.0))
         for joint in robot.joint_names
     }
-    text = Path(str(robot.source['urdf'])).read_text(encoding='utf-8')
+    text = urdf_text(robot)
     return write_urdf(text, bodies, dynamics)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from sgp_ros.errors import ConfigError
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.urdf_robot import urdf_text
 from sgp_ros.simulation.assembly import find_simulator
 from sgp_ros.simulation.effects import ChosenEffect
 from sgp_ros.simulation.tree_simulator import tree_simulator
@@ -76,7 +77,7 @@ def _of_yaml(path: Path) -> SimulatedRobot:
         )  # fmt: skip
     nominal = nominal_model(robot)
     effects = tuple(_chosen(effect, nominal) for effect in nominal.effects)
-    return SimulatedRobot(_of_urdf(Path(str(robot.source['urdf']))), path.stem, effects)
+    return SimulatedRobot(tree_simulator(urdf_text(robot)), path.stem, effects)
 
 
 def _chosen(stated: StatedEffect, nominal: Nominal) -> ChosenEffect:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.robots.built_in_nominal import NOMINAL, built_in_document
 from sgp_ros.robots.effect_terms import ON_TREE, changed_tree
 from sgp_ros.robots.stated_effects import read_effects
-from sgp_ros.robots.urdf_robot import nominal_tree
+from sgp_ros.robots.urdf_robot import build_urdf_robot, nominal_tree
 
 if TYPE_CHECKING:
     import numpy as np
@@ -27,12 +29,14 @@ class Nominal:
         plain: the tree of the URDF.
         tree: the same with stated tilt of the base and payload.
         effects: all that it states.
+        is_lumped: whether it is a built-in robot, known by its coefficients alone.
     """
 
     robot: Robot
     plain: Tree
     tree: Tree
     effects: tuple[StatedEffect, ...]
+    is_lumped: bool = False
 
     @property
     def stated(self) -> tuple[StatedEffect, ...]:
@@ -40,9 +44,18 @@ class Nominal:
         return tuple(e for e in self.effects if e.is_complete and e.name not in ON_TREE)
 
     @property
-    def left_out(self) -> tuple[StatedEffect, ...]:
-        """The effects whose stated numbers do not say what they do."""
-        return tuple(e for e in self.effects if not e.is_complete)
+    def remarks(self) -> tuple[str, ...]:
+        """What a user should know of it."""
+        lumped = (
+            f'The bodies of {self.robot.name} are the simplest that have its coefficients: '
+            'mass and centre of a link are no measurement.'
+        )
+        return ((lumped,) if self.is_lumped else ()) + tuple(
+            f'{e.name} of {e.joint} is stated by too few numbers and so not part of the nominal '
+            'robot.'
+            for e in self.effects
+            if not e.is_complete
+        )
 
     def without_stated(self, bodies: np.ndarray | None) -> np.ndarray | None:
         """Return bodies (b, 10) of a diagnosis less the payload that the robot states."""
@@ -50,14 +63,19 @@ class Nominal:
 
 
 def nominal_model(robot: Robot) -> Nominal:
-    """Return the nominal model of a robot.
+    """Return the nominal model of a robot; a built-in one becomes a robot with a URDF.
 
     Raises:
         ConfigError: the robot has no nominal bodies, or its URDF is no longer what it was.
     """
-    plain = nominal_tree(robot)
     problems: list[str] = []
+    is_lumped = robot.name in NOMINAL and 'urdf' not in robot.source
+    if is_lumped:
+        built = build_urdf_robot(built_in_document(robot), Path(), problems)
+        assert built is not None, problems
+        robot = built
+    plain = nominal_tree(robot)
     effects = read_effects(robot.source.get('effects'), plain, problems)
     if problems:
         raise ConfigError(f'robot {robot.name}: ' + ' | '.join(problems), 'as it was before')
-    return Nominal(robot, plain, changed_tree(plain, effects), effects)
+    return Nominal(robot, plain, changed_tree(plain, effects), effects, is_lumped)

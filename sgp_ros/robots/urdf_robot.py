@@ -3,7 +3,7 @@
 A robot YAML with the key `urdf` says which joints move and which physics is assumed:
 
     schema: 1
-    urdf: panda.urdf            # relative to this file
+    urdf: panda.urdf            # relative to this file; or the XML itself
     name: panda
     joints: [j1, j2]            # those that move, in this order; others are locked
     locked: {torso: 0.15}       # where [rad or m]; 0 if not said
@@ -65,8 +65,8 @@ def build_urdf_robot(
         None where the URDF cannot be read as the document asks for.
     """
     entries = Entries(document, problems)
-    path = folder / entries.text('urdf', '')
-    tree = _read_tree(entries, path)
+    place = _place(entries.text('urdf', ''), folder)
+    tree = _read_tree(entries, place)
     if tree is None:
         return None
     joints = _joints(tree, entries.numbers('effort_gain'), problems)
@@ -83,9 +83,9 @@ def build_urdf_robot(
         target='effort',
         terms=terms,
         residual_inputs=tuple((f'position:{name}', f'velocity:{name}') for name in names),
-        description=_description(tree, path, effects),
+        description=_description(tree, place, effects),
         source={k: v for k, v in document.items() if k not in {'schema', 'urdf', 'parameters'}}
-        | {'urdf': str(path.resolve())},
+        | {'urdf': str(place.resolve()) if isinstance(place, Path) else place},
         effort_map=effort_map(tree, effects, width),
     )
     return _with_inputs(robot, document.get('residual_inputs', 'own'), problems)
@@ -120,13 +120,24 @@ def nominal_tree(robot: Robot) -> Tree:
         )
     problems: list[str] = []
     source = str(robot.source['urdf'])
-    tree = _read_tree(Entries(robot.source, problems), Path(source))
+    tree = _read_tree(Entries(robot.source, problems), _place(source, Path()))
     if tree is None:
         raise ConfigError(f'URDF {source}: ' + ' | '.join(problems), 'as it was before')
     return tree
 
 
-def _read_tree(entries: Entries, path: Path) -> Tree | None:
+def urdf_text(robot: Robot) -> str:
+    """Return the text of the URDF of a robot from one."""
+    place = _place(str(robot.source['urdf']), Path())
+    return place if isinstance(place, str) else place.read_text(encoding='utf-8-sig')
+
+
+def _place(urdf: str, folder: Path) -> Path | str:
+    """Return the file that the key `urdf` names, or the XML that stands there itself."""
+    return urdf if urdf.lstrip().startswith('<') else folder / urdf
+
+
+def _read_tree(entries: Entries, place: Path | str) -> Tree | None:
     payload = _payload(entries)
     arguments = {
         'joints': entries.names('joints'),
@@ -134,7 +145,7 @@ def _read_tree(entries: Entries, path: Path) -> Tree | None:
         'passive': entries.names('passive'),
     }
     try:
-        return read_urdf(path, **arguments, payload=payload)  # type: ignore[arg-type]  # as named
+        return read_urdf(place, **arguments, payload=payload)  # type: ignore[arg-type]  # as named
     except ConfigError as error:
         entries.problems.append(str(error))
         return None
@@ -154,8 +165,9 @@ def _payload(entries: Entries) -> Payload | None:
     )
 
 
-def _description(tree: Tree, path: Path, effects: Sequence[StatedEffect]) -> str:
-    text = f'Rigid-body tree of {tree.size} joints from {path.name}'
+def _description(tree: Tree, place: Path | str, effects: Sequence[StatedEffect]) -> str:
+    file = place.name if isinstance(place, Path) else 'a URDF'
+    text = f'Rigid-body tree of {tree.size} joints from {file}'
     for is_online, lead in ((True, 'with'), (False, 'not modelled online:')):
         named = [f'{e.name} of {e.joint}' for e in effects if e.is_online == is_online]
         text += f'; {lead} {", ".join(named)}' if named else ''

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from sgp_ros.diagnosis.trajectory import SHORTEST_ROWS
 from sgp_ros.engine.samples import CommandSample, JointSample
+from sgp_ros.errors import ConfigError
 from sgp_ros.recordings.writer import Status
+from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.ros.diagnosis_process import (
     DiagnosisDone,
     DiagnosisFailed,
@@ -64,8 +66,10 @@ class Diagnosing:
         states = sum(isinstance(event, JointSample) for event in self._events)
         if self._process is not None:
             return False, 'a diagnosis is already running; /diagnostics tells its outcome'
-        if 'urdf' not in self._robot.source:
-            return False, f'robot {self._robot.name} has no URDF; give one as parameter robot'
+        try:
+            nominal_model(self._robot)
+        except ConfigError as error:
+            return False, ' '.join(str(error).split())
         if states < SHORTEST_ROWS:
             return False, f'too few states: {states}, at least {SHORTEST_ROWS} are needed'
         events = tuple(_named(event, command_joints) for event in self._events)

@@ -9,8 +9,8 @@ from sgp_ros.robots.registry import load_robot
 from sgp_ros.ros.diagnosing import MOST_EVENTS, Diagnosing, _named
 
 
-def _diagnosing(window_s: float) -> Diagnosing:
-    return Diagnosing(load_robot('reaction_wheel'), 'reaction_wheel', window_s)
+def _diagnosing(window_s: float, robot: str = 'reaction_wheel') -> Diagnosing:
+    return Diagnosing(load_robot(robot), robot, window_s)
 
 
 def _state(stamp_ns: int) -> JointSample:
@@ -35,10 +35,10 @@ def test_the_memory_of_events_is_bounded_where_stamps_stand_still() -> None:
     assert len(kept._events) == MOST_EVENTS
 
 
-def test_a_robot_without_urdf_is_refused_with_the_reason() -> None:
-    started, message = _diagnosing(1.0).start(('',))
+def test_a_robot_without_nominal_bodies_is_refused_with_the_reason() -> None:
+    started, message = _diagnosing(1.0, 'simple_pendulum').start(('',))
     assert not started
-    assert 'reaction_wheel has no URDF' in message
+    assert 'simple_pendulum has no nominal values of J' in message
 
 
 def test_commands_without_names_get_those_of_the_settings() -> None:
