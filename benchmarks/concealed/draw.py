@@ -74,30 +74,37 @@ def draw_case(seed, tier, only, out):
 def _attempt(seed, rng, tier, wanted, out):
     names = _names(rng, wanted)
     world = worlds.draw_world(seed, rng, tier, _largest_error(rng, tier, wanted, names))
-    pilot = world.run('near', 12.0, 1)
-    motion = worlds.pilot_motion(pilot, world)
-    relative = 0.002 if tier == 'A' else float(rng.choice([0.01, 0.03]))
-    noise = tuple(float(relative * v) for v in motion.velocity)
-    has_velocity = world.sensors.measures_velocity or 'velocity_filter_lag' in names
-    world = replace(
-        world,
-        sensors=replace(world.sensors, velocity_noise=noise, measures_velocity=has_velocity),
+    world, motion, relative = observed(
+        rng, world, tier, needs_velocity='velocity_filter_lag' in names
     )
     concealed = [draw_effect(rng, name, world.bodies, motion, tier == 'B') for name in names]
     for effect in concealed:
         low, high = _TARGETS[tier]
         sizes.sized(world, effect, math.exp(rng.uniform(math.log(low), math.log(high))))
+    recordings = run_all(world, concealed)
+    _check(recordings['real'], world, concealed)
+    return write_case(seed, tier, wanted, out, rng, world, concealed, recordings, motion, relative)
+
+
+def observed(rng, world, tier, *, needs_velocity=False):
+    """Return the world with noise of its velocities, its usual motion, and that noise."""
+    motion = worlds.pilot_motion(world.run('near', 12.0, 1), world)
+    relative = 0.002 if tier == 'A' else float(rng.choice([0.01, 0.03]))
+    noise = tuple(float(relative * v) for v in motion.velocity)
+    has_velocity = world.sensors.measures_velocity or needs_velocity
+    sensors = replace(world.sensors, velocity_noise=noise, measures_velocity=has_velocity)
+    return replace(world, sensors=sensors), motion, relative
+
+
+def run_all(world, concealed):
+    """Return the recordings of a world by name."""
     recordings = {
         name: world.run('far' if name == 'real_far' else 'near', seconds, number, concealed)
         for (name, seconds), number in zip(_SECONDS.items(), _NUMBERS.values(), strict=True)
     }
-    _check(recordings['real'], world, concealed)
     perfect = Sensors(measures_velocity=True, command_latency_s=world.sensors.command_latency_s)
     recordings['sim'] = world.run('near', 12.0, 4, is_nominal=True, sensors=perfect)
-    _write(seed, tier, wanted, out, rng, world, concealed, recordings, motion, relative)
-    what = ', '.join(f'{e.name}@{e.joint}' for e in concealed) or wanted
-    share = ' '.join(f'{x:.4f}' for x in sizes.shares(recordings['real'], world))
-    return f'case_{seed:03d} {tier} {world.family:9s} {what} {share}'
+    return recordings
 
 
 def _names(rng, wanted):
@@ -130,11 +137,7 @@ def draw_transport(rng, tier):
 
 def _check(real, world, concealed):
     """Refuse a world in which a concealed effect is smaller than what counts as physics."""
-    for effect in concealed:
-        recording = real
-        if len(concealed) > 1:
-            recording = world.run('near', 12.0, 1, [effect])
-        share = sizes.own_share(recording, world, effect)
+    for effect, share in zip(concealed, own_shares(real, world, concealed), strict=True):
         if share < sizes.SMALLEST_SHARE:
             raise UnsuitableError(f'{effect.name} makes {share:.2e}')
     if not concealed and world.errors:
@@ -143,7 +146,18 @@ def _check(real, world, concealed):
             raise UnsuitableError(f'wrong parameters make {error:.2e}')
 
 
-def _write(seed, tier, wanted, out, rng, world, concealed, recordings, motion, relative):
+def own_shares(real, world, concealed):
+    """Return the share of each concealed effect alone; each of several needs a run of its own."""
+    return [
+        sizes.own_share(
+            real if len(concealed) == 1 else world.run('near', 12.0, 1, [effect]), world, effect
+        )
+        for effect in concealed
+    ]
+
+
+def write_case(seed, tier, wanted, out, rng, world, concealed, recordings, motion, relative):
+    """Write recordings and answers of a world and return a line about it."""
     case, names = f'case_{seed:03d}', [body.joint for body in world.bodies]
     folder = out / 'cases' / case
     folder.mkdir(exist_ok=True)
@@ -194,6 +208,8 @@ def _write(seed, tier, wanted, out, rng, world, concealed, recordings, motion, r
         signals[f'{name}_t'] = 1e-9 * (recording.stamps_ns - recording.stamps_ns[0])
         signals[f'{name}_a'] = recording.true_acceleration.astype(np.float32)
     np.savez(out / 'answers' / f'{case}_truth.npz', **signals)
+    what = ', '.join(f'{e.name}@{e.joint}' for e in concealed) or wanted
+    return f'{case} {tier} {world.family:9s} {what} {" ".join(f"{x:.4f}" for x in share)}'
 
 
 if __name__ == '__main__':

@@ -17,7 +17,7 @@ _NAMES = (
 
 @dataclass(frozen=True)
 class Body:
-    """A link and the joint that carries it; `span` is how far a motion goes from the centre."""
+    """A link and the joint that carries it; a motion goes as far as `span` from `centre`."""
 
     joint: str
     link: str
@@ -35,6 +35,7 @@ class Body:
     span: float
     effort: float = 1e4
     is_driven: bool = True
+    centre: float = 0.0
 
     @property
     def is_prismatic(self):

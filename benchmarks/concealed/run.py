@@ -48,7 +48,7 @@ def main():
         cases = [f'case_{seed:03d}' for seed in range(first, last)]
         cases = [case for case in cases if (worlds / 'answers' / f'{case}.json').exists()]
         with ThreadPoolExecutor(arguments.processes) as pool:
-            scored = list(pool.map(lambda case: _scored(worlds, case, Path(folder)), cases))
+            scored = list(pool.map(lambda case: scored_case(worlds, case, Path(folder)), cases))
     report = {
         'schema': 1, 'tier': arguments.tier, 'seeds': arguments.seeds,
         'environment': environment(), 'summary': summary(scored), 'cases': scored,
@@ -62,7 +62,7 @@ def _run(module, *words):
     subprocess.run([sys.executable, '-m', module, *words], check=True)
 
 
-def _scored(worlds, case, scratch):
+def scored_case(worlds, case, scratch):
     """Diagnose one case where its answer is out of sight, then score it."""
     sealed, folder, out = worlds / 'cases' / case, scratch / 'open' / case, scratch / 'out' / case
     shutil.copytree(sealed, folder)

@@ -104,6 +104,7 @@ class World:
             free = np.array([min(body.limit, 2.3 * body.span) - body.span for body in bodies])
             centre = rng.choice([-1.0, 1.0], len(bodies)) * rng.uniform(0.6, 0.9) * free
             span, fastest = rng.uniform(0.6, 0.85) * span, 1.3 * fastest
+        centre = centre + np.array([body.centre for body in bodies])
         return random_multisine(rng, centre, span, lowest_hz=slowest, highest_hz=fastest)
 
     def _check(self, recording, region):
@@ -146,6 +147,11 @@ def draw_world(seed, rng, tier, with_errors):
         true_bodies, errors = robots.wrong(rng, bodies, largest, 1.0 if tier == 'B' else 0.6)
         if not errors:
             raise UnsuitableError('no wrong parameter')
+    return make_world(seed, rng, tier, family, bodies, true_bodies, errors)
+
+
+def make_world(seed, rng, tier, family, bodies, true_bodies, errors):
+    """Return a world of given bodies with sensors and control as its tier has them."""
     is_hard = tier == 'B'
     rate_hz = float(
         rng.choice([100.0, 125.0, 200.0, 250.0, 500.0] if is_hard else [125.0, 200.0, 250.0])
