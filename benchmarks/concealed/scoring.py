@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections import Counter
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -35,8 +36,9 @@ def is_right(answer, diagnosis):
 
 def components(answer, diagnosis):
     """Return how many of the concealed effects are among the findings."""
-    names = {(f['effect'], f['joint']) for f in diagnosis['findings']}
-    return sum((e['effect'], e['joint']) in names for e in answer['effects'])
+    found = Counter((f['effect'], f['joint']) for f in diagnosis['findings'])
+    concealed = Counter((e['effect'], e['joint']) for e in answer['effects'])
+    return sum((found & concealed).values())
 
 
 def overlap(answer, diagnosis):
@@ -63,25 +65,40 @@ def _iou(found, true):
 
 
 def parameter_scores(answer, diagnosis):
-    """Return relative error and whether the truth lies within two standard deviations."""
+    """Return relative error and whether the truth lies within two standard deviations.
+
+    Of effects of one name on one joint each gets the finding that is nearest to it.
+    """
     result = []
+    left = list(diagnosis['findings'])
     for effect in answer['effects']:
         match = [
-            f for f in diagnosis['findings']
+            f for f in left
             if (f['effect'], f['joint']) == (effect['effect'], effect['joint'])
         ]  # fmt: skip
-        for name in effect['scored'] if match else []:
-            found = match[0]['parameters'].get(name)
-            if found is None:
-                continue
-            true, error = effect['parameters'][name], None
-            scale = _scale(name, effect, answer)
-            error = abs(found['value'] - true)
-            std = found.get('std')
-            covered = None if not std else bool(error <= 2.0 * std)
-            result.append({'name': f'{effect["effect"]}.{name}', 'error': error / scale,
-                           'covered': covered})  # fmt: skip
+        if not match:
+            continue
+        scores, best = min(
+            ((_compared(effect, f, answer), f) for f in match),
+            key=lambda pair: sum(score['error'] for score in pair[0]),
+        )
+        left.remove(best)
+        result += scores
     return result
+
+
+def _compared(effect, finding, answer):
+    scores = []
+    for name in effect['scored']:
+        found = finding['parameters'].get(name)
+        if found is None:
+            continue
+        error, std = abs(found['value'] - effect['parameters'][name]), found.get('std')
+        covered = None if not std else bool(error <= 2.0 * std)
+        scores.append({'name': f'{effect["effect"]}.{name}',
+                       'error': error / _scale(name, effect, answer),
+                       'covered': covered})  # fmt: skip
+    return scores
 
 
 def _scale(name, effect, answer):

@@ -7,8 +7,12 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks.concealed import draw, robots, sizes
+from benchmarks.concealed import draw, paper, robots, scoring, sizes
 from benchmarks.concealed.kinds import SCORED
+from sgp_ros.robots.nominal import nominal_model
+from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.rigid_body import mass_matrix
+from sgp_ros.simulation.figure_eight import ARM
 from sgp_ros.simulation.registry import EFFECTS
 from sgp_ros.simulation.tree_text import read_tree
 
@@ -54,3 +58,65 @@ def test_drawn_case_has_the_layout_and_the_size_that_was_promised(tmp_path, monk
     assert [j.name for j in read_tree(urdf).joints] == answer['joints']
     truth = np.load(tmp_path / 'answers' / 'case_000_truth.npz', allow_pickle=False)
     assert truth['real_far_a'].shape == (len(truth['real_far_t']), len(answer['joints']))
+
+
+@pytest.mark.parametrize(
+    ('name', 'built_in'), [('pendulum', 'toy_pendulum'), ('wheel', 'reaction_wheel_6')]
+)
+def test_the_papers_robots_are_those_of_the_package_without_friction(tmp_path, name, built_in):
+    """The mass matrix at rest, hanging or upright, is that of the built-in robot."""
+    family, bodies, _ = paper.CONCEALMENTS[name](1.0)
+    path = tmp_path / 'robot.urdf'
+    path.write_text(robots.urdf(family, bodies), encoding='utf-8')
+    drawn = nominal_model(load_robot(str(path))).tree
+    stated = nominal_model(load_robot(built_in)).tree
+    q = np.zeros((1, drawn.size))
+    M, known = (mass_matrix(tree, tree.parameters, q)[0] for tree in (drawn, stated))
+    ball = paper.BALL if name == 'pendulum' else 0.0
+    np.testing.assert_allclose(M, known + ball, rtol=1e-9)
+    assert not drawn.damping.any()
+
+
+def test_the_papers_arm_has_its_friction_towards_both_limits():
+    """As the arm of the reproduction has it, counted from the middle of the range."""
+    _, bodies, effects = paper.arm(1.0)
+    friction, body = ARM.frictions[2], bodies[2]
+    middle = 0.5 * (friction.lower + friction.upper)
+    for q in np.linspace(-body.limit, body.limit, 9):
+        added = sum(
+            e.parameters['amplitude']
+            * max(0.0, (q - (x := e.parameters['onset'])) / (np.sign(x) * body.limit - x))
+            for e in effects
+        )
+        assert added == pytest.approx(float(friction.near_limits(np.array(middle + q))))
+
+
+def test_what_is_too_small_to_count_is_not_asked_for():
+    """A row tells which of the concealed effects count, and what was named beside them."""
+    row = {
+        'truth': [['viscous_friction', 'pole'], ['viscous_friction', 'wheel']],
+        'found': [['viscous_friction', 'wheel', 0.9], ['hysteresis', 'pole', 0.8]],
+    }
+    found = paper.with_shares(row, 1.0, [0.001, 0.07])
+    assert (found['counting'], found['counting_found'], found['spurious']) == (1, 1, 1)
+
+
+def test_two_effects_of_one_name_on_one_joint_are_each_compared_with_their_own():
+    """In whatever order they are found; one finding does not stand for both."""
+
+    def entry(onset):
+        return {'effect': 'limit_friction', 'joint': 'j', 'scored': ['onset'],
+                'parameters': {'onset': onset}}  # fmt: skip
+
+    def finding(onset):
+        return {'effect': 'limit_friction', 'joint': 'j',
+                'parameters': {'onset': {'value': onset, 'std': 0.02}}}  # fmt: skip
+
+    answer = {'effects': [entry(0.3), entry(-0.3)], 'joint_range': {'j': [-1.0, 1.0]}}
+    both = {'findings': [finding(-0.31), finding(0.31)]}
+    assert scoring.components(answer, both) == 2
+    scores = scoring.parameter_scores(answer, both)
+    assert [s['error'] for s in scores] == pytest.approx([0.005, 0.005])
+    assert all(s['covered'] for s in scores)
+    assert scoring.components(answer, {'findings': [finding(0.3)]}) == 1
+    assert len(scoring.parameter_scores(answer, {'findings': [finding(0.3)]})) == 1
