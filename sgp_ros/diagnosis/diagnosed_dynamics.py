@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from sgp_ros.diagnosis.equations import Equations
     from sgp_ros.diagnosis.remainder import Remainder
     from sgp_ros.robots.effects.effect import Effect
+    from sgp_ros.robots.stated_effects import StatedEffect
     from sgp_ros.robots.tree import Tree
 
 _SMALL = 1e-6
@@ -39,12 +40,14 @@ class DiagnosedDynamics:
         tree: with the bodies of the model.
         step: of the recording [s].
         remainders: processes beside the model.
+        stated: effects without memory that the nominal robot has, beside those of its tree.
     """
 
     model: Model
     tree: Tree
     step: float
     remainders: tuple[Remainder, ...] = ()
+    stated: tuple[StatedEffect, ...] = ()
 
     def equations(
         self, q: np.ndarray, v: np.ndarray, loads: np.ndarray
@@ -61,12 +64,14 @@ class DiagnosedDynamics:
         """
         m, k = q.shape
         a = np.repeat(np.vstack([np.zeros((1, k)), np.eye(k)]), m, axis=0)
-        motion = self._motion(np.tile(q, (k + 1, 1)), np.tile(v, (k + 1, 1)), a, loads)
+        stated = _chosen(self.stated, _sees_acceleration)
+        motion = self._motion(np.tile(q, (k + 1, 1)), np.tile(v, (k + 1, 1)), a, loads, stated)
         needed = motion.effort_for(motion.position, motion.velocity, a)
-        inertial = extra_force(_part(self.model, lambda effect: effect.sees_acceleration), motion)
+        inertial = extra_force(_part(self.model, _sees_acceleration), motion)
         e = (needed - motion.effort - inertial).reshape(k + 1, m, k)
-        here = self._motion(q, v, np.zeros_like(q), loads)
-        others = extra_force(_part(self.model, lambda effect: not effect.sees_acceleration), here)
+        stated = _chosen(self.stated, _sees_no_acceleration)
+        here = self._motion(q, v, np.zeros_like(q), loads, stated)
+        others = extra_force(_part(self.model, _sees_no_acceleration), here)
         drive = loads[:, k : 2 * k] - e[0] + others
         for remainder in self.remainders:
             drive[:, remainder.joint] += remainder.force(here)
@@ -75,20 +80,23 @@ class DiagnosedDynamics:
     def level_of_dry_friction(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """Return half the jump of each joint's force as its velocity changes sign, (m, k)."""
         level = np.zeros_like(q)
-        dry = [
-            (s, c)
+        known = [
+            (s.effect, s.place, s.shape, c)
             for s, c in zip(self.model.suspects, self.model.coefficients, strict=True)
-            if s.effect.holds(s.place)
         ]
+        known += [
+            (x.effect, x.place, x.shape, x.coefficients)
+            for x in self.stated
+            if x.effect is not None and x.place is not None
+        ]
+        dry = [entry for entry in known if entry[0].holds(entry[1])]
         if dry:
             still = np.zeros_like(q)
             motion = self._motion(q, still, still, loads)
             up, down = motion.sliding(1.0), motion.sliding(-1.0)
-            for s, c in dry:
-                jump = s.effect.columns(down, s.place, s.shape) - s.effect.columns(
-                    up, s.place, s.shape
-                )
-                level[:, s.place.joint] += 0.5 * (jump @ c)
+            for effect, place, shape, c in dry:
+                jump = effect.columns(down, place, shape) - effect.columns(up, place, shape)
+                level[:, place.joint] += 0.5 * (jump @ c)
         return level
 
     def fastest_rate(self, q: np.ndarray, v: np.ndarray, loads: np.ndarray) -> float:
@@ -114,12 +122,19 @@ class DiagnosedDynamics:
         return float(np.abs(np.linalg.eigvals(A)).max())
 
     def _motion(
-        self, q: np.ndarray, v: np.ndarray, a: np.ndarray, loads: np.ndarray
+        self,
+        q: np.ndarray,
+        v: np.ndarray,
+        a: np.ndarray,
+        loads: np.ndarray,
+        stated: tuple[StatedEffect, ...] = (),
     ) -> ObservedMotion:
         """Return states as the effects see them; loads are repeated as often as needed."""
         k = q.shape[1]
         given = np.tile(loads, (len(q) // len(loads), 1))
-        motion = ObservedMotion(self.tree, given[:, 2 * k], self.step, q, v, a, given[:, :k], None)
+        motion = ObservedMotion(
+            self.tree, given[:, 2 * k], self.step, q, v, a, given[:, :k], None, stated=stated
+        )
         motion.__dict__['direction'] = np.sign(v)
         return motion
 
@@ -133,14 +148,37 @@ def dynamics_of(
     """Return the dynamics of a model fitted on `equations` for the recording of a motion."""
     change = (model.w @ equations.directions).reshape(motion.tree.parameters.shape)
     tree = replace(motion.tree, parameters=motion.tree.parameters + change)
-    local = _part(model, lambda effect: not effect.has_memory)
-    return DiagnosedDynamics(local, tree, motion.step, remainders)
+    local, stated = _part(model, _is_local), _chosen(motion.stated, _is_local)
+    return DiagnosedDynamics(local, tree, motion.step, remainders, stated)
 
 
 def remembered_force(model: Model, motion: ObservedMotion, tree: Tree) -> np.ndarray:
     """Return the force of the effects with memory along a motion, (n, k) [N m or N]."""
-    remembering = _part(model, lambda effect: effect.has_memory)
-    return extra_force(remembering, replace(motion, tree=tree))
+    stated = _chosen(motion.stated, _has_memory)
+    return extra_force(_part(model, _has_memory), replace(motion, tree=tree, stated=stated))
+
+
+def _has_memory(effect: Effect) -> bool:
+    return effect.has_memory
+
+
+def _is_local(effect: Effect) -> bool:
+    return not effect.has_memory
+
+
+def _sees_acceleration(effect: Effect) -> bool:
+    return effect.sees_acceleration
+
+
+def _sees_no_acceleration(effect: Effect) -> bool:
+    return not effect.sees_acceleration
+
+
+def _chosen(
+    stated: tuple[StatedEffect, ...], is_in: Callable[[Effect], bool]
+) -> tuple[StatedEffect, ...]:
+    """Return some of the stated effects."""
+    return tuple(x for x in stated if x.effect is not None and is_in(x.effect))
 
 
 def _part(model: Model, is_in: Callable[[Effect], bool]) -> Model:

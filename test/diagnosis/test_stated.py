@@ -112,3 +112,19 @@ def test_a_stated_lag_of_the_velocity_is_not_found_again(robots, perfect):
         raw = collect(events, robot, known)
         equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
         assert [lag.is_physics for lag in sensor_lags(raw, equations)] == [is_physics]
+
+
+def test_roll_outs_of_the_nominal_robot_have_what_it_states(named, robots):
+    """A robot whose truth is stated ends where it did; without, it does not."""
+    name, events = named
+    robot, tree = robots[1]
+    told, untold = (
+        diagnose(events, robot, tree, {}, stated=stated)
+        for stated in (_stated(name, tree), ())
+    )  # fmt: skip
+    assert told.verdict == 'no_mismatch'
+    after, before = (
+        found.proofs['train'].rollout_before[tree.joint_names[0]] for found in (told, untold)
+    )
+    assert after < 0.05 * before
+    assert told.proofs['train'].failed == 0
