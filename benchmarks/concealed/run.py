@@ -35,17 +35,19 @@ _CALM = {'no_mismatch', 'parameters_only'}
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
     parser.add_argument('--tier', choices=('A', 'B'), default='A')
-    parser.add_argument('--seeds', default='0:40', help='FIRST:LAST+1')
+    parser.add_argument('--seeds', default='0:40', help='FIRST:LAST+1[,...]')
     parser.add_argument('--worlds', type=Path, help='worlds drawn before; else they are drawn')
     parser.add_argument('--processes', type=int, default=2)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         worlds = arguments.worlds or Path(folder) / 'worlds'
-        if arguments.worlds is None:
-            _run('benchmarks.concealed.draw', '--seeds', arguments.seeds, '--tier',
-                 arguments.tier, '--out', str(worlds))  # fmt: skip
-        first, last = map(int, arguments.seeds.split(':'))
-        cases = [f'case_{seed:03d}' for seed in range(first, last)]
+        cases = []
+        for seeds in arguments.seeds.split(','):
+            if arguments.worlds is None:
+                _run('benchmarks.concealed.draw', '--seeds', seeds, '--tier', arguments.tier,
+                     '--out', str(worlds))  # fmt: skip
+            first, last = map(int, seeds.split(':'))
+            cases += [f'case_{seed:03d}' for seed in range(first, last)]
         cases = [case for case in cases if (worlds / 'answers' / f'{case}.json').exists()]
         with ThreadPoolExecutor(arguments.processes) as pool:
             scored = list(pool.map(lambda case: scored_case(worlds, case, Path(folder)), cases))

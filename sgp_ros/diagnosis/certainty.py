@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.diagnosis.decision import ADEQUATE_REST, TEMPER, Scale
+from sgp_ros.diagnosis.decision import TEMPER, Scale
 from sgp_ros.diagnosis.equivalence import is_same_law
 
 if TYPE_CHECKING:
@@ -71,14 +71,14 @@ def probabilities(
             and is_same_law(equations, asserted, m)
         )
     ]
-    adequate = 1.0 / (1.0 + (decision.rest / ADEQUATE_REST) ** 2) if models else 0.0
+    adequate = 1.0 / (1.0 + decision.excess**2)
     by_key: dict[object, float] = {}
     worth = TEMPER * np.array([scale.worth(m) for m in (competition.base, *models)])
     odds = np.exp(worth - worth.max())
     for model, p in zip(models, odds[1:] / odds.sum(), strict=True):
         for s in model.suspects:
             by_key[s.key] = by_key.get(s.key, 0.0) + float(p) * adequate
-    unknown = float(np.clip(decision.rest / (decision.rest + ADEQUATE_REST), 0.05, 0.97))
+    unknown = float(np.clip(decision.excess / (decision.excess + 1.0), 0.05, 0.97))
     return Probabilities(
         {key: min(p, 0.99) for key, p in by_key.items()},
         unknown,

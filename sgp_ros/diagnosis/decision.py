@@ -44,6 +44,8 @@ MOST_OPPOSED = 5.0
 """Greatest ratio of the effects' mean squares, added up, to that of their sum, or of all there is
 to explain.
 """
+_NOTHING = 1.0 / ADEQUATE_REST
+"""Excess of a model that explains nothing."""
 FILTER_ERRORS = 1.0
 """Multiple of the measured errors of smoothing that a perfect model may leave."""
 
@@ -56,7 +58,7 @@ class Decision:
         verdict: as in the schema.
         model: that is asserted; for `unexplained` the inertial parameters alone.
         rivals: models that were not asserted, best first.
-        rest: of the best model, relative to what it explains.
+        excess: what the best model leaves, relative to what an adequate one may.
         worst: index of the joint where most is left.
         tentative: best model where nothing is adequate.
         against: score of the best model without effects [nats].
@@ -65,7 +67,7 @@ class Decision:
     verdict: str
     model: Model
     rivals: tuple[Model, ...]
-    rest: float
+    excess: float
     worst: int
     tentative: Model | None = None
     against: float = 0.0
@@ -111,6 +113,11 @@ class Scale:
         """Return the rest of a model relative to what it explains."""
         return float(self.shares(model).sum()) / self.explained(model)
 
+    def excess(self, model: Model) -> float:
+        """Return what a model leaves, relative to what an adequate one may."""
+        slight = float(self.shares(model).max()) / SLIGHT_REST
+        return min(self.rest(model) / ADEQUATE_REST, slight)
+
     def counts(self, model: Model) -> bool:
         """Return whether effects are large enough and do not cancel each other, or the bodies."""
         return self.is_sound(model) and min(model.shares) > SHARE_TOLERANCE * LEAST_SHARE
@@ -154,12 +161,12 @@ def decide(equations: Equations, competition: Competition) -> Decision:
     left = float(scale.shares(competition.parameters).max())
     if ranked and scale.worth(ranked[0]) > scale.worth(base):
         best, rivals = ranked[0], tuple(ranked[1:])
-        rest = scale.rest(best)
-        if rest < ADEQUATE_REST or float(scale.shares(best).max()) < SLIGHT_REST:
-            return Decision('missing_physics', best, rivals, rest, worst, against=base.score)
+        excess = scale.excess(best)
+        if excess < 1.0:
+            return Decision('missing_physics', best, rivals, excess, worst, against=base.score)
         if left > SHARE_TOLERANCE * LEAST_SHARE:
-            return Decision('unexplained', base, tuple(ranked), rest, worst, best, base.score)
+            return Decision('unexplained', base, tuple(ranked), excess, worst, best, base.score)
     elif left > LEAST_SHARE:
-        return Decision('unexplained', base, tuple(ranked), 1.0, worst, against=base.score)
+        return Decision('unexplained', base, tuple(ranked), _NOTHING, worst, against=base.score)
     verdict = 'parameters_only' if base.is_free else 'no_mismatch'
-    return Decision(verdict, base, tuple(ranked), 1.0, worst, against=base.score)
+    return Decision(verdict, base, tuple(ranked), _NOTHING, worst, against=base.score)
