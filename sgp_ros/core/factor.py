@@ -1,67 +1,115 @@
-"""A Cholesky factor that grows by a row and drops any sample, with whitened data beside it."""
+"""A Cholesky factor that grows by a row, drops any sample and takes a rank-one change.
+
+Whitened data stand beside it and take the same rotations.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg
 
-from sgp_ros.core.rotations import drop_row, solve_lower
+from sgp_ros.core.factor_loops import (
+    absorb_column,
+    close_gap,
+    combine_rows,
+    move_to_front,
+    solve_lower,
+)
+from sgp_ros.core.sliding import SlidingRows, length_for
 from sgp_ros.errors import NumericalError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from sgp_ros.core.kernels import Kernel
+    from sgp_ros.core.output_groups import OutputGroup
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Whitening:
+    """An input against the buffered samples of one factor.
+
+    Attributes:
+        s: (d,) the input in units of the length scales.
+        v: (n,) `L^-1 k(U, u)`; empty where Z is zero.
+        explained: (k, p + 1) what the samples tell there: of each regressor, then of Z.
+        prior: variance of Z there before any sample, for the first output.
+        reduction: of it by the samples.
+    """
+
+    s: np.ndarray
+    v: np.ndarray
+    explained: np.ndarray
+    prior: float
+    reduction: float
+
+    @property
+    def variance(self) -> float:
+        """Variance of Z given the samples, for the first output."""
+        return self.prior - self.reduction
 
 
 class GrowingFactor:
-    """Factor of `K + noise I` over the buffered inputs of one component of X.
-
-    Attributes:
-        A: (capacity, p) whitened regressor `L^-1 F`; the first `size` rows count.
-        b: (capacity,) whitened observations `L^-1 y`.
-        size: samples held.
+    """Factor of `K + noise I` over the buffered inputs of one group of outputs.
 
     Args:
-        kernel: of the component; None where Z is zero, then nothing but noise is factored.
-        noise: its noise variance.
+        group: the outputs, their kernel and noise.
         p: number of coefficients.
         capacity: most samples held at once.
     """
 
-    def __init__(self, kernel: Kernel | None, noise: float, p: int, capacity: int) -> None:
-        self._kernel = kernel
-        self._noise = noise
-        dense = capacity if kernel is not None else 0
-        self._L = np.zeros((dense, dense))
-        self._S = np.zeros((dense, 0 if kernel is None else len(kernel.inputs)))
-        self.A = np.zeros((capacity, p))
-        self.b = np.zeros(capacity)
-        self.size = 0
+    def __init__(self, group: OutputGroup, p: int, capacity: int) -> None:
+        self._kernel = group.kernel
+        self._noise = group.noise
+        self._scales = np.array(group.scales)[:, None]  # (k, 1)
+        dense = length_for(capacity) if group.kernel is not None else 0
+        self._U = np.zeros((dense, dense))
+        self._S = SlidingRows(capacity, (0 if group.kernel is None else len(group.kernel.inputs),))
+        self._white = SlidingRows(capacity, (len(group.outputs) * (p + 1),))
+        self._shape = (len(group.outputs), p + 1)
+        self._carried = np.zeros(capacity)
 
-    def prior_variance(self, u: np.ndarray) -> float:
-        """Return the variance of Z at an input u (d,) before any sample."""
-        return 0.0 if self._kernel is None else float(self._kernel.diagonal(u[None])[0])
+    @property
+    def size(self) -> int:
+        """Samples held."""
+        return self._white.size
 
-    def solve(self, u: np.ndarray) -> np.ndarray:
-        """Return `L^-1 k(U, u)`, (size,), for an input u (d,)."""
+    @property
+    def white(self) -> np.ndarray:
+        """Whitened regressors and, last, observations `L^-1 [F y]`, (size, k, p + 1)."""
+        return self._white.rows.reshape(self.size, *self._shape)
+
+    @property
+    def lower(self) -> np.ndarray:
+        """The lower factor, a view (size, size); (0, 0) where Z is zero."""
         if self._kernel is None:
-            return np.zeros(self.size)
-        s = self._kernel.scale(u[None])[0]
-        v = self._kernel.vector(self._S[: self.size], s)
-        solve_lower(self._L, self.size, v)
-        return v
+            return self._U
+        live = slice(self._white.start, self._white.start + self.size)
+        return self._U[live, live].T
 
-    def pivot(self, v: np.ndarray, u: np.ndarray) -> float:
-        """Return the diagonal element that `append` would add, for `v = solve(u)`.
+    def whiten(self, u: np.ndarray) -> Whitening:
+        """Return an input u (d,) against the samples. O(n^2 / 2 + n k p)."""
+        explained = np.zeros(self._shape)
+        if self._kernel is None:
+            return Whitening(np.zeros(0), np.zeros(0), explained, 0.0, 0.0)
+        s = self._kernel.scale(u[None])[0]
+        v = self._kernel.vector(self._S.rows, s)
+        solve_lower(self._U, self._white.start, v)
+        combine_rows(v, self._white.rows, explained.reshape(-1))
+        explained *= self._scales
+        prior = float(self._kernel.diagonal(u[None])[0])
+        return Whitening(s, v, explained, prior, float(v @ v))
+
+    def pivot(self, whitening: Whitening) -> float:
+        """Return the diagonal element that `append` would add.
 
         Raises:
             NumericalError: the sample adds no positive variance in double precision.
         """
-        square = self.prior_variance(u) + self._noise - float(v @ v)
+        square = whitening.prior + self._noise - whitening.reduction
         if not square > 0.0:
             raise NumericalError(
                 f'a sample repeats {self.size} others to rounding, variance {square:.3g}',
@@ -70,66 +118,71 @@ class GrowingFactor:
             )
         return math.sqrt(square)
 
-    def append(
-        self, v: np.ndarray, u: np.ndarray, f: np.ndarray, y: float
-    ) -> tuple[np.ndarray, float]:
-        """Border the factor with input u, regressor f (p,) and observation y.
+    def append(self, whitening: Whitening, data: np.ndarray) -> np.ndarray:
+        """Border the factor with a sample.
 
         Args:
-            v: `solve(u)`, (size,).
-            u: input, (d,).
-            f: regressor, (p,).
-            y: observation.
+            whitening: of its input.
+            data: its regressors and, last, observations, (k, p + 1).
 
         Returns:
-            The whitened row (p,) and value: `p(y | earlier samples, W)`.
+            The whitened data (k, p + 1): `p(y | earlier samples, W)`.
 
         Raises:
             NumericalError: as `pivot`.
         """
-        n = self.size
-        diagonal = self.pivot(v, u)
-        row = (f - v @ self.A[:n]) / diagonal
-        value = float((y - v @ self.b[:n]) / diagonal)
+        diagonal = self.pivot(whitening)
+        row: np.ndarray = (data - whitening.explained) / (diagonal * self._scales)
+        if self._kernel is not None and self._white.is_at_end:
+            move_to_front(self._U, self._white.start, self.size)
+        self._white.append(row.reshape(-1))
+        self._S.append(whitening.s)
         if self._kernel is not None:
-            self._L[n, :n] = v
-            self._L[n, n] = diagonal
-            self._S[n] = self._kernel.scale(u[None])[0]
-        self.A[n] = row
-        self.b[n] = value
-        self.size += 1
-        return row, value
+            last = self._white.start + self.size - 1
+            self._U[self._white.start : last, last] = whitening.v
+            self._U[last, last] = diagonal
+        return row
 
-    def drop(self, m: int) -> tuple[np.ndarray, float]:
+    def drop(self, m: int) -> np.ndarray:
         """Remove sample m.
 
         Returns:
-            The whitened row (p,) and value of that sample given the remaining ones.
+            The whitened data (k, p + 1) of that sample given the remaining ones.
         """
-        n = self.size
+        n, start = self.size, self._white.start
+        row = self._white.rows[m].copy()
         if self._kernel is not None:
-            drop_row(self._L, self.A, self.b, n, m)
-            self._S[m : n - 1] = self._S[m + 1 : n]
-            row, value = self.A[n - 1].copy(), float(self.b[n - 1])
-        else:
-            row, value = self.A[m].copy(), float(self.b[m])
-            self.A[m : n - 1] = self.A[m + 1 : n]
-            self.b[m : n - 1] = self.b[m + 1 : n]
-        self.size -= 1
-        return row, value
+            carried = self._carried[: n - 1 - m]
+            carried[:] = self._U[start + m, start + m + 1 : start + n]
+            absorb_column(self._U, start + m + 1, carried, self._white.rows[m + 1 :], row)
+            if m < n - 1:
+                close_gap(self._U, start, n, m)
+        self._white.drop(m)
+        self._S.drop(m)
+        return row.reshape(self._shape)
 
-    def refactorise(self, U: np.ndarray, F: np.ndarray, y: np.ndarray) -> None:
-        """Factor anew from inputs U (n, d), regressors F (n, p), observations y (n,). O(n^3 / 3).
+    def absorb(self, column: np.ndarray) -> None:
+        """Factor `K + noise I + column column^T` instead, for a column (n,). O(n^2)."""
+        carried = self._carried[: self.size]
+        carried[:] = column
+        extra = np.zeros(self._shape).reshape(-1)
+        absorb_column(self._U, self._white.start, carried, self._white.rows, extra)
+
+    def fill(self, U: np.ndarray, data: np.ndarray) -> None:
+        """Fill a new factor from inputs U (n, d), regressors and observations (n, k, p + 1).
+
+        O(n^3 / 3).
 
         Raises:
             NumericalError: the covariance is not positive definite.
         """
-        n = self.size = len(y)
+        n = len(U)
         if not n:
             return
+        flat = (data / self._scales).reshape(n, -1)
         if self._kernel is None:
-            root = np.sqrt(self._noise)
-            self.A[:n], self.b[:n] = F / root, y / root
+            self._white.replace(flat / math.sqrt(self._noise))
+            self._S.replace(np.zeros((n, 0)))
             return
         K = self._kernel.matrix(U)
         K[np.diag_indices(n)] += self._noise
@@ -141,21 +194,17 @@ class GrowingFactor:
                 'a noise variance above the rounding error of the signal variance',
                 'raise the noise variance',
             ) from error
-        white = linalg.solve_triangular(L, np.column_stack([F, y]), lower=True)
-        self._L[:n, :n] = L
-        self._S[:n] = self._kernel.scale(U)
-        self.A[:n], self.b[:n] = white[:, :-1], white[:, -1]
+        self._U[:n, :n] = L.T
+        self._S.replace(self._kernel.scale(U))
+        self._white.replace(linalg.solve_triangular(L, flat, lower=True))
 
     def state(self) -> dict[str, np.ndarray]:
         """Return what `restore` needs, as arrays."""
-        n = self.size
-        return {
-            'L': self._L[:n, :n], 'S': self._S[:n], 'A': self.A[:n], 'b': self.b[:n],
-        }  # fmt: skip
+        return {'L': self.lower, 'S': self._S.rows, 'white': self._white.rows}
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue exactly where `state` was taken."""
-        n = self.size = len(state['b'])
-        self.A[:n], self.b[:n] = state['A'], state['b']
-        if self._kernel is not None:
-            self._L[:n, :n], self._S[:n] = state['L'], state['S']
+        self._white.replace(state['white'])
+        self._S.replace(state['S'])
+        n = len(state['L'])
+        self._U[:n, :n] = state['L'].T

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import linalg
 
 from sgp_ros.core.posterior import NULL_TOLERANCE, RANK_TOLERANCE, ZERO_COLUMN
-from sgp_ros.core.rotations import absorb_row, absorbed_rows_numpy
+from sgp_ros.core.rotations import absorb_rows, absorbed_rows_numpy
 
 if TYPE_CHECKING:
     from sgp_ros.core.prior import CoefficientPrior
@@ -47,9 +47,12 @@ class Information:
         """Return an independent copy."""
         return Information(self.R.copy(), self.z.copy())
 
-    def absorb(self, row: np.ndarray, value: float) -> None:
-        """Add the equation `row w = value` of unit noise; row (p,). O(p^2)."""
-        absorb_row(self.R, self.z, row.copy(), value)
+    def absorb(self, rows: np.ndarray) -> None:
+        """Add equations of unit noise, their values in the last column of rows (r, p + 1).
+
+        O(r p^2).
+        """
+        absorb_rows(self.R, self.z, rows.copy())
         self._solved = None
 
     def scaled(self, factor: float) -> Information:

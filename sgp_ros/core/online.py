@@ -1,6 +1,7 @@
 """Joint inference of W and Z one sample at a time, with a bounded number of samples in Z.
 
-Each component of X has its own growing factor L with `A = L^-1 F` and `b = L^-1 y` beside it.
+Components of X with the same covariance up to a scale share one growing factor L, with
+`A = L^-1 F` and `b = L^-1 y` of each beside it.
 Appending borders the factor; the solve it needs is the one the prediction made. Dropping a sample
 rotates the factor and leaves the conditional row of that sample: information on W that no
 remaining sample repeats. With `remember` it is kept, and the likelihood is a product of
@@ -18,11 +19,15 @@ import numpy as np
 from sgp_ros.core.factor import GrowingFactor
 from sgp_ros.core.information import Information
 from sgp_ros.core.model import Observations
+from sgp_ros.core.output_groups import output_groups
+from sgp_ros.core.sliding import SlidingRows
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from sgp_ros.core.factor import Whitening
     from sgp_ros.core.model import Model
+    from sgp_ros.core.output_groups import OutputGroup
     from sgp_ros.core.prior import CoefficientPrior
 
 
@@ -35,7 +40,7 @@ class OnlinePrediction:
         covariance: (k, k) of X, without noise; infinite on the diagonal where an undetermined
             direction of W enters.
         u, f: the input (d,) and regressor (k, p) it was made for.
-        solves: `L^-1 k*` per component, (n,) each.
+        whitenings: the input against the samples, one per factor.
         version: state of the model it was made with.
     """
 
@@ -43,7 +48,7 @@ class OnlinePrediction:
     covariance: np.ndarray
     u: np.ndarray
     f: np.ndarray
-    solves: tuple[np.ndarray, ...]
+    whitenings: tuple[Whitening, ...]
     version: int
 
 
@@ -66,10 +71,10 @@ class OnlineRegression:
         self._remember = remember
         self._version = 0
         p = prior.size
-        self._U = np.zeros((0, 0))
-        self._F = np.zeros((0, len(model.kernels), p))
-        self._y = np.zeros((0, len(model.kernels)))
+        self._U = SlidingRows(budget + 1, (0,))
+        self._data = SlidingRows(budget + 1, (len(model.kernels), p + 1))
         self._model = model
+        self._groups: tuple[OutputGroup, ...] = ()
         self._factors: tuple[GrowingFactor, ...] = ()
         self._kept = tuple(Information.nothing(p) for _ in model.kernels)
         self._rebuild()
@@ -87,12 +92,13 @@ class OnlineRegression:
     @property
     def size(self) -> int:
         """Number of samples in the buffer."""
-        return len(self._U)
+        return self._data.size
 
     @property
     def buffer(self) -> Observations:
-        """The buffered samples, oldest first."""
-        return Observations(self._U, self._F, self._y)
+        """A copy of the buffered samples, oldest first."""
+        data = self._data.rows
+        return Observations(self._U.rows.copy(), data[:, :, :-1].copy(), data[:, :, -1].copy())
 
     @property
     def base(self) -> Information:
@@ -102,36 +108,36 @@ class OnlineRegression:
         return self._prior.with_rows(np.vstack(rows), np.concatenate(values))
 
     def predict(self, u: np.ndarray, f: np.ndarray) -> OnlinePrediction:
-        """Predict X at input u (d,) with regressor f (k, p). O(k n^2)."""
-        return self._predict(u, f, tuple(factor.solve(u) for factor in self._factors))
+        """Predict X at input u (d,) with regressor f (k, p). O(n^2 / 2) per factor."""
+        return self._predict(u, f, tuple(factor.whiten(u) for factor in self._factors))
 
     def with_regressor(self, prediction: OnlinePrediction, f: np.ndarray) -> OnlinePrediction:
-        """Predict for another regressor f (k, p) at an input that Z sees as the same. O(k n p)."""
-        return self._predict(prediction.u, f, prediction.solves)
+        """Predict for another regressor f (k, p) at an input that Z sees as the same. O(k p^2)."""
+        return self._predict(prediction.u, f, prediction.whitenings)
 
     def _predict(
-        self, u: np.ndarray, f: np.ndarray, solves: tuple[np.ndarray, ...]
+        self, u: np.ndarray, f: np.ndarray, whitenings: tuple[Whitening, ...]
     ) -> OnlinePrediction:
         rows = f.copy()
         mean = np.zeros(len(f))
         variance = np.zeros(len(f))
-        for j, (factor, v) in enumerate(zip(self._factors, solves, strict=True)):
-            n = len(v)
-            rows[j] -= v @ factor.A[:n]
-            mean[j] = v @ factor.b[:n]
-            variance[j] = factor.prior_variance(u) - v @ v
+        for group, whitening in zip(self._groups, whitenings, strict=True):
+            for i, j in enumerate(group.outputs):
+                rows[j] -= whitening.explained[i, :-1]
+                mean[j] = whitening.explained[i, -1]
+                variance[j] = group.scales[i] ** 2 * whitening.variance
         mean += rows @ self._total.coefficients
         spread = self._total.spread(rows)  # (k, r)
         covariance = spread @ spread.T
         covariance[np.diag_indices(len(f))] += variance
         unknown = ~self._total.is_determined(rows)
         covariance[unknown, unknown] = np.inf
-        return OnlinePrediction(mean, covariance, u, f, solves, self._version)
+        return OnlinePrediction(mean, covariance, u, f, whitenings, self._version)
 
     def learn(self, prediction: OnlinePrediction, y: np.ndarray) -> None:
         """Add the sample that `prediction` was made for, observed as y (k,).
 
-        The oldest sample leaves when the budget is reached. O(k n^2).
+        The oldest sample leaves when the budget is reached. O(n^2) per factor.
 
         Raises:
             ValueError: the model changed since the prediction.
@@ -139,17 +145,20 @@ class OnlineRegression:
         """
         if prediction.version != self._version:
             raise ValueError('the prediction was made before the last change of the model')
-        for factor, v in zip(self._factors, prediction.solves, strict=True):
-            factor.pivot(v, prediction.u)
+        for factor, whitening in zip(self._factors, prediction.whitenings, strict=True):
+            factor.pivot(whitening)
         self._version += 1
-        for j, (factor, v) in enumerate(zip(self._factors, prediction.solves, strict=True)):
-            row, value = factor.append(v, prediction.u, prediction.f[j], float(y[j]))
-            self._total.absorb(row, value)
-        self._U = _appended(self._U, prediction.u)
-        self._F = _appended(self._F, prediction.f)
-        self._y = _appended(self._y, y)
+        data = np.column_stack([prediction.f, y])  # (k, p + 1)
+        for group, factor, whitening in zip(
+            self._groups, self._factors, prediction.whitenings, strict=True
+        ):
+            self._total.absorb(factor.append(whitening, data[list(group.outputs)]))
+        if not self.size:
+            self._U = SlidingRows(self._budget + 1, prediction.u.shape)
+        self._U.append(prediction.u)
+        self._data.append(data)
         while self.size > self._budget:
-            self._drop_oldest()
+            self._drop(0)
 
     def change(
         self,
@@ -175,7 +184,7 @@ class OnlineRegression:
         self._remember = self._remember if remember is None else remember
         try:
             while self.size > self._budget:
-                self._drop_oldest()
+                self._drop(0)
             self._rebuild()
         except Exception:
             self._model, self._budget, self._remember, self._kept = previous
@@ -184,7 +193,7 @@ class OnlineRegression:
     def state(self) -> dict[str, np.ndarray]:
         """Return everything that was learned, as arrays; `restore` takes it back."""
         arrays = {
-            'U': self._U, 'F': self._F, 'y': self._y,
+            'U': self._U.rows, 'data': self._data.rows,
             'kept_R': np.array([kept.R for kept in self._kept]),
             'kept_z': np.array([kept.z for kept in self._kept]),
             'total_R': self._total.R, 'total_z': self._total.z,
@@ -196,7 +205,7 @@ class OnlineRegression:
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue exactly where `state` was taken."""
-        self._U, self._F, self._y = (np.array(state[name]) for name in ('U', 'F', 'y'))
+        self._hold(state['U'], state['data'])
         self._kept = tuple(
             Information(np.array(R), np.array(z))
             for R, z in zip(state['kept_R'], state['kept_z'], strict=True)
@@ -209,34 +218,39 @@ class OnlineRegression:
             )
         self._version += 1
 
-    def _drop_oldest(self) -> None:
-        for factor, kept in zip(self._factors, self._kept, strict=True):
-            row, value = factor.drop(0)
+    def _drop(self, m: int) -> None:
+        for group, factor in zip(self._groups, self._factors, strict=True):
+            rows = factor.drop(m)
             if self._remember:
-                kept.absorb(row, value)
-        self._U, self._F, self._y = self._U[1:], self._F[1:], self._y[1:]
+                for j, row in zip(group.outputs, rows, strict=True):
+                    self._kept[j].absorb(row[None])
+        self._U.drop(m)
+        self._data.drop(m)
         if not self._remember:
             self._total = self._with_buffer()
 
+    def _hold(self, U: np.ndarray, data: np.ndarray) -> None:
+        """Hold copies of inputs U (n, d) and data (n, k, p + 1), with room for the budget."""
+        buffers = []
+        for rows in (U, data):
+            buffer = SlidingRows(self._budget + 1, rows.shape[1:])
+            buffer.replace(rows)
+            buffers.append(buffer)
+        self._U, self._data = buffers
+
     def _rebuild(self) -> None:
+        groups = output_groups(self._model)
         factors = []
-        for j, kernel in enumerate(self._model.kernels):
-            factor = GrowingFactor(
-                kernel, self._model.noise[j], len(self._prior.z), self._budget + 1
-            )
-            factor.refactorise(self._U, self._F[:, j], self._y[:, j])
+        for group in groups:
+            factor = GrowingFactor(group, len(self._prior.z), self._budget + 1)
+            factor.fill(self._U.rows, self._data.rows[:, list(group.outputs)])
             factors.append(factor)
-        self._factors = tuple(factors)
+        self._hold(self._U.rows, self._data.rows)
+        self._groups, self._factors = groups, tuple(factors)
         self._total = self._with_buffer()
         self._version += 1
 
     def _with_buffer(self) -> Information:
-        rows = [factor.A[: factor.size] for factor in self._factors]
-        values = [factor.b[: factor.size] for factor in self._factors]
-        return self.base.with_rows(np.vstack(rows), np.concatenate(values))
-
-
-def _appended(array: np.ndarray, row: np.ndarray) -> np.ndarray:
-    if not len(array):
-        return row[None].copy()
-    return np.concatenate([array, row[None]])
+        p = len(self._prior.z)
+        rows = np.vstack([factor.white.reshape(-1, p + 1) for factor in self._factors])
+        return self.base.with_rows(rows[:, :-1], rows[:, -1])

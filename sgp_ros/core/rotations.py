@@ -1,9 +1,8 @@
-"""Compiled loops of the growing factor: plane rotations and triangular solves, in place.
+"""Equations that enter a triangular system by plane rotations, compiled, in place.
 
-Each touches every stored number once and allocates nothing. The plain NumPy versions at the end
-of this module compute the same from scratch; the tests hold the two together.
+The plain NumPy version at the end computes the same by one QR; the tests hold the two together.
 
-Sources: Gill, Golub, Murray, Saunders 1974 (methods C1, C2); Golub and Van Loan, section 5.1.
+Source: Golub and Van Loan, section 5.1.
 """
 
 from __future__ import annotations
@@ -12,72 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numba import njit
-from scipy import linalg
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 _compiled: Callable[[Any], Any] = njit(cache=True, error_model='numpy')
-
-
-@_compiled
-def solve_lower(L: np.ndarray, n: int, x: np.ndarray) -> None:
-    """Replace x (n,) by L^-1 x for the leading n x n part of L. O(n^2 / 2)."""
-    for i in range(n):
-        total = x[i]
-        for j in range(i):
-            total -= L[i, j] * x[j]
-        x[i] = total / L[i, i]
-
-
-@_compiled
-def drop_row(L: np.ndarray, A: np.ndarray, b: np.ndarray, n: int, m: int) -> None:
-    """Remove sample m from the factor of n samples, with the same rotations on A and b.
-
-    Afterwards the leading n - 1 rows hold the factor of the others, and row n - 1 of A and b
-    holds the whitened row of the removed sample given the others: `p(y_m | y_others, W)`.
-    O((n - m)^2 + (n - m) p) operations.
-
-    Args:
-        L: (N, N) lower factor in its leading n x n part.
-        A: (N, p) whitened regressor.
-        b: (N,) whitened observations.
-        n: samples held.
-        m: sample to remove.
-    """
-    p = A.shape[1]
-    size = n - 1 - m
-    cosines = np.empty(size)
-    sines = np.empty(size)
-    extra = A[m].copy()
-    extra_b = b[m]
-    for i in range(size):
-        source = m + 1 + i
-        row = m + i
-        carried = L[source, m]
-        for j in range(m):
-            L[row, j] = L[source, j]
-        for j in range(i):
-            value = L[source, m + 1 + j]
-            L[row, m + j] = cosines[j] * value + sines[j] * carried
-            carried = cosines[j] * carried - sines[j] * value
-        value = L[source, source]
-        radius = np.hypot(value, carried)
-        cosine = value / radius
-        sine = carried / radius
-        cosines[i] = cosine
-        sines[i] = sine
-        L[row, row] = radius
-        for c in range(p):
-            value = A[source, c]
-            A[row, c] = cosine * value + sine * extra[c]
-            extra[c] = cosine * extra[c] - sine * value
-        value = b[source]
-        b[row] = cosine * value + sine * extra_b
-        extra_b = cosine * extra_b - sine * value
-    for c in range(p):
-        A[n - 1, c] = extra[c]
-    b[n - 1] = extra_b
 
 
 @_compiled
@@ -103,16 +41,15 @@ def absorb_row(R: np.ndarray, z: np.ndarray, row: np.ndarray, value: float) -> N
         value = cosine * value - sine * above
 
 
-def dropped_row_numpy(
-    L: np.ndarray, A: np.ndarray, b: np.ndarray, m: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what `drop_row` leaves in L (n-1, n-1), A (n, p), b (n,), from refactorisation."""
-    n = len(L)
-    order = [*range(m), *range(m + 1, n), m]
-    K, F, y = L @ L.T, L @ A, L @ b
-    factor = linalg.cholesky(K[np.ix_(order, order)], lower=True)
-    white = linalg.solve_triangular(factor, np.column_stack([F, y])[order], lower=True)
-    return factor[: n - 1, : n - 1], white[:, :-1], white[:, -1]
+@_compiled
+def absorb_rows(R: np.ndarray, z: np.ndarray, rows: np.ndarray) -> None:
+    """Add equations with their values in the last column of `rows` (r, p + 1), used up. O(r p^2).
+
+    As `absorb_row` for each.
+    """
+    p = len(z)
+    for i in range(len(rows)):
+        absorb_row(R, z, rows[i, :p], rows[i, p])
 
 
 def absorbed_rows_numpy(

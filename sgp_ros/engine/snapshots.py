@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from sgp_ros.engine.estimator import Estimator
     from sgp_ros.robots.robot import Robot
 
-VERSION = 1
+VERSION = 2
 
 
 def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:

@@ -7,20 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sgp_ros.core.factor import GrowingFactor
 from sgp_ros.core.information import Information
 from sgp_ros.core.kernels import SquaredExponential
 from sgp_ros.core.model import Model, Observations
 from sgp_ros.core.online import OnlineRegression
 from sgp_ros.core.posterior import Posterior
 from sgp_ros.core.prior import CoefficientPrior
-from sgp_ros.core.rotations import (
-    absorb_row,
-    absorbed_rows_numpy,
-    drop_row,
-    dropped_row_numpy,
-    solve_lower,
-)
+from sgp_ros.core.rotations import absorb_rows, absorbed_rows_numpy
 from sgp_ros.errors import NumericalError
 from test.core.worlds import random_problem
 
@@ -65,53 +58,14 @@ def test_chain_rule_of_predictions_is_the_evidence():
     assert total == pytest.approx(Posterior(model, data, prior).log_evidence, abs=1e-9)
 
 
-@given(st.integers(0, 10_000), st.integers(2, 12), st.data())
-def test_dropping_equals_refactorisation(seed, n, data):
-    """Rotations leave the factor of the others and the conditional row of the dropped one."""
-    m = data.draw(st.integers(0, n - 1))
-    rng = np.random.default_rng(seed)
-    root = rng.normal(size=(n, n))
-    L = np.linalg.cholesky(root @ root.T + np.eye(n))
-    A, b = rng.normal(size=(n, 2)), rng.normal(size=n)
-    expected = dropped_row_numpy(L, A, b, m)
-    drop_row(L, A, b, n, m)
-    for found, wanted in zip((L[: n - 1, : n - 1], A, b), expected, strict=True):
-        np.testing.assert_allclose(np.tril(found) if found is not A and found.ndim == 2 else found,
-                                   wanted, atol=1e-8)  # fmt: skip
-
-
-@given(st.integers(0, 10_000))
-def test_append_then_drop_is_the_identity(seed):
-    """A sample that comes and goes leaves no trace in the factor."""
-    rng = np.random.default_rng(seed)
-    factor = GrowingFactor(SquaredExponential(1.0, (1.0,), (0,)), 0.1, 2, 10)
-    factor.refactorise(rng.normal(size=(6, 1)), rng.normal(size=(6, 2)), rng.normal(size=6))
-    before = {name: array.copy() for name, array in factor.state().items()}
-    u = rng.normal(size=1)
-    factor.append(factor.solve(u), u, rng.normal(size=2), 0.3)
-    factor.drop(6)
-    for name, array in factor.state().items():
-        np.testing.assert_array_equal(array, before[name])
-
-
-def test_compiled_solve_equals_lapack():
-    """The forward substitution is that of the library."""
-    rng = np.random.default_rng(3)
-    L = np.tril(rng.normal(size=(8, 8))) + 5.0 * np.eye(8)
-    x = rng.normal(size=8)
-    expected = np.linalg.solve(L, x)
-    solve_lower(L, 8, x)
-    np.testing.assert_allclose(x, expected, rtol=1e-12)
-
-
 @given(st.integers(0, 10_000), st.integers(0, 6))
 def test_rows_one_by_one_equal_one_factorisation(seed, rows):
     """Information grown by rotations is that of a single QR."""
     rng = np.random.default_rng(seed)
     A, b = rng.normal(size=(rows, 3)), rng.normal(size=rows)
     R, z = np.zeros((3, 3)), np.zeros(3)
-    for row, value in zip(A, b, strict=True):
-        absorb_row(R, z, row.copy(), value)
+    for row in np.column_stack([A, b]):
+        absorb_rows(R, z, row[None].copy())
     S, t = absorbed_rows_numpy(np.zeros((3, 3)), np.zeros(3), A, b)
     np.testing.assert_allclose(R.T @ R, S.T @ S, atol=1e-10)
     np.testing.assert_allclose(R.T @ z, S.T @ t, atol=1e-10)
@@ -183,6 +137,27 @@ def test_without_memory_only_the_buffer_counts():
     batch = Posterior(model, tail, PRIORS[1])
     np.testing.assert_allclose(online.information.coefficients, batch.coefficients, atol=1e-9)
     np.testing.assert_allclose(online.information.covariance, batch.covariance, atol=1e-9)
+
+
+def test_sharing_a_factor_changes_no_prediction():
+    """Outputs whose covariances differ by a scale are predicted as with a factor of their own.
+
+    The other model parts them by 1e-10 of a noise variance, which is all that may come out.
+    """
+    model, data = random_problem(16, n=30, k=3)
+    first = model.kernels[0]
+    double = SquaredExponential(4.0 * first.variance, first.lengthscales, first.inputs)
+    kernels = (first, model.kernels[1], double)
+    shared = _stream(Model(kernels, (0.2, 0.3, 0.8)), data, PRIORS[1], 8)
+    parted = _stream(Model(kernels, (0.2, 0.3, 0.8 * (1.0 + 1e-10))), data, PRIORS[1], 8)
+    factors = [sum(name.endswith('_L') for name in x.state()) for x in (shared, parted)]
+    assert factors == [2, 3]
+    found, wanted = (x.predict(data.U[0], data.F[1]) for x in (shared, parted))
+    np.testing.assert_allclose(found.mean, wanted.mean, rtol=1e-8)
+    np.testing.assert_allclose(found.covariance, wanted.covariance, rtol=1e-8)
+    for x in (shared, parted):
+        x.change(model=x.model)
+    np.testing.assert_allclose(shared.predict(data.U[0], data.F[1]).mean, wanted.mean, rtol=1e-8)
 
 
 def test_memory_is_calibrated_on_long_streams():
