@@ -25,18 +25,16 @@ _compiled: Callable[[Any], Any] = njit(cache=True, error_model='numpy')
 
 
 @_compiled
-def _take_one(x0: float, u0: np.ndarray, x: np.ndarray) -> None:
-    for i in range(len(x)):
-        x[i] -= x0 * u0[i]
-
-
-@_compiled
 def _take_four(
-    x0: float, x1: float, x2: float, x3: float,
-    u0: np.ndarray, u1: np.ndarray, u2: np.ndarray, u3: np.ndarray, x: np.ndarray,
+    U: np.ndarray, r: int, first: int, stop: int, start: int,
+    x0: float, x1: float, x2: float, x3: float, x: np.ndarray,
 ) -> None:  # fmt: skip
-    for i in range(len(x)):
-        x[i] = x[i] - x0 * u0[i] - x1 * u1[i] - x2 * u2[i] - x3 * u3[i]
+    one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
+    for i in range(first, stop):
+        x[i - start] = (
+            x[i - start] - x0 * U[r, i] - x1 * U[r + one, i]
+            - x2 * U[r + two, i] - x3 * U[r + three, i]
+        )  # fmt: skip
 
 
 @_compiled
@@ -52,20 +50,20 @@ def solve_lower(U: np.ndarray, start: int, x: np.ndarray) -> None:
     stop = start + n
     quads = n - n % 4
     for j in range(0, quads, 4):
-        r = start + j
         for a in range(j, j + 4):
             x[a] /= U[start + a, start + a]
             for c in range(a + 1, j + 4):
                 x[c] -= x[a] * U[start + a, start + c]
+        r = start + j
+        # Unsigned indices: a signed one might count from the end, and the loop would stay scalar.
         _take_four(
-            x[j], x[j + 1], x[j + 2], x[j + 3],
-            U[r, r + 4 : stop], U[r + 1, r + 4 : stop],
-            U[r + 2, r + 4 : stop], U[r + 3, r + 4 : stop], x[j + 4 :],
+            U, np.uint64(r), np.uint64(r + 4), np.uint64(stop), np.uint64(start),
+            x[j], x[j + 1], x[j + 2], x[j + 3], x,
         )  # fmt: skip
     for j in range(quads, n):
-        r = start + j
-        x[j] /= U[r, r]
-        _take_one(x[j], U[r, r + 1 : stop], x[j + 1 :])
+        for a in range(quads, j):
+            x[j] -= x[a] * U[start + a, start + j]
+        x[j] /= U[start + j, start + j]
 
 
 @_compiled
@@ -74,33 +72,50 @@ def combine_rows(v: np.ndarray, rows: np.ndarray, total: np.ndarray) -> None:
 
     Rows are added in order, each element in the same way: the bits depend on no library.
     """
+    n = len(v)
+    quads = n - n % 4
     total[:] = 0.0
-    for i in range(len(v)):
-        _take_one(-v[i], rows[i], total)
+    for i in range(0, quads, 4):
+        v0, v1, v2, v3 = v[i], v[i + 1], v[i + 2], v[i + 3]
+        for c in range(len(total)):
+            total[c] = (
+                total[c] + v0 * rows[i, c] + v1 * rows[i + 1, c]
+                + v2 * rows[i + 2, c] + v3 * rows[i + 3, c]
+            )  # fmt: skip
+    for i in range(quads, n):
+        for c in range(len(total)):
+            total[c] += v[i] * rows[i, c]
 
 
 @_compiled
-def _rotate(c: float, s: float, row: np.ndarray, carried: np.ndarray) -> None:
-    for i in range(len(carried)):
-        a = row[i]
-        b = carried[i]
-        row[i] = c * a + s * b
-        carried[i] = c * b - s * a
-
-
-@_compiled
-def _rotate_twice(
-    c: float, s: float, c2: float, s2: float,
-    row: np.ndarray, second: np.ndarray, carried: np.ndarray,
+def _rotate_pair(
+    U: np.ndarray, r: int, first: int, stop: int, start: int,
+    c: float, s: float, c2: float, s2: float, carried: np.ndarray,
 ) -> None:  # fmt: skip
-    for i in range(len(carried)):
-        a = row[i]
-        b = carried[i]
-        a2 = second[i]
-        row[i] = c * a + s * b
+    one = np.uint64(1)
+    for i in range(first, stop):
+        a = U[r, i]
+        b = carried[i - start]
+        a2 = U[r + one, i]
+        U[r, i] = c * a + s * b
         b = c * b - s * a
-        second[i] = c2 * a2 + s2 * b
-        carried[i] = c2 * b - s2 * a2
+        U[r + one, i] = c2 * a2 + s2 * b
+        carried[i - start] = c2 * b - s2 * a2
+
+
+@_compiled
+def _rotation(a: float, b: float) -> tuple[float, float, float]:
+    """Return cosine, sine and radius of the rotation that turns (a, b) into (radius, 0)."""
+    radius = np.sqrt(a * a + b * b)
+    return a / radius, b / radius, radius
+
+
+@_compiled
+def _rotate_data(white: np.ndarray, j: int, c: float, s: float, extra: np.ndarray) -> None:
+    for i in range(len(extra)):
+        a = white[j, i]
+        white[j, i] = c * a + s * extra[i]
+        extra[i] = c * extra[i] - s * a
 
 
 @_compiled
@@ -123,24 +138,19 @@ def absorb_column(
     stop = start + n
     for j in range(0, n - 1, 2):
         r = start + j
-        radius = np.sqrt(U[r, r] * U[r, r] + carried[j] * carried[j])
-        c, s = U[r, r] / radius, carried[j] / radius
-        U[r, r] = radius
+        c, s, U[r, r] = _rotation(U[r, r], carried[j])
         a, b = U[r, r + 1], carried[j + 1]
         U[r, r + 1] = c * a + s * b
-        b = c * b - s * a
-        a = U[r + 1, r + 1]
-        radius = np.sqrt(a * a + b * b)
-        c2, s2 = a / radius, b / radius
-        U[r + 1, r + 1] = radius
-        _rotate_twice(c, s, c2, s2, U[r, r + 2 : stop], U[r + 1, r + 2 : stop], carried[j + 2 :])
-        _rotate_twice(c, s, c2, s2, white[j], white[j + 1], extra)
+        c2, s2, U[r + 1, r + 1] = _rotation(U[r + 1, r + 1], c * b - s * a)
+        _rotate_pair(
+            U, np.uint64(r), np.uint64(r + 2), np.uint64(stop), np.uint64(start),
+            c, s, c2, s2, carried,
+        )  # fmt: skip
+        _rotate_data(white, j, c, s, extra)
+        _rotate_data(white, j + 1, c2, s2, extra)
     if n % 2:
-        r = stop - 1
-        radius = np.sqrt(U[r, r] * U[r, r] + carried[n - 1] * carried[n - 1])
-        c, s = U[r, r] / radius, carried[n - 1] / radius
-        U[r, r] = radius
-        _rotate(c, s, white[n - 1], extra)
+        c, s, U[stop - 1, stop - 1] = _rotation(U[stop - 1, stop - 1], carried[n - 1])
+        _rotate_data(white, n - 1, c, s, extra)
 
 
 @_compiled

@@ -10,10 +10,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg
 
 from sgp_ros.core.posterior import NULL_TOLERANCE, RANK_TOLERANCE, ZERO_COLUMN
-from sgp_ros.core.rotations import absorb_rows, absorbed_rows_numpy
+from sgp_ros.core.rotations import (
+    absorb_rows,
+    absorbed_rows_numpy,
+    has_safe_diagonal,
+    solve_rows,
+    solve_upper,
+)
 
 if TYPE_CHECKING:
     from sgp_ros.core.prior import CoefficientPrior
@@ -84,7 +89,9 @@ class Information:
         solved = self._solution()
         if solved.spread is not None:
             return rows @ solved.spread
-        return linalg.solve_triangular(self.R, rows.T, trans='T', check_finite=False).T
+        solution = rows.copy()
+        solve_rows(self.R, solution)
+        return solution
 
     def is_determined(self, rows: np.ndarray) -> np.ndarray:
         """Whether `rows W` leaves out every undetermined direction, (k,) for rows (k, p)."""
@@ -106,17 +113,18 @@ class _Solved:
 
     def __init__(self, R: np.ndarray, z: np.ndarray) -> None:
         p = len(z)
-        self.scale = np.sqrt((R * R).sum(axis=0))
-        is_zero = self.scale <= ZERO_COLUMN * self.scale.max(initial=0.0)
-        self.scale[is_zero] = 1.0
         self.null = np.zeros((p, 0))
         self.spread: np.ndarray | None = None
         if not p:
             self.spread, self.w = np.zeros((0, 0)), np.zeros(0)
             return
-        if not is_zero.any() and np.all(np.abs(np.diag(R)) > RANK_TOLERANCE * self.scale):
-            self.w = linalg.solve_triangular(R, z, check_finite=False)
+        if has_safe_diagonal(R, ZERO_COLUMN, RANK_TOLERANCE):
+            self.w = z.copy()
+            solve_upper(R, self.w)
             return
+        self.scale = np.sqrt((R * R).sum(axis=0))
+        is_zero = self.scale <= ZERO_COLUMN * self.scale.max(initial=0.0)
+        self.scale[is_zero] = 1.0
         U, S, Vt = np.linalg.svd(np.where(is_zero, 0.0, R / self.scale))
         rank = int((RANK_TOLERANCE * max(S[0], 1e-300) < S).sum())
         self.spread = Vt[:rank].T / S[:rank] / self.scale[:, None]

@@ -122,16 +122,16 @@ class OnlineRegression:
         mean = np.zeros(len(f))
         variance = np.zeros(len(f))
         for group, whitening in zip(self._groups, whitenings, strict=True):
-            for i, j in enumerate(group.outputs):
-                rows[j] -= whitening.explained[i, :-1]
-                mean[j] = whitening.explained[i, -1]
-                variance[j] = group.scales[i] ** 2 * whitening.variance
+            outputs = list(group.outputs)
+            rows[outputs] -= whitening.explained[:, :-1]
+            mean[outputs] = whitening.explained[:, -1]
+            variance[outputs] = np.square(group.scales) * whitening.variance
         mean += rows @ self._total.coefficients
         spread = self._total.spread(rows)  # (k, r)
         covariance = spread @ spread.T
-        covariance[np.diag_indices(len(f))] += variance
-        unknown = ~self._total.is_determined(rows)
-        covariance[unknown, unknown] = np.inf
+        diagonal = covariance.reshape(-1)[:: len(f) + 1]
+        diagonal += variance
+        diagonal[~self._total.is_determined(rows)] = np.inf
         return OnlinePrediction(mean, covariance, u, f, whitenings, self._version)
 
     def learn(self, prediction: OnlinePrediction, y: np.ndarray) -> None:
@@ -148,7 +148,7 @@ class OnlineRegression:
         for factor, whitening in zip(self._factors, prediction.whitenings, strict=True):
             factor.pivot(whitening)
         self._version += 1
-        data = np.column_stack([prediction.f, y])  # (k, p + 1)
+        data = np.concatenate([prediction.f, y[:, None]], axis=1)  # (k, p + 1)
         for group, factor, whitening in zip(
             self._groups, self._factors, prediction.whitenings, strict=True
         ):

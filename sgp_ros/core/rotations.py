@@ -52,6 +52,53 @@ def absorb_rows(R: np.ndarray, z: np.ndarray, rows: np.ndarray) -> None:
         absorb_row(R, z, rows[i, :p], rows[i, p])
 
 
+@_compiled
+def has_safe_diagonal(R: np.ndarray, zero: float, rank: float) -> bool:
+    """Whether a triangular R (p, p) may be solved with as it is. O(p^2 / 2).
+
+    Args:
+        R: upper triangular.
+        zero: share of the largest column norm up to which a column counts as zero.
+        rank: share of its column's norm that each diagonal element must exceed.
+    """
+    p = len(R)
+    largest = 0.0
+    for j in range(p):
+        square = 0.0
+        for i in range(j + 1):
+            square += R[i, j] * R[i, j]
+        if not abs(R[j, j]) > rank * np.sqrt(square):
+            return False
+        largest = max(largest, square)
+    for j in range(p):
+        square = 0.0
+        for i in range(j + 1):
+            square += R[i, j] * R[i, j]
+        if square <= zero * zero * largest:
+            return False
+    return True
+
+
+@_compiled
+def solve_upper(R: np.ndarray, x: np.ndarray) -> None:
+    """Replace x (p,) by R^-1 x for an upper triangular R (p, p). O(p^2 / 2)."""
+    for i in range(len(x) - 1, -1, -1):
+        for j in range(i + 1, len(x)):
+            x[i] -= R[i, j] * x[j]
+        x[i] /= R[i, i]
+
+
+@_compiled
+def solve_rows(R: np.ndarray, rows: np.ndarray) -> None:
+    """Replace rows (k, p) by rows R^-1 for an upper triangular R (p, p). O(k p^2 / 2)."""
+    for a in range(len(rows)):
+        row = rows[a]
+        for i in range(len(row)):
+            row[i] /= R[i, i]
+            for j in range(i + 1, len(row)):
+                row[j] -= row[i] * R[i, j]
+
+
 def absorbed_rows_numpy(
     R: np.ndarray, z: np.ndarray, rows: np.ndarray, values: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
