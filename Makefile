@@ -42,6 +42,7 @@ oldest: $(OLDEST)/.made
 	$(OLDEST)/bin/python -m pytest -q $(NUMERIC)
 
 bench: $(VENV)/.test
+	$(BIN)/sgp bench
 	$(BIN)/python -m benchmarks.filter
 	$(BIN)/python -m benchmarks.regressor
 

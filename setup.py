@@ -56,6 +56,8 @@ setup(
         'wheels': ['ros-rclpy[fastrtps]==7.1.6', 'ros-jazzy-common-interfaces==5.3.6'],
         # The dynamics of URDF robots in `sgp simulate`.
         'simulate': ['mujoco>=3.2'],
+        # The rivals of `sgp bench`.
+        'bench': ['scikit-learn>=1.4', 'torch>=2', 'gpytorch>=1.11'],
         'test': [
             'mujoco>=3.2',
             'pytest>=8',

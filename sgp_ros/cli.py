@@ -68,6 +68,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_diagnose(commands)
     _add_import(commands)
     _add_reproduce(commands)
+    _add_bench(commands)
     return parser
 
 
@@ -221,6 +222,17 @@ def _add_reproduce(commands: Any) -> None:
     parser.add_argument('--seeds', type=int, default=None, metavar='N',
                         help='worlds per experiment (default: 20)')  # fmt: skip
     parser.add_argument('--quick', action='store_true', help='few seeds, under two minutes')
+
+
+def _add_bench(commands: Any) -> None:
+    parser = _add(
+        commands, 'bench', run.bench,
+        "Measure speed and memory beside rivals and the machine's limit.",
+        'sgp bench step --out out/bench',
+    )  # fmt: skip
+    parser.add_argument('names', metavar='NAME', nargs='*',
+                        help='step or evidence (default: all)')  # fmt: skip
+    parser.add_argument('--quick', action='store_true', help='small sizes, under a minute')
 
 
 if __name__ == '__main__':

@@ -26,6 +26,13 @@ def reproduce(arguments: argparse.Namespace) -> Result:
     )
 
 
+def bench(arguments: argparse.Namespace) -> Result:
+    """Run benchmarks."""
+    from sgp_ros.experiments.bench.command import run_bench
+
+    return run_bench(arguments.names, arguments.out, Progress('bench'), is_quick=arguments.quick)
+
+
 def demo(arguments: argparse.Namespace) -> Result:
     """Run the demonstration."""
     from sgp_ros.experiments.demo import run_demo

@@ -37,7 +37,7 @@ LAYERS = {
     },
     'experiments': {
         'numpy', 'matplotlib', 'yaml', 'core', 'robots', 'simulation', 'engine', 'recordings',
-        'diagnosis', 'report', 'offline', 'errors',
+        'diagnosis', 'report', 'offline', 'errors', 'scipy', 'gpytorch', 'sklearn', 'torch',
     },
     'commands': {
         'core', 'robots', 'simulation', 'engine', 'recordings', 'diagnosis', 'report',

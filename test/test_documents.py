@@ -31,6 +31,7 @@ def test_commands_in_documents_exist(path):
     for block in re.findall(r'```(?:bash|console)\n(.*?)```', text, re.DOTALL):
         for name in re.findall(r'^\s*(?:\$ )?(?:\S*/)?sgp (\w+)', block, re.MULTILINE):
             assert name in {
+                'bench',
                 'demo',
                 'diagnose',
                 'identify',
