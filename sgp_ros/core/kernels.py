@@ -12,6 +12,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from sgp_ros.core.linear_kernel import Linear
+from sgp_ros.core.matrix_loops import turn_into_exponents
 
 T = TypeVar('T')
 
@@ -112,13 +113,11 @@ class SquaredExponential:
         """
         S = self.scale(U)
         T = S if V is None else self.scale(V)
-        squares = (S * S).sum(axis=1)[:, None] + (T * T).sum(axis=1)[None, :]
-        squares -= 2.0 * (S @ T.T)
-        np.maximum(squares, 0.0, out=squares)
-        squares *= -0.5
-        np.exp(squares, out=squares)
-        squares *= self.variance
-        return squares
+        K = S @ T.T
+        turn_into_exponents(K, 0.5 * (S * S).sum(axis=1), 0.5 * (T * T).sum(axis=1))
+        np.exp(K, out=K)
+        K *= self.variance
+        return K
 
     def diagonal(self, U: np.ndarray) -> np.ndarray:
         """Return the prior variances at rows of U (n, d), (n,)."""
@@ -158,7 +157,8 @@ class SquaredExponential:
         `2 (sum_a r_a s_ia^2 - s_i^T weighted s_i)` with row sums r: O(n^2 d), no n x n x d array.
         """
         S = self.scale(U)
-        weighted = H * self.matrix(U)
+        weighted = self.matrix(U)
+        weighted *= H
         rows = weighted.sum(axis=1)
         lengths = 2.0 * (rows @ (S * S) - np.einsum('ai,ai->i', S, weighted @ S))
         return np.concatenate([[rows.sum()], lengths])

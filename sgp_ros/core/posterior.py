@@ -16,6 +16,7 @@ import numpy as np
 from scipy import linalg
 
 from sgp_ros.core.blocks import Block, build_blocks
+from sgp_ros.core.matrix_loops import subtract_symmetric
 from sgp_ros.core.prediction import Prediction
 
 if TYPE_CHECKING:
@@ -237,13 +238,14 @@ def _curvature(block: Block, residual: np.ndarray, left: np.ndarray) -> np.ndarr
     """Return `alpha alpha^T - C^-1` of a block, (N, N)."""
     alpha = block.unwhiten(residual)
     Q = block.unwhiten(left)
+    factors = np.column_stack([alpha, Q])
+    H = factors @ factors.T
     if block.L is None:
-        inverse = np.eye(len(alpha)) / block.noise
+        H[np.diag_indices(len(H))] -= 1.0 / block.noise
     else:
         inverse, _ = linalg.lapack.dpotri(block.L, lower=True)
-        lower = np.tril(inverse, -1)
-        inverse = lower + lower.T + np.diag(np.diag(inverse))
-    return np.outer(alpha, alpha) - inverse + Q @ Q.T
+        subtract_symmetric(H, inverse.T)
+    return H
 
 
 def _mark_undetermined(covariance: np.ndarray, G: np.ndarray, solution: _Solution) -> None:
