@@ -198,6 +198,19 @@ class GrowingFactor:
         self._S.replace(self._kernel.scale(U))
         self._white.replace(linalg.solve_triangular(L, flat, lower=True))
 
+    def distance(self, exact: GrowingFactor) -> float:
+        """Return the relative distance from a factor of the same samples, in Frobenius norm.
+
+        The larger one of factor and whitened data; infinite where a number here is not finite.
+        """
+        pairs = ((self.lower, exact.lower), (self.white, exact.white))
+        ratios = [
+            float(np.linalg.norm(found - right) / np.linalg.norm(right))
+            for found, right in pairs
+            if right.any()
+        ]
+        return max((x if np.isfinite(x) else np.inf for x in ratios), default=0.0)
+
     def state(self) -> dict[str, np.ndarray]:
         """Return what `restore` needs, as arrays."""
         return {'L': self.lower, 'S': self._S.rows, 'white': self._white.rows}

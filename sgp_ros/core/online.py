@@ -21,6 +21,7 @@ from sgp_ros.core.information import Information
 from sgp_ros.core.model import Observations
 from sgp_ros.core.output_groups import output_groups
 from sgp_ros.core.sliding import SlidingRows
+from sgp_ros.errors import NumericalError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -70,6 +71,7 @@ class OnlineRegression:
         self._budget = budget
         self._remember = remember
         self._version = 0
+        self._rotated = 0
         p = prior.size
         self._U = SlidingRows(budget + 1, (0,))
         self._data = SlidingRows(budget + 1, (len(model.kernels), p + 1))
@@ -99,6 +101,11 @@ class OnlineRegression:
         """A copy of the buffered samples, oldest first."""
         data = self._data.rows
         return Observations(self._U.rows.copy(), data[:, :, :-1].copy(), data[:, :, -1].copy())
+
+    @property
+    def rotated(self) -> int:
+        """Samples dropped since the factors were last computed from the buffer."""
+        return self._rotated
 
     @property
     def base(self) -> Information:
@@ -160,6 +167,30 @@ class OnlineRegression:
         while self.size > self._budget:
             self._drop(0)
 
+    def is_sound(self, prediction: OnlinePrediction) -> bool:
+        """Whether every factor gave the observation a positive variance."""
+        try:
+            for factor, whitening in zip(self._factors, prediction.whitenings, strict=True):
+                factor.pivot(whitening)
+        except NumericalError:
+            return False
+        return True
+
+    def refresh(self) -> float:
+        """Factor the buffer anew, O(n^3 / 3) per factor, and say how far the factors had drifted.
+
+        Returns:
+            The largest norm of a difference, over the norm of what it should have been, among
+            the factors and their whitened data; infinite where a factor was lost.
+
+        Raises:
+            NumericalError: the buffer has no factor in double precision; nothing has changed.
+        """
+        before = self._factors
+        self._rebuild()
+        drift = [a.distance(b) for a, b in zip(before, self._factors, strict=True)]
+        return max(drift, default=0.0)
+
     def change(
         self,
         model: Model | None = None,
@@ -196,6 +227,7 @@ class OnlineRegression:
             'U': self._U.rows, 'data': self._data.rows,
             'kept_R': np.array([kept.R for kept in self._kept]),
             'kept_z': np.array([kept.z for kept in self._kept]),
+            'rotated': np.array(self._rotated),
             'total_R': self._total.R, 'total_z': self._total.z,
         }  # fmt: skip
         for j, factor in enumerate(self._factors):
@@ -206,6 +238,7 @@ class OnlineRegression:
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue exactly where `state` was taken."""
         self._hold(state['U'], state['data'])
+        self._rotated = int(state['rotated'])
         self._kept = tuple(
             Information(np.array(R), np.array(z))
             for R, z in zip(state['kept_R'], state['kept_z'], strict=True)
@@ -224,6 +257,7 @@ class OnlineRegression:
             if self._remember:
                 for j, row in zip(group.outputs, rows, strict=True):
                     self._kept[j].absorb(row[None])
+        self._rotated += 1
         self._U.drop(m)
         self._data.drop(m)
         if not self._remember:
@@ -248,6 +282,7 @@ class OnlineRegression:
         self._hold(self._U.rows, self._data.rows)
         self._groups, self._factors = groups, tuple(factors)
         self._total = self._with_buffer()
+        self._rotated = 0
         self._version += 1
 
     def _with_buffer(self) -> Information:

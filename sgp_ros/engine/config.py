@@ -130,6 +130,11 @@ class EngineConfig:
         'buffer.remember', 'bool', default=True,
         description='Keep what dropped samples told about W.',
     )  # fmt: skip
+    buffer_check_period: int = _setting(
+        'buffer.check_period', 'int', 5000,
+        'Learned samples between two comparisons of the factor with one computed anew.',
+        low=10, high=1_000_000,
+    )  # fmt: skip
     refit_enabled: bool = _setting(
         'refit.enabled', 'bool', default=True, description='Refit the hyper-parameters.'
     )

@@ -12,6 +12,7 @@ from sgp_ros.core.model import Model, Observations
 from sgp_ros.core.online import OnlinePrediction, OnlineRegression
 from sgp_ros.core.scores import RunningScore
 from sgp_ros.engine.complement import solve_complement
+from sgp_ros.engine.factor_safety import check_factor, predict_soundly
 from sgp_ros.engine.prior_knowledge import (
     complement_columns,
     model_of_settings,
@@ -117,7 +118,7 @@ class Estimator:
 
     def _predict_score_learn(self, regression: OnlineRegression, equation: Equation) -> Estimate:
         u, f, y = self._arrays(equation)
-        prediction = regression.predict(u, f)
+        prediction = predict_soundly(regression, u, f, self._counts)
         noise = np.array(regression.model.noise)
         target = Channel(y, prediction.mean, np.diag(prediction.covariance) + noise)
         complement = self._complement(regression, equation, prediction)
@@ -145,6 +146,8 @@ class Estimator:
             self._counts.unlearnable += 1
             return False
         self._counts.learned += 1
+        if self._counts.learned % self._config.buffer_check_period == 0:
+            check_factor(regression, self._counts)
         return True
 
     def _arrays(self, equation: Equation) -> Arrays:

@@ -98,6 +98,9 @@ class Counts:
         scored: equations whose prediction entered the scores.
         unlearnable: equations that repeat others to rounding.
         refits, refits_refused: fits of hyper-parameters put in force, and those refused.
+        factor_checks, factor_drift: factors compared with fresh ones, and the largest relative
+            difference found.
+        factor_rebuilt: factors that were lost to rounding and computed anew from the buffer.
     """
 
     read: int = 0
@@ -112,6 +115,9 @@ class Counts:
     unlearnable: int = 0
     refits: int = 0
     refits_refused: int = 0
+    factor_checks: int = 0
+    factor_drift: float = 0.0
+    factor_rebuilt: int = 0
 
     @property
     def used(self) -> int:

@@ -75,6 +75,11 @@ def collect_metrics(
             'refits': counts.refits,
             'refits_refused': counts.refits_refused,
         },
+        'factor': {
+            'checks': counts.factor_checks,
+            'drift': counts.factor_drift,
+            'rebuilt': counts.factor_rebuilt,
+        },
         'timing': _timing(timing),
         'delay_s': engine.delay_s,
         'settings': {k: _plain(v) for k, v in engine.config.to_mapping().items()},

@@ -134,6 +134,9 @@ class Health:
             'delay_s': f'{engine.delay_s:.6f}',
             'refits': str(counts.refits),
             'refits_refused': str(counts.refits_refused),
+            'factor_checks': str(counts.factor_checks),
+            'factor_drift': f'{counts.factor_drift:.3g}',
+            'factor_rebuilt': str(counts.factor_rebuilt),
             'last_refit': self.last_fit,
         }
         return 'model', OK, message, values

@@ -445,6 +445,32 @@ def test_repeated_states_of_a_still_robot_are_survived():
     _run(events)  # a constant target: variance zero, still no exception
 
 
+def test_a_lost_factor_is_rebuilt_and_counted():
+    """A factor that holds no numbers any more is computed from the buffer; the stream goes on."""
+    events = pendulum_events(400)
+    settings = config(PENDULUM, refit__enabled=False, buffer__budget=20)
+    whole, broken = Engine(PENDULUM, settings), Engine(PENDULUM, settings)
+    found = []
+    for engine in (whole, broken):
+        for i, event in enumerate(events):
+            if i == 600 and engine is broken:
+                engine.estimator.regression._factors[0]._U[:] = np.nan
+            found.append(engine.push(event).estimates)
+    half = len(found) // 2
+    assert whole.counts.factor_rebuilt == 0
+    assert broken.counts.factor_rebuilt == 1
+    assert broken.counts.learned == whole.counts.learned
+    for one, other in zip(sum(found[:half], ()), sum(found[half:], ()), strict=True):
+        np.testing.assert_allclose(one.acceleration.mean, other.acceleration.mean, rtol=1e-6)
+
+
+def test_the_drift_of_the_factor_is_measured_at_its_period():
+    """Every so many learned samples the factor is compared with a fresh one."""
+    engine, _ = _run(pendulum_events(400), buffer__check_period=50, buffer__budget=20)
+    assert engine.counts.factor_checks == engine.counts.learned // 50 > 0
+    assert 0.0 < engine.counts.factor_drift < 1e-6
+
+
 def test_changes_of_settings_are_events():
     """A change pushed as an event has the effect of one applied at its stamp."""
     events = pendulum_events(200)
