@@ -158,15 +158,18 @@ def close_gap(U: np.ndarray, start: int, n: int, m: int) -> None:
     """Move samples 0..m-1 up by one place, over sample m. O(n m), nothing for the oldest."""
     for j in range(m - 1, -1, -1):
         r = start + j
-        U[r + 1, start + m + 1 : start + n] = U[r, start + m + 1 : start + n]
-        U[r + 1, r + 1 : start + m + 1] = U[r, r : start + m]
+        for i in range(start + m + 1, start + n):
+            U[r + 1, i] = U[r, i]
+        for i in range(r, start + m):
+            U[r + 1, i + 1] = U[r, i]
 
 
 @_compiled
 def move_to_front(U: np.ndarray, start: int, n: int) -> None:
     """Move the factor of n samples from `start` to the first rows of U. O(n^2 / 2)."""
     for j in range(n):
-        U[j, j:n] = U[start + j, start + j : start + n]
+        for i in range(j, n):
+            U[j, i] = U[start + j, start + i]
 
 
 def absorbed_column_numpy(

@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numba import njit
 
 from sgp_ros.core.factor import GrowingFactor
 from sgp_ros.core.factor_loops import (
     absorb_column,
     absorbed_column_numpy,
+    close_gap,
     combine_rows,
     dropped_row_numpy,
+    move_to_front,
     solve_lower,
 )
 from sgp_ros.core.kernels import SquaredExponential
@@ -151,6 +154,32 @@ def test_a_long_stream_equals_a_fresh_factor(leaves):
     L, white = _dense(U, data)
     np.testing.assert_allclose(factor.lower, L, atol=1e-11)
     np.testing.assert_allclose(factor.white, white, atol=1e-10)
+
+
+def _machine_code(function, signature):
+    """Compile without the cache, from which code comes that cannot be read."""
+    compiled = njit(function, error_model='numpy')
+    compiled.compile(signature)
+    code = compiled.inspect_llvm(compiled.signatures[0])
+    assert 'define' in code
+    return code
+
+
+@pytest.mark.parametrize(
+    'loop', [solve_lower, combine_rows, absorb_column, close_gap, move_to_front]
+)
+def test_compiled_loops_allocate_nothing(loop):
+    """What the compiler made of each loop calls no allocator."""
+    rng = np.random.default_rng(0)
+    for m in (0, 3, 9):
+        factor, _, _ = _filled(rng, n=9)
+        for _ in range(2 * ROOM):
+            factor.append(factor.whiten(rng.normal(size=1)), rng.normal(size=(2, 3)))
+            factor.drop(m)
+    for signature in loop.signatures:
+        assert 'NRT_MemInfo_alloc' not in _machine_code(loop.py_func, signature)
+    with_scratch = _machine_code(lambda x: np.zeros(len(x)), (loop.signatures[0][0],))
+    assert 'NRT_MemInfo_alloc' in with_scratch  # so this is how an allocation would look
 
 
 def test_groups_are_covariances_equal_up_to_a_scale():
