@@ -62,6 +62,15 @@ def test_the_page_of_diagnosis_is_that_of_the_results():
     assert module.TARGET.read_text(encoding='utf-8') == module.text()
 
 
+def test_the_page_of_performance_is_that_of_the_results():
+    """Mend with `python docs/generate_performance.py`."""
+    path = ROOT / 'docs' / 'generate_performance.py'
+    spec = importlib.util.spec_from_file_location('generate_performance', path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.TARGET.read_text(encoding='utf-8') == module.text()
+
+
 def test_numbers_in_the_filter_page_are_the_measured_ones():
     """The table is that of the committed result."""
     result = json.loads((ROOT / 'benchmarks/results/filter.json').read_text(encoding='utf-8'))

@@ -78,7 +78,7 @@ def bench_tables(result: dict[str, Any]) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def _cell(value: float | None) -> str:
+def _cell(value: float | str | None) -> str:
     if value is None:
         return 'not installed'
-    return str(value) if isinstance(value, int) else f'{value:.4g}'
+    return f'{value:.4g}' if isinstance(value, float) else str(value)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from sgp_ros.core.online import OnlineRegression
 from sgp_ros.core.prior import CoefficientPrior
 from sgp_ros.core.sliding import length_for
+from sgp_ros.experiments.bench.parts import part_times
 from sgp_ros.experiments.bench.problem import draw_problem
 from sgp_ros.experiments.bench.rivals import timed
 from sgp_ros.experiments.bench.timing import median_seconds, move_seconds
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from sgp_ros.experiments.bench.rivals import Rivals
 
 SIZES = (250, 500, 1000, 2000)
-SHAPES = ((1, 8), (1, 21), (7, 8), (7, 21))
+SHAPES = ((1, 8), (1, 21), (7, 21))
 """Outputs and inputs."""
 REPEATS, RIVAL_REPEATS = 9, 3
 
@@ -55,6 +56,7 @@ def step_row(n: int, outputs: int, inputs: int, rivals: Rivals, repeats: int) ->
         'step_ms': 1e3 * step_s, 'floor_ms': 1e3 * floor_s, 'times_floor': step_s / floor_s,
         'megabytes': 8e-6 * (read + 2 * updated),
     }  # fmt: skip
+    row |= part_times(problem, n, repeats, step_s)
     until = draw_problem(n + 1, outputs, inputs, seed=n)
     for name, rival in rivals.items():
         row |= timed(name, step_s, RIVAL_REPEATS, None if rival is None else rival.step(until))
