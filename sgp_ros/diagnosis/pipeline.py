@@ -64,8 +64,7 @@ def diagnose(
     raw = collect(events, robot, stated)
     held = {stem: collect(recording, robot, stated) for stem, recording in tests.items()}
     raw, kept, remarks = keep_back(raw) if holds_out else (raw, {}, ())
-    bandwidth = choose_bandwidth(raw, tree)
-    equations = make_equations(raw, tree, bandwidth)
+    equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
     competition = compete(equations, lambda share: progress(0.05 + 0.75 * share))
     decision = decide(equations, competition)
     lags = [lag for lag in sensor_lags(raw, equations) if lag.is_physics]
@@ -93,7 +92,7 @@ def diagnose(
         predictions=predictions,
         dependences=dependences(equations, competition.parameters.residual),
         traces=_traces(equations, competition, decision.model, remainders, forces),
-        cutoff_hz=bandwidth.cutoff,
+        cutoff_hz=equations.filter.cutoff,
         rate_hz=1.0 / (raw.step * equations.filter.decimation),
         rows=len(equations.d),
         refused={reason: count for reason, count in raw.refused.items() if count},
