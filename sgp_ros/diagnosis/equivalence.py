@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sgp_ros.diagnosis.decision import LEAST_SHARE, TEMPER, Scale
-from sgp_ros.diagnosis.findings import joint_name
+from sgp_ros.diagnosis.places import joint_name
 from sgp_ros.diagnosis.prediction import imbalance
 from sgp_ros.diagnosis.result import Equivalent
 from sgp_ros.robots.effects.drive import Drive

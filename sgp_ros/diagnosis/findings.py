@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.diagnosis.places import joint_name
 from sgp_ros.diagnosis.result import Finding, Location, Parameter, ParameterError
 from sgp_ros.diagnosis.uncertainty import reported_std
 from sgp_ros.robots.effects.effect import Fitted, Quantity
@@ -21,17 +22,10 @@ if TYPE_CHECKING:
     from sgp_ros.diagnosis.suspects import Columns
     from sgp_ros.diagnosis.velocity_sensor import SensorLag
     from sgp_ros.robots.effects.effect import Value
-    from sgp_ros.robots.effects.observed_motion import ObservedMotion
 
-PLACES = {-1: 'base', -2: 'tool', -3: 'all'}
 MODEL_ERROR = 0.003
 """Relative standard deviation that approximations of the signals add to every number."""
 MOST_ALTERNATIVES = 8
-
-
-def joint_name(motion: ObservedMotion, joint: int) -> str:
-    """Return the name of a joint as in the schema."""
-    return PLACES.get(joint) or motion.tree.joint_names[joint]
 
 
 def asserted(
