@@ -114,8 +114,9 @@ def rollouts_sentences(found: Diagnosis) -> str:
 
 
 def _way(nmse: float) -> str:
-    """Return the root of an error as a share of the way."""
-    return f'{100.0 * math.sqrt(nmse):.2g} %'
+    """Return the root of an error as a share of the way, or as a multiple of it."""
+    share = math.sqrt(nmse)
+    return f'{100.0 * share:.2g} %' if share < 0.995 else f'{share:.3g} times the length'
 
 
 def _nats(value: float, interval: tuple[float, float] | None) -> str:
