@@ -13,6 +13,8 @@ from sgp_ros.diagnosis.suspects import Columns, Suspect, dry_joints, shape_bound
 from sgp_ros.robots.effects.effect import Fitted
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from sgp_ros.diagnosis.equations import Equations
     from sgp_ros.robots.effects.effect import Place
 
@@ -233,8 +235,8 @@ def _searched(
     return with_shapes(suspects, x)
 
 
-def _rotors(
-    suspects: tuple[Suspect, ...], coefficients: list[np.ndarray], equations: Equations
+def rotors(
+    suspects: Sequence[Suspect], coefficients: Sequence[np.ndarray], equations: Equations
 ) -> np.ndarray:
     """Return the inertia that suspects add to each joint, (k,) [kg m^2 or kg]."""
     added = np.zeros(equations.d.shape[1])
@@ -266,7 +268,7 @@ def _solved(
     w = frame.parameters(left)
     residual = left - equations.base @ w
     mean = (residual**2).mean(axis=0)
-    heavier = equations.log_inertia(w, _rotors(suspects, coefficients, equations))
+    heavier = equations.log_inertia(w, rotors(suspects, coefficients, equations))
     # what is measured is the motion: the floor is one of accelerations
     variance = mean + floors(equations) * np.exp(2.0 * max(heavier, -50.0) / len(mean))
     N = len(residual)

@@ -31,8 +31,9 @@ ADEQUATE_REST = 0.025
 SLIGHT_REST = 0.1 * LEAST_SHARE
 """A rest below this share of the mean squared effort is adequate in any case."""
 ROWS = 100.0
-"""Rows that count as independent when rests are compared: the shape of a column is only nearly
-right, and what is wrong with it repeats in every row.
+"""Most rows that count as independent when rests are compared.
+
+The shape of a column is only nearly right, and what is wrong with it repeats in every row.
 """
 SHAPE_ERROR = 0.001
 """Part of the discrepancy that the right column may leave for the same reason."""
@@ -82,19 +83,22 @@ class Scale:
         error: (k,) what filters and smoothing leave of a perfect model, as mean squares.
         base: rest of the best model without effects, (k,) shares.
         nominal: discrepancy of the nominal robot, (k,) shares.
+        rows: that count as independent.
     """
 
     power: np.ndarray
     error: np.ndarray
     base: np.ndarray
     nominal: np.ndarray
+    rows: float
 
     @classmethod
     def of(cls, equations: Equations, competition: Competition) -> Scale:
         """Return the scale of a recording."""
         power, error = equations.power, FILTER_ERRORS * equations.model_error
         base = np.maximum(competition.base.mean_square - error, 0.0) / power
-        return cls(power, error, base, competition.nominal.mean_square / power)
+        nominal = competition.nominal.mean_square / power
+        return cls(power, error, base, nominal, min(ROWS, len(equations.d)))
 
     def shares(self, model: Model) -> np.ndarray:
         """Return what a model leaves beyond the errors of the filters, (k,) shares."""
@@ -130,7 +134,7 @@ class Scale:
     def fit(self, model: Model) -> float:
         """Return the tempered log likelihood, with the prior of the bodies' change [nats]."""
         floor = FLOOR_SHARE + SHAPE_ERROR * self.nominal + self.error / self.power
-        likelihood = -0.5 * ROWS * float(np.log(model.mean_square / self.power + floor).sum())
+        likelihood = -0.5 * self.rows * float(np.log(model.mean_square / self.power + floor).sum())
         return likelihood - 0.5 * float(model.w @ model.w)
 
     def worth(self, model: Model) -> float:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.diagnosis.candidates import rotors
 from sgp_ros.diagnosis.decision import LEAST_SHARE, TEMPER, Scale
 from sgp_ros.diagnosis.places import joint_name
 from sgp_ros.diagnosis.prediction import imbalance
@@ -59,16 +60,41 @@ def equivalents(
     if decision.verdict == 'unexplained':
         return ()
     scale, best = Scale.of(equations, competition), decision.model
-    bases = competition.nominal, competition.parameters
+    unlikely = _without_prior(equations, competition.parameters)
+    others = {*decision.rivals, competition.nominal, competition.parameters} - {best}
     found: list[Equivalent] = []
     known: list[Model] = [best]
-    rivals = sorted({*decision.rivals, *bases} - {best}, key=scale.worth, reverse=True)
-    for rival in rivals:
-        is_alike = scale.fit(rival) > scale.fit(best) - ALIKE
+    least = _fit(equations, scale, best) - ALIKE
+    for rival in (unlikely, *sorted(others, key=scale.worth, reverse=True)):
+        prior = 0.5 * float(rival.w @ rival.w) if rival is unlikely else 0.0
+        is_alike = _fit(equations, scale, rival) + prior > least
         if len(found) < MOST and is_alike and not any(_contains(rival, m) for m in known):
             known.append(rival)
             found += _told(equations, best, rival)
     return tuple(found)
+
+
+def _fit(equations: Equations, scale: Scale, model: Model) -> float:
+    """Return the tempered log likelihood of the motion, which is what was measured [nats].
+
+    A residual of effort is the larger the heavier the robot that a model supposes.
+    """
+    added = rotors(model.suspects, model.coefficients, equations)
+    return scale.fit(model) + scale.rows * equations.log_inertia(model.w, added)
+
+
+def _without_prior(equations: Equations, parameters: Model) -> Model:
+    """Return the model of the bodies alone that may differ by any amount.
+
+    What the prior thinks unlikely still explains the recording: a motor that delivers a third,
+    or bodies three times as heavy.
+    """
+    base = equations.base / parameters.sigma[:, None]
+    N, k, p = base.shape
+    w = np.linalg.lstsq(
+        base.reshape(N * k, p), (equations.d / parameters.sigma).ravel(), rcond=1e-6
+    )[0]
+    return replace(parameters, w=w, residual=equations.d - equations.base @ w)
 
 
 def _contains(rival: Model, model: Model) -> bool:

@@ -171,9 +171,7 @@ def equivalence_sentence(found: Equivalent) -> str:
         f'{EFFECT_NAMES.get(effect, effect)} {_PLACES.get(joint, f"on {joint}")}'
         for joint, effect in found.effects
     ]
-    text = (
-        f'On this motion {" with ".join(parts) or "other parameters of the bodies"} fits as well'
-    )
+    text = f'On this motion {" with ".join(parts) or "another set of bodies"} fits as well'
     if not found.motion:
         return f'{text}; no motion that was tried tells them apart: measure one of them by itself.'
     factor = f'{found.contrast:.0f}' if found.contrast < 1e4 else 'more than 10000'

@@ -119,3 +119,13 @@ def test_what_leaves_next_to_nothing_is_adequate_whatever_it_explained(damped):
     small = replace(scale, base=10.0 * scale.shares(model), nominal=10.0 * scale.shares(model))
     assert small.rest(model) > 0.05
     assert small.excess(model) < 0.1
+
+
+def test_few_rows_tell_less(damped):
+    """A recording of fewer rows than count as independent weighs a fit by what it has."""
+    competition = _competition(damped, _fitted(damped, 'viscous_friction'))
+    few = replace(damped, d=damped.d[:40])
+    whole, part = (Scale.of(e, competition) for e in (damped, few))
+    (model,) = competition.singles
+    gains = [s.fit(model) - s.fit(competition.nominal) for s in (whole, part)]
+    assert gains[1] == pytest.approx(gains[0] * 40.0 / whole.rows)

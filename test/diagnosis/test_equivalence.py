@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,7 @@ from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.suspects import Columns, Suspect
 from sgp_ros.robots.effects.catalogue import EFFECTS
 from sgp_ros.robots.effects.effect import Place
-from test.diagnosis.worlds import CHAINS, events_of, simulate
+from test.diagnosis.worlds import CHAINS, events_of, robot_of, simulate
 
 
 def _fitted(equations, *names, is_free=False):
@@ -87,3 +89,14 @@ def test_a_moved_motion_is_consistent(narrow, how):
         found = np.gradient(signal, motion.step, axis=0)[50:-50]
         np.testing.assert_allclose(found, slope[50:-50], atol=0.02 * np.abs(slope).max())
     np.testing.assert_allclose(np.diff(motion.time), motion.step)
+
+
+def test_a_weak_motor_may_be_heavy_bodies_that_the_prior_thinks_unlikely(tmp_path):
+    """With one joint without damping `gain u = J a + G sin q`: no motion separates the two."""
+    (link,) = CHAINS[1]
+    chain = (replace(link, damping=0.0),)
+    world = simulate(chain, 5, 10.0, motor=lambda commands, t: (0.4 * commands[-1][0],))
+    found = diagnose(events_of(world), *robot_of(tmp_path, chain), {})
+    assert [f.effect for f in found.findings] == ['torque_gain']
+    assert found.equivalents[0].effects == ()
+    assert found.equivalents[0].motion == ''

@@ -125,7 +125,7 @@ def test_what_cannot_be_told_is_said_with_the_motion_that_would(tmp_path):
     assert 'a motion twice as wide tells them apart' in sentence
     assert ' 7 times' in sentence
     never = equivalence_sentence(Equivalent((), '', 1.0))
-    assert 'other parameters of the bodies fits as well; no motion that was tried' in never
+    assert 'another set of bodies fits as well; no motion that was tried' in never
     found = replace(diagnosis('parameters_only'), equivalents=(told,))
     write_diagnosis(tmp_path, found)
     assert sentence in (tmp_path / 'report.html').read_text()
