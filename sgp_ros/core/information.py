@@ -102,6 +102,27 @@ class Information:
         outside = np.linalg.norm(scaled @ solved.null, axis=1)
         return outside <= NULL_TOLERANCE * np.linalg.norm(scaled, axis=1)
 
+    def predict(
+        self, rows: np.ndarray, mean: np.ndarray, variance: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return mean (k,) and covariance (k, k) of `rows W + Z`. O(k p^2).
+
+        Args:
+            rows: (k, p).
+            mean: of Z, (k,).
+            variance: of Z, (k,), its components independent.
+
+        Returns:
+            Mean and covariance, the latter infinite on the diagonal where an undetermined
+            direction of W enters.
+        """
+        spread = self.spread(rows)  # (k, r)
+        covariance = spread @ spread.T
+        diagonal = covariance.reshape(-1)[:: len(rows) + 1]
+        diagonal += variance
+        diagonal[~self.is_determined(rows)] = np.inf
+        return mean + rows @ self.coefficients, covariance
+
     def _solution(self) -> _Solved:
         if self._solved is None:
             self._solved = _Solved(self.R, self.z)

@@ -11,46 +11,24 @@ the noise of its time; when a fit finds another noise, it is scaled to that.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sgp_ros.core.factor import GrowingFactor
 from sgp_ros.core.information import Information
-from sgp_ros.core.model import Observations
+from sgp_ros.core.online_prediction import OnlinePrediction
 from sgp_ros.core.output_groups import output_groups
-from sgp_ros.core.sliding import SlidingRows
+from sgp_ros.core.sample_buffer import SampleBuffer
 from sgp_ros.errors import NumericalError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from sgp_ros.core.factor import Whitening
-    from sgp_ros.core.model import Model
+    from sgp_ros.core.model import Model, Observations
     from sgp_ros.core.output_groups import OutputGroup
     from sgp_ros.core.prior import CoefficientPrior
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class OnlinePrediction:
-    """Prediction of X at one input, with what learning it reuses.
-
-    Attributes:
-        mean: (k,).
-        covariance: (k, k) of X, without noise; infinite on the diagonal where an undetermined
-            direction of W enters.
-        u, f: the input (d,) and regressor (k, p) it was made for.
-        whitenings: the input against the samples, one per factor.
-        version: state of the model it was made with.
-    """
-
-    mean: np.ndarray
-    covariance: np.ndarray
-    u: np.ndarray
-    f: np.ndarray
-    whitenings: tuple[Whitening, ...]
-    version: int
 
 
 class OnlineRegression:
@@ -73,8 +51,7 @@ class OnlineRegression:
         self._version = 0
         self._rotated = 0
         p = prior.size
-        self._U = SlidingRows(budget + 1, (0,))
-        self._data = SlidingRows(budget + 1, (len(model.kernels), p + 1))
+        self._samples = SampleBuffer.empty(len(model.kernels), p)
         self._model = model
         self._groups: tuple[OutputGroup, ...] = ()
         self._factors: tuple[GrowingFactor, ...] = ()
@@ -94,13 +71,12 @@ class OnlineRegression:
     @property
     def size(self) -> int:
         """Number of samples in the buffer."""
-        return self._data.size
+        return self._samples.size
 
     @property
     def buffer(self) -> Observations:
         """A copy of the buffered samples, oldest first."""
-        data = self._data.rows
-        return Observations(self._U.rows.copy(), data[:, :, :-1].copy(), data[:, :, -1].copy())
+        return self._samples.observations()
 
     @property
     def rotated(self) -> int:
@@ -133,12 +109,7 @@ class OnlineRegression:
             rows[outputs] -= whitening.explained[:, :-1]
             mean[outputs] = whitening.explained[:, -1]
             variance[outputs] = np.square(group.scales) * whitening.variance
-        mean += rows @ self._total.coefficients
-        spread = self._total.spread(rows)  # (k, r)
-        covariance = spread @ spread.T
-        diagonal = covariance.reshape(-1)[:: len(f) + 1]
-        diagonal += variance
-        diagonal[~self._total.is_determined(rows)] = np.inf
+        mean, covariance = self._total.predict(rows, mean, variance)
         return OnlinePrediction(mean, covariance, u, f, whitenings, self._version)
 
     def learn(self, prediction: OnlinePrediction, y: np.ndarray) -> None:
@@ -160,10 +131,7 @@ class OnlineRegression:
             self._groups, self._factors, prediction.whitenings, strict=True
         ):
             self._total.absorb(factor.append(whitening, data[list(group.outputs)]))
-        if not self.size:
-            self._U = SlidingRows(self._budget + 1, prediction.u.shape)
-        self._U.append(prediction.u)
-        self._data.append(data)
+        self._samples.append(prediction.u, data)
         while self.size > self._budget:
             self._drop(0)
 
@@ -224,7 +192,7 @@ class OnlineRegression:
     def state(self) -> dict[str, np.ndarray]:
         """Return everything that was learned, as arrays; `restore` takes it back."""
         arrays = {
-            'U': self._U.rows, 'data': self._data.rows,
+            'U': self._samples.inputs, 'data': self._samples.data,
             'kept_R': np.array([kept.R for kept in self._kept]),
             'kept_z': np.array([kept.z for kept in self._kept]),
             'rotated': np.array(self._rotated),
@@ -237,7 +205,7 @@ class OnlineRegression:
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue exactly where `state` was taken."""
-        self._hold(state['U'], state['data'])
+        self._samples = SampleBuffer(state['U'], state['data'], self._budget + 1)
         self._rotated = int(state['rotated'])
         self._kept = tuple(
             Information(np.array(R), np.array(z))
@@ -258,28 +226,18 @@ class OnlineRegression:
                 for j, row in zip(group.outputs, rows, strict=True):
                     self._kept[j].absorb(row[None])
         self._rotated += 1
-        self._U.drop(m)
-        self._data.drop(m)
+        self._samples.drop(m)
         if not self._remember:
             self._total = self._with_buffer()
-
-    def _hold(self, U: np.ndarray, data: np.ndarray) -> None:
-        """Hold copies of inputs U (n, d) and data (n, k, p + 1), with room for the budget."""
-        buffers = []
-        for rows in (U, data):
-            buffer = SlidingRows(self._budget + 1, rows.shape[1:])
-            buffer.replace(rows)
-            buffers.append(buffer)
-        self._U, self._data = buffers
 
     def _rebuild(self) -> None:
         groups = output_groups(self._model)
         factors = []
         for group in groups:
             factor = GrowingFactor(group, len(self._prior.z), self._budget + 1)
-            factor.fill(self._U.rows, self._data.rows[:, list(group.outputs)])
+            factor.fill(self._samples.inputs, self._samples.data[:, list(group.outputs)])
             factors.append(factor)
-        self._hold(self._U.rows, self._data.rows)
+        self._samples = self._samples.with_room(self._budget + 1)
         self._groups, self._factors = groups, tuple(factors)
         self._total = self._with_buffer()
         self._rotated = 0

@@ -56,7 +56,9 @@ class SlidingRows:
         self.size -= 1
         if m == self.size:
             return
-        self._block[self.start + 1 : self.start + 1 + m] = self._block[self.start : self.start + m]
+        if m:
+            live = slice(self.start, self.start + m)
+            self._block[self.start + 1 : self.start + 1 + m] = self._block[live]
         self.start += 1
 
     def replace(self, rows: np.ndarray) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from sgp_ros.core.online import OnlinePrediction
+    from sgp_ros.core.online_prediction import OnlinePrediction
 
 _LEAST_RECIPROCAL_CONDITION = 1e-12
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from sgp_ros.core.learning import initial_model
 from sgp_ros.core.model import Model, Observations
-from sgp_ros.core.online import OnlinePrediction, OnlineRegression
+from sgp_ros.core.online import OnlineRegression
 from sgp_ros.core.scores import RunningScore
 from sgp_ros.engine.complement import solve_complement
 from sgp_ros.engine.factor_safety import check_factor, predict_soundly
@@ -22,6 +22,7 @@ from sgp_ros.engine.results import Channel, Estimate
 from sgp_ros.errors import NumericalError
 
 if TYPE_CHECKING:
+    from sgp_ros.core.online_prediction import OnlinePrediction
     from sgp_ros.engine.config import EngineConfig
     from sgp_ros.engine.results import Counts
     from sgp_ros.engine.windows import Equation

@@ -9,7 +9,8 @@ from sgp_ros.errors import NumericalError
 if TYPE_CHECKING:
     import numpy as np
 
-    from sgp_ros.core.online import OnlinePrediction, OnlineRegression
+    from sgp_ros.core.online import OnlineRegression
+    from sgp_ros.core.online_prediction import OnlinePrediction
     from sgp_ros.engine.results import Counts
 
 
