@@ -19,6 +19,7 @@ from sgp_ros.core.factor_loops import (
     move_to_front,
     solve_lower,
 )
+from sgp_ros.core.inverse_column import inverse_column
 from sgp_ros.core.sliding import SlidingRows, length_for
 from sgp_ros.errors import NumericalError
 
@@ -78,6 +79,11 @@ class GrowingFactor:
         return self._white.size
 
     @property
+    def outputs(self) -> int:
+        """Outputs that share the factor."""
+        return len(self._scales)
+
+    @property
     def white(self) -> np.ndarray:
         """Whitened regressors and, last, observations `L^-1 [F y]`, (size, k, p + 1)."""
         return self._white.rows.reshape(self.size, *self._shape)
@@ -89,6 +95,12 @@ class GrowingFactor:
             return self._U
         live = slice(self._white.start, self._white.start + self.size)
         return self._U[live, live].T
+
+    def inverse_column(self, m: int) -> np.ndarray:
+        """Return column m (n,) of `(K + noise I)^-1`; (0,) where Z is zero. O(n^2)."""
+        if self._kernel is None:
+            return np.zeros(0)
+        return inverse_column(self._U, self._white.start, self.size, m)
 
     def whiten(self, u: np.ndarray) -> Whitening:
         """Return an input u (d,) against the samples. O(n^2 / 2 + n k p)."""

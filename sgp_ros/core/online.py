@@ -2,11 +2,12 @@
 
 Components of X with the same covariance up to a scale share one growing factor L, with
 `A = L^-1 F` and `b = L^-1 y` of each beside it.
-Appending borders the factor; the solve it needs is the one the prediction made. Dropping a sample
-rotates the factor and leaves the conditional row of that sample: information on W that no
-remaining sample repeats. With `remember` it is kept, and the likelihood is a product of
-conditionals in which every sample counts once (Vecchia 1988). What is kept was whitened with
-the noise of its time; when a fit finds another noise, it is scaled to that.
+Appending borders the factor; the solve it needs is the one the prediction made. Which sample
+leaves a full buffer is a policy (`core.retention`). Dropping it rotates the factor and leaves the
+conditional row of that sample: information on W that no remaining sample repeats. With `remember`
+it is kept, and the likelihood is a product of conditionals in which every sample counts once
+(Vecchia 1988). What is kept was whitened with the noise of its time; when a fit finds another
+noise, it is scaled to that.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from sgp_ros.core.factor import GrowingFactor
 from sgp_ros.core.information import Information
 from sgp_ros.core.online_prediction import OnlinePrediction
 from sgp_ros.core.output_groups import output_groups
+from sgp_ros.core.retention import RETENTIONS
 from sgp_ros.core.sample_buffer import SampleBuffer
 from sgp_ros.errors import NumericalError
 
@@ -39,15 +41,23 @@ class OnlineRegression:
         prior: of W.
         budget: most samples that Z is conditioned on.
         remember: whether W keeps what dropped samples told about it.
+        policy: which sample leaves a full buffer, a key of `RETENTIONS`.
     """
 
     def __init__(
-        self, model: Model, prior: CoefficientPrior, budget: int, *, remember: bool = True
+        self,
+        model: Model,
+        prior: CoefficientPrior,
+        budget: int,
+        *,
+        remember: bool = True,
+        policy: str = 'oldest',
     ) -> None:
         self._prior = Information.of_prior(prior)
         self._total = self._prior.copy()
         self._budget = budget
         self._remember = remember
+        self._retention = RETENTIONS[policy]()
         self._version = 0
         self._rotated = 0
         p = prior.size
@@ -75,7 +85,7 @@ class OnlineRegression:
 
     @property
     def buffer(self) -> Observations:
-        """A copy of the buffered samples, oldest first."""
+        """A copy of the buffered samples, in the order in which they came."""
         return self._samples.observations()
 
     @property
@@ -115,7 +125,7 @@ class OnlineRegression:
     def learn(self, prediction: OnlinePrediction, y: np.ndarray) -> None:
         """Add the sample that `prediction` was made for, observed as y (k,).
 
-        The oldest sample leaves when the budget is reached. O(n^2) per factor.
+        One sample leaves when the budget is exceeded. O(n^2) per factor.
 
         Raises:
             ValueError: the model changed since the prediction.
@@ -132,8 +142,9 @@ class OnlineRegression:
         ):
             self._total.absorb(factor.append(whitening, data[list(group.outputs)]))
         self._samples.append(prediction.u, data)
+        self._retention.append(self._factors, prediction.u)
         while self.size > self._budget:
-            self._drop(0)
+            self._drop(self._retention.choose(self._factors))
 
     def is_sound(self, prediction: OnlinePrediction) -> bool:
         """Whether every factor gave the observation a positive variance."""
@@ -165,14 +176,15 @@ class OnlineRegression:
         budget: int | None = None,
         *,
         remember: bool | None = None,
+        policy: str | None = None,
     ) -> None:
-        """Take other hyper-parameters, budget or memory; refactorises the buffer, O(k n^3).
+        """Take other hyper-parameters, budget, memory or policy; refactorises, O(k n^3).
 
         Raises:
             NumericalError: the buffer has no factor under the new hyper-parameters; nothing has
                 changed then.
         """
-        previous = (self._model, self._budget, self._remember, self._kept)
+        previous = (self._model, self._budget, self._remember, self._kept, self._retention)
         if model is not None:
             ratios = np.sqrt(np.array(self._model.noise) / np.array(model.noise))
             self._kept = tuple(
@@ -181,12 +193,15 @@ class OnlineRegression:
             self._model = model
         self._budget = budget or self._budget
         self._remember = self._remember if remember is None else remember
+        if policy is not None:
+            self._retention = RETENTIONS[policy]()
+            self._retention.rebuild(self._model, self._factors, self._samples.inputs)
         try:
             while self.size > self._budget:
-                self._drop(0)
+                self._drop(self._retention.choose(self._factors))
             self._rebuild()
         except Exception:
-            self._model, self._budget, self._remember, self._kept = previous
+            self._model, self._budget, self._remember, self._kept, self._retention = previous
             raise
 
     def state(self) -> dict[str, np.ndarray]:
@@ -201,6 +216,8 @@ class OnlineRegression:
         for j, factor in enumerate(self._factors):
             for name, array in factor.state().items():
                 arrays[f'factor{j}_{name}'] = array
+        for name, array in self._retention.state().items():
+            arrays[f'retention_{name}'] = array
         return {name: array.copy() for name, array in arrays.items()}
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
@@ -217,9 +234,17 @@ class OnlineRegression:
             factor.restore(
                 {k.removeprefix(prefix): v for k, v in state.items() if k.startswith(prefix)}
             )
+        self._retention.restore(
+            {
+                k.removeprefix('retention_'): v
+                for k, v in state.items()
+                if k.startswith('retention_')
+            }
+        )
         self._version += 1
 
     def _drop(self, m: int) -> None:
+        self._retention.drop(self._factors, m)
         for group, factor in zip(self._groups, self._factors, strict=True):
             rows = factor.drop(m)
             if self._remember:
@@ -240,6 +265,7 @@ class OnlineRegression:
         self._samples = self._samples.with_room(self._budget + 1)
         self._groups, self._factors = groups, tuple(factors)
         self._total = self._with_buffer()
+        self._retention.rebuild(self._model, self._factors, self._samples.inputs)
         self._rotated = 0
         self._version += 1
 
