@@ -130,6 +130,11 @@ class EngineConfig:
         'buffer.remember', 'bool', default=True,
         description='Keep what dropped samples told about W.',
     )  # fmt: skip
+    buffer_policy: str = _setting(
+        'buffer.policy', 'str', 'oldest',
+        'Which sample leaves a full buffer; coverage parts the closest two inputs of Z.',
+        choices=('oldest', 'least_informative', 'coverage'),
+    )  # fmt: skip
     buffer_check_period: int = _setting(
         'buffer.check_period', 'int', 5000,
         'Learned samples between two comparisons of the factor with one computed anew.',

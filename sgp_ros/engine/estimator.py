@@ -86,12 +86,16 @@ class Estimator:
         """
         if self.regression is not None:
             model = model_of_settings(config, self.inputs, self.regression.model)
-            changed = model != self.regression.model
-            if changed or config.buffer_budget != self._config.buffer_budget or (
-                config.buffer_remember != self._config.buffer_remember
+            is_moved = config.buffer_policy != self._config.buffer_policy
+            if model != self.regression.model or is_moved or any(
+                getattr(config, name) != getattr(self._config, name)
+                for name in ('buffer_budget', 'buffer_remember')
             ):  # fmt: skip
                 self.regression.change(
-                    model, config.buffer_budget, remember=config.buffer_remember
+                    model,
+                    config.buffer_budget,
+                    remember=config.buffer_remember,
+                    policy=config.buffer_policy if is_moved else None,
                 )
                 self._refresh_baseline()
         self._config = config
@@ -238,7 +242,11 @@ class Estimator:
         """Return an empty model with these hyper-parameters."""
         config = self._config
         return OnlineRegression(
-            model, self._prior, config.buffer_budget, remember=config.buffer_remember
+            model,
+            self._prior,
+            config.buffer_budget,
+            remember=config.buffer_remember,
+            policy=config.buffer_policy,
         )
 
     def make_baseline(self, model: Model) -> OnlineRegression:

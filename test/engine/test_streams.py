@@ -1,0 +1,68 @@
+"""Laws of settings that say how a long stream is kept."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.replay import replay
+from test.engine.worlds import PENDULUM, config, pendulum_events
+
+KEEPING = [
+    {'buffer__policy': 'least_informative'},
+    {'buffer__policy': 'coverage'},
+]
+
+
+def _estimates(engine, events):
+    found = []
+    replay(engine, events, lambda step: found.extend(step.estimates))
+    return np.array([np.concatenate([e.acceleration.mean, e.effort.variance]) for e in found])
+
+
+def _restored(engine):
+    """Return an engine that took the other one's snapshot through a file."""
+    file = io.BytesIO()
+    np.savez(file, **engine.snapshot())
+    file.seek(0)
+    again = Engine(PENDULUM, config())
+    with np.load(file, allow_pickle=False) as snapshot:
+        again.restore(snapshot)
+    return again
+
+
+@pytest.mark.parametrize('options', KEEPING)
+def test_stop_save_restore_continue_equals_never_stopped(options):
+    """A snapshot through a file continues to the same bits, however the stream is kept."""
+    events = pendulum_events(400)
+    engine = Engine(PENDULUM, config(refit__period=100, buffer__budget=30, **options))
+    _estimates(engine, events[:500])
+    again = _restored(engine)
+    np.testing.assert_array_equal(
+        _estimates(again, events[500:]), _estimates(engine, events[500:])
+    )
+
+
+@pytest.mark.parametrize('options', KEEPING)
+def test_each_way_of_keeping_is_another_model(options):
+    """A setting that changed nothing would be a setting without effect."""
+    events = pendulum_events(400)
+    default = _estimates(Engine(PENDULUM, config(buffer__budget=20)), events)
+    other = _estimates(Engine(PENDULUM, config(buffer__budget=20, **options)), events)
+    assert not np.array_equal(default[-50:], other[-50:], equal_nan=True)
+
+
+def test_a_policy_may_change_between_two_samples():
+    """A live change takes effect on the next sample that leaves."""
+    events = pendulum_events(400)
+    engine = Engine(PENDULUM, config(buffer__budget=20))
+    _estimates(engine, events[:400])
+    before = engine.estimator.regression.buffer.U
+    engine.change({'buffer.policy': 'coverage'})
+    np.testing.assert_array_equal(engine.estimator.regression.buffer.U, before)
+    _estimates(engine, events[400:])
+    times_kept = {tuple(u) for u in engine.estimator.regression.buffer.U}
+    assert times_kept & {tuple(u) for u in before}
