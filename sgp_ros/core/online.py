@@ -84,6 +84,11 @@ class OnlineRegression:
         return self._samples.size
 
     @property
+    def is_whole(self) -> bool:
+        """Whether other hyper-parameters lose nothing that Z was told: Z is the buffer."""
+        return True
+
+    @property
     def buffer(self) -> Observations:
         """A copy of the buffered samples, in the order in which they came."""
         return self._samples.observations()

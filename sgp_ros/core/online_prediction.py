@@ -20,8 +20,10 @@ class OnlinePrediction:
         covariance: (k, k) of X, without noise; infinite on the diagonal where an undetermined
             direction of W enters.
         u, f: the input (d,) and regressor (k, p) it was made for.
-        whitenings: the input against the samples, one per factor.
+        whitenings: the input against the samples, one per factor; in a basis against the inducing
+            inputs, one per component.
         version: state of the model it was made with.
+        gains: of a basis, by which data enter the features, (m,) per component; else none.
     """
 
     mean: np.ndarray
@@ -30,3 +32,4 @@ class OnlinePrediction:
     f: np.ndarray
     whitenings: tuple[Whitening, ...]
     version: int
+    gains: tuple[np.ndarray, ...] = ()
