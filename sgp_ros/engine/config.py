@@ -137,8 +137,17 @@ class EngineConfig:
     )  # fmt: skip
     buffer_check_period: int = _setting(
         'buffer.check_period', 'int', 5000,
-        'Learned samples between two comparisons of the factor with one computed anew.',
+        'Learned samples between two comparisons of an exact factor with one computed anew.',
         low=10, high=1_000_000,
+    )  # fmt: skip
+    buffer_mode: str = _setting(
+        'buffer.mode', 'str', 'exact',
+        'exact: Z is conditioned on the buffer; basis: on the whole stream, in a basis of Z.',
+        choices=('exact', 'basis'), read_only=True,
+    )  # fmt: skip
+    basis_features: int = _setting(
+        'basis.features', 'int', 100, 'Most features of the basis of each joint.',
+        low=1, high=2000, read_only=True,
     )  # fmt: skip
     refit_enabled: bool = _setting(
         'refit.enabled', 'bool', default=True, description='Refit the hyper-parameters.'

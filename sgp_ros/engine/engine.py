@@ -249,7 +249,8 @@ class Engine:
         self.next_fit = self.counts.learned
 
     def _schedule_fit(self) -> None:
-        if not self.is_ready or not self.config.refit_enabled:
+        regression = self.estimator.regression
+        if regression is None or not (self.config.refit_enabled and regression.is_whole):
             return
         if self.counts.learned >= self.next_fit and self.request_refit():
             self.next_fit = self.counts.learned + self.config.refit_period

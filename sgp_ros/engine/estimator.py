@@ -15,6 +15,7 @@ from sgp_ros.engine.complement import solve_complement
 from sgp_ros.engine.factor_safety import check_factor, predict_soundly
 from sgp_ros.engine.prior_knowledge import (
     complement_columns,
+    empty_regression,
     model_of_settings,
     prior_of_robot,
 )
@@ -23,6 +24,7 @@ from sgp_ros.errors import NumericalError
 
 if TYPE_CHECKING:
     from sgp_ros.core.online_prediction import OnlinePrediction
+    from sgp_ros.core.regression import Regression
     from sgp_ros.engine.config import EngineConfig
     from sgp_ros.engine.results import Counts
     from sgp_ros.engine.windows import Equation
@@ -57,8 +59,8 @@ class Estimator:
             self._complement_columns & set(seen) for seen in columns
         )
         self._config = config
-        self.regression: OnlineRegression | None = None
-        self.baseline: OnlineRegression | None = None
+        self.regression: Regression | None = None
+        self.baseline: Regression | None = None
         self.waiting: list[Arrays] = []
         self.forget_scores()
         if not any(joint.is_automatic for joint in config.hyper):
@@ -121,7 +123,7 @@ class Estimator:
             return estimate
         return self._predict_score_learn(self.regression, equation)
 
-    def _predict_score_learn(self, regression: OnlineRegression, equation: Equation) -> Estimate:
+    def _predict_score_learn(self, regression: Regression, equation: Equation) -> Estimate:
         u, f, y = self._arrays(equation)
         prediction = predict_soundly(regression, u, f, self._counts)
         noise = np.array(regression.model.noise)
@@ -142,9 +144,7 @@ class Estimator:
             is_learned,
         )
 
-    def _learn(
-        self, regression: OnlineRegression, prediction: OnlinePrediction, y: np.ndarray
-    ) -> bool:
+    def _learn(self, regression: Regression, prediction: OnlinePrediction, y: np.ndarray) -> bool:
         try:
             regression.learn(prediction, y)
         except NumericalError:
@@ -174,7 +174,7 @@ class Estimator:
         return values
 
     def _complement(
-        self, regression: OnlineRegression, equation: Equation, prediction: OnlinePrediction
+        self, regression: Regression, equation: Equation, prediction: OnlinePrediction
     ) -> Channel:
         measured = self._measured(equation, self._robot.complement)
         k = len(measured)
@@ -238,16 +238,9 @@ class Estimator:
         if self._config.learning_enabled:
             self.baseline.learn(prediction, y)
 
-    def make_regression(self, model: Model) -> OnlineRegression:
+    def make_regression(self, model: Model) -> Regression:
         """Return an empty model with these hyper-parameters."""
-        config = self._config
-        return OnlineRegression(
-            model,
-            self._prior,
-            config.buffer_budget,
-            remember=config.buffer_remember,
-            policy=config.buffer_policy,
-        )
+        return empty_regression(model, self._prior, self._config)
 
     def make_baseline(self, model: Model) -> OnlineRegression:
         """Return an empty model of the physics alone."""

@@ -1,4 +1,4 @@
-"""What robot and settings say before any sample: prior of W, hyper-parameters, inputs."""
+"""What robot and settings say before any sample: prior of W, hyper-parameters, empty model."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.core.basis import BasisRegression
 from sgp_ros.core.kernels import SquaredExponential
 from sgp_ros.core.model import Model
+from sgp_ros.core.online import OnlineRegression
 from sgp_ros.core.prior import CoefficientPrior
 
 if TYPE_CHECKING:
     from sgp_ros.core.kernels import Kernel
+    from sgp_ros.core.regression import Regression
     from sgp_ros.engine.config import EngineConfig, JointHyperparameters
     from sgp_ros.robots.robot import Robot
 
@@ -47,6 +50,15 @@ def prior_of_robot(robot: Robot, config: EngineConfig) -> CoefficientPrior:
     mean = np.array([c.prior_mean for c in robot.coefficients])
     std = np.array([c.prior_std for c in robot.coefficients]) * config.prior_scale
     return CoefficientPrior.from_std(mean, std)
+
+
+def empty_regression(model: Model, prior: CoefficientPrior, config: EngineConfig) -> Regression:
+    """Return the kind of model that the settings name, before any sample."""
+    budget, remember = config.buffer_budget, config.buffer_remember
+    if config.buffer_mode == 'basis':
+        return BasisRegression(model, prior, budget, config.basis_features, remember=remember)
+    policy = config.buffer_policy
+    return OnlineRegression(model, prior, budget, remember=remember, policy=policy)
 
 
 def complement_columns(robot: Robot) -> set[int]:

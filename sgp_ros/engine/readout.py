@@ -11,14 +11,14 @@ from sgp_ros.engine.results import ParameterEstimate, Score
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from sgp_ros.core.online import OnlineRegression
+    from sgp_ros.core.regression import Regression
     from sgp_ros.core.scores import RunningScore
     from sgp_ros.engine.config import EngineConfig
     from sgp_ros.robots.robot import Robot
 
 
 def read_parameters(
-    robot: Robot, config: EngineConfig, model: OnlineRegression | None
+    robot: Robot, config: EngineConfig, model: Regression | None
 ) -> tuple[ParameterEstimate, ...]:
     """Return the posterior of every coefficient under a model; empty without one."""
     if model is None or config.model_method == 'GP':

@@ -30,7 +30,7 @@ from sgp_ros.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from sgp_ros.core.online import OnlineRegression
+    from sgp_ros.core.regression import Regression
     from sgp_ros.engine.engine import Engine
     from sgp_ros.engine.estimator import Estimator
     from sgp_ros.robots.robot import Robot
@@ -133,14 +133,12 @@ def fill_from_snapshot(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> No
         estimator.baseline = _read_regression('baseline', snapshot, engine)
 
 
-def _regressions(estimator: Estimator) -> dict[str, OnlineRegression]:
+def _regressions(estimator: Estimator) -> dict[str, Regression]:
     found = {'model': estimator.regression, 'baseline': estimator.baseline}
     return {name: regression for name, regression in found.items() if regression is not None}
 
 
-def _read_regression(
-    name: str, snapshot: Mapping[str, np.ndarray], engine: Engine
-) -> OnlineRegression:
+def _read_regression(name: str, snapshot: Mapping[str, np.ndarray], engine: Engine) -> Regression:
     kernels: list[SquaredExponential | None] = []
     for j, columns in enumerate(engine.estimator.inputs):
         key = f'{name}_kernel{j}'

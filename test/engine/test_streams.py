@@ -14,6 +14,7 @@ from test.engine.worlds import PENDULUM, config, pendulum_events
 KEEPING = [
     {'buffer__policy': 'least_informative'},
     {'buffer__policy': 'coverage'},
+    {'buffer__mode': 'basis', 'basis__features': 10},
 ]
 
 
@@ -66,3 +67,24 @@ def test_a_policy_may_change_between_two_samples():
     _estimates(engine, events[400:])
     times_kept = {tuple(u) for u in engine.estimator.regression.buffer.U}
     assert times_kept & {tuple(u) for u in before}
+
+
+def test_fits_end_where_new_features_would_forget():
+    """In a basis, hyper-parameters are fitted while the kept samples are the whole stream."""
+    events = pendulum_events(1000)
+    options = {'refit__period': 20, 'buffer__budget': 60, 'filter__hop': 0.01}
+    basis = Engine(PENDULUM, config(buffer__mode='basis', **options))
+    exact = Engine(PENDULUM, config(**options))
+    _estimates(basis, events)
+    _estimates(exact, events)
+    assert 1 <= basis.fits <= 3
+    assert exact.fits > 10
+
+
+def test_a_basis_has_no_factor_to_check():
+    """No sample is ever dropped from it, so nothing drifts and nothing is measured."""
+    settings = config(buffer__mode='basis', buffer__check_period=20, buffer__budget=20)
+    engine = Engine(PENDULUM, settings)
+    _estimates(engine, pendulum_events(400))
+    assert engine.counts.learned > 40
+    assert engine.counts.factor_checks == engine.counts.factor_rebuilt == 0

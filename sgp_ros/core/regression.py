@@ -1,0 +1,67 @@
+"""What a stream asks of a regression, whichever way it keeps what it learned."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import numpy as np
+
+    from sgp_ros.core.information import Information
+    from sgp_ros.core.model import Model, Observations
+    from sgp_ros.core.online_prediction import OnlinePrediction
+
+
+class Regression(Protocol):
+    """The posterior of W and Z after each sample."""
+
+    @property
+    def model(self) -> Model:
+        """Hyper-parameters in force."""
+
+    @property
+    def information(self) -> Information:
+        """What is known of W."""
+
+    @property
+    def size(self) -> int:
+        """Number of samples kept."""
+
+    @property
+    def buffer(self) -> Observations:
+        """The samples kept."""
+
+    @property
+    def base(self) -> Information:
+        """What the prior and the samples that are gone tell of W."""
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether other hyper-parameters would lose nothing that Z was told."""
+
+    def predict(self, u: np.ndarray, f: np.ndarray) -> OnlinePrediction:
+        """Predict X at input u (d,) with regressor f (k, p)."""
+
+    def with_regressor(self, prediction: OnlinePrediction, f: np.ndarray) -> OnlinePrediction:
+        """Predict for another regressor f (k, p) at an input that Z sees as the same."""
+
+    def learn(self, prediction: OnlinePrediction, y: np.ndarray) -> None:
+        """Add the sample that `prediction` was made for, observed as y (k,)."""
+
+    def change(
+        self,
+        model: Model | None = None,
+        budget: int | None = None,
+        *,
+        remember: bool | None = None,
+        policy: str | None = None,
+    ) -> None:
+        """Take other hyper-parameters, budget, memory or policy."""
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Return everything that was learned, as arrays."""
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """Continue exactly where `state` was taken."""
