@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sgp_ros.core.feature_block import FeatureBlock, remainder_of
+from sgp_ros.core.forgetting import Forgetting
 from sgp_ros.core.information import Information
 from sgp_ros.core.model import Observations
 from sgp_ros.core.online_prediction import OnlinePrediction
@@ -38,6 +39,7 @@ class BasisRegression:
         budget: most samples kept for fits of the hyper-parameters; at least half as many are.
         features: most features of each component.
         remember: whether W keeps under new hyper-parameters what samples told that are gone.
+        forgetting: samples after which what was learned counts 1/e; 0 never forgets.
     """
 
     def __init__(
@@ -48,8 +50,10 @@ class BasisRegression:
         features: int,
         *,
         remember: bool = True,
+        forgetting: float = 0.0,
     ) -> None:
         self._prior = Information.of_prior(prior)
+        self._forgetting = Forgetting(forgetting, self._prior)
         self._features = features
         self._budget = budget
         self._remember = remember
@@ -149,6 +153,7 @@ class BasisRegression:
         if prediction.version != self._version:
             raise ValueError('the prediction was made before the last change of the model')
         self._version += 1
+        self._fade()
         self._absorb(prediction.whitenings, prediction.f, y)
         u = prediction.u[None]
         self._U = np.concatenate([self._U, u]) if self.size else u.copy()
@@ -156,10 +161,26 @@ class BasisRegression:
         self._y = np.concatenate([self._y, y[None]])
         self._forget_half()
 
-    def _absorb(self, features: tuple[Whitening, ...], f: np.ndarray, y: np.ndarray) -> None:
+    def _fade(self) -> None:
+        if self._forgetting.factor == 1.0:
+            return
+        stages = (self._told, self._told_middle, self._told_first)
+        self._forgetting.fade(self._total, [told for stage in stages for told in stage])
+        for block, told in zip(self._blocks, self._told, strict=True):
+            rest = block.fade(self._forgetting)
+            self._total.absorb(rest)
+            told.absorb(rest)
+
+    def _absorb(
+        self,
+        features: tuple[Whitening, ...],
+        f: np.ndarray,
+        y: np.ndarray,
+        weight: float = 1.0,
+    ) -> None:
         resolved = True
         for j, block in enumerate(self._blocks):
-            rest = block.absorb(features[j], f[j], float(y[j]))[None]
+            rest = block.absorb(features[j], f[j], float(y[j]), weight)[None]
             resolved &= block.is_resolved
             self._total.absorb(rest)
             self._told[j].absorb(rest)
@@ -182,6 +203,7 @@ class BasisRegression:
         *,
         remember: bool | None = None,
         policy: str | None = None,
+        forgetting: float | None = None,
     ) -> None:
         """Take other hyper-parameters, budget or memory; `policy` says nothing here.
 
@@ -192,8 +214,12 @@ class BasisRegression:
         del policy
         self._budget = budget or self._budget
         self._remember = self._remember if remember is None else remember
-        if model is None or model == self._model:
-            return
+        if model is not None and model != self._model:
+            self._learn_again(model)
+        if forgetting is not None:
+            self._forgetting = Forgetting(forgetting, self._prior)
+
+    def _learn_again(self, model: Model) -> None:
         ratios = np.sqrt(np.array(self._model.noise) / np.array(model.noise))
         self._told = tuple(
             told.scaled(float(ratio) if self._remember else 0.0)
@@ -206,13 +232,15 @@ class BasisRegression:
         for i, (u, f, y) in enumerate(zip(self._U, self._F, self._y, strict=True)):
             if i == self._middle:
                 self._told_middle = tuple(told.copy() for told in self._told)
-            self._absorb(tuple(block.features(u) for block in self._blocks), f, y)
+            weight = self._forgetting.factor ** (self.size - 1 - i)
+            self._absorb(tuple(block.features(u) for block in self._blocks), f, y, weight)
         self._version += 1
 
     def state(self) -> dict[str, np.ndarray]:
         """Return everything that was learned, as arrays; `restore` takes it back."""
         arrays = {name: getattr(self, f'_{name}') for name in _ARRAYS}
-        arrays['counts'] = np.array([self._middle, self._gone, self._unresolved])
+        counts = [self._middle, self._gone, self._unresolved, self._forgetting.turn]
+        arrays['counts'] = np.array(counts)
         arrays |= {'total_R': self._total.R, 'total_z': self._total.z}
         for name in ('told', 'told_middle', 'told_first'):
             for j, told in enumerate(getattr(self, f'_{name}')):
@@ -224,7 +252,8 @@ class BasisRegression:
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue exactly where `state` was taken."""
         self._U, self._F, self._y = (np.array(state[name]) for name in _ARRAYS)
-        self._middle, self._gone, self._unresolved = (int(n) for n in state['counts'])
+        counts = (int(n) for n in state['counts'])
+        self._middle, self._gone, self._unresolved, self._forgetting.turn = counts
         self._total = _read(state, 'total')
         k = len(self._blocks)
         self._told = tuple(_read(state, f'told{j}') for j in range(k))

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from sgp_ros.core.factor import Whitening
+    from sgp_ros.core.forgetting import Forgetting
     from sgp_ros.core.kernels import Kernel
 
 REMAINDER = 0.01
@@ -67,8 +68,16 @@ class FeatureBlock:
         solve_transposed(self._R, self.size, g)
         return g
 
-    def absorb(self, features: Whitening, f: np.ndarray, y: float) -> np.ndarray:
+    def absorb(
+        self, features: Whitening, f: np.ndarray, y: float, weight: float = 1.0
+    ) -> np.ndarray:
         """Learn observation y with regressor f (p,) at the input of these features.
+
+        Args:
+            features: of the input.
+            f: regressor.
+            y: observation.
+            weight: by which its equation of unit noise counts; less than one for an old sample.
 
         Returns:
             What it tells of W alone: a row of unit noise and its value, (p + 1,).
@@ -81,10 +90,26 @@ class FeatureBlock:
             self._factor.append(features, np.zeros((1, 1)))
             self._R[self.size - 1, self.size - 1] = 1.0
             phi, remainder = np.append(phi, math.sqrt(remainder)), 0.0
-        deviation = math.sqrt(self._noise + remainder)
-        rest /= deviation
-        absorb_equation(self._R, self.S, self.size, phi / deviation, rest)
+        scale = weight / math.sqrt(self._noise + remainder)
+        rest *= scale
+        absorb_equation(self._R, self.S, self.size, scale * phi, rest)
         return rest
+
+    def fade(self, forgetting: Forgetting) -> np.ndarray:
+        """Forget a little of the data, nothing of the prior: the weights in turn get theirs back.
+
+        Returns:
+            What that leaves on W: rows of unit noise and their values, (1, p + 1), or none.
+        """
+        m = self.size
+        if not m:
+            return np.zeros((0, self.S.shape[1]))
+        self._R[:m, :m] *= forgetting.factor
+        self.S[:m] *= forgetting.factor
+        phi, rest = np.zeros(m), np.zeros(self.S.shape[1])
+        phi[forgetting.turn % m] = forgetting.lost(m)
+        absorb_equation(self._R, self.S, m, phi, rest)
+        return rest[None]
 
     def state(self) -> dict[str, np.ndarray]:
         """Return what `restore` needs, as arrays."""

@@ -60,6 +60,12 @@ class Information:
         absorb_rows(self.R, self.z, rows.copy())
         self._solved = None
 
+    def fade(self, factor: float) -> None:
+        """Let all equations count `factor` times as much as before, their noise still one."""
+        self.R *= factor
+        self.z *= factor
+        self._solved = None
+
     def scaled(self, factor: float) -> Information:
         """Return this information as if its noise had had `1 / factor` times the deviation."""
         return Information(factor * self.R, factor * self.z)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sgp_ros.core.factor import GrowingFactor
+from sgp_ros.core.forgetting import Forgetting
 from sgp_ros.core.information import Information
 from sgp_ros.core.online_prediction import OnlinePrediction
 from sgp_ros.core.output_groups import output_groups
@@ -42,6 +43,7 @@ class OnlineRegression:
         budget: most samples that Z is conditioned on.
         remember: whether W keeps what dropped samples told about it.
         policy: which sample leaves a full buffer, a key of `RETENTIONS`.
+        forgetting: samples after which information on W counts 1/e; 0 never forgets.
     """
 
     def __init__(
@@ -52,8 +54,10 @@ class OnlineRegression:
         *,
         remember: bool = True,
         policy: str = 'oldest',
+        forgetting: float = 0.0,
     ) -> None:
         self._prior = Information.of_prior(prior)
+        self._forgetting = Forgetting(forgetting, self._prior)
         self._total = self._prior.copy()
         self._budget = budget
         self._remember = remember
@@ -141,6 +145,9 @@ class OnlineRegression:
         for factor, whitening in zip(self._factors, prediction.whitenings, strict=True):
             factor.pivot(whitening)
         self._version += 1
+        if self._forgetting.factor != 1.0:
+            self._forgetting.fade(self._total, self._kept)
+            self._samples.fade(self._forgetting.factor)
         data = np.concatenate([prediction.f, y[:, None]], axis=1)  # (k, p + 1)
         for group, factor, whitening in zip(
             self._groups, self._factors, prediction.whitenings, strict=True
@@ -182,6 +189,7 @@ class OnlineRegression:
         *,
         remember: bool | None = None,
         policy: str | None = None,
+        forgetting: float | None = None,
     ) -> None:
         """Take other hyper-parameters, budget, memory or policy; refactorises, O(k n^3).
 
@@ -208,15 +216,19 @@ class OnlineRegression:
         except Exception:
             self._model, self._budget, self._remember, self._kept, self._retention = previous
             raise
+        if forgetting is not None:
+            self._forgetting = Forgetting(forgetting, self._prior)
 
     def state(self) -> dict[str, np.ndarray]:
         """Return everything that was learned, as arrays; `restore` takes it back."""
         arrays = {
             'U': self._samples.inputs, 'data': self._samples.data,
+            'weights': self._samples.weights,
             'kept_R': np.array([kept.R for kept in self._kept]),
             'kept_z': np.array([kept.z for kept in self._kept]),
             'rotated': np.array(self._rotated),
             'total_R': self._total.R, 'total_z': self._total.z,
+            'turn': np.array(self._forgetting.turn),
         }  # fmt: skip
         for j, factor in enumerate(self._factors):
             for name, array in factor.state().items():
@@ -227,13 +239,14 @@ class OnlineRegression:
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue exactly where `state` was taken."""
-        self._samples = SampleBuffer(state['U'], state['data'], self._budget + 1)
+        self._samples = SampleBuffer(state['U'], state['data'], state['weights'], self._budget + 1)
         self._rotated = int(state['rotated'])
         self._kept = tuple(
             Information(np.array(R), np.array(z))
             for R, z in zip(state['kept_R'], state['kept_z'], strict=True)
         )
         self._total = Information(np.array(state['total_R']), np.array(state['total_z']))
+        self._forgetting.turn = int(state['turn'])
         for j, factor in enumerate(self._factors):
             prefix = f'factor{j}_'
             factor.restore(
@@ -250,8 +263,9 @@ class OnlineRegression:
 
     def _drop(self, m: int) -> None:
         self._retention.drop(self._factors, m)
+        weight = self._samples.weights[m]
         for group, factor in zip(self._groups, self._factors, strict=True):
-            rows = factor.drop(m)
+            rows = weight * factor.drop(m)
             if self._remember:
                 for j, row in zip(group.outputs, rows, strict=True):
                     self._kept[j].absorb(row[None])
@@ -275,6 +289,7 @@ class OnlineRegression:
         self._version += 1
 
     def _with_buffer(self) -> Information:
-        p = len(self._prior.z)
-        rows = np.vstack([factor.white.reshape(-1, p + 1) for factor in self._factors])
+        p, weights = len(self._prior.z), self._samples.weights[:, None, None]
+        whitened = [(weights * factor.white).reshape(-1, p + 1) for factor in self._factors]
+        rows = np.vstack(whitened)
         return self.base.with_rows(rows[:, :-1], rows[:, -1])

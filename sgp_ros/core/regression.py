@@ -57,8 +57,9 @@ class Regression(Protocol):
         *,
         remember: bool | None = None,
         policy: str | None = None,
+        forgetting: float | None = None,
     ) -> None:
-        """Take other hyper-parameters, budget, memory or policy."""
+        """Take other hyper-parameters, budget, memory, policy or forgetting."""
 
     def state(self) -> dict[str, np.ndarray]:
         """Return everything that was learned, as arrays."""

@@ -149,6 +149,11 @@ class EngineConfig:
         'basis.features', 'int', 100, 'Most features of the basis of each joint.',
         low=1, high=2000, read_only=True,
     )  # fmt: skip
+    forgetting_samples: float = _setting(
+        'forgetting.samples', 'float', 0.0,
+        'Learned samples after which what is known of W counts 1/e; 0 never forgets.',
+        low=0.0, high=1e9,
+    )  # fmt: skip
     refit_enabled: bool = _setting(
         'refit.enabled', 'bool', default=True, description='Refit the hyper-parameters.'
     )

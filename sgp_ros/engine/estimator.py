@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from sgp_ros.robots.robot import Robot
 
 _BASELINE_BUDGET = 1
+_KEEPING = ('buffer_budget', 'buffer_remember', 'buffer_policy', 'forgetting_samples')
+"""Settings of which a change reaches the models."""
 
 Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Input u (4 k,), regressor f (k, p) and target y (k,) of one equation."""
@@ -86,21 +88,32 @@ class Estimator:
         Raises:
             NumericalError: the buffer has no factor under new hyper-parameters; nothing changed.
         """
-        if self.regression is not None:
-            model = model_of_settings(config, self.inputs, self.regression.model)
-            is_moved = config.buffer_policy != self._config.buffer_policy
-            if model != self.regression.model or is_moved or any(
-                getattr(config, name) != getattr(self._config, name)
-                for name in ('buffer_budget', 'buffer_remember')
-            ):  # fmt: skip
-                self.regression.change(
-                    model,
-                    config.buffer_budget,
-                    remember=config.buffer_remember,
-                    policy=config.buffer_policy if is_moved else None,
-                )
-                self._refresh_baseline()
+        old = self._config
         self._config = config
+        if self.regression is None:
+            return
+        model = model_of_settings(config, self.inputs, self.regression.model)
+        is_same = model == self.regression.model and all(
+            getattr(config, name) == getattr(old, name) for name in _KEEPING
+        )
+        if is_same:
+            return
+        forgetting = config.forgetting_samples
+        is_faded_anew = forgetting != old.forgetting_samples
+        try:
+            self.regression.change(
+                model,
+                config.buffer_budget,
+                remember=config.buffer_remember,
+                policy=config.buffer_policy if config.buffer_policy != old.buffer_policy else None,
+                forgetting=forgetting if is_faded_anew else None,
+            )
+        except NumericalError:
+            self._config = old
+            raise
+        if is_faded_anew and self.baseline is not None:
+            self.baseline.change(forgetting=forgetting)
+        self._refresh_baseline()
 
     def _refresh_baseline(self) -> None:
         """Give the physics alone the noise that its own errors show."""
@@ -244,7 +257,8 @@ class Estimator:
 
     def make_baseline(self, model: Model) -> OnlineRegression:
         """Return an empty model of the physics alone."""
-        return OnlineRegression(model, self._prior, _BASELINE_BUDGET)
+        forgetting = self._config.forgetting_samples
+        return OnlineRegression(model, self._prior, _BASELINE_BUDGET, forgetting=forgetting)
 
     def _start(self, arrays: list[Arrays]) -> None:
         """Make the first model from what was gathered, then learn that."""

@@ -55,10 +55,24 @@ def prior_of_robot(robot: Robot, config: EngineConfig) -> CoefficientPrior:
 def empty_regression(model: Model, prior: CoefficientPrior, config: EngineConfig) -> Regression:
     """Return the kind of model that the settings name, before any sample."""
     budget, remember = config.buffer_budget, config.buffer_remember
+    forgetting = config.forgetting_samples
     if config.buffer_mode == 'basis':
-        return BasisRegression(model, prior, budget, config.basis_features, remember=remember)
-    policy = config.buffer_policy
-    return OnlineRegression(model, prior, budget, remember=remember, policy=policy)
+        return BasisRegression(
+            model,
+            prior,
+            budget,
+            config.basis_features,
+            remember=remember,
+            forgetting=forgetting,
+        )
+    return OnlineRegression(
+        model,
+        prior,
+        budget,
+        remember=remember,
+        policy=config.buffer_policy,
+        forgetting=forgetting,
+    )
 
 
 def complement_columns(robot: Robot) -> set[int]:

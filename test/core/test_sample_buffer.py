@@ -16,8 +16,10 @@ def test_a_buffer_is_the_list_of_what_came_and_was_not_dropped(dropped):
     buffer, held = SampleBuffer.empty(2, 3).with_room(4), []
     for m in dropped:
         u, data = rng.normal(size=2), rng.normal(size=(2, 4))
+        buffer.fade(0.5)
         buffer.append(u, data)
-        held.append((u, data))
+        held = [(x, rows, 0.5 * weight) for x, rows, weight in held]
+        held.append((u, data, 1.0))
         if m < len(held):
             buffer.drop(m)
             del held[m]
@@ -27,7 +29,8 @@ def test_a_buffer_is_the_list_of_what_came_and_was_not_dropped(dropped):
             del held[0]
         seen = buffer.observations()
         assert buffer.size == len(held) == len(seen.U)
-        for i, (u, data) in enumerate(held):
+        for i, (u, data, weight) in enumerate(held):
             np.testing.assert_array_equal(seen.U[i], u)
             np.testing.assert_array_equal(seen.F[i], data[:, :-1])
             np.testing.assert_array_equal(seen.y[i], data[:, -1])
+            assert buffer.weights[i] == weight

@@ -15,6 +15,8 @@ KEEPING = [
     {'buffer__policy': 'least_informative'},
     {'buffer__policy': 'coverage'},
     {'buffer__mode': 'basis', 'basis__features': 10},
+    {'forgetting__samples': 30.0},
+    {'forgetting__samples': 30.0, 'buffer__mode': 'basis'},
 ]
 
 
@@ -67,6 +69,20 @@ def test_a_policy_may_change_between_two_samples():
     _estimates(engine, events[400:])
     times_kept = {tuple(u) for u in engine.estimator.regression.buffer.U}
     assert times_kept & {tuple(u) for u in before}
+
+
+@pytest.mark.parametrize('mode', ['exact', 'basis'])
+def test_forgetting_may_begin_between_two_samples(mode):
+    """From then on parameters become less certain than those of an engine that hardly forgets."""
+    events = pendulum_events(600)
+    stds = []
+    for forgetting in (1e9, 30.0):
+        engine = Engine(PENDULUM, config(refit__enabled=False, buffer__mode=mode))
+        _estimates(engine, events[:400])
+        engine.change({'forgetting.samples': forgetting})
+        _estimates(engine, events[400:])
+        stds.append([p.std for p in engine.parameters() + engine.physics_parameters()])
+    assert np.all(np.array(stds[1]) > np.array(stds[0]))
 
 
 def test_fits_end_where_new_features_would_forget():
