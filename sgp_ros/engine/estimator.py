@@ -191,7 +191,7 @@ class Estimator:
     ) -> Channel:
         measured = self._measured(equation, self._robot.complement)
         k = len(measured)
-        unknown = Channel(measured, np.full(k, np.nan), np.full(k, np.nan))
+        unknown = Channel.unknown(measured)
         joints = list(equation.complement_joints)
         if not joints or self._config.model_method == 'GP':
             return unknown
@@ -280,19 +280,13 @@ class Estimator:
         return model_of_settings(self._config, self.inputs, start)
 
     def _unknown(self, equation: Equation) -> Estimate:
-        def blank(channel: str) -> Channel:
-            measured = self._measured(equation, channel)
-            return Channel(
-                measured, np.full(len(measured), np.nan), np.full(len(measured), np.nan)
-            )
-
         return Estimate(
             equation.stamp_ns,
             self._robot.joint_names,
             equation.motion.position[0],
             equation.motion.velocity[0],
-            blank('acceleration'),
-            blank('effort'),
+            Channel.unknown(self._measured(equation, 'acceleration')),
+            Channel.unknown(self._measured(equation, 'effort')),
             is_scored=False,
             is_learned=self._config.learning_enabled,
         )

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    import numpy as np
+import numpy as np
 
+if TYPE_CHECKING:
     from sgp_ros.engine.samples import Event
 
 REFUSALS = ('late', 'duplicate', 'nonfinite', 'unpaired', 'unknown_joint', 'gap')
@@ -30,6 +30,11 @@ class Channel:
     measured: np.ndarray
     mean: np.ndarray
     variance: np.ndarray
+
+    @classmethod
+    def unknown(cls, measured: np.ndarray) -> Channel:
+        """Return these measurements without a prediction."""
+        return cls(measured, np.full(len(measured), np.nan), np.full(len(measured), np.nan))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
