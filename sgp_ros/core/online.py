@@ -93,6 +93,11 @@ class OnlineRegression:
         return True
 
     @property
+    def unresolved(self) -> int:
+        """Samples at which a basis had no room: there is none."""
+        return 0
+
+    @property
     def buffer(self) -> Observations:
         """A copy of the buffered samples, in the order in which they came."""
         return self._samples.observations()

@@ -41,6 +41,10 @@ class Regression(Protocol):
     def is_whole(self) -> bool:
         """Whether other hyper-parameters would lose nothing that Z was told."""
 
+    @property
+    def unresolved(self) -> int:
+        """Samples at which the basis of Z had no room; 0 without a basis."""
+
     def predict(self, u: np.ndarray, f: np.ndarray) -> OnlinePrediction:
         """Predict X at input u (d,) with regressor f (k, p)."""
 

@@ -25,6 +25,7 @@ from sgp_ros.errors import NumericalError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from sgp_ros.core.drift import DriftTest
     from sgp_ros.core.model import Model
     from sgp_ros.engine.config import EngineConfig
     from sgp_ros.engine.samples import SettingValue
@@ -65,6 +66,11 @@ class Engine:
         """Number of samples that Z is conditioned on."""
         regression = self.estimator.regression
         return len(self.estimator.waiting) if regression is None else regression.size
+
+    @property
+    def drift(self) -> tuple[DriftTest, ...]:
+        """Whether the errors of each joint have grown."""
+        return self.estimator.drift
 
     def push(self, event: Event) -> Step:
         """Take one event; count it as refused if it cannot be used.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.core.drift import DriftTest
 from sgp_ros.core.learning import initial_model
 from sgp_ros.core.model import Model, Observations
 from sgp_ros.core.online import OnlineRegression
@@ -45,6 +46,7 @@ class Estimator:
         regression: physics and process; None until enough samples started it.
         baseline: physics alone on the same samples; None where the method has no process.
         scores: of the model, channel name to one score per joint.
+        drift: tests of the target, one per joint.
         baseline_scores: of the baseline on the target, one per joint.
         waiting: inputs, regressors and targets gathered before the first model.
     """
@@ -76,6 +78,7 @@ class Estimator:
             for channel in ('acceleration', 'effort')
         }
         self.baseline_scores = tuple(RunningScore() for _ in range(k))
+        self.drift = tuple(DriftTest() for _ in range(k))
 
     def begin_stream(self, counts: Counts) -> None:
         """Keep the models; count and score anew."""
@@ -93,10 +96,9 @@ class Estimator:
         if self.regression is None:
             return
         model = model_of_settings(config, self.inputs, self.regression.model)
-        is_same = model == self.regression.model and all(
+        if model == self.regression.model and all(
             getattr(config, name) == getattr(old, name) for name in _KEEPING
-        )
-        if is_same:
+        ):
             return
         forgetting = config.forgetting_samples
         is_faded_anew = forgetting != old.forgetting_samples
@@ -226,6 +228,9 @@ class Estimator:
         if not np.all(np.isfinite(target.variance)):
             return False
         self._counts.scored += 1
+        errors = (target.measured - target.mean) / np.sqrt(target.variance)
+        for test, error in zip(self.drift, errors, strict=True):
+            test.add(float(error))
         for channel, values in (
             (self._robot.target, target), (self._robot.complement, complement)
         ):  # fmt: skip

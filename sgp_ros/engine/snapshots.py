@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sgp_ros.core.drift import DriftTest
 from sgp_ros.core.kernels import SquaredExponential
 from sgp_ros.core.model import Model
 from sgp_ros.core.scores import RunningScore
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from sgp_ros.engine.estimator import Estimator
     from sgp_ros.robots.robot import Robot
 
-VERSION = 2
+VERSION = 3
 
 
 def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
@@ -65,6 +66,7 @@ def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
         'next_ns': intake.windows.next_ns,
         'last_state_ns': intake.last_state_ns,
         'scores': {c: [asdict(s) for s in scores] for c, scores in estimator.scores.items()},
+        'drift': [asdict(test) for test in estimator.drift],
         'baseline_scores': [asdict(score) for score in estimator.baseline_scores],
     }
     arrays = {'json': np.array(json.dumps(text))}
@@ -124,6 +126,7 @@ def fill_from_snapshot(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> No
         for channel, scores in text['scores'].items()
     }
     estimator.baseline_scores = tuple(RunningScore(**s) for s in text['baseline_scores'])
+    estimator.drift = tuple(DriftTest(**test) for test in text['drift'])
     estimator.waiting = list(
         zip(*(snapshot[f'waiting_{name}'] for name in ('U', 'F', 'y')), strict=True)
     )

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 _DURATIONS = 2000
 _MEMORY = 100
-_DRIFTED = 4.0
+_SURPRISING = 4.0
 
 
 class Health:
@@ -120,7 +120,7 @@ class Health:
         }
 
     def _model(self, engine: Engine) -> tuple[str, int, str, dict[str, str]]:
-        config, counts = engine.config, engine.counts
+        config, counts, regression = engine.config, engine.counts, engine.estimator.regression
         message = 'predicts and learns'
         if not engine.is_ready:
             message = f'gathers the first {config.learning_initial} samples'
@@ -131,6 +131,7 @@ class Health:
             'learning': str(int(config.learning_enabled)),
             'buffer': str(engine.buffer_size),
             'budget': str(config.buffer_budget),
+            'basis_unresolved': str(0 if regression is None else regression.unresolved),
             'delay_s': f'{engine.delay_s:.6f}',
             'refits': str(counts.refits),
             'refits_refused': str(counts.refits_refused),
@@ -151,12 +152,18 @@ class Health:
         target = scores.get(engine.robot.target)
         if target is None or self._surprise is None:
             return f'fit {joint}', OK, 'nothing scored yet', values
-        drift = float(self._surprise[j])
-        values['drift'] = f'{drift:.4f}'
+        surprise, drift = float(self._surprise[j]), engine.drift[j]
+        values['surprise'] = f'{surprise:.4f}'
+        values['drift'] = f'{drift.level:.4f}'
         message = f'nMSE {target.nmse:.3g}, coverage {100 * target.coverage95:.1f} %'
-        if drift > _DRIFTED:
-            message += f'; recent squared errors are {drift:.1f} times what the model expects'
-        return f'fit {joint}', WARN if drift > _DRIFTED else OK, message, values
+        is_wrong = surprise > _SURPRISING
+        if is_wrong:
+            message += f'; recent squared errors are {surprise:.1f} times what the model expects'
+        if drift.is_drifting:
+            message += (
+                '; errors have grown beyond chance: the robot drifts or moves as never before'
+            )
+        return f'fit {joint}', WARN if is_wrong or drift.is_drifting else OK, message, values
 
 
 def _flat(counts: Counts, unreadable: int) -> dict[str, int]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import io
+import json
 
 import numpy as np
 import pytest
 
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
+from sgp_ros.errors import ConfigError
 from test.engine.worlds import PENDULUM, config, pendulum_events
 
 KEEPING = [
@@ -47,6 +49,8 @@ def test_stop_save_restore_continue_equals_never_stopped(options):
     np.testing.assert_array_equal(
         _estimates(again, events[500:]), _estimates(engine, events[500:])
     )
+    assert again.drift == engine.drift
+    assert again.drift[0].n > 0
 
 
 @pytest.mark.parametrize('options', KEEPING)
@@ -95,6 +99,16 @@ def test_fits_end_where_new_features_would_forget():
     _estimates(exact, events)
     assert 1 <= basis.fits <= 3
     assert exact.fits > 10
+
+
+def test_a_model_of_another_version_is_refused():
+    """Arrays that mean something else must not be read."""
+    engine = Engine(PENDULUM, config())
+    snapshot = engine.snapshot()
+    text = json.loads(str(snapshot['json']))
+    snapshot['json'] = np.array(json.dumps(text | {'version': 2}))
+    with pytest.raises(ConfigError, match='version 2'):
+        engine.restore(snapshot)
 
 
 def test_a_basis_has_no_factor_to_check():
