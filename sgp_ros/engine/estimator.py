@@ -19,6 +19,7 @@ from sgp_ros.engine.prior_knowledge import (
     empty_regression,
     model_of_settings,
     prior_of_robot,
+    sample_budget,
 )
 from sgp_ros.engine.results import Channel, Estimate
 from sgp_ros.errors import NumericalError
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 
 _BASELINE_BUDGET = 1
 _KEEPING = ('buffer_budget', 'buffer_remember', 'buffer_policy', 'forgetting_samples')
-"""Settings of which a change reaches the models."""
 
 Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Input u (4 k,), regressor f (k, p) and target y (k,) of one equation."""
@@ -105,7 +105,7 @@ class Estimator:
         try:
             self.regression.change(
                 model,
-                config.buffer_budget,
+                sample_budget(config),
                 remember=config.buffer_remember,
                 policy=config.buffer_policy if config.buffer_policy != old.buffer_policy else None,
                 forgetting=forgetting if is_faded_anew else None,

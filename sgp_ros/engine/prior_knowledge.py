@@ -52,9 +52,20 @@ def prior_of_robot(robot: Robot, config: EngineConfig) -> CoefficientPrior:
     return CoefficientPrior.from_std(mean, std)
 
 
+def sample_budget(config: EngineConfig) -> int:
+    """Return how many samples a model may keep.
+
+    A basis takes other hyper-parameters without loss only while it keeps the whole stream, so
+    the first fit must come in that time.
+    """
+    if config.buffer_mode == 'basis':
+        return max(config.buffer_budget, 2 * config.learning_initial)
+    return config.buffer_budget
+
+
 def empty_regression(model: Model, prior: CoefficientPrior, config: EngineConfig) -> Regression:
     """Return the kind of model that the settings name, before any sample."""
-    budget, remember = config.buffer_budget, config.buffer_remember
+    budget, remember = sample_budget(config), config.buffer_remember
     forgetting = config.forgetting_samples
     if config.buffer_mode == 'basis':
         return BasisRegression(

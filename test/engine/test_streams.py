@@ -118,3 +118,12 @@ def test_a_basis_has_no_factor_to_check():
     _estimates(engine, pendulum_events(400))
     assert engine.counts.learned > 40
     assert engine.counts.factor_checks == engine.counts.factor_rebuilt == 0
+
+
+def test_a_basis_is_fitted_at_least_once():
+    """A model that begins with more samples than the budget still takes the first fit whole."""
+    options = {'learning__initial': 50, 'buffer__budget': 20, 'filter__hop': 0.01}
+    engine = Engine(PENDULUM, config(buffer__mode='basis', **options))
+    _estimates(engine, pendulum_events(1000))
+    assert engine.counts.refits >= 1
+    assert engine.buffer_size <= 100
