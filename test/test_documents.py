@@ -125,7 +125,9 @@ def test_numbers_in_the_page_of_pendulums_are_the_measured_ones():
             assert f'| {" | ".join(cells)} |' in text
 
 
-@pytest.mark.parametrize('name', ['reproduction', 'recordings', 'pendulums', 'diagnosis_real'])
+@pytest.mark.parametrize(
+    'name', ['reproduction', 'recordings', 'pendulums', 'diagnosis_real', 'streams']
+)
 def test_generated_pages_are_those_of_the_results(name):
     """Mend with `python docs/generate_<name>.py`."""
     path = ROOT / 'docs' / f'generate_{name}.py'

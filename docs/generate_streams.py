@@ -1,0 +1,165 @@
+"""Write docs/streams.md from committed results: `python docs/generate_streams.py`."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+TARGET = Path(__file__).parent / 'streams.md'
+RESULTS = ROOT / 'benchmarks' / 'results'
+PAGE = (Path(__file__).parent / 'templates' / 'streams.txt').read_text(encoding='utf-8')
+
+
+def _load(name):
+    return json.loads((RESULTS / f'{name}.json').read_text(encoding='utf-8'))
+
+
+def _table(titles, rows):
+    lines = [f'| {" | ".join(titles)} |', '|---' * len(titles) + '|']
+    return '\n'.join(lines + [f'| {" | ".join(row)} |' for row in rows])
+
+
+def _percent(x, digits=1):
+    return f'{100 * x:.{digits}f} %'
+
+
+def _mean(values):
+    return sum(values) / len(values)
+
+
+def _long(result):
+    titles = ('way', 'µs a sample, first and last block', 'p99 of the last', 'MB, first and last block',
+              'nMSE of the function', 'coverage', 'NLPD', 'intervals of W too narrow by')  # fmt: skip
+    rows = []
+    for name, way in result['ways'].items():
+        times, memory = way['us_p50'], way['resident_mb']
+        rows.append((
+            name, f'{times[0]:.0f}, {times[-1]:.0f}', f'{way["us_p99"][-1]:.0f}',
+            f'{memory[0]:.0f}, {memory[-1]:.0f}', f'{way["nmse"][-1]:.2g}',
+            _percent(way['coverage95']), f'{way["nlpd"]:.3f}', f'{math.sqrt(way["w_msq"][-1]):.1f}',
+        ))  # fmt: skip
+    return _table(titles, rows)
+
+
+def _long_text(result):
+    errors = sorted(result['random_subset_nmse'])
+    basis = result['ways']['basis']
+    return (
+        f'{result["samples"]} samples of one joint whose truth is a draw from the model, buffer of '
+        f'{result["budget"]}, {basis["features"][0]} features in use. A batch fit to a random subset '
+        f'of {result["budget"]} samples has an nMSE of {errors[len(errors) // 2]:.2g} '
+        f'({errors[0]:.2g} to {errors[-1]:.2g} over {len(errors)} subsets). The last column is the '
+        'root mean square of the whitened error of W, 1 where intervals are right; with four '
+        'coefficients chance alone gives 0.5 to 1.5. Times are those of the processor.'
+    )
+
+
+def _accuracy(result):
+    titles = ('stream', 'method', 'nMSE', 'NLPD', 'coverage', 'µs')
+    rows = []
+    for name, stream in result['streams'].items():
+        first = f'{name}, {stream["equations"]} equations'
+        for method, found in stream['methods'].items():
+            cells = (f'{_mean(found["nmse"]):.3g}', f'{_mean(found["nlpd"]):.3g}',
+                     _percent(_mean(found['coverage95'])))  # fmt: skip
+            rows.append((first, method, *cells, f'{found["us"]:.0f}' if 'us' in found else ''))
+            first = ''
+    return _table(titles, rows)
+
+
+def _best(result):
+    parts = []
+    for name, stream in result['streams'].items():
+        methods = stream['methods']
+        least = {
+            key: min(methods, key=lambda m, key=key: _mean(methods[m][key]))
+            for key in ('nmse', 'nlpd')
+        }
+        parts.append(f'{name}: {least["nmse"]} (nMSE), {least["nlpd"]} (NLPD)')
+    return 'Best of each stream: ' + '; '.join(parts) + '.'
+
+
+def _worlds(found):
+    titles = ('way, hyper-parameters', 'coverage of predictions', 'NLPD', 'coverage of W',
+              'intervals of W too narrow by')  # fmt: skip
+    rows = [
+        (name, _percent(way['coverage95']), f'{way["nlpd"]:.3f}', _percent(way['w_coverage95']),
+         f'{math.sqrt(way["w_msq"]):.1f}')
+        for name, way in found.items()
+    ]  # fmt: skip
+    return _table(titles, rows)
+
+
+def _wheels(found):
+    titles = ('mode', 'joint', 'coverage', 'NLPD')
+    rows = [
+        (mode, joint, _percent(row['coverage95'][i]), f'{row["nlpd"][i]:.3f}')
+        for mode, row in found.items()
+        for i, joint in enumerate(row['joints'])
+    ]
+    return _table(titles, rows)
+
+
+def _recordings(found):
+    titles = ('recording', 'joint', 'coverage, exact', 'NLPD', 'coverage, basis', 'NLPD', 'drift')
+    rows = []
+    for name, row in found.items():
+        for i, joint in enumerate(row['joints']):
+            cells = []
+            for mode in ('exact', 'basis'):
+                cells += [_percent(row[mode]['coverage95'][i]), f'{row[mode]["nlpd"][i]:.3g}']
+            drifting = [mode for mode in ('exact', 'basis') if row[mode]['drifting'][i]]
+            rows.append((name if i == 0 else '', joint, *cells, ', '.join(drifting)))
+    return _table(titles, rows)
+
+
+def _live(result):
+    titles = ('run', 'lost', 'learned', 'refits, refused', 'callback p50, p99, max [ms]',
+              'latency p50, p99 [ms]', 'beyond settings', 'processor')  # fmt: skip
+    rows = []
+    for name, run in result['runs'].items():
+        callback = ', '.join(f'{run["callback_ms"][q]:.2f}' for q in ('p50', 'p99', 'max'))
+        pairs = [
+            ', '.join(f'{run[key][q]:.1f}' for q in ('p50', 'p99'))
+            for key in ('latency_ms', 'latency_beyond_settings_ms')
+        ]
+        rows.append((
+            name, f'{run["lost"]} of {run["published"]}', str(run['learned']),
+            f'{run["refits"]}, {run["refits_refused"]}', callback, *pairs,
+            _percent(run['processor_share'], 0),
+        ))  # fmt: skip
+    return _table(titles, rows)
+
+
+def text():
+    """Return the page."""
+    long, accuracy, live = (_load(n) for n in ('long_stream', 'stream_accuracy', 'live_rate'))
+    calibration = _load('calibration')
+    worlds, wheels = calibration['worlds'], calibration['wheels']
+    count = next(iter(worlds.values()))['worlds']
+    drifting = {mode: _percent(_mean(row['drifting'])) for mode, row in wheels.items()}
+    values = {
+        'LONG': _long(long), 'LONG_TEXT': _long_text(long), 'ACCURACY': _accuracy(accuracy),
+        'BEST': _best(accuracy),
+        'WORLDS': _worlds(worlds), 'WHEELS': _wheels(wheels),
+        'WORLDS_TEXT': f'{count} worlds drawn from the model itself, {calibration["length"]} samples '
+        f'each, a joint that returns, buffer of {calibration["budget"]}, at most '
+        f'{calibration["features"]} features; hyper-parameters known, or learned from the first samples:',
+        'WHEELS_TEXT': f'{wheels["exact"]["wheels"]} simulated reaction wheels with encoders, '
+        f'{calibration["wheel_s"]:g} s each, through the whole engine to a model that holds all of '
+        'their physics:',
+        'SETTLED': '100', 'RECORDINGS': _recordings(calibration['recordings']),
+        'WHEELS_COUNT': str(wheels['exact']['wheels']), 'FALSE_EXACT': drifting['exact'],
+        'FALSE_BASIS': drifting['basis'], 'LIVE': _live(live), 'LIVE_BUDGET': str(live['budget']),
+        'LIVE_SECONDS': f'{live["seconds"]:g}', 'CORES': live['environment']['cores'],
+    }  # fmt: skip
+    page = PAGE
+    for name, value in values.items():
+        page = page.replace('{' + name + '}', value)
+    return page
+
+
+if __name__ == '__main__':
+    TARGET.write_text(text(), encoding='utf-8')
