@@ -1,13 +1,12 @@
 """Joint inference of W and Z one sample at a time, with a bounded number of samples in Z.
 
 Components of X with the same covariance up to a scale share one growing factor L, with
-`A = L^-1 F` and `b = L^-1 y` of each beside it.
-Appending borders the factor; the solve it needs is the one the prediction made. Which sample
-leaves a full buffer is a policy (`core.retention`). Dropping it rotates the factor and leaves the
-conditional row of that sample: information on W that no remaining sample repeats. With `remember`
-it is kept, and the likelihood is a product of conditionals in which every sample counts once
-(Vecchia 1988). What is kept was whitened with the noise of its time; when a fit finds another
-noise, it is scaled to that.
+`A = L^-1 F` and `b = L^-1 y` of each beside it. Appending borders the factor; the solve it needs
+is the one the prediction made. Which sample leaves a full buffer is a policy (`core.retention`).
+Dropping it rotates the factor and leaves the conditional row of that sample: information on W
+that no remaining sample repeats. With `remember` it is kept, and the likelihood is a product of
+conditionals in which every sample counts once (Vecchia 1988). What is kept was whitened with the
+noise of its time; when a fit finds another noise, it is scaled to that.
 """
 
 from __future__ import annotations
@@ -220,6 +219,7 @@ class OnlineRegression:
             self._rebuild()
         except Exception:
             self._model, self._budget, self._remember, self._kept, self._retention = previous
+            self._retention.rebuild(self._model, self._factors, self._samples.inputs)
             raise
         if forgetting is not None:
             self._forgetting = Forgetting(forgetting, self._prior)
@@ -253,17 +253,8 @@ class OnlineRegression:
         self._total = Information(np.array(state['total_R']), np.array(state['total_z']))
         self._forgetting.turn = int(state['turn'])
         for j, factor in enumerate(self._factors):
-            prefix = f'factor{j}_'
-            factor.restore(
-                {k.removeprefix(prefix): v for k, v in state.items() if k.startswith(prefix)}
-            )
-        self._retention.restore(
-            {
-                k.removeprefix('retention_'): v
-                for k, v in state.items()
-                if k.startswith('retention_')
-            }
-        )
+            factor.restore(_part(state, f'factor{j}_'))
+        self._retention.restore(_part(state, 'retention_'))
         self._version += 1
 
     def _drop(self, m: int) -> None:
@@ -298,3 +289,7 @@ class OnlineRegression:
         whitened = [(weights * factor.white).reshape(-1, p + 1) for factor in self._factors]
         rows = np.vstack(whitened)
         return self.base.with_rows(rows[:, :-1], rows[:, -1])
+
+
+def _part(state: Mapping[str, np.ndarray], prefix: str) -> dict[str, np.ndarray]:
+    return {k.removeprefix(prefix): v for k, v in state.items() if k.startswith(prefix)}

@@ -12,6 +12,7 @@ from sgp_ros.core.model import Model
 from sgp_ros.core.online import OnlineRegression
 from sgp_ros.core.prior import CoefficientPrior
 from sgp_ros.core.retention import RETENTIONS
+from sgp_ros.errors import NumericalError
 from test.core.worlds import random_problem
 
 FLAT = CoefficientPrior.flat(3)
@@ -147,6 +148,26 @@ def test_a_policy_taken_later_goes_on_from_the_buffer(policy):
         if i >= 8:
             changed.learn(changed.predict(data.U[i], data.F[i]), data.y[i])
     np.testing.assert_array_equal(changed.buffer.U, always.buffer.U)
+
+
+@pytest.mark.parametrize('policy', RETENTIONS)
+def test_a_refused_change_leaves_a_stream_that_goes_on(policy):
+    """A model without factor is refused; the policy then knows which samples are left."""
+    model, data = random_problem(9, n=40)
+    data.U[:20] = data.U[0] + 1e-9 * np.arange(20)[:, None]
+    lost = Model(model.kernels, (1e-300, 1e-300))
+    online = OnlineRegression(model, FLAT, 20, policy=policy)
+    for i in range(20):
+        online.learn(online.predict(data.U[i], data.F[i]), data.y[i])
+    with pytest.raises(NumericalError):
+        online.change(lost, 12, policy='oldest')
+    fresh = OnlineRegression(model, FLAT, 20, policy=policy)
+    for u, f, y in zip(*(getattr(online.buffer, x) for x in 'UFy'), strict=True):
+        fresh.learn(fresh.predict(u, f), y)
+    for one in (online, fresh):
+        for i in range(20, 40):
+            one.learn(one.predict(data.U[i], data.F[i]), data.y[i])
+    np.testing.assert_array_equal(online.buffer.U, fresh.buffer.U)
 
 
 @pytest.mark.parametrize('policy', RETENTIONS)
