@@ -216,7 +216,7 @@ def test_services_answer(graph: Graph) -> None:
     assert 'learning.initial' in refit.message
     diagnose = graph.call(Trigger, '/sgp_node/diagnose')
     assert not diagnose.success
-    assert 'has no URDF' in diagnose.message
+    assert 'too few states: 0' in diagnose.message
     assert graph.call(SetBool, '/sgp_node/learn', SetBool.Request(data=False)).success
     client = graph.parameters()
     (value,) = graph.answer(client.get_parameters(['learning.enabled'])).values
