@@ -60,7 +60,12 @@ and need the YAML.
    the same, the one with the fewest effects and parameters is asserted. What the best model leaves, relative to
    what there was to explain, must be small, else the verdict is `unexplained`, and a Gaussian process Z is learned
    for the joint; the inputs that evidence keeps are what the discrepancy depends on.
-7. **Prove.** Efforts, one-step accelerations, predictive densities and roll-outs of 0.3 s from measured states,
+   The share of an effect counts before any filter, for impacts of backlash lie above the cut-off.
+   Where the best explanation of all is too small to be physics, no larger one is asserted in its place.
+7. **Cannot tell.** Rivals whose odds the data move by less than twenty are carried over to other motions: the whole
+   range of the joints, faster, slower, elsewhere. Those that differ nowhere by 0.4 % are the same law under a richer
+   name, and count for the finding; the others are reported with the motion on which they differ most.
+8. **Prove.** Efforts, one-step accelerations, predictive densities and roll-outs of 0.3 s from measured states,
    on held-out recordings, before and after, each with a 95 % interval; how far the recording lies from what was
    learned stands beside them.
 
@@ -106,6 +111,10 @@ TAIL = """
   passes for Coulomb friction. Cubic drag is not in the list and comes close to quadratic drag.
 * **Motion that is faster than the filters.** A robot that whirls or chatters leaves a discrepancy that no
   model explains. The tool counts the part that it can measure as error, the rest may come out as `unexplained`.
+* **Heavier or weaker.** The odds between models compare residuals of effort, and a model of heavier bodies has
+  larger ones for the same motion: the `log det M` of step 5 enters the evidence, not yet these odds. So a weak motor
+  is preferred to heavy bodies that fit the motion as well ([diagnosis_real.md](diagnosis_real.md), the
+  heavier pendulum); the equivalence is said, the probability is too high.
 * **More than two effects at one joint** are not searched for.
 * **Backlash** is modelled with a hard contact; the gap is right to a few per cent, single impacts are not.
 * **Probabilities** are tempered odds among the models that were fitted; the table above says how well they hold.
@@ -133,7 +142,7 @@ def _percent(rate):
         return 'none drawn'
     return (
         f'{100 * rate["share"]:.0f} % of {rate["n"]} '
-        f'({100 * rate["low"]:.0f} to {100 * rate["high"]:.0f} %)'
+        f'({100 * max(rate["low"], 0.0):.0f} to {100 * rate["high"]:.0f} %)'
     )
 
 
@@ -160,7 +169,9 @@ def _tier(name, report):
         lines.append(
             f'| share of the best possible improvement, {stem}, median | {_number(value)} |'
         )
-    lines.append(f'| seconds per world, median | {_number(s["seconds_median"])} |')
+    lines.append(
+        f'| seconds per world, two at a time on a busy machine, median | {_number(s["seconds_median"])} |'
+    )
     lines.append(f'| commands that failed | {s["failed"]} |')
     lines += ['\n| stated certainty | right |', '|---|---|']
     lines += [
