@@ -62,9 +62,13 @@ def test_unknown_benchmarks_are_refused(tmp_path):
 @pytest.mark.parametrize(
     'rival',
     [
-        pytest.param(sklearn_rival, marks=pytest.mark.skipif(not find_spec('sklearn'), reason='')),
         pytest.param(
-            gpytorch_rival, marks=pytest.mark.skipif(not find_spec('gpytorch'), reason='')
+            sklearn_rival,
+            marks=pytest.mark.skipif(not find_spec('sklearn'), reason='no scikit-learn'),
+        ),
+        pytest.param(
+            gpytorch_rival,
+            marks=pytest.mark.skipif(not find_spec('gpytorch'), reason='no GPyTorch'),
         ),
     ],
 )
