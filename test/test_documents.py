@@ -44,33 +44,6 @@ def test_commands_in_documents_exist(path):
             assert name in targets, name
 
 
-def test_the_page_of_settings_is_that_of_the_code():
-    """Mend with `python docs/generate_settings.py`."""
-    path = ROOT / 'docs' / 'generate_settings.py'
-    spec = importlib.util.spec_from_file_location('generate_settings', path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    assert module.TARGET.read_text(encoding='utf-8') == module.text()
-
-
-def test_the_page_of_diagnosis_is_that_of_the_results():
-    """Mend with `python docs/generate_diagnosis.py`."""
-    path = ROOT / 'docs' / 'generate_diagnosis.py'
-    spec = importlib.util.spec_from_file_location('generate_diagnosis', path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    assert module.TARGET.read_text(encoding='utf-8') == module.text()
-
-
-def test_the_page_of_performance_is_that_of_the_results():
-    """Mend with `python docs/generate_performance.py`."""
-    path = ROOT / 'docs' / 'generate_performance.py'
-    spec = importlib.util.spec_from_file_location('generate_performance', path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    assert module.TARGET.read_text(encoding='utf-8') == module.text()
-
-
 def test_numbers_in_the_filter_page_are_the_measured_ones():
     """The table is that of the committed result."""
     result = json.loads((ROOT / 'benchmarks/results/filter.json').read_text(encoding='utf-8'))
@@ -126,9 +99,9 @@ def test_numbers_in_the_page_of_pendulums_are_the_measured_ones():
 
 
 @pytest.mark.parametrize(
-    'name', ['reproduction', 'recordings', 'pendulums', 'diagnosis_real', 'streams']
+    'name', sorted(p.stem.removeprefix('generate_') for p in (ROOT / 'docs').glob('generate_*.py'))
 )
-def test_generated_pages_are_those_of_the_results(name):
+def test_generated_pages_are_those_of_code_and_results(name):
     """Mend with `python docs/generate_<name>.py`."""
     path = ROOT / 'docs' / f'generate_{name}.py'
     spec = importlib.util.spec_from_file_location(f'generate_{name}', path)
