@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sgp_ros.diagnosis.decision import TEMPER, Scale
-from sgp_ros.diagnosis.equivalence import is_same_law
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from sgp_ros.diagnosis.candidates import Model
     from sgp_ros.diagnosis.decision import Decision
     from sgp_ros.diagnosis.equations import Equations
+    from sgp_ros.diagnosis.equivalence import Contrasts
     from sgp_ros.diagnosis.hypotheses import Competition
     from sgp_ros.diagnosis.result import Finding
 
@@ -53,7 +53,7 @@ class Probabilities:
 
 
 def probabilities(
-    equations: Equations, competition: Competition, decision: Decision
+    equations: Equations, competition: Competition, decision: Decision, contrasts: Contrasts
 ) -> Probabilities:
     """Return the tempered probabilities of all effects.
 
@@ -65,11 +65,7 @@ def probabilities(
         m
         for m in (*competition.singles, *competition.pairs, *competition.more)
         if scale.counts(m)
-        and not (
-            m.key != asserted.key
-            and scale.worth(m) > least
-            and is_same_law(equations, asserted, m)
-        )
+        and not (m.key != asserted.key and scale.worth(m) > least and contrasts.is_same_law(m))
     ]
     adequate = 1.0 / (1.0 + decision.excess**2)
     by_key: dict[object, float] = {}

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,8 @@ from sgp_ros.diagnosis.result import Equivalent
 from sgp_ros.robots.effects.drive import Drive
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from sgp_ros.diagnosis.candidates import Model
     from sgp_ros.diagnosis.decision import Decision
     from sgp_ros.diagnosis.equations import Equations
@@ -34,6 +37,7 @@ CLEARER = 2.0
 """A motion separates models if their efforts differ this many times more, as mean squares."""
 LONGEST = 4000
 """Rows of the recording that are carried over to other motions."""
+RECORDED = 'the motion of the recording'
 MOTIONS = {
     'a motion over the whole range of the joints': (np.inf, 1.0, 0.0),
     'a motion half as wide': (0.5, 1.0, 0.0),
@@ -47,8 +51,61 @@ A width without bound is what the limits of the joints allow, a turn where there
 """
 
 
+class Contrasts:
+    """How far rivals differ from the asserted model, on the recorded motion and on others.
+
+    What the asserted model takes for these motions is computed once.
+
+    Args:
+        equations: of the recording.
+        asserted: the model to compare with.
+    """
+
+    def __init__(self, equations: Equations, asserted: Model) -> None:
+        self._equations = equations
+        self._asserted = asserted
+        self._known: dict[Model, dict[str, float]] = {}
+
+    def of(self, rival: Model) -> dict[str, float]:
+        """Return the mean square by which the efforts differ, relative, by motion.
+
+        Summed over joints; `RECORDED` is the motion of the recording.
+        """
+        if rival not in self._known:
+            self._known[rival] = {
+                name: self._difference(rival, *there) for name, there in self._motions.items()
+            }
+        return self._known[rival]
+
+    def is_same_law(self, rival: Model) -> bool:
+        """Return whether a rival says the same on any motion, as far as physics counts.
+
+        So does a law with one parameter more whose value makes it the simpler one.
+        """
+        return max(self.of(rival).values()) < LEAST_SHARE
+
+    @cached_property
+    def _motions(self) -> dict[str, tuple[ObservedMotion, np.ndarray, np.ndarray]]:
+        """Motions with the asserted model's imbalance (n, k) and the powers (k,) of efforts."""
+        found = {}
+        for name, how in {RECORDED: (1.0, 1.0, 0.0), **MOTIONS}.items():
+            motion = moved(self._equations.motion, *how)
+            driven = motion.tree.is_actuated[: motion.tree.size]
+            inertial = motion.mass_diagonal * motion.acceleration
+            power = np.where(driven, (motion.effort**2).mean(axis=0), (inertial**2).mean(axis=0))
+            found[name] = motion, imbalance(self._asserted, self._equations, motion), power
+        return found
+
+    def _difference(
+        self, rival: Model, motion: ObservedMotion, asserted: np.ndarray, power: np.ndarray
+    ) -> float:
+        apart = asserted - imbalance(rival, self._equations, motion)
+        share = (apart**2).mean(axis=0) / np.maximum(power, 1e-300)
+        return float(share[motion.moves].sum()) + 1e-300
+
+
 def equivalents(
-    equations: Equations, competition: Competition, decision: Decision
+    equations: Equations, competition: Competition, decision: Decision, contrasts: Contrasts
 ) -> tuple[Equivalent, ...]:
     """Return what the recording cannot tell from the asserted model, best first.
 
@@ -56,6 +113,7 @@ def equivalents(
         equations: of the recording.
         competition: its models.
         decision: `unexplained` has no model to tell anything from.
+        contrasts: of the rivals to the asserted model.
     """
     if decision.verdict == 'unexplained':
         return ()
@@ -66,11 +124,14 @@ def equivalents(
     known: list[Model] = [best]
     least = _fit(equations, scale, best) - ALIKE
     for rival in (unlikely, *sorted(others, key=scale.worth, reverse=True)):
+        if len(found) == MOST:
+            break
         prior = 0.5 * float(rival.w @ rival.w) if rival is unlikely else 0.0
-        is_alike = _fit(equations, scale, rival) + prior > least
-        if len(found) < MOST and is_alike and not any(_contains(rival, m) for m in known):
+        is_other = not any(_contains(rival, m) for m in known)
+        if is_other and _fit(equations, scale, rival) + prior > least:
             known.append(rival)
-            found += _told(equations, best, rival)
+            if not contrasts.is_same_law(rival):
+                found.append(_told(equations, rival, contrasts.of(rival)))
     return tuple(found)
 
 
@@ -102,47 +163,15 @@ def _contains(rival: Model, model: Model) -> bool:
     return model.key <= rival.key and (rival.is_free or not model.is_free)
 
 
-def _told(equations: Equations, best: Model, rival: Model) -> list[Equivalent]:
-    """Return what tells two models apart; nothing for the same law under another name."""
-    here, there = _contrasts(equations, best, rival)
-    name = max(there, key=lambda n: there[n])
-    if max(here, there[name]) < LEAST_SHARE:
-        return []
+def _told(equations: Equations, rival: Model, contrasts: Mapping[str, float]) -> Equivalent:
+    """Return a rival with the motion that would tell it from the asserted model."""
+    name = max(MOTIONS, key=lambda n: contrasts[n])
     effects = tuple(
         (joint_name(equations.motion, s.place.joint), s.effect.name) for s in rival.suspects
     )
-    if there[name] < CLEARER * here:
-        return [Equivalent(effects, '', 1.0)]
-    return [Equivalent(effects, name, there[name] / here)]
-
-
-def is_same_law(equations: Equations, one: Model, other: Model) -> bool:
-    """Return whether two models say the same on any motion, as far as physics counts.
-
-    So does a law with one parameter more whose value makes it the simpler one.
-    """
-    here, there = _contrasts(equations, one, other)
-    return max(here, *there.values()) < LEAST_SHARE
-
-
-def _contrasts(equations: Equations, one: Model, other: Model) -> tuple[float, dict[str, float]]:
-    """Return the difference of two models on the recorded motion, and on each other one."""
-    here = _difference(equations, one, other, moved(equations.motion, 1.0, 1.0, 0.0))
-    there = {
-        name: _difference(equations, one, other, moved(equations.motion, *how))
-        for name, how in MOTIONS.items()
-    }
-    return here, there
-
-
-def _difference(equations: Equations, one: Model, other: Model, motion: ObservedMotion) -> float:
-    """Return the mean square by which the efforts of two models differ, relative, over joints."""
-    driven = motion.tree.is_actuated[: motion.tree.size]
-    inertial = motion.mass_diagonal * motion.acceleration
-    power = np.where(driven, (motion.effort**2).mean(axis=0), (inertial**2).mean(axis=0))
-    apart = imbalance(one, equations, motion) - imbalance(other, equations, motion)
-    share = (apart**2).mean(axis=0) / np.maximum(power, 1e-300)
-    return float(share[motion.moves].sum()) + 1e-300
+    if contrasts[name] < CLEARER * contrasts[RECORDED]:
+        return Equivalent(effects, '', 1.0)
+    return Equivalent(effects, name, contrasts[name] / contrasts[RECORDED])
 
 
 def moved(motion: ObservedMotion, width: float, speed: float, shift: float) -> ObservedMotion:

@@ -8,6 +8,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.places import joint_name
 from sgp_ros.diagnosis.result import Finding, Location, Parameter, ParameterError
+from sgp_ros.diagnosis.suspects import Columns
 from sgp_ros.diagnosis.uncertainty import reported_std
 from sgp_ros.robots.effects.effect import Fitted, Quantity
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from sgp_ros.diagnosis.decision import Decision
     from sgp_ros.diagnosis.equations import Equations
     from sgp_ros.diagnosis.remainder import Remainder
-    from sgp_ros.diagnosis.suspects import Columns
     from sgp_ros.diagnosis.velocity_sensor import SensorLag
     from sgp_ros.robots.effects.effect import Value
 
@@ -31,7 +31,6 @@ MOST_ALTERNATIVES = 8
 def asserted(
     equations: Equations,
     decision: Decision,
-    columns: Columns,
     lags: Sequence[SensorLag],
     remainders: Sequence[Remainder],
     chances: Probabilities,
@@ -40,7 +39,7 @@ def asserted(
     findings: list[Finding] = []
     forces = list(decision.model.forces) if decision.verdict == 'missing_physics' else []
     if decision.verdict == 'missing_physics':
-        std = reported_std(decision.model, columns)
+        std = reported_std(decision.model, Columns(equations))
         findings = [
             _finding(decision, decision.model, i, std[i], chances)
             for i in range(len(decision.model.suspects))

@@ -11,7 +11,7 @@ from sgp_ros.diagnosis.certainty import certainty_of, probabilities
 from sgp_ros.diagnosis.decision import Decision, decide
 from sgp_ros.diagnosis.dependence import dependences
 from sgp_ros.diagnosis.equations import make_equations
-from sgp_ros.diagnosis.equivalence import equivalents
+from sgp_ros.diagnosis.equivalence import Contrasts, equivalents
 from sgp_ros.diagnosis.final_model import FinalModel
 from sgp_ros.diagnosis.findings import alternatives, asserted, parameter_errors
 from sgp_ros.diagnosis.held_out import keep_back
@@ -19,7 +19,6 @@ from sgp_ros.diagnosis.hypotheses import compete
 from sgp_ros.diagnosis.proof import prove
 from sgp_ros.diagnosis.remainder import learn_remainder
 from sgp_ros.diagnosis.result import Diagnosis, Traces
-from sgp_ros.diagnosis.suspects import Columns
 from sgp_ros.diagnosis.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.velocity_sensor import sensor_lags
 
@@ -71,12 +70,12 @@ def diagnose(
     remainders = _remainders(equations, decision)
     final = FinalModel(decision.model, competition.nominal, equations, remainders)
     progress(0.9)
-    columns = Columns(equations)
+    contrasts = Contrasts(equations, decision.model)
     recordings = {'train': raw, **kept, **held}
     proofs = {stem: prove(final, part, tree) for stem, part in recordings.items()}
     predictions = {stem: final.predict(part, tree) for stem, part in held.items()}
-    chances = probabilities(equations, competition, decision)
-    findings, forces = asserted(equations, decision, columns, lags, remainders, chances)
+    chances = probabilities(equations, competition, decision, contrasts)
+    findings, forces = asserted(equations, decision, lags, remainders, chances)
     verdict = 'missing_physics' if lags and decision.verdict in _CALM else decision.verdict
     progress(1.0)
     return Diagnosis(
@@ -98,7 +97,7 @@ def diagnose(
         refused={reason: count for reason, count in raw.refused.items() if count},
         remarks=remarks,
         bodies=diagnosed_bodies(equations, decision.model),
-        equivalents=equivalents(equations, competition, decision),
+        equivalents=equivalents(equations, competition, decision, contrasts),
     )
 
 

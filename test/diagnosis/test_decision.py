@@ -13,20 +13,12 @@ from sgp_ros.diagnosis.hypotheses import Competition, compete
 from sgp_ros.diagnosis.suspects import Columns, Suspect
 from sgp_ros.robots.effects.catalogue import EFFECTS
 from sgp_ros.robots.effects.effect import Place
+from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
 
 
-def _fitted(equations, *names, is_free=False):
-    suspects = tuple(
-        Suspect(EFFECTS[n], Place(0), EFFECTS[n].starts(equations.motion, Place(0))[0])
-        for n in names
-    )
-    start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
-    return fit(Columns(equations), suspects, start, is_free=is_free)
-
-
 def _competition(equations, *models):
-    bases = (_fitted(equations, is_free=f) for f in (False, True))
+    bases = (fitted(equations, is_free=f) for f in (False, True))
     return Competition(*bases, tuple(m for m in models if m), ())
 
 
@@ -36,7 +28,7 @@ def damped(equations_for, viscous):
 
 
 def test_an_effect_that_explains_all_is_asserted(damped):
-    right, wrong = _fitted(damped, 'viscous_friction'), _fitted(damped, 'spring')
+    right, wrong = fitted(damped, 'viscous_friction'), fitted(damped, 'spring')
     decision = decide(damped, _competition(damped, wrong, right))
     assert decision.verdict == 'missing_physics'
     assert decision.model is right
@@ -45,15 +37,15 @@ def test_an_effect_that_explains_all_is_asserted(damped):
 
 def test_among_equal_fits_the_simpler_is_asserted(damped):
     """The richer model leaves no more, and loses."""
-    simple = _fitted(damped, 'viscous_friction')
-    rich = _fitted(damped, 'viscous_friction', 'quadratic_drag')
+    simple = fitted(damped, 'viscous_friction')
+    rich = fitted(damped, 'viscous_friction', 'quadratic_drag')
     assert rich.mean_square[0] <= simple.mean_square[0] * (1.0 + 1e-9)
     assert decide(damped, _competition(damped, rich, simple)).model is simple
 
 
 def test_what_leaves_much_is_not_asserted(damped):
     """A spring where friction is missing: nothing adequate is there, on joint 0."""
-    decision = decide(damped, _competition(damped, _fitted(damped, 'spring')))
+    decision = decide(damped, _competition(damped, fitted(damped, 'spring')))
     assert decision.verdict == 'unexplained'
     assert decision.worst == 0
 
@@ -62,7 +54,7 @@ def test_an_effect_too_small_to_be_physics_is_not_asserted(equations_for):
     """It is significant by far, and makes less than the schema counts."""
     world = simulate(CHAINS[1], 3, 10.0, force=lambda t, q, v: (-0.02 * v[0],))
     _, equations = equations_for(world)
-    small = _fitted(equations, 'viscous_friction')
+    small = fitted(equations, 'viscous_friction')
     competition = _competition(equations, small)
     assert small.score > competition.base.score + NATS
     assert small.shares[0] < SHARE_TOLERANCE * LEAST_SHARE
@@ -72,7 +64,7 @@ def test_an_effect_too_small_to_be_physics_is_not_asserted(equations_for):
 
 
 def test_effects_that_cancel_each_other_do_not_count(damped):
-    model = _fitted(damped, 'viscous_friction', 'quadratic_drag')
+    model = fitted(damped, 'viscous_friction', 'quadratic_drag')
     (net,) = [sum(model.forces)]
     opposed = replace(model, forces=(10.0 * net, -9.0 * net))
     agreeing = replace(model, forces=(0.5 * net, 0.5 * net))
@@ -114,7 +106,7 @@ def test_more_than_two_effects_are_found_where_joints_lack_several(equations_for
 
 def test_what_leaves_next_to_nothing_is_adequate_whatever_it_explained(damped):
     """A rest that is no physics condemns no model, though there was little to explain."""
-    competition = _competition(damped, _fitted(damped, 'viscous_friction'))
+    competition = _competition(damped, fitted(damped, 'viscous_friction'))
     scale, (model,) = Scale.of(damped, competition), competition.singles
     small = replace(scale, base=10.0 * scale.shares(model), nominal=10.0 * scale.shares(model))
     assert small.rest(model) > 0.05
@@ -123,7 +115,7 @@ def test_what_leaves_next_to_nothing_is_adequate_whatever_it_explained(damped):
 
 def test_few_rows_tell_less(damped):
     """A recording of fewer rows than count as independent weighs a fit by what it has."""
-    competition = _competition(damped, _fitted(damped, 'viscous_friction'))
+    competition = _competition(damped, fitted(damped, 'viscous_friction'))
     few = replace(damped, d=damped.d[:40])
     whole, part = (Scale.of(e, competition) for e in (damped, few))
     (model,) = competition.singles

@@ -7,31 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.candidates import fit, floors
 from sgp_ros.diagnosis.decision import Decision, decide
-from sgp_ros.diagnosis.equivalence import CLEARER, MOTIONS, equivalents, moved
+from sgp_ros.diagnosis.equivalence import CLEARER, MOTIONS, Contrasts, equivalents, moved
 from sgp_ros.diagnosis.hypotheses import Competition, compete
 from sgp_ros.diagnosis.pipeline import diagnose
-from sgp_ros.diagnosis.suspects import Columns, Suspect
-from sgp_ros.robots.effects.catalogue import EFFECTS
-from sgp_ros.robots.effects.effect import Place
+from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, events_of, robot_of, simulate
 
 
-def _fitted(equations, *names, is_free=False):
-    suspects = tuple(
-        Suspect(EFFECTS[n], Place(0), EFFECTS[n].starts(equations.motion, Place(0))[0])
-        for n in names
-    )
-    start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
-    return fit(Columns(equations), suspects, start, is_free=is_free)
-
-
 def _told(equations, best, rivals):
-    bases = _fitted(equations), _fitted(equations, is_free=True)
+    bases = fitted(equations), fitted(equations, is_free=True)
     competition = Competition(*bases, (best, *rivals), ())
     decision = Decision('missing_physics', best, tuple(rivals), 0.0, 0)
-    return equivalents(equations, competition, decision)
+    return equivalents(equations, competition, decision, Contrasts(equations, best))
 
 
 @pytest.fixture(scope='module')
@@ -43,7 +31,7 @@ def narrow(equations_for):
 
 def test_a_spring_seen_at_small_angles_may_be_a_wrong_body(narrow):
     """The wider motion separates them, for the weight follows the sine."""
-    found = _told(narrow, _fitted(narrow, 'spring'), [])
+    found = _told(narrow, fitted(narrow, 'spring'), [])
     assert [e.effects for e in found] == [()]
     assert found[0].motion == 'a motion over the whole range of the joints'
     assert found[0].contrast > CLEARER
@@ -52,13 +40,13 @@ def test_a_spring_seen_at_small_angles_may_be_a_wrong_body(narrow):
 def test_a_spring_seen_at_large_angles_has_no_equivalent(equations_for):
     world = simulate(CHAINS[1], 5, 10.0, force=lambda t, q, v: (-0.6 * q[0],), reach=3.0)
     equations = equations_for(world)[1]
-    rivals = [_fitted(equations, name) for name in ('viscous_friction', 'armature')]
-    assert _told(equations, _fitted(equations, 'spring'), rivals) == ()
+    rivals = [fitted(equations, name) for name in ('viscous_friction', 'armature')]
+    assert _told(equations, fitted(equations, 'spring'), rivals) == ()
 
 
 def test_what_contains_the_finding_is_no_other_explanation(narrow):
-    spring, more = _fitted(narrow, 'spring'), _fitted(narrow, 'spring', 'viscous_friction')
-    found = _told(narrow, spring, [more, _fitted(narrow, 'spring', is_free=True)])
+    spring, more = fitted(narrow, 'spring'), fitted(narrow, 'spring', 'viscous_friction')
+    found = _told(narrow, spring, [more, fitted(narrow, 'spring', is_free=True)])
     assert all(('joint0', 'spring') not in e.effects for e in found)
 
 
@@ -76,7 +64,8 @@ def test_nothing_is_equivalent_to_what_is_unexplained(narrow):
     competition = compete(narrow, lambda _share: None)
     asserted = decide(narrow, competition)
     unknown = Decision('unexplained', competition.base, asserted.rivals, 1.0, 0)
-    assert equivalents(narrow, competition, unknown) == ()
+    contrasts = Contrasts(narrow, competition.base)
+    assert equivalents(narrow, competition, unknown, contrasts) == ()
 
 
 @pytest.mark.parametrize('how', MOTIONS.values())
