@@ -121,3 +121,14 @@ def test_few_rows_tell_less(damped):
     (model,) = competition.singles
     gains = [s.fit(model) - s.fit(competition.nominal) for s in (whole, part)]
     assert gains[1] == pytest.approx(gains[0] * 40.0 / whole.rows)
+
+
+def test_no_larger_effect_takes_the_place_of_a_better_one_that_is_too_small(damped):
+    small = fitted(damped, 'viscous_friction')
+    large = fitted(damped, 'viscous_friction', 'quadratic_drag')
+    small.__dict__['shares'], large.__dict__['shares'] = [0.1 * LEAST_SHARE], [1.0, 1.0]
+    competition = _competition(damped, small, large)
+    scale = Scale.of(damped, competition)
+    assert scale.worth(small) > scale.worth(large)
+    assert scale.excess(large) < 1.0
+    assert decide(damped, competition).verdict != 'missing_physics'

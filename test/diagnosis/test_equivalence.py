@@ -89,3 +89,24 @@ def test_a_weak_motor_may_be_heavy_bodies_that_the_prior_thinks_unlikely(tmp_pat
     assert [f.effect for f in found.findings] == ['torque_gain']
     assert found.equivalents[0].effects == ()
     assert found.equivalents[0].motion == ''
+
+
+def test_a_richer_name_of_the_same_law_is_no_other_explanation(equations_for):
+    """Friction that differs with direction, but does not, is Coulomb friction."""
+    world = simulate(CHAINS[1], 4, 10.0, dry=lambda t, q, s: 0.5)
+    equations = equations_for(world)[1]
+    best, richer = (fitted(equations, n) for n in ('coulomb_friction', 'asymmetric_coulomb'))
+    contrasts = Contrasts(equations, best)
+    assert contrasts.is_same_law(richer)
+    assert not contrasts.is_same_law(fitted(equations, 'viscous_friction'))
+    assert _told(equations, best, [richer]) == ()
+
+
+def test_noise_does_not_hide_that_bodies_may_be_heavier(tmp_path):
+    """Their residual of effort is larger because they are heavier: the motion fits as well."""
+    (link,) = CHAINS[1]
+    chain = (replace(link, damping=0.0),)
+    world = simulate(chain, 5, 10.0, motor=lambda commands, t: (0.15 * commands[-1][0],))
+    found = diagnose(events_of(world, quantum=0.1), *robot_of(tmp_path, chain), {})
+    assert 'torque_gain' in {f.effect for f in found.findings}
+    assert () in [e.effects for e in found.equivalents]
