@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from sgp_ros.diagnosis.equations import Equations
-    from sgp_ros.robots.effects.effect import Effect, Place
+    from sgp_ros.robots.effects.effect import Effect, Place, SmallEffect
     from sgp_ros.robots.effects.observed_motion import ObservedMotion
 
 TRIALS = 2
@@ -100,6 +100,8 @@ def _trial(
     rest: _Rest, suspect: Suspect, motion: ObservedMotion, before: np.ndarray
 ) -> Trial | None:
     effect = suspect.effect
+    if effect.small is not None:
+        return _small_trial(rest, suspect, effect.small, motion, before)
     raw = effect.columns(motion, suspect.place, suspect.shape)
     if raw.shape[-1] == 0:
         return None
@@ -113,6 +115,20 @@ def _trial(
     elif not effect.is_possible(Fitted(motion, suspect.place, suspect.shape, c)):
         return None
     return rest.gain(rest.y - x @ c, before, len(c) + len(suspect.shape)), suspect
+
+
+def _small_trial(
+    rest: _Rest, start: Suspect, small: SmallEffect, motion: ObservedMotion, before: np.ndarray
+) -> Trial | None:
+    """Return the trial of an effect that is linear in its size while it is small."""
+    x = rest.apart(small.columns(motion, start.place, start.shape), start.place)
+    scale = np.sqrt((x * x).sum(axis=0)) + 1e-300
+    c = np.linalg.lstsq(x / scale, rest.y, rcond=1e-7)[0] / scale
+    shape = small.shape(start.shape, c)
+    fitted = Fitted(motion, start.place, shape, np.ones(1))
+    if not start.effect.is_possible(fitted):
+        return None
+    return rest.gain(rest.y - x @ c, before, len(shape)), replace(start, shape=shape)
 
 
 def _intervals(rest: _Rest, place: Place, before: np.ndarray) -> Iterator[Trial]:

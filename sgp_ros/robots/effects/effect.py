@@ -80,6 +80,20 @@ class Fitted:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class SmallEffect:
+    """What an effect whose shape says all is to first order in its size: where a search starts.
+
+    Attributes:
+        columns: from motion, place and one of the effect's `starts` to forces per coefficient, as
+            those of an `Effect`.
+        shape: from that start and coefficients (m,) to the shape of the effect itself, (s,).
+    """
+
+    columns: Callable[[ObservedMotion, Place, np.ndarray], np.ndarray]
+    shape: Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Effect:
     """A kind of physics that a nominal model may lack.
 
@@ -89,7 +103,8 @@ class Effect:
         columns: from motion, place and shape (s,) to forces per coefficient, (n, m) on the joint
             of the place or (n, k, m) on all joints [N m or N per unit of the coefficient].
         places: where it could act on a robot, in which variants.
-        starts: shapes from which a search starts, (starts, s); (1, 0) for none.
+        starts: shapes from which a search starts, (starts, s); (1, 0) for none. Where the effect
+            has a `small` one, what that needs.
         report: the values of `quantities`.
         is_possible: whether coefficients and shape have physical signs and sizes.
         formula: for people.
@@ -100,6 +115,7 @@ class Effect:
         sees_acceleration: its force depends on the acceleration.
         has_memory: its force at a time depends on other times too, of the motion or the commands.
         bounds: of the shape, (s,) each.
+        small: to first order in its size; None where starts are shapes.
         interval: variable and intervals of the region it is confined to; None for everywhere.
     """
 
@@ -118,6 +134,7 @@ class Effect:
     sees_acceleration: bool = False
     has_memory: bool = False
     bounds: Callable[[ObservedMotion, Place], tuple[np.ndarray, np.ndarray]] | None = None
+    small: SmallEffect | None = None
     interval: Callable[[Fitted], tuple[str, list[list[float]]]] | None = None
 
     def holds(self, place: Place) -> bool:

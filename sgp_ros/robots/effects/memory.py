@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,15 +12,16 @@ from sgp_ros.robots.effects.effect import (
     Effect,
     Place,
     Quantity,
+    SmallEffect,
     always,
     every_joint,
     every_motor,
     is_positive,
 )
-from sgp_ros.robots.effects.loads import per_turn, wave
+from sgp_ros.robots.effects.loads import per_turn
 
 if TYPE_CHECKING:
-    from sgp_ros.robots.effects.effect import Fitted
+    from sgp_ros.robots.effects.effect import Fitted, Value
     from sgp_ros.robots.effects.observed_motion import ObservedMotion
 
 
@@ -46,35 +48,85 @@ def _ways(motion: ObservedMotion, place: Place) -> np.ndarray:
 
 
 def _eccentric(motion: ObservedMotion, place: Place, shape: np.ndarray) -> np.ndarray:
-    """Return the change of the nominal efforts per amplitude of sine and cosine, (n, k, 2).
+    """Return the change of the nominal efforts by an encoder's error, (n, k, 1).
 
-    The encoder shows `q + e(q)`, so that the true motion is, to first order, `q - e(q)`.
+    The encoder shows `q = x + e(x)` with `e = s sin(r x) + c cos(r x)`, r the periods per turn;
+    shape is (periods, s, c). The true x, dx and ddx follow without approximation; the efforts
+    change with them to first order.
     """
     j = place.joint
     rate = shape[0] * per_turn(motion, j)
     q, v, a = motion.position[:, j], motion.velocity[:, j], motion.acceleration[:, j]
-    angle = rate * q
+    x = q.copy()
+    for _ in range(_NEWTON):
+        e, slope, _ = _error(x, rate, shape[1:])
+        x -= (x + e - q) / np.maximum(1.0 + slope, 0.1)
+    e, slope, bend = _error(x, rate, shape[1:])
+    dx = v / np.maximum(1.0 + slope, 0.1)
+    ddx = (a - bend * dx**2) / np.maximum(1.0 + slope, 0.1)
+    by_q, by_v, by_a = motion.effort_slopes(j)
+    change = by_q * (q - x)[:, None] + by_v * (v - dx)[:, None] + by_a * (a - ddx)[:, None]
+    return np.asarray(change[:, :, None])
+
+
+_NEWTON = 6
+"""Steps to the true position."""
+
+
+def _error(
+    x: np.ndarray, rate: float, size: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return e, de/dx and d^2 e/dx^2 of an encoder, (n,) each."""
+    sine, cosine = np.sin(rate * x), np.cos(rate * x)
+    e = size[0] * sine + size[1] * cosine
+    return e, rate * (size[0] * cosine - size[1] * sine), -(rate**2) * e
+
+
+def _slightly_eccentric(motion: ObservedMotion, place: Place, start: np.ndarray) -> np.ndarray:
+    """Return the change of the nominal efforts per sine and cosine of a small error, (n, k, 2)."""
+    j = place.joint
+    rate = start[0] * per_turn(motion, j)
+    q, v, a = motion.position[:, j], motion.velocity[:, j], motion.acceleration[:, j]
     by_q, by_v, by_a = motion.effort_slopes(j)
     columns = []
-    for wave_, slope in ((np.sin, np.cos), (np.cos, lambda x: -np.sin(x))):
-        e = wave_(angle)
-        de = rate * slope(angle) * v
-        dde = rate * slope(angle) * a - rate**2 * e * v**2
-        columns.append(by_q * e[:, None] + by_v * de[:, None] + by_a * dde[:, None])
+    for size in np.eye(2):
+        e, slope, bend = _error(q, rate, size)
+        change = by_v * (slope * v)[:, None] + by_a * (slope * a + bend * v**2)[:, None]
+        columns.append(by_q * e[:, None] + change)
     return np.stack(columns, axis=2)
 
 
 def _turns(motion: ObservedMotion, place: Place) -> np.ndarray:
+    """Return periods to start from, on prismatic joints from half a wave in the range."""
     if motion.tree.is_prismatic[place.joint]:
         span = float(np.ptp(motion.position[:, place.joint]))
-        return np.arange(1.0, 9.0)[:, None] / max(span, 1e-9)
-    return np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])[:, None]
+        return np.arange(0.5, 9.0, 0.5)[:, None] / max(span, 1e-9)
+    return np.arange(1.0, 11.0)[:, None]
+
+
+_STEEPEST = 0.9
+"""Greatest slope of an encoder's error: one that turned back would be no encoder."""
 
 
 def _is_monotonic(f: Fitted) -> bool:
-    """Return whether the encoder's error changes by less than half of the way."""
-    slope = np.hypot(*f.coefficients) * f.shape[0] * per_turn(f.motion, f.place.joint)
-    return bool(slope < 0.5)
+    """Return whether the encoder never turns back."""
+    slope = np.hypot(*f.shape[1:]) * f.shape[0] * per_turn(f.motion, f.place.joint)
+    return bool(slope < _STEEPEST)
+
+
+def _eccentricity(f: Fitted) -> dict[str, Value]:
+    periods, sine, cosine = (float(x) for x in f.shape)
+    return {
+        'amplitude': math.hypot(sine, cosine), 'periods': periods,
+        'phase': math.atan2(cosine, sine),
+    }  # fmt: skip
+
+
+def _eccentricity_bounds(motion: ObservedMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
+    turns = _turns(motion, place)
+    low, high = 0.9 * float(turns[0, 0]), 1.5 * float(turns[-1, 0])
+    most = _STEEPEST / (low * per_turn(motion, place.joint))
+    return np.array([low, -most, -most]), np.array([high, most, most])
 
 
 def _backlash(motion: ObservedMotion, place: Place, shape: np.ndarray) -> np.ndarray:
@@ -141,12 +193,10 @@ HYSTERESIS = Effect(
 ENCODER_ECCENTRICITY = Effect(
     'encoder_eccentricity',
     (Quantity('amplitude', 'rad'), Quantity('periods', '1/revolution'), Quantity('phase', 'rad')),
-    _eccentric, every_joint, _turns, wave, _is_monotonic,
-    'encoder shows q + amplitude sin(periods q + phase)', uses_bodies=True,
-    sees_acceleration=True,
-    bounds=lambda motion, place: (
-        _turns(motion, place)[0] * 0.9, _turns(motion, place)[-1] * 1.5
-    ),
+    _eccentric, every_joint, _turns, _eccentricity, _is_monotonic,
+    'encoder shows q + amplitude sin(periods q + phase)', is_given=True, uses_bodies=True,
+    sees_acceleration=True, bounds=_eccentricity_bounds,
+    small=SmallEffect(_slightly_eccentric, lambda start, c: np.array([start[0], *c])),
 )  # fmt: skip
 BACKLASH = Effect(
     'backlash', (Quantity('gap', 'rad'),), _backlash, every_motor, _gaps,

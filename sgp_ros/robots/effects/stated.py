@@ -198,14 +198,13 @@ _INVERSE: dict[str, Callable[[Numbers], tuple[list[float], list[float]]]] = {
     # the share of the inertia that sits on the motor's side is not stated
     'backlash': lambda x: ([math.nan, x['gap']], [1.0]),
     'hysteresis': lambda x: ([x['presliding']], [x['level']]),
-    'encoder_eccentricity': _wave,
+    'encoder_eccentricity': lambda x: ([x['periods'], *_wave(x)[1]], [1.0]),
 }  # fmt: skip
 
 _COEFFICIENTS = {
     'stribeck_friction': (Quantity('coulomb', 'N m'), Quantity('stribeck', 'N m')),
     'spring': (Quantity('stiffness', 'N m/rad'), Quantity('preload', 'N m')),
     'cogging': (Quantity('sine', 'N m'), Quantity('cosine', 'N m')),
-    'encoder_eccentricity': (Quantity('sine', 'rad'), Quantity('cosine', 'rad')),
 }
 """Of effects whose coefficients are no stated numbers."""
 _LINEAR = {
