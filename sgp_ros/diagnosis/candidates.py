@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 FLOOR_SHARE = 1e-5
 """Errors of signals and filters that no model explains, as a share of the mean square."""
+UNSEEN = 1e-12
+"""A column that is this much smaller than the largest acts on nothing; its coefficient is zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +33,7 @@ class Model:
         coefficients: linear coefficients per suspect.
         w: (p,) inertial parameters' changes in standard deviations.
         sigma: (k,) root mean square of the residual with its floor.
+        heavier: mean of log det(M / M nominal) of its bodies and rotors.
         score: log likelihood less penalties [nats].
         residual: (N, k) [N m or N].
         forces: filtered force of each suspect, (N, k).
@@ -40,6 +43,7 @@ class Model:
     coefficients: tuple[np.ndarray, ...]
     w: np.ndarray
     sigma: np.ndarray
+    heavier: float
     score: float
     residual: np.ndarray
     forces: tuple[np.ndarray, ...]
@@ -178,9 +182,10 @@ def split(
 def _least(A: np.ndarray, y: np.ndarray) -> np.ndarray:
     if not A.shape[1]:
         return np.zeros(0)
-    scale = np.sqrt((A * A).sum(axis=0)) + 1e-300
+    scale = np.sqrt((A * A).sum(axis=0))
+    scale[scale <= UNSEEN * scale.max()] = np.inf
     c = np.linalg.lstsq(A / scale, y, rcond=1e-7)[0]
-    return c / scale
+    return np.asarray(c / scale)
 
 
 def residual_of(
@@ -235,14 +240,19 @@ def _searched(
     return with_shapes(suspects, x)
 
 
-def rotors(
+def added_inertia(
     suspects: Sequence[Suspect], coefficients: Sequence[np.ndarray], equations: Equations
 ) -> np.ndarray:
-    """Return the inertia that suspects add to each joint, (k,) [kg m^2 or kg]."""
-    added = np.zeros(equations.d.shape[1])
+    """Return what rotors and loads add to the mass matrix, (`POSES`, k, k) [kg m^2 or kg]."""
+    still, *pushed = equations.poses
+    added = np.zeros((*still.position.shape, len(pushed)))
     for s, c in zip(suspects, coefficients, strict=True):
-        if s.effect.name == 'armature':
-            added[s.place.joint] += c[0]
+        if not s.effect.sees_acceleration or s.effect.uses_bodies:
+            continue
+        before = s.effect.columns(still, s.place, s.shape) @ c
+        for j, motion in enumerate(pushed):
+            force = s.effect.columns(motion, s.place, s.shape) @ c - before
+            added[:, s.place.joint if force.ndim == 1 else slice(None), j] -= force
     return added
 
 
@@ -268,7 +278,7 @@ def _solved(
     w = frame.parameters(left)
     residual = left - equations.base @ w
     mean = (residual**2).mean(axis=0)
-    heavier = equations.log_inertia(w, rotors(suspects, coefficients, equations))
+    heavier = equations.log_inertia(w, added_inertia(suspects, coefficients, equations))
     # what is measured is the motion: the floor is one of accelerations
     variance = mean + floors(equations) * np.exp(2.0 * max(heavier, -50.0) / len(mean))
     N = len(residual)
@@ -280,5 +290,6 @@ def _solved(
         - _cost(frame, size)
     )
     return Model(
-        suspects, tuple(coefficients), w, np.sqrt(variance), score, residual, tuple(forces), frame
-    )
+        suspects, tuple(coefficients), w, np.sqrt(variance), heavier, score, residual,
+        tuple(forces), frame,
+    )  # fmt: skip

@@ -9,6 +9,7 @@ body may have another mass, another centre, another inertia.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +29,10 @@ if TYPE_CHECKING:
 
 SPREAD = 0.25
 """Prior standard deviation of mass and inertia, relative; of the centre, to the radius."""
+
+
+POSES = 32
+"""Positions over which the inertia of a robot is averaged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,18 +107,36 @@ class Equations:
             moving[rows, j] = 0.0
         return replace(self, d=d, base=base, moving=moving)
 
-    def log_inertia(self, w: np.ndarray, rotors: np.ndarray) -> float:
-        """Return the mean of log det(M / M nominal) for changed bodies and rotors.
+    @cached_property
+    def poses(self) -> tuple[ObservedMotion, ...]:
+        """Positions over the recording, at rest, and with a unit acceleration of each joint.
+
+        k + 1 motions of `POSES` rows.
+        """
+        rows = np.linspace(0, len(self.motion.time) - 1, POSES).astype(int)
+        q = self.motion.position[rows]
+        still = replace(
+            self.motion, time=self.motion.time[rows], position=q, velocity=np.zeros_like(q),
+            acceleration=np.zeros_like(q), effort=np.zeros_like(q), drive=None, starts=(0,),
+        )  # fmt: skip
+        units = np.eye(q.shape[1])
+        pushed = (replace(still, acceleration=np.tile(unit, (len(q), 1))) for unit in units)
+        return still, *pushed
+
+    def log_inertia(self, w: np.ndarray, added: np.ndarray) -> float:
+        """Return the mean of log det(M / M nominal) for changed bodies and what is added to M.
 
         What is measured is the motion: a model of other inertia must not gain from residuals in
         smaller units of effort. Minus infinity where the mass matrix is not positive.
+
+        Args:
+            w: (p,) change of the bodies.
+            added: (k, k), or (`POSES`, k, k) for the poses [kg m^2 or kg].
         """
-        tree = self.motion.tree
-        rows = np.linspace(0, len(self.motion.time) - 1, 32).astype(int)
-        q = self.motion.position[rows]
+        tree, q = self.motion.tree, self.poses[0].position
         nominal = mass_matrix(tree, tree.parameters, q)
         changed = tree.parameters + (w @ self.directions).reshape(tree.parameters.shape)
-        M = mass_matrix(tree, changed, q) + np.diag(rotors)
+        M = mass_matrix(tree, changed, q) + added
         if np.linalg.eigvalsh(M)[:, 0].min() <= 0.0:
             return -np.inf
         return float((np.linalg.slogdet(M)[1] - np.linalg.slogdet(nominal)[1]).mean())

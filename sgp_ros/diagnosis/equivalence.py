@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.diagnosis.candidates import rotors
 from sgp_ros.diagnosis.decision import LEAST_SHARE, TEMPER, Scale
 from sgp_ros.diagnosis.places import joint_name
 from sgp_ros.diagnosis.prediction import imbalance
@@ -122,26 +121,17 @@ def equivalents(
     others = {*decision.rivals, competition.nominal, competition.parameters} - {best}
     found: list[Equivalent] = []
     known: list[Model] = [best]
-    least = _fit(equations, scale, best) - ALIKE
+    least = scale.fit(best) - ALIKE
     for rival in (unlikely, *sorted(others, key=scale.worth, reverse=True)):
         if len(found) == MOST:
             break
         prior = 0.5 * float(rival.w @ rival.w) if rival is unlikely else 0.0
         is_other = not any(_contains(rival, m) for m in known)
-        if is_other and _fit(equations, scale, rival) + prior > least:
+        if is_other and scale.fit(rival) + prior > least:
             known.append(rival)
             if not contrasts.is_same_law(rival):
                 found.append(_told(equations, rival, contrasts.of(rival)))
     return tuple(found)
-
-
-def _fit(equations: Equations, scale: Scale, model: Model) -> float:
-    """Return the tempered log likelihood of the motion, which is what was measured [nats].
-
-    A residual of effort is the larger the heavier the robot that a model supposes.
-    """
-    added = rotors(model.suspects, model.coefficients, equations)
-    return scale.fit(model) + scale.rows * equations.log_inertia(model.w, added)
 
 
 def _without_prior(equations: Equations, parameters: Model) -> Model:
@@ -155,7 +145,8 @@ def _without_prior(equations: Equations, parameters: Model) -> Model:
     w = np.linalg.lstsq(
         base.reshape(N * k, p), (equations.d / parameters.sigma).ravel(), rcond=1e-6
     )[0]
-    return replace(parameters, w=w, residual=equations.d - equations.base @ w)
+    heavier = equations.log_inertia(w, np.zeros((k, k)))
+    return replace(parameters, w=w, heavier=heavier, residual=equations.d - equations.base @ w)
 
 
 def _contains(rival: Model, model: Model) -> bool:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.diagnosis.candidates import UNSEEN
 from sgp_ros.diagnosis.colour import correlation_factor
 from sgp_ros.diagnosis.regression import Frame
 from sgp_ros.diagnosis.suspects import Columns, Suspect, shape_bounds, with_shapes
@@ -35,7 +36,10 @@ def _force(
 
 
 def covariance(model: Model, columns: Columns) -> np.ndarray:
-    """Return the covariance of all free coefficients, then all shapes, (c + s, c + s)."""
+    """Return the covariance of all free coefficients, then all shapes, (c + s, c + s).
+
+    A shape that nothing depends on may lie anywhere within its bounds.
+    """
     frame = Frame.of(model.frame.equations, model.sigma, is_free=model.is_free)
     free = [
         frame.projected(columns.of(s, frame.equations, model.w))
@@ -68,9 +72,13 @@ def covariance(model: Model, columns: Columns) -> np.ndarray:
             slopes.append(((fa - fb) / max(a - b, 1e-300))[:, :, None])
         parts.append(frame.projected(np.concatenate(slopes, axis=2)))
     J = np.concatenate(parts, axis=1) if parts else np.zeros((1, 0))
-    scale = np.sqrt((J * J).sum(axis=0)) + 1e-300
+    scale = np.sqrt((J * J).sum(axis=0))
+    is_seen = scale > UNSEEN * scale.max(initial=0.0)
+    scale[~is_seen] = np.inf
     inverse = np.linalg.pinv((J / scale).T @ (J / scale), rcond=1e-10)
-    return inverse / scale / scale[:, None] * _inflation(model)
+    C = inverse / scale / scale[:, None] * _inflation(model)
+    spans = np.concatenate([np.zeros(len(scale) - len(low)), high - low])
+    return np.asarray(C + np.diag(np.where(is_seen, 0.0, spans**2 / 12.0)))
 
 
 def _inflation(model: Model) -> float:

@@ -106,7 +106,7 @@ def test_noise_does_not_hide_that_bodies_may_be_heavier(tmp_path):
     """Their residual of effort is larger because they are heavier: the motion fits as well."""
     (link,) = CHAINS[1]
     chain = (replace(link, damping=0.0),)
-    world = simulate(chain, 5, 10.0, motor=lambda commands, t: (0.15 * commands[-1][0],))
+    world = simulate(chain, 5, 10.0, motor=lambda commands, t: (0.35 * commands[-1][0],))
     found = diagnose(events_of(world, quantum=0.1), *robot_of(tmp_path, chain), {})
     assert 'torque_gain' in {f.effect for f in found.findings}
     assert () in [e.effects for e in found.equivalents]

@@ -13,6 +13,7 @@ from sgp_ros.diagnosis.trajectory import Bandwidth, collect
 from sgp_ros.diagnosis.uncertainty import covariance, reported_std
 from sgp_ros.robots.effects.catalogue import EFFECTS
 from sgp_ros.robots.effects.effect import Fitted, Place
+from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, events_of, simulate
 
 RUNS = 40
@@ -85,3 +86,15 @@ def test_without_effects_there_is_nothing_to_be_uncertain_of(equations_for, visc
     model = fit(columns, (), np.full(1, 0.1), is_free=False)
     assert covariance(model, columns).shape == (0, 0)
     assert reported_std(model, columns) == []
+
+
+def test_a_number_that_nothing_depends_on_may_be_anything(equations_for, viscous):
+    """One link cannot tell where a load sits along its axis: a flat distribution in its bounds."""
+    _, equations = equations_for(viscous)
+    model = fitted(equations, 'payload')
+    (std,) = reported_std(model, Columns(equations))
+    low, high = EFFECTS['payload'].bounds(equations.motion, Place(0))
+    axis = int(np.flatnonzero(np.abs(equations.motion.tree.axes[0]) > 0.5)[0])
+    name = 'xyz'[axis]
+    assert std[name] == pytest.approx((high - low)[1 + axis] / np.sqrt(12.0), rel=1e-3)
+    assert all(np.isfinite(x) for x in std.values())
