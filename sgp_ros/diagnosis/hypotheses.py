@@ -25,6 +25,8 @@ THIRD = 3
 """Suspects that are fitted as a third, fourth, ... effect."""
 LEFT_SHARE = 0.0024
 """Share of the mean squared effort that calls for one more effect."""
+EXCHANGES = 2
+"""Times that an effect of the best pair is exchanged for another."""
 GAIN = 10.0
 """Evidence that it must have [nats]."""
 
@@ -79,10 +81,38 @@ def compete(equations: Equations, progress: Callable[[float], None]) -> Competit
             for s in second
         ]  # fmt: skip
         progress(0.45 + 0.55 * (number + 1) / len(parents))
-    ranked = _ranked(pairs)
+    ranked = _ranked([*pairs, *_exchanged(columns, _ranked(pairs))])
     best = max([*singles, *ranked], key=lambda m: m.score, default=None)
     more = [] if best is None else _extended(columns, best)
     return Competition(bases[0], bases[1], tuple(singles), tuple(ranked), tuple(more))
+
+
+def _exchanged(columns: Columns, ranked: list[Model]) -> list[Model]:
+    """Return pairs like the best one with another effect in place of either.
+
+    Of two effects that are seen only together, neither need be among the best alone. As long as
+    that is better and leaves what counts as physics, it is done again with the best of them.
+    """
+    found: list[Model] = []
+    power = columns.equations(frozenset()).power
+    best = ranked[0] if ranked else None
+    for _ in range(EXCHANGES):
+        if best is None or (best.mean_square / power).max() < LEFT_SHARE:
+            break
+        trials: list[Model] = []
+        for kept in best.suspects:
+            parent = fit(columns, (kept,), best.sigma, is_free=best.is_free, w=best.w, rounds=2,
+                         steps=4)  # fmt: skip
+            second = _distinct(screen(columns, parent, EFFECTS.values()), SECOND)
+            trials += [
+                fit(columns, (*parent.suspects, s), best.sigma, is_free=best.is_free, w=best.w,
+                    rounds=2, steps=8)
+                for s in second
+            ]  # fmt: skip
+        found += trials
+        better = _ranked(trials)
+        best = better[0] if better and better[0].score > best.score else None
+    return found
 
 
 def _extended(columns: Columns, model: Model) -> list[Model]:
