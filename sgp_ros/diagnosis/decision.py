@@ -1,9 +1,10 @@
 """What the competition of models lets us assert.
 
 Statistical significance is not enough: the schema calls physics what makes at least 0.4 % of the
-mean squared effort of some joint. A model is adequate when what it leaves is small against what it
-explains. Among adequate models of nearly the same residual the one with the fewest parameters is
-asserted.
+mean squared effort of some joint. Among models of nearly the same residual the one with the fewest
+parameters is asserted, if each of its effects predicts parts of the recording that were left out
+(`second_opinion`). It is adequate when what it leaves, as far as that is no noise (`referee`), is
+small against what it explains.
 """
 
 from __future__ import annotations
@@ -14,6 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sgp_ros.diagnosis.candidates import FLOOR_SHARE
+from sgp_ros.diagnosis.referee import structure
+from sgp_ros.diagnosis.second_opinion import support
+from sgp_ros.diagnosis.suspects import Columns
 
 if TYPE_CHECKING:
     from sgp_ros.diagnosis.candidates import Model
@@ -25,9 +29,9 @@ LEAST_SHARE = 0.004
 SHARE_TOLERANCE = 0.6
 """An estimated share may be this much smaller than the least one."""
 NATS = 10.0
-"""Evidence that an effect must have beside practical weight."""
+"""Evidence that an effect must have beside practical weight, and on parts left out."""
 ADEQUATE_REST = 0.025
-"""Greatest rest of an adequate model, relative to what it explains."""
+"""Greatest structured rest of an adequate model, relative to what it explains."""
 SLIGHT_REST = 0.1 * LEAST_SHARE
 """A rest below this share of the mean squared effort is adequate in any case."""
 ROWS = 100.0
@@ -100,6 +104,11 @@ class Scale:
         nominal = competition.nominal.mean_square / power
         return cls(power, error, base, nominal, min(ROWS, len(equations.d)))
 
+    @property
+    def floor(self) -> np.ndarray:
+        """What the right model may leave, (k,) shares."""
+        return np.asarray(FLOOR_SHARE + SHAPE_ERROR * self.nominal + self.error / self.power)
+
     def shares(self, model: Model) -> np.ndarray:
         """Return what a model leaves beyond the errors of the filters, (k,) shares."""
         return np.maximum(model.mean_square - self.error, 0.0) / self.power
@@ -113,14 +122,19 @@ class Scale:
         effects = min(model.net_share, float(self.nominal.sum()))
         return max(float(self.base.sum()), effects, 1e-12)
 
-    def rest(self, model: Model) -> float:
-        """Return the rest of a model relative to what it explains."""
-        return float(self.shares(model).sum()) / self.explained(model)
+    def rest(self, model: Model, structured: np.ndarray | float = 1.0) -> float:
+        """Return the rest of a model relative to what it explains.
 
-    def excess(self, model: Model) -> float:
+        Args:
+            model: fitted.
+            structured: share of each joint's rest that is no noise, (k,).
+        """
+        return float((structured * self.shares(model)).sum()) / self.explained(model)
+
+    def excess(self, model: Model, structured: np.ndarray | float = 1.0) -> float:
         """Return what a model leaves, relative to what an adequate one may."""
-        slight = float(self.shares(model).max()) / SLIGHT_REST
-        return min(self.rest(model) / ADEQUATE_REST, slight)
+        slight = float((structured * self.shares(model)).max()) / SLIGHT_REST
+        return min(self.rest(model, structured) / ADEQUATE_REST, slight)
 
     def counts(self, model: Model) -> bool:
         """Return whether effects are large enough and do not cancel each other, or the bodies."""
@@ -132,9 +146,14 @@ class Scale:
         return sum(model.filtered_shares) < MOST_OPPOSED * there
 
     def fit(self, model: Model) -> float:
-        """Return the tempered log likelihood, with the prior of the bodies' change [nats]."""
-        floor = FLOOR_SHARE + SHAPE_ERROR * self.nominal + self.error / self.power
-        likelihood = -0.5 * self.rows * float(np.log(model.mean_square / self.power + floor).sum())
+        """Return the tempered log likelihood, with the prior of the bodies' change [nats].
+
+        It is one of the motion, which is what was measured: a residual of effort, and what a
+        perfect model would leave of it, is the larger the heavier the robot of a model is.
+        """
+        floor = self.floor * np.exp(2.0 * max(model.heavier, -50.0) / len(self.power))
+        share = model.mean_square / self.power + floor
+        likelihood = self.rows * (model.heavier - 0.5 * float(np.log(share).sum()))
         return likelihood - 0.5 * float(model.w @ model.w)
 
     def worth(self, model: Model) -> float:
@@ -161,16 +180,29 @@ def decide(equations: Equations, competition: Competition) -> Decision:
     """Return the verdict on a recording."""
     scale, base = Scale.of(equations, competition), competition.base
     ranked = _ranked(competition, scale)
+    best = _supported(equations, scale, [m for m in ranked if scale.worth(m) > scale.worth(base)])
+    rivals = tuple(m for m in ranked if m is not best)
     worst = int(np.argmax(scale.base))
-    left = float(scale.shares(competition.parameters).max())
-    if ranked and scale.worth(ranked[0]) > scale.worth(base):
-        best, rivals = ranked[0], tuple(ranked[1:])
-        excess = scale.excess(best)
+    left = scale.shares(competition.parameters)
+    if best is not None:
+        excess = scale.excess(best, structure(equations, best.residual))
         if excess < 1.0:
             return Decision('missing_physics', best, rivals, excess, worst, against=base.score)
-        if left > SHARE_TOLERANCE * LEAST_SHARE:
-            return Decision('unexplained', base, tuple(ranked), excess, worst, best, base.score)
-    elif left > LEAST_SHARE:
-        return Decision('unexplained', base, tuple(ranked), _NOTHING, worst, against=base.score)
+        if left.max() > SHARE_TOLERANCE * LEAST_SHARE:
+            found = (best, *rivals)
+            return Decision('unexplained', base, found, excess, worst, best, base.score)
+    elif left.max() > LEAST_SHARE:
+        left = left * structure(equations, competition.parameters.residual)
+        if left.max() > LEAST_SHARE:
+            return Decision('unexplained', base, rivals, _NOTHING, worst, against=base.score)
     verdict = 'parameters_only' if base.is_free else 'no_mismatch'
-    return Decision(verdict, base, tuple(ranked), _NOTHING, worst, against=base.score)
+    return Decision(verdict, base, rivals, _NOTHING, worst, against=base.score)
+
+
+def _supported(equations: Equations, scale: Scale, ranked: list[Model]) -> Model | None:
+    """Return the first model whose effects all predict parts of the recording left out."""
+    columns, floor = Columns(equations), scale.floor * scale.power
+    for model in ranked:
+        if scale.rows * min(support(columns, model, floor)) > NATS:
+            return model
+    return None

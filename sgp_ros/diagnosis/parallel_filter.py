@@ -39,6 +39,12 @@ class ParallelFilter:
         )
 
     @cached_property
+    def correlation(self) -> float:
+        """Correlation of white noise from one row out to the next."""
+        t, d = self.taps, self.decimation
+        return float(t[d:] @ t[:-d]) / float(t @ t) if d < len(t) else 0.0
+
+    @cached_property
     def kept(self) -> tuple[np.ndarray, ...]:
         """Rows in the middle of the filter for each row out, a part per segment."""
         half = len(self.taps) // 2 + 4

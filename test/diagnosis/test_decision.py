@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.candidates import fit, floors
+from sgp_ros.diagnosis.candidates import added_inertia, fit, floors
 from sgp_ros.diagnosis.decision import LEAST_SHARE, NATS, SHARE_TOLERANCE, Scale, decide
+from sgp_ros.diagnosis.equations import make_equations
 from sgp_ros.diagnosis.hypotheses import Competition, compete
 from sgp_ros.diagnosis.suspects import Columns, Suspect
+from sgp_ros.diagnosis.trajectory import choose_bandwidth, collect
 from sgp_ros.robots.effects.catalogue import EFFECTS
 from sgp_ros.robots.effects.effect import Place
+from sgp_ros.robots.rigid_body import mass_matrix
 from test.diagnosis.fitted_models import fitted
-from test.diagnosis.worlds import CHAINS, simulate
+from test.diagnosis.worlds import CHAINS, events_of, robot_of, simulate
 
 
 def _competition(equations, *models):
@@ -61,6 +65,30 @@ def test_an_effect_too_small_to_be_physics_is_not_asserted(equations_for):
     decision = decide(equations, competition)
     assert decision.verdict in {'no_mismatch', 'parameters_only'}
     assert decision.model is competition.base
+
+
+def test_noise_of_the_effort_leaves_an_adequate_model(damped):
+    """White noise that is a tenth of what friction makes is no physics; a pattern is."""
+    right = fitted(damped, 'viscous_friction')
+    discrepancy = damped.d.std()
+    noise = 0.3 * discrepancy * np.random.default_rng(0).normal(size=damped.d.shape)
+    noisy = replace(damped, d=damped.d + noise)
+    decision = decide(noisy, _competition(noisy, fitted(noisy, 'viscous_friction')))
+    assert decision.verdict == 'missing_physics'
+    q = damped.motion.position[damped.filter.rows]
+    wavy = replace(damped, d=damped.d + 0.4 * discrepancy * np.sin(5.0 * q))
+    decision = decide(wavy, _competition(wavy, fitted(wavy, 'viscous_friction')))
+    assert decision.verdict == 'unexplained'
+    assert right.mean_square[0] < 1e-3 * discrepancy**2
+
+
+def test_noise_alone_is_not_unexplained(equations_for, perfect):
+    """It leaves more than counts as physics, and nothing foretells it."""
+    _, equations = equations_for(perfect[1])
+    rng = np.random.default_rng(1)
+    noise = 0.1 * np.sqrt(equations.power) * rng.normal(size=equations.d.shape)
+    noisy = replace(equations, d=equations.d + noise)
+    assert decide(noisy, _competition(noisy)).verdict in {'no_mismatch', 'parameters_only'}
 
 
 def test_effects_that_cancel_each_other_do_not_count(damped):
@@ -132,3 +160,36 @@ def test_no_larger_effect_takes_the_place_of_a_better_one_that_is_too_small(damp
     assert scale.worth(small) > scale.worth(large)
     assert scale.excess(large) < 1.0
     assert decide(damped, competition).verdict != 'missing_physics'
+
+
+def test_a_weak_motor_and_heavy_bodies_fit_alike(tmp_path):
+    """Half of the effort, or twice the inertia and weight: what is left of the motion is equal."""
+    (link,) = CHAINS[1]
+    chain = (replace(link, damping=0.0),)
+    world = simulate(
+        chain, 6, 10.0, motor=lambda commands, t: (0.5 * commands[-1][0],),
+        force=lambda t, q, v: (0.1 * math.sin(37.0 * t),),
+    )  # fmt: skip
+    robot, tree = robot_of(tmp_path, chain)
+    raw = collect(events_of(world), robot)
+    equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
+    weak, heavy = fitted(equations, 'torque_gain'), fitted(equations, is_free=True)
+    scale = Scale.of(equations, _competition(equations, weak))
+    prior = 0.5 * float(heavy.w @ heavy.w)
+    assert heavy.heavier == pytest.approx(math.log(2.0), abs=0.05)
+    assert weak.heavier == 0.0
+    assert heavy.mean_square[0] > 3.0 * weak.mean_square[0]
+    assert scale.fit(heavy) + prior == pytest.approx(scale.fit(weak), abs=5.0)
+
+
+def test_a_load_and_a_heavier_body_have_the_same_inertia(equations_for):
+    """What a point mass adds to the mass matrix is what its body parameters add."""
+    _, equations = equations_for(simulate(CHAINS[2], 2, 6.0))
+    load = Suspect(EFFECTS['payload'], Place(1), np.array([0.4, 0.0, 0.0, -0.2]))
+    rotor = Suspect(EFFECTS['armature'], Place(0), np.zeros(0))
+    added = added_inertia((load, rotor), (np.ones(1), np.array([0.03])), equations)
+    tree, q = equations.motion.tree, equations.poses[0].position
+    heavier = tree.parameters.copy()
+    heavier[1] += 0.4 * np.array([1.0, 0.0, 0.0, -0.2, 0.04, 0.0, 0.04, 0.0, 0.0, 0.0])
+    wanted = mass_matrix(tree, heavier, q) - mass_matrix(tree, tree.parameters, q)
+    np.testing.assert_allclose(added, wanted + np.diag([0.03, 0.0]), atol=1e-12)

@@ -67,3 +67,12 @@ def test_too_short_a_recording_gives_no_rows():
     """Not an error here: who asks decides."""
     low = _filter(segments=(slice(0, 20),))
     assert low(np.ones((20, 2))).shape == (0, 2)
+
+
+def test_the_correlation_of_filtered_white_noise_is_what_it_says():
+    """Of one row out with the next."""
+    low = ParallelFilter(200.0, 16.0, (slice(0, 400_000),))
+    rows = low(np.random.default_rng(0).normal(size=400_000))
+    measured = float(rows[1:] @ rows[:-1]) / float(rows @ rows)
+    assert low.correlation == pytest.approx(measured, abs=0.01)
+    assert 0.2 < low.correlation < 0.8
