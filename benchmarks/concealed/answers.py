@@ -49,11 +49,19 @@ def accepted(concealed, bodies, motion):
         low, high = motion.low[concealed.index], motion.high[concealed.index]
         if lo < low + 0.05 * (high - low) or hi > high - 0.05 * (high - low):
             answers.append(_answer(verdict, 'limit_friction', joint, same))
-    if joint == 'all':
-        answers += [_answer(verdict, name, b.joint, same) for b in bodies if b.is_driven]
-    if name == 'command_delay' and joint != 'all' and sum(b.is_driven for b in bodies) == 1:
-        answers.append(_answer(verdict, name, 'all', same))
+    answers += [_answer(verdict, name, other, same) for other in _other_joints(concealed, bodies)]
     return answers
+
+
+def _other_joints(concealed, bodies):
+    """Return the joints at which the same effect would give the same motion."""
+    name, joint = concealed.name, concealed.joint
+    driven = [b.joint for b in bodies if b.is_driven]
+    if name == 'joint_coupling' and concealed.parameters['kind'] == 'spring':
+        return [concealed.parameters['source_joint']]
+    if joint == 'all':
+        return driven
+    return ['all'] if name == 'command_delay' and len(driven) == 1 else []
 
 
 def without_effect(errors, bodies):

@@ -27,6 +27,10 @@ SCORED = {
 """Parameters whose estimates are scored."""
 
 
+_STEEPEST = 0.8
+"""Greatest slope of an encoder's error: an encoder does not turn back."""
+
+
 class UnsuitableError(Exception):
     """The robot or its motion cannot show this effect."""
 
@@ -134,7 +138,11 @@ def _on_joint(rng, name, bodies, motion, j):
         'velocity_filter_lag': (0.02, lambda s: {'time_constant': max(s, 1e-3)}),
     }  # fmt: skip
     size, values = table[name]
-    largest = {'torque_gain': 0.6, 'actuator_lag': 0.08, 'velocity_filter_lag': 0.06}
+    turn = 2.0 * math.pi * turns if is_linear else turns
+    largest = {
+        'torque_gain': 0.6, 'actuator_lag': 0.08, 'velocity_filter_lag': 0.06,
+        'encoder_eccentricity': _STEEPEST / turn,
+    }  # fmt: skip
     return Concealed(name, bodies[j].joint, j, values, size, largest=largest.get(name, math.inf))
 
 
