@@ -11,6 +11,7 @@ from scipy import optimize
 from sgp_ros.core.kernels import SquaredExponential
 from sgp_ros.core.model import Model
 from sgp_ros.core.posterior import Posterior
+from sgp_ros.core.search_box import opened_box, search_box, variance_or_one
 from sgp_ros.errors import NumericalError
 
 if TYPE_CHECKING:
@@ -22,8 +23,6 @@ RULES = ('paper', 'standardised')
 """How length scales start: at the variance of each input, as printed in the paper, or at its
 standard deviation, which has the right unit and does not depend on the unit chosen."""
 
-_NOISE_FLOOR = 1e-8
-_RANGE = 1e4
 _RESTART_SPREAD = 1.5
 _REFUSED = 1e25
 _SCREENED_LENGTHS = (0.3, 1.0, 3.0)
@@ -64,8 +63,8 @@ def initial_model(
     """
     if rule not in RULES:
         raise ValueError(f'rule {rule!r} is none of {RULES}')
-    power = _variance_or_one(data.y)
-    spread = _variance_or_one(data.U)
+    power = variance_or_one(data.y)
+    spread = variance_or_one(data.U)
     if rule == 'standardised':
         spread = np.sqrt(spread)
     kernels: list[Kernel | None] = []
@@ -113,8 +112,9 @@ def learn(
 ) -> LearnedModel:
     """Maximise the evidence from `start` and from `restarts` random perturbations of it.
 
-    L-BFGS-B on the logarithms, with the analytic gradient, within a factor of 1e4 of the scale
-    of data: noise at least 1e-8 of the target's variance keeps the covariance factorable.
+    L-BFGS-B on the logarithms, with the analytic gradient, in a box relative to the data. Where
+    the best point touches the top of a variance, the search goes on from there in a higher box
+    (`core/search_box.py`): in one box of that height, trials without a factor end searches early.
 
     Raises:
         NumericalError: not one start led to a positive definite covariance.
@@ -122,23 +122,23 @@ def learn(
     """
     if restarts and rng is None:
         raise ValueError('restarts need a random generator')
-    bounds = _bounds(data, start)
+    box = search_box(data, start)
     starts = [start.log_parameters]
     for _ in range(restarts):
         assert rng is not None
         starts.append(starts[0] + _RESTART_SPREAD * rng.standard_normal(len(starts[0])))
     search = _Search(data, prior, start)
     for theta in starts:
-        low, high = bounds.T
-        optimize.minimize(
-            search.objective, np.clip(theta, low, high), jac=True, method='L-BFGS-B', bounds=bounds
-        )
+        search.climb(theta, box)
     if search.best is None:
         raise NumericalError(
             f'no positive definite covariance in {len(starts)} starts of the fit',
             'distinct inputs and a target that varies',
             'check the recording for repeated or constant samples',
         )
+    higher = opened_box(box, search.best, data, start)
+    if higher is not None:
+        search.climb(search.best, higher)
     model = start.with_log_parameters(search.best)
     return LearnedModel(model, -search.lowest, search.evaluations, search.refused)
 
@@ -155,7 +155,14 @@ class _Search:
         self.evaluations = 0
         self.refused = 0
 
-    def objective(self, theta: np.ndarray) -> tuple[float, np.ndarray]:
+    def climb(self, theta: np.ndarray, box: np.ndarray) -> None:
+        """Search from theta (h,) inside a box (h, 2)."""
+        low, high = box.T
+        optimize.minimize(
+            self._objective, np.clip(theta, low, high), jac=True, method='L-BFGS-B', bounds=box
+        )
+
+    def _objective(self, theta: np.ndarray) -> tuple[float, np.ndarray]:
         self.evaluations += 1
         try:
             model = self._start.with_log_parameters(theta)
@@ -180,24 +187,3 @@ class _Search:
         offset = theta - self.best
         height = 1.0 + abs(self.lowest)
         return self.lowest + height * (1.0 + 0.5 * float(offset @ offset)), height * offset
-
-
-def _variance_or_one(x: np.ndarray) -> np.ndarray:
-    variance = x.var(axis=0)
-    return np.where(variance > 0.0, variance, 1.0)
-
-
-def _bounds(data: Observations, start: Model) -> np.ndarray:
-    power = _variance_or_one(data.y)
-    spread = np.sqrt(_variance_or_one(data.U))
-    rows: list[tuple[float, float]] = []
-    for component, kernel in enumerate(start.kernels):
-        if kernel is None:
-            continue
-        variance = power[component] if data.G is None else power.mean()
-        scales = kernel.scales(float(variance), spread[list(kernel.inputs)])
-        heights = len(scales) - len(kernel.inputs)
-        rows += [(x / _RANGE**2, x * _RANGE) for x in scales[:heights]]
-        rows += [(x / _RANGE, x * _RANGE) for x in scales[heights:]]
-    rows += [(_NOISE_FLOOR * x, 1e2 * x) for x in power]
-    return np.log(np.array(rows))

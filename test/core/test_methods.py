@@ -163,8 +163,7 @@ def test_a_fit_without_any_factor_raises(monkeypatch):
     """Where no start has a positive definite covariance, the error says what to look at."""
     data = Observations(np.zeros((6, 1)), np.zeros((6, 1, 0)), np.zeros((6, 1)))
     start = Model((SquaredExponential(1.0, (1.0,), (0,)),), (1e-300,))
-    monkeypatch.setattr('sgp_ros.core.learning._NOISE_FLOOR', 1e-300)
-    monkeypatch.setattr('sgp_ros.core.learning._RANGE', 1e4)
+    monkeypatch.setattr('sgp_ros.core.search_box._NOISE_FLOOR', 1e-300)
     with pytest.raises(NumericalError, match='no positive definite'):
         learn(data, CoefficientPrior.flat(0), start)
 

@@ -56,7 +56,7 @@ def drawn(problem: Problem, seed: int) -> Problem:
 def additive(problem: Problem, seed: int) -> Problem:
     """Return a sum of sines of each input, which no squared exponential of all inputs fits well.
 
-    The evidence grows with the signal variance without end.
+    The evidence is highest where the signal variance is far above the variance of the data.
     """
     n = len(problem.U)
     noise = 0.1 * np.random.default_rng(seed).normal(size=(n, 1))
