@@ -144,18 +144,19 @@ class Engine:
         """Put fitted hyper-parameters in force.
 
         Returns:
-            The event to record; None where the fit failed, was no better than what was in force,
-            or gives no factor: it is then counted as refused.
+            The event to record; None where the fit is refused, which is counted by reason.
         """
-        if fit.model is not None and fit.log_evidence > fit.log_evidence_before:
+        reason = fit.refusal
+        if not reason:
+            assert fit.model is not None
             try:
                 change = self.change(self._hyper_settings(fit.model))
             except NumericalError:
-                pass
+                reason = 'no_factor'
             else:
                 self.counts.refits += 1
                 return change
-        self.counts.refits_refused += 1
+        self.counts.refits_refused_for[reason] += 1
         return None
 
     def hyper_settings(self) -> dict[str, SettingValue]:

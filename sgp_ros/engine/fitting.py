@@ -57,6 +57,13 @@ class FitResult:
     log_evidence_before: float
     evaluations: int
 
+    @property
+    def refusal(self) -> str:
+        """Why it is of no use, one of `results.REFIT_REFUSALS`; empty where it is better."""
+        if self.model is None or not math.isfinite(self.log_evidence):
+            return 'diverged'
+        return '' if self.log_evidence > self.log_evidence_before else 'no_better'
+
 
 def fit(request: FitRequest) -> FitResult:
     """Maximise the evidence of the buffered samples given the dropped ones. O(k n^3) a step."""

@@ -16,6 +16,10 @@ REFUSALS = ('late', 'duplicate', 'nonfinite', 'unpaired', 'unknown_joint', 'gap'
 COMMAND_REFUSALS = ('late', 'nonfinite', 'unknown_joint', 'wrong_length')
 """Reasons for which a command is refused."""
 
+REFIT_REFUSALS = ('diverged', 'no_better', 'no_factor')
+"""Reasons for which a fit is refused: it found nothing that has an evidence; it found none higher
+than the one in force; the buffer of by then has no factor under what it found."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Channel:
@@ -102,7 +106,8 @@ class Counts:
         learned: equations that the model learned.
         scored: equations whose prediction entered the scores.
         unlearnable: equations that repeat others to rounding.
-        refits, refits_refused: fits of hyper-parameters put in force, and those refused.
+        refits: fits of hyper-parameters put in force.
+        refits_refused_for: those refused by reason.
         factor_checks, factor_drift: factors compared with fresh ones, and the largest relative
             difference found.
         factor_rebuilt: factors that were lost to rounding and computed anew from the buffer.
@@ -119,7 +124,9 @@ class Counts:
     scored: int = 0
     unlearnable: int = 0
     refits: int = 0
-    refits_refused: int = 0
+    refits_refused_for: dict[str, int] = field(
+        default_factory=lambda: dict.fromkeys(REFIT_REFUSALS, 0)
+    )
     factor_checks: int = 0
     factor_drift: float = 0.0
     factor_rebuilt: int = 0
@@ -128,6 +135,11 @@ class Counts:
     def used(self) -> int:
         """States that took part in a window or wait for one."""
         return self.read - sum(self.refused.values())
+
+    @property
+    def refits_refused(self) -> int:
+        """Fits of hyper-parameters that were not put in force."""
+        return sum(self.refits_refused_for.values())
 
 
 @dataclass(frozen=True, slots=True)

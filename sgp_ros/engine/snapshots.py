@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from sgp_ros.engine.estimator import Estimator
     from sgp_ros.robots.robot import Robot
 
-VERSION = 3
+VERSION = 4
 
 
 def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:

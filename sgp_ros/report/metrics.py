@@ -74,6 +74,7 @@ def collect_metrics(
             'repeating': counts.unlearnable,
             'refits': counts.refits,
             'refits_refused': counts.refits_refused,
+            'refits_refused_for': dict(counts.refits_refused_for),
         },
         'factor': {
             'checks': counts.factor_checks,

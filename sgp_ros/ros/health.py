@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from sgp_ros.engine.engine import Engine
+    from sgp_ros.engine.fitting import FitResult
     from sgp_ros.engine.results import Counts, Estimate
     from sgp_ros.errors import MessageError
 
@@ -44,6 +45,18 @@ class Health:
     def note_push(self, duration_s: float) -> None:
         """Note how long the engine took for one event [s]."""
         self._durations_s.append(duration_s)
+
+    def note_fit(self, fit: FitResult, *, is_in_force: bool) -> None:
+        """Note what a fit found, and why it was refused if it was."""
+        gain = fit.log_evidence - fit.log_evidence_before
+        if is_in_force:
+            self.last_fit = f'log evidence rose by {gain:.3g} nat'
+        elif fit.refusal == 'diverged':
+            self.last_fit = 'refused: diverged, nothing that it tried has a usable covariance'
+        elif fit.refusal == 'no_better':
+            self.last_fit = f'refused: no better, its log evidence is {-gain:.3g} nat lower'
+        else:
+            self.last_fit = 'refused: the buffer has no factor under what it found'
 
     def note_unreadable(self, error: MessageError) -> None:
         """Note a message that is no sample."""
@@ -135,6 +148,7 @@ class Health:
             'delay_s': f'{engine.delay_s:.6f}',
             'refits': str(counts.refits),
             'refits_refused': str(counts.refits_refused),
+            **{f'refits_refused.{why}': str(n) for why, n in counts.refits_refused_for.items()},
             'factor_checks': str(counts.factor_checks),
             'factor_drift': f'{counts.factor_drift:.3g}',
             'factor_rebuilt': str(counts.factor_rebuilt),

@@ -72,12 +72,9 @@ class Session:
         answer = self._fits.poll()
         if isinstance(answer, FitResult):
             change = self.engine.accept_fit(answer)
-            if change is None:
-                self.health.last_fit = 'refused: no better than what is in force'
-            else:
+            self.health.note_fit(answer, is_in_force=change is not None)
+            if change is not None:
                 self._write_event(change)
-                gain = answer.log_evidence - answer.log_evidence_before
-                self.health.last_fit = f'log evidence rose by {gain:.3g} nat'
         elif isinstance(answer, WorkerLost):
             self.health.last_fit = f'lost: the worker ended with code {answer.exit_code}'
             return f'fit {self.health.last_fit}; another starts with the next fit'

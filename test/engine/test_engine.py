@@ -335,14 +335,23 @@ def test_wrong_settings_change_nothing():
 
 
 def test_a_fit_that_is_no_better_is_refused():
-    """Worse, failed or factorless hyper-parameters are counted and not put in force."""
+    """Worse, failed or factorless hyper-parameters are counted, each by its reason."""
     engine, _ = _run(pendulum_events(200), refit__enabled=False)
     model = engine.estimator.regression.model
-    worse = FitResult(0, model, 1.0, 2.0, 5)
-    failed = FitResult(0, None, -np.inf, 2.0, 5)
-    assert engine.accept_fit(worse) is None
-    assert engine.accept_fit(failed) is None
-    assert engine.counts.refits_refused == 2
+    lost = dataclasses.replace(model, noise=(1e-300,))
+    for fit_, reason in (
+        (FitResult(0, model, 1.0, 2.0, 5), 'no_better'),
+        (FitResult(0, model, 2.0, 2.0, 5), 'no_better'),
+        (FitResult(0, None, -np.inf, 2.0, 5), 'diverged'),
+        (FitResult(0, model, np.nan, 2.0, 5), 'diverged'),
+        (FitResult(0, model, np.inf, 2.0, 5), 'diverged'),
+        (FitResult(0, lost, 3.0, 2.0, 5), 'no_factor'),
+    ):
+        before = dict(engine.counts.refits_refused_for)
+        assert engine.accept_fit(fit_) is None
+        assert engine.counts.refits_refused_for == before | {reason: before[reason] + 1}
+    assert engine.counts.refits_refused == 6
+    assert engine.counts.refits == 0
     assert engine.estimator.regression.model == model
 
 
