@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from sgp_ros.engine.samples import SettingValue
     from sgp_ros.robots.robot import Robot
 
+_LARGEST = 1e12
+"""Largest length scale [unit of the input]; of a variance, its square."""
+
 
 def _setting(
     name: str,
@@ -285,11 +288,12 @@ def describe_settings(robot: Robot) -> tuple[Setting, ...]:
         dynamic += [
             Setting(prefix + 'signal_variance', 'float', 0.0,
                     'Prior variance of Z; 0 estimates it.', unit=f'({unit})^2', low=0.0,
-                    high=1e12),
+                    high=_LARGEST**2),
             Setting(prefix + 'lengthscales', 'float_array', (0.0,),
-                    'Length scale of Z per input; [0.0] estimates them.', low=0.0, high=1e12),
+                    'Length scale of Z per input; [0.0] estimates them.', low=0.0,
+                    high=_LARGEST),
             Setting(prefix + 'noise_variance', 'float', 0.0,
                     'Variance of the noise; 0 estimates it.', unit=f'({unit})^2', low=0.0,
-                    high=1e12),
+                    high=_LARGEST**2),
         ]  # fmt: skip
     return tuple(_static_settings().values()) + tuple(dynamic)

@@ -355,6 +355,16 @@ def test_a_fit_that_is_no_better_is_refused():
     assert engine.estimator.regression.model == model
 
 
+def test_a_fit_may_find_what_the_scale_of_the_data_allows():
+    """Efforts of a thousand newton metres that are linear in an input ask for 1e14 N^2 m^2."""
+    engine, _ = _run(pendulum_events(200), refit__enabled=False)
+    model = engine.estimator.regression.model
+    large = tuple(dataclasses.replace(kernel, variance=1e14) for kernel in model.kernels)
+    found = dataclasses.replace(model, kernels=large, noise=(1e4,))
+    assert engine.accept_fit(FitResult(0, found, 3.0, 2.0, 5)) is not None
+    assert engine.estimator.regression.model == found
+
+
 def test_fits_are_asked_for_at_sample_counts():
     """The first when the first model exists, then every `refit.period` learned samples."""
     engine = Engine(PENDULUM, config(refit__period=50))
