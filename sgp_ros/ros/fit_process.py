@@ -2,7 +2,8 @@
 
 One worker serves one request at a time. It starts when the node does, because its imports take
 longer than most fits; it is killed when the node ends, and ends by itself when the node vanishes.
-This module imports nothing of ROS: the worker loads it.
+It computes only where nothing else wants to run, so on a computer without a free core a fit takes
+as long as that lasts. This module imports nothing of ROS: the worker loads it.
 """
 
 from __future__ import annotations
@@ -114,8 +115,21 @@ class FitProcess:
         return WorkerLost(None if process is None else process.exitcode, had_request)
 
 
-def _serve(connection: Connection) -> None:
+def _leave_the_processor() -> None:
+    """Run only where nothing else wants to run.
+
+    Under `SCHED_IDLE` (Linux) whoever wakes up takes the processor at once; from a nice process it
+    would wait for the end of a slice, some milliseconds. Elsewhere, or where a container
+    forbids it, niceness alone.
+    """
     os.nice(_NICENESS)
+    if hasattr(os, 'SCHED_IDLE'):
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+
+
+def _serve(connection: Connection) -> None:
+    _leave_the_processor()
     try:
         connection.send(_READY)
         while True:

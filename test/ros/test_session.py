@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
+from multiprocessing import connection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -59,10 +60,12 @@ def _events(count: int) -> list[Event]:
 
 def _await(fits: FitProcess) -> FitResult | WorkerLost:
     end = time.monotonic() + DEADLINE_S
-    while time.monotonic() < end:
+    while (left := end - time.monotonic()) > 0.0:
         answer = fits.poll()
         if answer is not None:
             return answer
+        assert fits._connection is not None
+        connection.wait([fits._connection], left)  # the worker needs the processor
     raise AssertionError('no answer of the worker')
 
 
@@ -108,6 +111,15 @@ def test_a_killed_worker_is_told_and_replaced(fits: FitProcess) -> None:
     os.kill(process.pid, signal.SIGKILL)
     assert _await(fits) == WorkerLost(-signal.SIGKILL, had_request=False)
     test_a_fit_in_a_process_equals_a_fit_in_place(fits)
+
+
+@pytest.mark.skipif(not hasattr(os, 'SCHED_IDLE'), reason='a policy of Linux')
+def test_a_fit_runs_only_where_nothing_else_wants_to(fits: FitProcess) -> None:
+    test_a_fit_in_a_process_equals_a_fit_in_place(fits)
+    process = fits._process
+    assert process is not None
+    assert process.pid is not None
+    assert os.sched_getscheduler(process.pid) == os.SCHED_IDLE
 
 
 def test_closing_kills_the_worker_at_once(fits: FitProcess) -> None:
