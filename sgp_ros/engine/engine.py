@@ -41,7 +41,7 @@ class Engine:
         counts: what became of every sample.
         delay_s: half the length of the last filter window [s].
         order, intake, estimator: the three stages of the fold.
-        fits, next_fit: fits asked for so far, and the learned count at which the next is due.
+        fits, next_fit: fits handed out so far, and the learned count at which the next is due.
     """
 
     def __init__(self, robot: Robot, config: EngineConfig) -> None:
@@ -52,7 +52,7 @@ class Engine:
         self.order = ReorderBuffer(round(config.reorder_window * 1e9))
         self.intake = Intake(robot, config, self.counts)
         self.estimator = Estimator(robot, config, self.counts)
-        self._fit_request: FitRequest | None = None
+        self._is_fit_due = False
         self.fits = 0
         self.next_fit = 0
 
@@ -123,29 +123,29 @@ class Engine:
         regression = self.estimator.regression
         if regression is None or regression.size < self.config.learning_initial:
             return False
-        self._fit_request = FitRequest(
-            self.fits,
+        self._is_fit_due = True
+        return True
+
+    def take_fit_request(self) -> FitRequest | None:
+        """Return the fit that is due, once, on the buffer as it is now."""
+        regression = self.estimator.regression
+        if regression is None or not self._is_fit_due:
+            return None
+        self._is_fit_due = False
+        base = regression.base
+        self.fits += 1
+        return FitRequest(
+            self.fits - 1,
             regression.buffer,
-            regression.base.R.copy(),
-            regression.base.z.copy(),
+            base.R.copy(),
+            base.z.copy(),
             regression.model,
             self.config.refit_restarts,
             self.config.seed,
         )
-        self.fits += 1
-        return True
-
-    def take_fit_request(self) -> FitRequest | None:
-        """Return the fit that is due, once."""
-        request, self._fit_request = self._fit_request, None
-        return request
 
     def accept_fit(self, fit: FitResult) -> SettingsChange | None:
-        """Put fitted hyper-parameters in force.
-
-        Returns:
-            The event to record; None where the fit is refused, which is counted by reason.
-        """
+        """Put a fit in force; return the event to record, None where it is refused and counted."""
         reason = fit.refusal
         if not reason:
             assert fit.model is not None
@@ -221,7 +221,7 @@ class Engine:
         self.order = ReorderBuffer(self.order.window_ns)
         self.intake = Intake(self.robot, self.config, self.counts)
         self.estimator.begin_stream(self.counts)
-        self._fit_request = None
+        self._is_fit_due = False
         self.next_fit = self.config.refit_period
 
     @property
@@ -252,7 +252,7 @@ class Engine:
     def _forget(self) -> None:
         self.estimator = Estimator(self.robot, self.config, self.counts)
         self.intake = Intake(self.robot, self.config, self.counts)
-        self._fit_request = None
+        self._is_fit_due = False
         self.next_fit = self.counts.learned
 
     def _schedule_fit(self) -> None:

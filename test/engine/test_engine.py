@@ -376,6 +376,17 @@ def test_fits_are_asked_for_at_sample_counts():
     assert counts == [20, 70, 120, 170]
 
 
+def test_a_fit_that_had_to_wait_sees_the_newest_samples():
+    """A worker that was busy gets the buffer of now; copying one at every count would be waste."""
+    engine = Engine(PENDULUM, config(refit__period=50))
+    for event in pendulum_events(600):
+        engine.push(event)
+    request = engine.take_fit_request()
+    np.testing.assert_array_equal(request.data.y, engine.estimator.regression.buffer.y)
+    assert request.number == 0
+    assert engine.fits == 1
+
+
 def test_fit_requests_cross_process_borders():
     """A request and its result survive the pickling of `multiprocessing`, to equal numbers."""
     engine = Engine(PENDULUM, config())
