@@ -12,6 +12,7 @@ import contextlib
 import multiprocessing
 import os
 import signal
+import threading
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING
@@ -46,6 +47,7 @@ class FitProcess:
         self._process: SpawnProcess | None = None
         self._connection: Connection | None = None
         self._waiting: FitRequest | None = None
+        self._sender: threading.Thread | None = None
         self._is_ready = False
         self.is_free = True
         self._start()
@@ -83,9 +85,11 @@ class FitProcess:
         if self._process is not None:
             self._process.kill()
             self._process.join()
+        if self._sender is not None:
+            self._sender.join()  # it fails at once: nobody reads any more
         if self._connection is not None:
             self._connection.close()
-        self._process = self._connection = None
+        self._process = self._connection = self._sender = None
         self._is_ready = False
 
     def _start(self) -> None:
@@ -101,11 +105,17 @@ class FitProcess:
         theirs.close()
 
     def _send_waiting(self) -> None:
-        """Send the request once the worker listens, so that a large one does not block here."""
+        """Send the request once the worker listens.
+
+        In a thread, because a pipe takes no more than its reader does, and this one reads only
+        when it is given the processor.
+        """
         if self._is_ready and self._waiting is not None and self._connection is not None:
             request, self._waiting = self._waiting, None
-            with contextlib.suppress(OSError):  # `poll` finds the end of the connection
-                self._connection.send(request)
+            self._sender = threading.Thread(
+                target=_send, args=(self._connection, request), daemon=True
+            )
+            self._sender.start()
 
     def _lose(self) -> WorkerLost:
         process, had_request = self._process, not self.is_free
@@ -113,6 +123,11 @@ class FitProcess:
         self._waiting = None
         self.is_free = True
         return WorkerLost(None if process is None else process.exitcode, had_request)
+
+
+def _send(connection: Connection, request: FitRequest) -> None:
+    with contextlib.suppress(OSError):  # `poll` finds the end of the connection
+        connection.send(request)
 
 
 def _leave_the_processor() -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import signal
+import threading
 import time
 from multiprocessing import connection
 from pathlib import Path
@@ -15,7 +17,7 @@ import yaml
 
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
-from sgp_ros.engine.fitting import FitResult, fit
+from sgp_ros.engine.fitting import FitRequest, FitResult, fit
 from sgp_ros.engine.samples import CommandSample, JointSample, SettingsChange
 from sgp_ros.errors import ConfigError
 from sgp_ros.recordings.predictions import PredictionTopics
@@ -120,6 +122,59 @@ def test_a_fit_runs_only_where_nothing_else_wants_to(fits: FitProcess) -> None:
     assert process is not None
     assert process.pid is not None
     assert os.sched_getscheduler(process.pid) == os.SCHED_IDLE
+
+
+def _too_large_for_a_pipe(fits: FitProcess) -> FitRequest:
+    """Return a request with many inputs that no kernel sees, once the worker listens."""
+    engine = _engine()
+    for event in _events(120):
+        engine.push(event)
+    assert engine.request_refit()
+    request = engine.take_fit_request()
+    assert request is not None
+    fits.submit(request)
+    _await(fits)
+    data = request.data
+    wide = np.hstack([data.U, np.zeros((len(data.U), 20_000))])
+    return dataclasses.replace(request, data=dataclasses.replace(data, U=wide))
+
+
+def _stop(fits: FitProcess) -> int:
+    """Stop the worker and return its process id."""
+    process = fits._process
+    assert process is not None
+    assert process.pid is not None
+    os.kill(process.pid, signal.SIGSTOP)
+    os.waitid(os.P_PID, process.pid, os.WSTOPPED)
+    return process.pid
+
+
+def test_handing_out_a_fit_does_not_wait_for_the_worker(fits: FitProcess) -> None:
+    request = _too_large_for_a_pipe(fits)
+    pid = _stop(fits)
+    is_needed = threading.Event()
+
+    def rescue() -> None:
+        is_needed.set()
+        os.kill(pid, signal.SIGCONT)
+
+    timer = threading.Timer(DEADLINE_S, rescue)
+    timer.start()
+    fits.submit(request)
+    timer.cancel()
+    assert not is_needed.is_set()
+    os.kill(pid, signal.SIGCONT)
+    assert isinstance(_await(fits), FitResult)
+
+
+def test_a_worker_that_never_reads_is_closed_at_once(fits: FitProcess) -> None:
+    request = _too_large_for_a_pipe(fits)
+    process = fits._process
+    _stop(fits)
+    fits.submit(request)
+    fits.close()
+    assert process is not None
+    assert process.exitcode == -signal.SIGKILL
 
 
 def test_closing_kills_the_worker_at_once(fits: FitProcess) -> None:
