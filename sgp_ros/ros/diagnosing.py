@@ -22,15 +22,25 @@ from sgp_ros.ros.verdict import ERROR, OK, WARN
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import numpy as np
+
     from sgp_ros.engine.samples import Event
     from sgp_ros.robots.robot import Robot
 
+    Names = tuple[str, ...]
+    State = tuple[int, Names, np.ndarray, np.ndarray | None, np.ndarray | None]
+    Command = tuple[int, np.ndarray, Names | None]
+
 MOST_EVENTS = 200_000
 """Remembered at most, whatever the window: a minute of states and commands at 1.6 kHz each."""
+_STATE_FIELDS = 5
 
 
 class Diagnosing:
     """Remembers the recent past of a robot and has it diagnosed elsewhere.
+
+    What is remembered are the fields of the samples, in plain tuples. The garbage collector lets
+    go of those; so many objects it would search for fifty milliseconds while messages wait.
 
     Args:
         robot: what the node identifies.
@@ -42,17 +52,30 @@ class Diagnosing:
         self._robot = robot
         self._path = path
         self._window_ns = round(window_s * 1e9)
-        self._events: deque[Event] = deque(maxlen=MOST_EVENTS)
+        self._past: deque[State | Command] = deque(maxlen=MOST_EVENTS)
         self._process: DiagnosisProcess | None = None
         self._outcome: DiagnosisDone | DiagnosisFailed | None = None
 
     def take(self, event: Event) -> None:
         """Remember a state or command, forget what is older than the window."""
-        if not isinstance(event, (JointSample, CommandSample)):
+        stamp_ns = event.stamp_ns
+        if isinstance(event, JointSample):
+            state = (stamp_ns, event.names, event.position, event.velocity, event.effort)
+            self._past.append(state)
+        elif isinstance(event, CommandSample):
+            self._past.append((stamp_ns, event.effort, event.names))
+        else:
             return
-        self._events.append(event)
-        while event.stamp_ns - self._events[0].stamp_ns > self._window_ns:
-            self._events.popleft()
+        while stamp_ns - self._past[0][0] > self._window_ns:
+            self._past.popleft()
+
+    @property
+    def events(self) -> tuple[JointSample | CommandSample, ...]:
+        """States and commands of the window, in the order in which they came."""
+        return tuple(
+            JointSample(*past) if len(past) == _STATE_FIELDS else CommandSample(*past)
+            for past in self._past
+        )
 
     def start(self, command_joints: tuple[str, ...]) -> tuple[bool, str]:
         """Start a diagnosis of the recent past.
@@ -63,7 +86,7 @@ class Diagnosing:
         Returns:
             Whether it was started, and one sentence.
         """
-        states = sum(isinstance(event, JointSample) for event in self._events)
+        states = sum(len(past) == _STATE_FIELDS for past in self._past)
         if self._process is not None:
             return False, 'a diagnosis is already running; /diagnostics tells its outcome'
         try:
@@ -72,7 +95,7 @@ class Diagnosing:
             return False, ' '.join(str(error).split())
         if states < SHORTEST_ROWS:
             return False, f'too few states: {states}, at least {SHORTEST_ROWS} are needed'
-        events = tuple(_named(event, command_joints) for event in self._events)
+        events = tuple(_named(event, command_joints) for event in self.events)
         self._process = DiagnosisProcess(DiagnosisRequest(self._path, events))
         return True, f'started on {states} states'
 
