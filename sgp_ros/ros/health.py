@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from typing import TYPE_CHECKING
 
@@ -29,12 +30,14 @@ class Health:
     Attributes:
         seen_joints: names in the last joint states.
         last_fit: one sentence on the last fit of hyper-parameters.
+        fit_since_s: when the fit that runs was handed out, on a steady clock [s]; None without.
         record_problem: why the record stopped; empty while all is well.
     """
 
     def __init__(self) -> None:
         self.seen_joints: tuple[str, ...] = ()
         self.last_fit = 'none yet'
+        self.fit_since_s: float | None = None
         self.record_problem = ''
         self._durations_s: deque[float] = deque(maxlen=_DURATIONS)
         self._unreadable = 0
@@ -152,9 +155,15 @@ class Health:
             'factor_checks': str(counts.factor_checks),
             'factor_drift': f'{counts.factor_drift:.3g}',
             'factor_rebuilt': str(counts.factor_rebuilt),
+            'refit_running': self._running_fit(),
             'last_refit': self.last_fit,
         }
         return 'model', OK, message, values
+
+    def _running_fit(self) -> str:
+        if self.fit_since_s is None:
+            return 'none'
+        return f'for {time.perf_counter() - self.fit_since_s:.1f} s'
 
     def _fit(self, engine: Engine, j: int, joint: str) -> tuple[str, int, str, dict[str, str]]:
         scores = engine.scores()[joint]

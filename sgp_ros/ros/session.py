@@ -124,5 +124,6 @@ class Session:
     def _hand_out_fit(self) -> None:
         if self._fits.is_free:
             request = self.engine.take_fit_request()
+            self.health.fit_since_s = None if request is None else time.perf_counter()
             if request is not None:
                 self._fits.submit(request)

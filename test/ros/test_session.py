@@ -200,6 +200,25 @@ def test_the_record_opens_with_the_settings_in_force(session: Session, tmp_path:
     assert [dict(c.settings) for c in changes[1:]] == [{'buffer.budget': 25}]
 
 
+def test_a_fit_that_runs_is_told_until_it_ends(session: Session) -> None:
+    for event in _events(60):
+        session.take(event)
+    assert session.refit()
+    sources = {'joint_states': ('/joint_states', 1), 'command': ('/command', 1)}
+
+    def running() -> str:
+        statuses = session.health.statuses(session.engine, 'node', 1.0, sources)
+        return next(s for s in statuses if s.name == 'node: model').values['refit_running']
+
+    assert running().startswith('for ')
+    end = time.monotonic() + DEADLINE_S
+    while session.health.last_fit == 'none yet' and time.monotonic() < end:
+        assert session._fits._connection is not None
+        connection.wait([session._fits._connection], DEADLINE_S)
+        session.poll_fit()
+    assert running() == 'none'
+
+
 @pytest.mark.filterwarnings('ignore::pytest.PytestUnraisableExceptionWarning')
 def test_a_full_disk_ends_the_record_but_not_the_session() -> None:
     session = Session(_engine(), Record(Path('/dev/full'), TOPICS, 'sensor_msgs/JointState'))
