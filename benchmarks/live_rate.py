@@ -12,6 +12,7 @@ callback must not depend on it.
 from __future__ import annotations
 
 import argparse
+import gc
 import json
 import os
 import tempfile
@@ -124,15 +125,17 @@ def _processor_s(pid):
     return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
 
 
-def _publish(listener, machine, first, seconds):
-    """Publish at the rate, in real time, with the time of sending as stamp.
+def _samples(machine, seconds):
+    """Return all states, made before the first is sent: the stream must not pause for them."""
+    signals = machine.signals(np.arange(round(seconds * RATE_HZ)) / RATE_HZ)
+    samples = list(zip(*([array('d', row) for row in signal] for signal in signals), strict=True))
+    gc.collect()
+    gc.freeze()
+    return samples
 
-    Returns:
-        The number of the next sample, and the time it took [s].
-    """
-    last = first + round(seconds * RATE_HZ)
-    signals = machine.signals(np.arange(first, last) / RATE_HZ)
-    samples = [[array('d', signal[i]) for signal in signals] for i in range(last - first)]
+
+def _publish(listener, machine, samples):
+    """Publish at the rate, stamped with the time of sending; return how long it took [s]."""
     count = 0
     began_ns = time.time_ns()
     while count < len(samples):
@@ -144,12 +147,13 @@ def _publish(listener, machine, first, seconds):
             listener.turn()
             due_ns = began_ns + round(count * 1e9 / RATE_HZ)
             time.sleep(max(0.0, 1e-9 * (due_ns - time.time_ns())))
-    return last, (time.time_ns() - began_ns) * 1e-9
+    return (time.time_ns() - began_ns) * 1e-9
 
 
 def _run(settings, seconds, graph):
     processes = LiveProcesses(graph)
     listener, machine = Listener(rclpy.Context(), int(graph['ROS_DOMAIN_ID'])), Machine()
+    samples, first = _samples(machine, WARM_UP_S + seconds), round(WARM_UP_S * RATE_HZ)
     try:
         node = processes.start('sgp_ros.ros.sgp_node', {
             **load_parameters(ROOT / 'config' / 'panda.yaml'),
@@ -160,12 +164,12 @@ def _run(settings, seconds, graph):
         processes.wait_for(
             node, listener.publisher.get_subscription_count, _START_LIMIT_S, 'to listen'
         )
-        count, _ = _publish(listener, machine, 0, WARM_UP_S)
+        _publish(listener, machine, samples[:first])
         listener.latencies_s.clear()
         listener.callbacks.clear()
         pid = _node_pid()
         before, wall = _processor_s(pid), time.monotonic()
-        count, took_s = _publish(listener, machine, count, seconds)
+        took_s = _publish(listener, machine, samples[first:])
         used, elapsed = _processor_s(pid) - before, time.monotonic() - wall
         end = time.monotonic() + 2.0
         while time.monotonic() < end:
@@ -173,7 +177,7 @@ def _run(settings, seconds, graph):
     finally:
         processes.stop()
         listener.close()
-    return _summary(listener, count, used / elapsed, took_s)
+    return _summary(listener, len(samples), used / elapsed, took_s)
 
 
 def _summary(listener, published, processor, took_s):
