@@ -38,11 +38,12 @@ class ParallelFilter:
             signal.firwin(2 * half + 1, self.cutoff, window=('kaiser', 5.0), fs=self.rate)
         )
 
-    @cached_property
-    def correlation(self) -> float:
-        """Correlation of white noise from one row out to the next."""
-        t, d = self.taps, self.decimation
-        return float(t[d:] @ t[:-d]) / float(t @ t) if d < len(t) else 0.0
+    def correlations(self, count: int) -> np.ndarray:
+        """Return the correlation of white noise between rows out, 0 to `count` rows apart."""
+        full = np.correlate(self.taps, self.taps, mode='full')[len(self.taps) - 1 :]
+        lags = np.arange(count + 1) * self.decimation
+        inside = lags < len(full)
+        return np.asarray(np.where(inside, full[np.where(inside, lags, 0)], 0.0) / full[0])
 
     @cached_property
     def kept(self) -> tuple[np.ndarray, ...]:

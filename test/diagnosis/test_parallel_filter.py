@@ -69,10 +69,10 @@ def test_too_short_a_recording_gives_no_rows():
     assert low(np.ones((20, 2))).shape == (0, 2)
 
 
-def test_the_correlation_of_filtered_white_noise_is_what_it_says():
-    """Of one row out with the next."""
+def test_the_correlations_of_filtered_white_noise_are_what_it_says():
+    """Between rows out that are none to four apart."""
     low = ParallelFilter(200.0, 16.0, (slice(0, 400_000),))
     rows = low(np.random.default_rng(0).normal(size=400_000))
-    measured = float(rows[1:] @ rows[:-1]) / float(rows @ rows)
-    assert low.correlation == pytest.approx(measured, abs=0.01)
-    assert 0.2 < low.correlation < 0.8
+    measured = [float(rows[i:] @ rows[: len(rows) - i]) / float(rows @ rows) for i in range(5)]
+    assert low.correlations(4) == pytest.approx(measured, abs=0.01)
+    assert low.correlations(400)[-1] == 0.0

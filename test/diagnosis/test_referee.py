@@ -46,8 +46,17 @@ def test_noise_on_top_of_a_function_counts_as_noise(equations):
 def test_what_its_own_past_foretells_is_structure(equations):
     """Though it has nothing to do with the motion."""
     rows = np.arange(len(equations.d))[:, None]
-    rest = np.sin(2.0 * np.pi * rows / 31.0) * np.sqrt(equations.power)
-    assert np.all(structure(equations, rest) > 0.6)
+    for period in (31.0, 4.1):  # a quarter of a period on, a sine has no correlation
+        rest = np.sin(2.0 * np.pi * rows / period) * np.sqrt(equations.power)
+        assert np.all(structure(equations, rest) > 0.9)
+
+
+def test_filtered_white_noise_foretells_nothing_of_itself(equations):
+    """Though rows behind a low-pass are correlated."""
+    white = np.random.default_rng(5).normal(size=equations.motion.effort.shape)
+    rest = equations.filter(white * np.sqrt(equations.power))
+    assert float(rest[1:, 0] @ rest[:-1, 0]) > 0.3 * float(rest[:, 0] @ rest[:, 0])
+    assert np.all(structure(equations, rest) < 0.15)
 
 
 def test_an_effort_does_not_explain_itself(equations):
