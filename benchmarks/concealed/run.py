@@ -1,10 +1,10 @@
 """Draw worlds with concealed physics, diagnose them by the command line, unseal, and score.
 
-    python -m benchmarks.concealed.run --tier B --seeds 100:137 [--worlds DIR] [--processes 2]
+    python -m benchmarks.concealed.run --tier B --seeds 100:137 [--only pair] [--worlds DIR]
 
 The answers lie in another folder than the recordings; `sgp diagnose` is started as a user does,
 in a process of its own, and sees the recordings alone. Results go to
-`benchmarks/results/concealed_<tier>.json`.
+`benchmarks/results/concealed_<tier>.json`, with `--only pair` to `concealed_<tier>_pair.json`.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
     parser.add_argument('--tier', choices=('A', 'B'), default='A')
     parser.add_argument('--seeds', default='0:40', help='FIRST:LAST+1[,...]')
+    parser.add_argument('--only', help='conceal this in every world, as `draw` has it')
     parser.add_argument('--worlds', type=Path, help='worlds drawn before; else they are drawn')
     parser.add_argument('--processes', type=int, default=2)
     arguments = parser.parse_args()
@@ -44,18 +45,20 @@ def main():
         cases = []
         for seeds in arguments.seeds.split(','):
             if arguments.worlds is None:
+                only = ('--only', arguments.only) if arguments.only else ()
                 _run('benchmarks.concealed.draw', '--seeds', seeds, '--tier', arguments.tier,
-                     '--out', str(worlds))  # fmt: skip
+                     '--out', str(worlds), *only)  # fmt: skip
             first, last = map(int, seeds.split(':'))
             cases += [f'case_{seed:03d}' for seed in range(first, last)]
         cases = [case for case in cases if (worlds / 'answers' / f'{case}.json').exists()]
         with ThreadPoolExecutor(arguments.processes) as pool:
             scored = list(pool.map(lambda case: scored_case(worlds, case, Path(folder)), cases))
     report = {
-        'schema': 1, 'tier': arguments.tier, 'seeds': arguments.seeds,
+        'schema': 1, 'tier': arguments.tier, 'seeds': arguments.seeds, 'only': arguments.only,
         'environment': environment(), 'summary': summary(scored), 'cases': scored,
     }  # fmt: skip
-    path = RESULTS / f'concealed_{arguments.tier.lower()}.json'
+    kind = f'_{arguments.only}' if arguments.only else ''
+    path = RESULTS / f'concealed_{arguments.tier.lower()}{kind}.json'
     path.write_text(json.dumps(report, indent=1, allow_nan=False) + '\n', encoding='utf-8')
     print(json.dumps(report['summary'], indent=1))
 

@@ -41,7 +41,7 @@ The shape of a column is only nearly right, and what is wrong with it repeats in
 """
 SHAPE_ERROR = 0.001
 """Part of the discrepancy that the right column may leave for the same reason."""
-PER_EFFECT, PER_PARAMETER = 15.0, 5.0
+PER_EFFECT, PER_PARAMETER = 10.0, 3.0
 """What an effect, and each number that the data determine, must be worth [nats]."""
 TEMPER = 0.3
 """Weight of a nat of `Scale.worth` in the odds of rivals."""
