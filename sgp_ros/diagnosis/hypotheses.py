@@ -12,6 +12,7 @@ from sgp_ros.diagnosis.colour import correlation_factor
 from sgp_ros.diagnosis.screening import screen
 from sgp_ros.diagnosis.suspects import Columns, Suspect
 from sgp_ros.robots.effects.catalogue import EFFECTS
+from sgp_ros.robots.effects.effect import Place
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -142,7 +143,36 @@ def _extended(columns: Columns, model: Model) -> list[Model]:
         best = max(gains, key=lambda m: gains[m])
         model = best
         found.append(model)
-    return [m for m in found if len(m.suspects) > 2]
+    found = [m for m in found if len(m.suspects) > 2]
+    return [*found, *_simpler(columns, found[-1])] if found else []
+
+
+def _simpler(columns: Columns, model: Model) -> list[Model]:
+    """Return a model with a law of one number in place of each richer one, and with all of them.
+
+    What was best while other effects were still missing may have more freedom than it needs.
+    """
+    motion = columns.equations(frozenset()).motion
+    simple = [e for e in EFFECTS.values() if e.bounds is None and len(e.quantities) == 1]
+    found: list[Model] = []
+    whole = model
+    for i, suspect in enumerate(model.suspects):
+        if len(suspect.effect.quantities) == 1:
+            continue
+        place = Place(suspect.place.joint)
+        kept = {s.key for s in model.suspects}
+        others = [Suspect(e, place, np.zeros(0)) for e in simple if place in e.places(motion)]
+        trials = [_replaced(columns, model, i, s) for s in others if s.key not in kept]
+        best = _ranked(trials)
+        if best:
+            found.append(best[0])
+            whole = _replaced(columns, whole, i, best[0].suspects[i])
+    return _ranked([*found, whole]) if found else []
+
+
+def _replaced(columns: Columns, model: Model, index: int, suspect: Suspect) -> Model:
+    suspects = (*model.suspects[:index], suspect, *model.suspects[index + 1 :])
+    return fit(columns, suspects, model.sigma, is_free=model.is_free, w=model.w, rounds=2, steps=4)
 
 
 def _gains(model: Model, trials: list[Model]) -> dict[Model, float]:

@@ -35,3 +35,17 @@ def test_a_pair_that_leaves_nothing_is_not_exchanged(equations_for, viscous):
     pair = fitted(equations, 'viscous_friction', 'spring')
     assert hypotheses._exchanged(Columns(equations), [pair]) == []
     assert hypotheses._exchanged(Columns(equations), []) == []
+
+
+def test_a_law_of_one_number_is_tried_in_place_of_a_richer_one(equations_for):
+    """Friction that was taken to differ with direction is Coulomb friction when all is there."""
+    world = simulate(
+        CHAINS[1], 4, 10.0, force=lambda t, q, v: (-0.3 * v[0],), dry=lambda t, q, s: 0.6
+    )  # fmt: skip
+    _, equations = equations_for(world)
+    rich = fitted(equations, 'asymmetric_coulomb', 'viscous_friction')
+    found = hypotheses._simpler(Columns(equations), rich)
+    assert {'coulomb_friction', 'viscous_friction'} in [_names(m) for m in found]
+    assert all(m.size < rich.size for m in found)
+    plain = fitted(equations, 'coulomb_friction', 'viscous_friction')
+    assert hypotheses._simpler(Columns(equations), plain) == []
