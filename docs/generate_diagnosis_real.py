@@ -120,13 +120,13 @@ def text():
     emps = {f['effect']: f['parameters'] for f in machines['emps']['findings']}
     levels = [emps['asymmetric_coulomb'][k]['value'] for k in ('level_pos', 'level_neg')]
     loaded = machines['simple_pendulum_1kg']
-    gain = next(f for f in loaded['findings'] if f['effect'] == 'torque_gain')
     joints = list(machines['panda']['fit']['train']['nmse_before'])
     panda = _dry_levels(machines['panda'])
     compared = ', '.join(
         f'joint {joints.index(j) + 1} {level:.3f} ({0.5 * PHI1[joints.index(j)]:.3f})'
         for j, level in sorted(panda.items())
     )
+    tiago = machines['tiago']['fit']['train']
     held = machines['emps']['fit']['emps_val_pulses']['nmse_after']['axis']
     fourth = machines['panda']['dependence'][3]
     lag = next(
@@ -141,9 +141,6 @@ def text():
         emps_mean=f'{0.5 * sum(levels):.1f}',
         emps_half=f'{0.5 * (levels[0] - levels[1]):.1f}',
         emps_left=f'{100 * held:.2g} %',
-        gain=f'{gain["parameters"]["gain"]["value"]:.3f}',
-        gain_p=f'{gain["probability"]:.2f}',
-        heavier=f'{1.0 / gain["parameters"]["gain"]["value"]:.1f}',
         rows_1kg=loaded['settings']['rows'],
         cutoff_1kg=f'{loaded["settings"]["cutoff_hz"]:.2g}',
         sigmoid=', '.join(f'{0.5 * phi:.3f}' for phi in PHI1),
@@ -153,7 +150,7 @@ def text():
         panda_rows=machines['panda']['settings']['rows'],
         panda_hz=f'{machines["panda"]["settings"]["cutoff_hz"]:.2g}',
         lag=f'{lag:.2f}',
-        tiago_rest=machines['tiago']['sentence'].rpartition('leaves ')[2].partition(' of')[0],
+        tiago_rest=f'{100 * max(tiago["nmse_after"].values()):.2g} %',
         **{name: _section(name, found) for name, found in machines.items()},
     )
 
