@@ -1,29 +1,36 @@
-"""What a stream tells of the Z of one component, in features of a bounded number of inputs.
+"""What a stream tells of the Z of outputs that share a kernel, in features of bounded number.
 
 The features at u are `phi(u) = L^-1 k(B, u)` with inducing inputs B and `L L^T = K(B, B)`, their
 weights standard normal: Z as the values at B predict it. What they cannot predict, the remainder
 `kappa(u, u) - phi phi^T`, counts as noise of its own at each sample (Snelson and Ghahramani 2006).
 An input joins B when its remainder is no longer small beside the noise; features that exist do not
 change by that, so nothing absorbed before has to be seen again.
+
+Two systems are kept: one that holds the prior of the weights, which W and predictions need, and
+one of the data alone, which other hyper-parameters need (`core.feature_change`). The second could
+be had from the first by taking the prior off, but where data tell little beside the prior that
+difference is rounding; rotations into a second triangle lose no digit.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sgp_ros.core.factor import GrowingFactor
+from sgp_ros.core.information import Information
 from sgp_ros.core.output_groups import OutputGroup
-from sgp_ros.core.trapezoid import absorb_equation, solve_transposed
+from sgp_ros.core.state_parts import part_of
+from sgp_ros.core.trapezoid import absorb_equation, absorbed_equations_numpy, solve_transposed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from sgp_ros.core.factor import Whitening
     from sgp_ros.core.forgetting import Forgetting
-    from sgp_ros.core.kernels import Kernel
 
 REMAINDER = 0.01
 """Share of the noise variance above which the remainder makes an input join. The features then
@@ -31,32 +38,53 @@ leave out a hundredth of the noise, and the squares of the pivots of L stay abov
 
 
 class FeatureBlock:
-    """Square-root information on the weights of one component, coupled to W.
+    """Square-root information on the weights of one group of outputs, coupled to W.
 
     Attributes:
-        S: (capacity, p + 1) coupling to W and right side; the first `size` rows count.
+        group: the outputs, their kernel and noise.
+        told: what the data tell of W whatever the weights are, one per output.
+        inputs: inducing inputs, (d,) each.
         is_resolved: whether the last sample left a remainder that is small beside the noise.
 
     Args:
-        kernel: of the component; None where Z is zero.
-        noise: its noise variance.
+        group: of outputs.
         p: number of coefficients.
         capacity: most inducing inputs.
     """
 
-    def __init__(self, kernel: Kernel | None, noise: float, p: int, capacity: int) -> None:
-        dense = capacity if kernel is not None else 0
-        self._noise = noise
-        self._capacity = dense
-        self._factor = GrowingFactor(OutputGroup(kernel, 0.0, (0,), (1.0,)), 0, dense)
-        self._R = np.zeros((dense, dense))
-        self.S = np.zeros((dense, p + 1))
+    def __init__(self, group: OutputGroup, p: int, capacity: int) -> None:
+        self.group = group
+        self.told = tuple(Information.nothing(p) for _ in group.outputs)
+        self.inputs: list[np.ndarray] = []
         self.is_resolved = True
+        k = len(group.outputs)
+        self._shape = (k, p + 1)
+        self._scales = np.array(group.scales)[:, None]  # (k, 1)
+        self._capacity = dense = capacity if group.kernel is not None else 0
+        self._factor = GrowingFactor(OutputGroup(group.kernel, 0.0, (0,), (1.0,)), 0, dense)
+        self._R, self._S = np.zeros((dense, dense)), np.zeros((dense, k * (p + 1)))
+        self._data_R, self._data_S = np.zeros_like(self._R), np.zeros_like(self._S)
 
     @property
     def size(self) -> int:
         """Inducing inputs held."""
         return self._factor.size
+
+    @property
+    def capacity(self) -> int:
+        """Most inducing inputs, 0 where Z is zero."""
+        return self._capacity
+
+    @property
+    def lower(self) -> np.ndarray:
+        """The factor L of K(B, B), a view (size, size)."""
+        return self._factor.lower
+
+    @property
+    def data(self) -> tuple[np.ndarray, np.ndarray]:
+        """The system without the prior, views (size, size) and (size, k (p + 1))."""
+        m = self.size
+        return self._data_R[:m, :m], self._data_S[:m]
 
     def features(self, u: np.ndarray) -> Whitening:
         """Return phi(u), (size,), as `v`, for an input u (d,). O(size^2 / 2)."""
@@ -65,66 +93,136 @@ class FeatureBlock:
     def gain(self, features: Whitening) -> np.ndarray:
         """Return g (size,) with `phi theta = g (z - S W)` plus noise of variance g g^T."""
         g = features.v.copy()
-        solve_transposed(self._R, self.size, g)
+        solve_transposed(self._R, g)
         return g
 
-    def absorb(
-        self, features: Whitening, f: np.ndarray, y: float, weight: float = 1.0
-    ) -> np.ndarray:
-        """Learn observation y with regressor f (p,) at the input of these features.
+    def explain(
+        self, features: Whitening, gain: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return what the data tell at an input: of each regressor, of Z, and its variance.
 
         Args:
             features: of the input.
-            f: regressor.
-            y: observation.
-            weight: by which its equation of unit noise counts; less than one for an old sample.
+            gain: of these.
 
         Returns:
-            What it tells of W alone: a row of unit noise and its value, (p + 1,).
+            Shapes (k, p), (k,) and (k,): Z is the second less the first times W.
         """
-        rest = np.append(f, y)
-        phi, remainder = features.v, remainder_of(features)
-        is_new = remainder > REMAINDER * self._noise
+        coupling = self._scales * (gain @ self._S[: len(gain)]).reshape(self._shape)
+        variance = np.square(self._scales[:, 0]) * (gain @ gain + remainder_of(features))
+        return coupling[:, :-1], coupling[:, -1], variance
+
+    def join(self, u: np.ndarray, features: Whitening) -> Whitening:
+        """Take the input u (d,) of these features into B if they leave out too much and room is.
+
+        Returns:
+            The features of u afterwards, with what they still leave out.
+        """
+        remainder = remainder_of(features)
+        is_new = remainder > REMAINDER * self.group.noise
         self.is_resolved = not is_new or self.size < self._capacity
-        if is_new and self.is_resolved:
-            self._factor.append(features, np.zeros((1, 1)))
-            self._R[self.size - 1, self.size - 1] = 1.0
-            phi, remainder = np.append(phi, math.sqrt(remainder)), 0.0
-        scale = weight / math.sqrt(self._noise + remainder)
-        rest *= scale
-        absorb_equation(self._R, self.S, self.size, scale * phi, rest)
-        return rest
+        if not (is_new and self.is_resolved):
+            return features
+        self._factor.append(features, np.zeros((1, 1)))
+        self.inputs.append(u.copy())
+        self._R[self.size - 1, self.size - 1] = 1.0
+        v = np.append(features.v, math.sqrt(remainder))
+        return replace(features, v=v, reduction=features.prior)
+
+    def absorb(
+        self, u: np.ndarray, features: Whitening, data: np.ndarray, weight: float = 1.0
+    ) -> np.ndarray:
+        """Learn regressors and, last, observations (k, p + 1) at the input u (d,).
+
+        Args:
+            u: input.
+            features: of it.
+            data: of the outputs of the group.
+            weight: by which the equations of unit noise count; less than one for an old sample.
+
+        Returns:
+            What they tell of W alone: rows of unit noise and their values, (k, p + 1).
+        """
+        found = self.join(u, features)
+        scale = weight / math.sqrt(self.group.noise + remainder_of(found))
+        rest = (scale / self._scales * data).reshape(-1)
+        alone = rest.copy()
+        absorb_equation(self._R, self._S, scale * found.v, rest)
+        absorb_equation(self._data_R, self._data_S, scale * found.v, alone)
+        for told, row in zip(self.told, alone.reshape(self._shape), strict=True):
+            told.absorb(row[None])
+        return rest.reshape(self._shape)
+
+    def learn_anew(self, U: np.ndarray, data: np.ndarray, weights: np.ndarray) -> None:
+        """Learn all outputs (n, k, p + 1) at the inputs U (n, d), weighted by (n,), in order."""
+        own = data[:, list(self.group.outputs)]
+        for u, row, weight in zip(U, own, weights, strict=True):
+            self.absorb(u, self.features(u), row, float(weight))
+
+    def take(self, R: np.ndarray, S: np.ndarray) -> None:
+        """Hold data of unit noise, weights `R` (r, size) and the rest `S` (r, k (p + 1)), instead.
+
+        What they tell of W whatever the weights are enters `told`. O(m^3).
+        """
+        m = self.size
+        R, S, alone = absorbed_equations_numpy(R, S, np.zeros((m, m)), np.zeros((m, S.shape[1])))
+        self._data_R[:m, :m], self._data_S[:m] = R, S
+        R, S, _ = absorbed_equations_numpy(np.eye(m), np.zeros_like(S), R, S)
+        self._R[:m, :m], self._S[:m] = R, S
+        for j, told in enumerate(self.told):
+            told.absorb(alone.reshape(-1, *self._shape)[:, j])
+
+    def on_coefficients(self) -> tuple[Information, ...]:
+        """Return what the data of each output tell of W under the prior of the weights. O(m^3)."""
+        m = self.size
+        _, _, rest = absorbed_equations_numpy(
+            np.eye(m), np.zeros((m, self._S.shape[1])), *self.data
+        )
+        rows = rest.reshape(-1, *self._shape)
+        return tuple(
+            told.with_rows(rows[:, j, :-1], rows[:, j, -1]) for j, told in enumerate(self.told)
+        )
 
     def fade(self, forgetting: Forgetting) -> np.ndarray:
         """Forget a little of the data, nothing of the prior: the weights in turn get theirs back.
 
         Returns:
-            What that leaves on W: rows of unit noise and their values, (1, p + 1), or none.
+            What that leaves on W: rows of unit noise and their values, (r, p + 1).
         """
         m = self.size
         if not m:
-            return np.zeros((0, self.S.shape[1]))
-        self._R[:m, :m] *= forgetting.factor
-        self.S[:m] *= forgetting.factor
-        phi, rest = np.zeros(m), np.zeros(self.S.shape[1])
+            return np.zeros((0, self._shape[1]))
+        for R, S in ((self._R, self._S), (self._data_R, self._data_S)):
+            R[:m, :m] *= forgetting.factor
+            S[:m] *= forgetting.factor
+        phi, rest = np.zeros(m), np.zeros(self._S.shape[1])
         phi[forgetting.turn % m] = forgetting.lost(m)
-        absorb_equation(self._R, self.S, m, phi, rest)
-        return rest[None]
+        absorb_equation(self._R, self._S, phi, rest)
+        return rest.reshape(self._shape)
 
     def state(self) -> dict[str, np.ndarray]:
         """Return what `restore` needs, as arrays."""
         m = self.size
         arrays = {f'inducing_{name}': array for name, array in self._factor.state().items()}
-        return arrays | {'R': self._R[:m, :m], 'C': self.S[:m]}
+        return arrays | {
+            'outputs': np.array(self.group.outputs), 'inputs': np.array(self.inputs),
+            'R': self._R[:m, :m], 'C': self._S[:m],
+            'data_R': self._data_R[:m, :m], 'data_C': self._data_S[:m],
+            'told_R': np.array([told.R for told in self.told]),
+            'told_z': np.array([told.z for told in self.told]),
+        }  # fmt: skip
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue exactly where `state` was taken."""
-        prefix = 'inducing_'
-        self._factor.restore(
-            {k.removeprefix(prefix): v for k, v in state.items() if k.startswith(prefix)}
-        )
+        self._factor.restore(part_of(state, 'inducing_'))
+        self.inputs = [np.array(u) for u in state['inputs']]
         m = self.size
-        self._R[:m, :m], self.S[:m] = state['R'], state['C']
+        self._R[:m, :m], self._S[:m] = state['R'], state['C']
+        self._data_R[:m, :m], self._data_S[:m] = state['data_R'], state['data_C']
+        self.told = tuple(
+            Information(np.array(R), np.array(z))
+            for R, z in zip(state['told_R'], state['told_z'], strict=True)
+        )
 
 
 def remainder_of(features: Whitening) -> float:

@@ -23,6 +23,9 @@ from sgp_ros.core.rotations import (
 if TYPE_CHECKING:
     from sgp_ros.core.prior import CoefficientPrior
 
+DIFFERENCE_TOLERANCE = 1e-10
+"""Share of a precision below which a difference from it is rounding."""
+
 
 class Information:
     """Square-root information on p coefficients.
@@ -73,6 +76,21 @@ class Information:
     def with_rows(self, rows: np.ndarray, values: np.ndarray) -> Information:
         """Return this information with equations `rows (r, p) w = values (r,)` added."""
         return Information(*absorbed_rows_numpy(self.R, self.z, rows, values))
+
+    def less(self, other: Information) -> Information:
+        """Return what this holds beside `other`, of which it must hold all, up to rounding.
+
+        The difference of the precisions `R^T R`, scaled to a diagonal of one, by its
+        eigenvectors. Where it is lost in rounding nothing is returned, never less. O(p^3).
+        """
+        scale = np.sqrt((self.R * self.R).sum(axis=0))
+        scale[scale == 0.0] = 1.0
+        own, others = self.R / scale, other.R / scale
+        values, vectors = np.linalg.eigh(own.T @ own - others.T @ others)
+        is_known = values > DIFFERENCE_TOLERANCE
+        roots, rows = np.sqrt(values[is_known]), vectors[:, is_known].T
+        z = rows @ (own.T @ self.z - others.T @ other.z) / roots
+        return Information.nothing(len(scale)).with_rows(roots[:, None] * rows * scale, z)
 
     @property
     def coefficients(self) -> np.ndarray:

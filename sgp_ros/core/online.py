@@ -87,11 +87,6 @@ class OnlineRegression:
         return self._samples.size
 
     @property
-    def is_whole(self) -> bool:
-        """Whether other hyper-parameters lose nothing that Z was told: Z is the buffer."""
-        return True
-
-    @property
     def unresolved(self) -> int:
         """Samples at which a basis had no room: there is none."""
         return 0

@@ -46,6 +46,14 @@ def output_groups(model: Model) -> tuple[OutputGroup, ...]:
     return tuple(found)
 
 
+def group_of(model: Model, outputs: tuple[int, ...]) -> OutputGroup:
+    """Return some outputs of one group as a group of their own."""
+    first = outputs[0]
+    noise = model.noise[first]
+    scales = tuple(float(np.sqrt(model.noise[j] / noise)) for j in outputs)
+    return OutputGroup(model.kernels[first], noise, outputs, scales)
+
+
 def _is_multiple(kernel: Kernel | None, noise: float, group: OutputGroup) -> bool:
     other = group.kernel
     if kernel is None or other is None:

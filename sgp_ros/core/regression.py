@@ -35,15 +35,11 @@ class Regression(Protocol):
 
     @property
     def base(self) -> Information:
-        """What the prior and the samples that are gone tell of W."""
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether other hyper-parameters would lose nothing that Z was told."""
+        """What the prior tells of W, and the samples that are gone beside those kept."""
 
     @property
     def unresolved(self) -> int:
-        """Samples at which the basis of Z had no room; 0 without a basis."""
+        """Samples at which the basis of Z had no room; 0 while there is no basis."""
 
     def predict(self, u: np.ndarray, f: np.ndarray) -> OnlinePrediction:
         """Predict X at input u (d,) with regressor f (k, p)."""

@@ -257,7 +257,7 @@ class Engine:
 
     def _schedule_fit(self) -> None:
         regression = self.estimator.regression
-        if regression is None or not (self.config.refit_enabled and regression.is_whole):
+        if regression is None or not self.config.refit_enabled:
             return
         if self.counts.learned >= self.next_fit and self.request_refit():
             self.next_fit = self.counts.learned + self.config.refit_period

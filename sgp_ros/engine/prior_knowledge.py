@@ -55,11 +55,10 @@ def prior_of_robot(robot: Robot, config: EngineConfig) -> CoefficientPrior:
 def sample_budget(config: EngineConfig) -> int:
     """Return how many samples a model may keep.
 
-    A basis takes other hyper-parameters without loss only while it keeps the whole stream, so
-    the first fit must come in that time.
+    In a basis they are there to be fitted to, so they suffice for a fit.
     """
     if config.buffer_mode == 'basis':
-        return max(config.buffer_budget, 2 * config.learning_initial)
+        return max(config.buffer_budget, config.learning_initial)
     return config.buffer_budget
 
 

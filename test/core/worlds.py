@@ -6,6 +6,7 @@ import numpy as np
 
 from sgp_ros.core.kernels import SquaredExponential
 from sgp_ros.core.model import Model, Observations
+from sgp_ros.core.prior import CoefficientPrior
 
 
 def random_problem(seed, n=12, k=2, p=3, d=3, gain=None, noise_like=None):
@@ -27,3 +28,18 @@ def random_problem(seed, n=12, k=2, p=3, d=3, gain=None, noise_like=None):
     if noise_like == 'parametric':
         kernels = (None,) * k
     return Model(kernels, tuple(rng.uniform(0.1, 0.5, size=m))), Observations(U, F, y, G)
+
+
+def returning(seed, n=700):
+    """Return model, prior, W and n samples of a robot that comes by each place every 50 or so."""
+    kernel = SquaredExponential(1.0, (0.5,), (0,))
+    grid = np.linspace(-2.0, 2.0, 40)[:, None]
+    K = kernel.matrix(grid) + 1e-9 * np.eye(40)
+    rng = np.random.default_rng(seed)
+    U = 2.0 * np.sin(2 * np.pi * np.arange(n) / 97.0 + rng.uniform(0.0, 6.0))[:, None]
+    F = np.stack([np.ones(n), U[:, 0], rng.normal(size=n)], axis=1)[:, None]
+    w = rng.normal(size=3)
+    z = np.linalg.solve(K, np.linalg.cholesky(K) @ rng.normal(size=40))
+    y = F[:, 0] @ w + kernel.matrix(U, grid) @ z + np.sqrt(0.1) * rng.normal(size=n)
+    prior = CoefficientPrior.from_std(np.zeros(3), np.ones(3))
+    return Model((kernel,), (0.1,)), prior, w, Observations(U, F, y[:, None])

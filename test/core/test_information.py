@@ -1,0 +1,38 @@
+"""Laws of information on W that is taken from other information."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sgp_ros.core.information import Information
+
+
+@given(st.integers(0, 10_000), st.integers(0, 6), st.integers(1, 6))
+def test_what_is_added_comes_out_again(seed, before, added):
+    """The difference of two states is what came between, of any rank and in any units."""
+    rng = np.random.default_rng(seed)
+    units = 10.0 ** rng.uniform(-3.0, 3.0, size=4)
+    A, b = rng.normal(size=(before + added, 4)) * units, rng.normal(size=before + added)
+    part = Information.nothing(4).with_rows(A[:before], b[:before])
+    found = part.with_rows(A[before:], b[before:]).less(part)
+    expected = A[before:].T @ A[before:] / np.outer(units, units)
+    np.testing.assert_allclose(found.R.T @ found.R / np.outer(units, units), expected, atol=1e-7)
+    np.testing.assert_allclose(
+        found.R.T @ found.z / units, A[before:].T @ b[before:] / units, atol=1e-6
+    )
+
+
+def test_a_difference_never_takes_anything_away():
+    """Where the other state knows more of a direction, rounding or not, nothing is returned."""
+    whole = Information(np.diag([2.0, 1.0]), np.array([1.0, 1.0]))
+    other = Information(np.diag([1.0, 1.5]), np.array([0.0, 3.0]))
+    found = whole.less(other)
+    np.testing.assert_allclose(found.R.T @ found.R, np.diag([3.0, 0.0]), atol=1e-12)
+    np.testing.assert_allclose(found.R.T @ found.z, [2.0, 0.0], atol=1e-12)
+
+
+def test_without_coefficients_there_is_no_difference():
+    """GP is the case p = 0."""
+    assert Information.nothing(0).less(Information.nothing(0)).R.shape == (0, 0)
