@@ -155,12 +155,8 @@ class GrowingFactor:
             self._U[last, last] = diagonal
         return row
 
-    def drop(self, m: int) -> np.ndarray:
-        """Remove sample m.
-
-        Returns:
-            The whitened data (k, p + 1) of that sample given the remaining ones.
-        """
+    def drop(self, m: int) -> None:
+        """Remove sample m. O(n^2)."""
         n, start = self.size, self._white.start
         row = self._white.rows[m].copy()
         if self._kernel is not None:
@@ -171,7 +167,6 @@ class GrowingFactor:
                 close_gap(self._U, start, n, m)
         self._white.drop(m)
         self._S.drop(m)
-        return row.reshape(self._shape)
 
     def absorb(self, column: np.ndarray) -> None:
         """Factor `K + noise I + column column^T` instead, for a column (n,). O(n^2)."""

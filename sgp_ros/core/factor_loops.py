@@ -180,13 +180,11 @@ def absorbed_column_numpy(
     return factor, linalg.solve_triangular(factor, L @ white, lower=True)
 
 
-def dropped_row_numpy(L: np.ndarray, white: np.ndarray, m: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the factor (n-1, n-1) without sample m and its whitened data (n, m) from scratch.
-
-    The last row of the data is that of sample m given the others.
-    """
-    n = len(L)
-    order = [*range(m), *range(m + 1, n), m]
+def dropped_sample_numpy(
+    L: np.ndarray, white: np.ndarray, m: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the factor (n-1, n-1) and whitened data (n-1, c) without sample m, from scratch."""
+    rest = np.delete(np.arange(len(L)), m)
     K, data = L @ L.T, L @ white
-    factor = linalg.cholesky(K[np.ix_(order, order)], lower=True)
-    return factor[: n - 1, : n - 1], linalg.solve_triangular(factor, data[order], lower=True)
+    factor = np.linalg.cholesky(K[np.ix_(rest, rest)])
+    return factor, np.linalg.solve(factor, data[rest])

@@ -1,12 +1,10 @@
 """Joint inference of W and Z one sample at a time, with a bounded number of samples in Z.
 
-Components of X with the same covariance up to a scale share one growing factor L, with
-`A = L^-1 F` and `b = L^-1 y` of each beside it. Appending borders the factor; the solve it needs
-is the one the prediction made. Which sample leaves a full buffer is a policy (`core.retention`).
-Dropping it rotates the factor and leaves the conditional row of that sample: information on W
-that no remaining sample repeats. With `remember` it is kept, and the likelihood is a product of
-conditionals in which every sample counts once (Vecchia 1988). What is kept was whitened with the
-noise of its time; when a fit finds another noise, it is scaled to that.
+Until the first sample leaves the buffer, everything is exact. From then on the posterior is the
+product `p(W | all samples) p(Z | W, buffer)`: the first from a basis that absorbs each sample once
+(`core.stream_basis`), the second from the factored buffer (`core.factored_buffer`). What this
+neglects: Z given W is told by the buffer alone, and for W, Z is what the features of the basis
+can express.
 """
 
 from __future__ import annotations
@@ -15,13 +13,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.core.factor import GrowingFactor
+from sgp_ros.core.factored_buffer import FactoredBuffer
 from sgp_ros.core.forgetting import Forgetting
 from sgp_ros.core.information import Information
 from sgp_ros.core.online_prediction import OnlinePrediction
-from sgp_ros.core.output_groups import output_groups
-from sgp_ros.core.retention import RETENTIONS
 from sgp_ros.core.sample_buffer import SampleBuffer
+from sgp_ros.core.state_parts import part_of
+from sgp_ros.core.stream_basis import StreamBasis
 from sgp_ros.errors import NumericalError
 
 if TYPE_CHECKING:
@@ -29,7 +27,6 @@ if TYPE_CHECKING:
 
     from sgp_ros.core.factor import Whitening
     from sgp_ros.core.model import Model, Observations
-    from sgp_ros.core.output_groups import OutputGroup
     from sgp_ros.core.prior import CoefficientPrior
 
 
@@ -40,7 +37,8 @@ class OnlineRegression:
         model: hyper-parameters, k kernels and k noise variances.
         prior: of W.
         budget: most samples that Z is conditioned on.
-        remember: whether W keeps what dropped samples told about it.
+        features: most features of each component by which W keeps what dropped samples told.
+        remember: whether it does; else it is known from the prior and the buffer.
         policy: which sample leaves a full buffer, a key of `RETENTIONS`.
         forgetting: samples after which information on W counts 1/e; 0 never forgets.
     """
@@ -51,66 +49,67 @@ class OnlineRegression:
         prior: CoefficientPrior,
         budget: int,
         *,
+        features: int = 100,
         remember: bool = True,
         policy: str = 'oldest',
         forgetting: float = 0.0,
     ) -> None:
         self._prior = Information.of_prior(prior)
         self._forgetting = Forgetting(forgetting, self._prior)
-        self._total = self._prior.copy()
+        self._features = features
         self._budget = budget
         self._remember = remember
-        self._retention = RETENTIONS[policy]()
         self._version = 0
-        self._rotated = 0
-        p = prior.size
-        self._samples = SampleBuffer.empty(len(model.kernels), p)
-        self._model = model
-        self._groups: tuple[OutputGroup, ...] = ()
-        self._factors: tuple[GrowingFactor, ...] = ()
-        self._kept = tuple(Information.nothing(p) for _ in model.kernels)
-        self._rebuild()
+        samples = SampleBuffer.empty(len(model.kernels), prior.size)
+        self._held = FactoredBuffer(model, samples, budget + 1, policy)
+        self._total = self._prior.copy()
+        self._basis: StreamBasis | None = None
 
     @property
     def model(self) -> Model:
         """Hyper-parameters in force."""
-        return self._model
+        return self._held.model
 
     @property
     def information(self) -> Information:
         """What is known of W."""
-        return self._total
+        return self._total if self._basis is None else self._basis.total
 
     @property
     def size(self) -> int:
         """Number of samples in the buffer."""
-        return self._samples.size
+        return self._held.size
 
     @property
     def unresolved(self) -> int:
-        """Samples at which a basis had no room: there is none."""
-        return 0
+        """Samples at which the features had no room for what Z may do there.
+
+        Such a remainder counts as noise that is new at each sample, though it is the same at each
+        return to the place: where there are many, the intervals of W are too narrow.
+        """
+        return 0 if self._basis is None else self._basis.unresolved
 
     @property
     def buffer(self) -> Observations:
         """A copy of the buffered samples, in the order in which they came."""
-        return self._samples.observations()
+        return self._held.samples.observations()
 
     @property
     def rotated(self) -> int:
         """Samples dropped since the factors were last computed from the buffer."""
-        return self._rotated
+        return self._held.rotated
 
     @property
     def base(self) -> Information:
-        """What the prior and the dropped samples tell of W."""
-        rows = [kept.R for kept in self._kept]
-        values = [kept.z for kept in self._kept]
-        return self._prior.with_rows(np.vstack(rows), np.concatenate(values))
+        """What the prior tells of W, and the dropped samples beside the buffer. O(n p^2)."""
+        if self._basis is None:
+            return self._prior.copy()
+        dropped = self._basis.total.less(self._with_buffer())
+        return self._prior.with_rows(dropped.R, dropped.z)
 
     def predict(self, u: np.ndarray, f: np.ndarray) -> OnlinePrediction:
         """Predict X at input u (d,) with regressor f (k, p). O(n^2 / 2) per factor."""
-        return self._predict(u, f, tuple(factor.whiten(u) for factor in self._factors))
+        return self._predict(u, f, self._held.whiten(u))
 
     def with_regressor(self, prediction: OnlinePrediction, f: np.ndarray) -> OnlinePrediction:
         """Predict for another regressor f (k, p) at an input that Z sees as the same. O(k p^2)."""
@@ -119,15 +118,8 @@ class OnlineRegression:
     def _predict(
         self, u: np.ndarray, f: np.ndarray, whitenings: tuple[Whitening, ...]
     ) -> OnlinePrediction:
-        rows = f.copy()
-        mean = np.zeros(len(f))
-        variance = np.zeros(len(f))
-        for group, whitening in zip(self._groups, whitenings, strict=True):
-            outputs = list(group.outputs)
-            rows[outputs] -= whitening.explained[:, :-1]
-            mean[outputs] = whitening.explained[:, -1]
-            variance[outputs] = np.square(group.scales) * whitening.variance
-        mean, covariance = self._total.predict(rows, mean, variance)
+        explained, mean, variance = self._held.explain(whitenings)
+        mean, covariance = self.information.predict(f - explained, mean, variance)
         return OnlinePrediction(mean, covariance, u, f, whitenings, self._version)
 
     def learn(self, prediction: OnlinePrediction, y: np.ndarray) -> None:
@@ -141,27 +133,40 @@ class OnlineRegression:
         """
         if prediction.version != self._version:
             raise ValueError('the prediction was made before the last change of the model')
-        for factor, whitening in zip(self._factors, prediction.whitenings, strict=True):
-            factor.pivot(whitening)
+        self._held.require_room(prediction.whitenings)
         self._version += 1
         if self._forgetting.factor != 1.0:
-            self._forgetting.fade(self._total, self._kept)
-            self._samples.fade(self._forgetting.factor)
-        data = np.concatenate([prediction.f, y[:, None]], axis=1)  # (k, p + 1)
-        for group, factor, whitening in zip(
-            self._groups, self._factors, prediction.whitenings, strict=True
-        ):
-            self._total.absorb(factor.append(whitening, data[list(group.outputs)]))
-        self._samples.append(prediction.u, data)
-        self._retention.append(self._factors, prediction.u)
+            self._fade()
+        u, data = prediction.u, np.concatenate([prediction.f, y[:, None]], axis=1)  # (k, p + 1)
+        rows = self._held.append(u, prediction.whitenings, data)
+        if self._basis is not None:
+            self._basis.absorb(u, self._basis.features(u), data)
+        else:
+            for row in rows:
+                self._total.absorb(row)
+        self._keep_to_budget()
+
+    def _fade(self) -> None:
+        self._held.samples.fade(self._forgetting.factor)
+        if self._basis is None:
+            self._forgetting.fade(self._total, ())
+        else:
+            self._basis.fade(self._forgetting)
+
+    def _keep_to_budget(self) -> None:
         while self.size > self._budget:
-            self._drop(self._retention.choose(self._factors))
+            if self._remember and self._basis is None:
+                self._basis = StreamBasis.of_samples(
+                    self.model, self._prior, self._features, self._held.samples
+                )
+            self._held.drop()
+            if self._basis is None:
+                self._total = self._with_buffer()
 
     def is_sound(self, prediction: OnlinePrediction) -> bool:
         """Whether every factor gave the observation a positive variance."""
         try:
-            for factor, whitening in zip(self._factors, prediction.whitenings, strict=True):
-                factor.pivot(whitening)
+            self._held.require_room(prediction.whitenings)
         except NumericalError:
             return False
         return True
@@ -176,10 +181,9 @@ class OnlineRegression:
         Raises:
             NumericalError: the buffer has no factor in double precision; nothing has changed.
         """
-        before = self._factors
-        self._rebuild()
-        drift = [a.distance(b) for a, b in zip(before, self._factors, strict=True)]
-        return max(drift, default=0.0)
+        before = self._held
+        self._take(FactoredBuffer(self.model, before.samples, self._budget + 1, before.policy))
+        return before.distance(self._held)
 
     def change(
         self,
@@ -194,97 +198,49 @@ class OnlineRegression:
 
         Raises:
             NumericalError: the buffer has no factor under the new hyper-parameters; nothing has
-                changed then.
+                changed.
         """
-        previous = (self._model, self._budget, self._remember, self._kept, self._retention)
-        if model is not None:
-            ratios = np.sqrt(np.array(self._model.noise) / np.array(model.noise))
-            self._kept = tuple(
-                kept.scaled(float(ratio)) for kept, ratio in zip(self._kept, ratios, strict=True)
-            )
-            self._model = model
-        self._budget = budget or self._budget
-        self._remember = self._remember if remember is None else remember
-        if policy is not None:
-            self._retention = RETENTIONS[policy]()
-            self._retention.rebuild(self._model, self._factors, self._samples.inputs)
-        try:
-            while self.size > self._budget:
-                self._drop(self._retention.choose(self._factors))
-            self._rebuild()
-        except Exception:
-            self._model, self._budget, self._remember, self._kept, self._retention = previous
-            self._retention.rebuild(self._model, self._factors, self._samples.inputs)
-            raise
+        model, policy = model or self.model, policy or self._held.policy
+        budget = budget or self._budget
+        remember = self._remember if remember is None else remember
+        samples = self._held.samples
+        held = FactoredBuffer(model, samples, max(budget, self.size) + 1, policy)
+        basis = self._basis if remember else None
+        if basis is not None and model != self.model:
+            basis = basis.under(model, samples)
+        self._budget, self._remember, self._basis = budget, remember, basis
+        self._take(held)
+        self._keep_to_budget()
         if forgetting is not None:
             self._forgetting = Forgetting(forgetting, self._prior)
 
     def state(self) -> dict[str, np.ndarray]:
         """Return everything that was learned, as arrays; `restore` takes it back."""
         arrays = {
-            'U': self._samples.inputs, 'data': self._samples.data,
-            'weights': self._samples.weights,
-            'kept_R': np.array([kept.R for kept in self._kept]),
-            'kept_z': np.array([kept.z for kept in self._kept]),
-            'rotated': np.array(self._rotated),
             'total_R': self._total.R, 'total_z': self._total.z,
             'turn': np.array(self._forgetting.turn),
         }  # fmt: skip
-        for j, factor in enumerate(self._factors):
-            for name, array in factor.state().items():
-                arrays[f'factor{j}_{name}'] = array
-        for name, array in self._retention.state().items():
-            arrays[f'retention_{name}'] = array
+        arrays |= self._held.state()
+        if self._basis is not None:
+            arrays |= {f'basis_{name}': array for name, array in self._basis.state().items()}
         return {name: array.copy() for name, array in arrays.items()}
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue exactly where `state` was taken."""
-        self._samples = SampleBuffer(state['U'], state['data'], state['weights'], self._budget + 1)
-        self._rotated = int(state['rotated'])
-        self._kept = tuple(
-            Information(np.array(R), np.array(z))
-            for R, z in zip(state['kept_R'], state['kept_z'], strict=True)
-        )
+        self._held.restore(state, self._budget + 1)
         self._total = Information(np.array(state['total_R']), np.array(state['total_z']))
         self._forgetting.turn = int(state['turn'])
-        for j, factor in enumerate(self._factors):
-            factor.restore(_part(state, f'factor{j}_'))
-        self._retention.restore(_part(state, 'retention_'))
+        basis = part_of(state, 'basis_')
+        self._basis = None
+        if basis:
+            self._basis = StreamBasis.restored(self.model, self._prior, self._features, basis)
         self._version += 1
 
-    def _drop(self, m: int) -> None:
-        self._retention.drop(self._factors, m)
-        weight = self._samples.weights[m]
-        for group, factor in zip(self._groups, self._factors, strict=True):
-            rows = weight * factor.drop(m)
-            if self._remember:
-                for j, row in zip(group.outputs, rows, strict=True):
-                    self._kept[j].absorb(row[None])
-        self._rotated += 1
-        self._samples.drop(m)
-        if not self._remember:
-            self._total = self._with_buffer()
-
-    def _rebuild(self) -> None:
-        groups = output_groups(self._model)
-        factors = []
-        for group in groups:
-            factor = GrowingFactor(group, len(self._prior.z), self._budget + 1)
-            factor.fill(self._samples.inputs, self._samples.data[:, list(group.outputs)])
-            factors.append(factor)
-        self._samples = self._samples.with_room(self._budget + 1)
-        self._groups, self._factors = groups, tuple(factors)
+    def _take(self, held: FactoredBuffer) -> None:
+        self._held = held
         self._total = self._with_buffer()
-        self._retention.rebuild(self._model, self._factors, self._samples.inputs)
-        self._rotated = 0
         self._version += 1
 
     def _with_buffer(self) -> Information:
-        p, weights = len(self._prior.z), self._samples.weights[:, None, None]
-        whitened = [(weights * factor.white).reshape(-1, p + 1) for factor in self._factors]
-        rows = np.vstack(whitened)
-        return self.base.with_rows(rows[:, :-1], rows[:, -1])
-
-
-def _part(state: Mapping[str, np.ndarray], prefix: str) -> dict[str, np.ndarray]:
-    return {k.removeprefix(prefix): v for k, v in state.items() if k.startswith(prefix)}
+        rows = self._held.rows
+        return self._prior.with_rows(rows[:, :-1], rows[:, -1])

@@ -1,7 +1,7 @@
 """Which sample leaves a full buffer: the oldest, the least informative, or one of a close pair.
 
-No policy looks at an observation. What stays is then chosen by inputs alone, so the product of
-conditionals that W keeps (`core.online`) remains a density of all observations.
+No policy looks at an observation: what Z is conditioned on is chosen by inputs alone, so the
+choice does not bias it.
 """
 
 from __future__ import annotations

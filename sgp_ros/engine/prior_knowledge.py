@@ -79,6 +79,7 @@ def empty_regression(model: Model, prior: CoefficientPrior, config: EngineConfig
         model,
         prior,
         budget,
+        features=config.basis_features,
         remember=remember,
         policy=config.buffer_policy,
         forgetting=forgetting,

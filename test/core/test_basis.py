@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from sgp_ros.core.basis import BasisRegression
 from sgp_ros.core.kernels import SquaredExponential
 from sgp_ros.core.model import Model, Observations
-from sgp_ros.core.online import OnlineRegression
 from sgp_ros.core.posterior import Posterior
 from sgp_ros.core.prior import CoefficientPrior
 from sgp_ros.core.trapezoid import (
@@ -156,18 +155,6 @@ def test_w_is_calibrated_on_streams_that_return():
         squares.append(_mean_square(online, w))
         assert online.unresolved == 0
     assert abs(np.mean(squares) - 1.0) < 4 * 0.105
-
-
-def test_on_streams_that_return_a_buffer_makes_w_too_certain():
-    """A limit of the exact mode that docs/streams.md states: the basis does not have it.
-
-    The mean of 20 draws of chi2_3 / 3 stays below 1.8 with four standard deviations, 0.18 each.
-    """
-    squares = []
-    for seed in range(20):
-        model, prior, w, data = returning(seed)
-        squares.append(_mean_square(_learn(OnlineRegression(model, prior, 20), data), w))
-    assert np.mean(squares) > 1.8
 
 
 def test_far_from_all_features_the_prior_of_z_remains():

@@ -9,6 +9,7 @@ from sgp_ros.core.basis import BasisRegression
 from sgp_ros.core.feature_change import interpolation_error
 from sgp_ros.core.kernels import SquaredExponential
 from sgp_ros.core.model import Model, Observations
+from sgp_ros.core.online import OnlineRegression
 from sgp_ros.core.posterior import Posterior
 from sgp_ros.core.prior import CoefficientPrior
 from test.core.worlds import random_problem, returning
@@ -22,11 +23,15 @@ def _learn(online, data):
     return online
 
 
+def _exact(model, prior):
+    return OnlineRegression(model, prior, 20, features=60)
+
+
 def _basis(model, prior):
     return BasisRegression(model, prior, 20, 60)
 
 
-WAYS = [_basis]
+WAYS = [_exact, _basis]
 
 
 def _spread_out(n=30):

@@ -484,7 +484,7 @@ def test_a_lost_factor_is_rebuilt_and_counted():
     for engine in (whole, broken):
         for i, event in enumerate(events):
             if i == 600 and engine is broken:
-                engine.estimator.regression._factors[0]._U[:] = np.nan
+                engine.estimator.regression._held.factors[0]._U[:] = np.nan
             found.append(engine.push(event).estimates)
     half = len(found) // 2
     assert whole.counts.factor_rebuilt == 0
