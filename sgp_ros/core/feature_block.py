@@ -23,6 +23,7 @@ import numpy as np
 from sgp_ros.core.factor import GrowingFactor
 from sgp_ros.core.information import Information
 from sgp_ros.core.output_groups import OutputGroup
+from sgp_ros.core.rotations import absorb_each
 from sgp_ros.core.state_parts import part_of
 from sgp_ros.core.trapezoid import absorb_equation, absorbed_equations_numpy, solve_transposed
 
@@ -42,7 +43,6 @@ class FeatureBlock:
 
     Attributes:
         group: the outputs, their kernel and noise.
-        told: what the data tell of W whatever the weights are, one per output.
         inputs: inducing inputs, (d,) each.
         is_resolved: whether the last sample left a remainder that is small beside the noise.
 
@@ -54,11 +54,11 @@ class FeatureBlock:
 
     def __init__(self, group: OutputGroup, p: int, capacity: int) -> None:
         self.group = group
-        self.told = tuple(Information.nothing(p) for _ in group.outputs)
         self.inputs: list[np.ndarray] = []
         self.is_resolved = True
         k = len(group.outputs)
         self._shape = (k, p + 1)
+        self._told_R, self._told_z = np.zeros((k, p, p)), np.zeros((k, p))
         self._scales = np.array(group.scales)[:, None]  # (k, 1)
         self._capacity = dense = capacity if group.kernel is not None else 0
         self._factor = GrowingFactor(OutputGroup(group.kernel, 0.0, (0,), (1.0,)), 0, dense)
@@ -85,6 +85,11 @@ class FeatureBlock:
         """The system without the prior, views (size, size) and (size, k (p + 1))."""
         m = self.size
         return self._data_R[:m, :m], self._data_S[:m]
+
+    @property
+    def told(self) -> tuple[Information, ...]:
+        """What the data tell of W whatever the weights are, one per output, not copied."""
+        return tuple(map(Information, self._told_R, self._told_z))
 
     def features(self, u: np.ndarray) -> Whitening:
         """Return phi(u), (size,), as `v`, for an input u (d,). O(size^2 / 2)."""
@@ -149,8 +154,7 @@ class FeatureBlock:
         alone = rest.copy()
         absorb_equation(self._R, self._S, scale * found.v, rest)
         absorb_equation(self._data_R, self._data_S, scale * found.v, alone)
-        for told, row in zip(self.told, alone.reshape(self._shape), strict=True):
-            told.absorb(row[None])
+        absorb_each(self._told_R, self._told_z, alone.reshape(self._shape))
         return rest.reshape(self._shape)
 
     def learn_anew(self, U: np.ndarray, data: np.ndarray, weights: np.ndarray) -> None:
@@ -208,8 +212,7 @@ class FeatureBlock:
             'outputs': np.array(self.group.outputs), 'inputs': np.array(self.inputs),
             'R': self._R[:m, :m], 'C': self._S[:m],
             'data_R': self._data_R[:m, :m], 'data_C': self._data_S[:m],
-            'told_R': np.array([told.R for told in self.told]),
-            'told_z': np.array([told.z for told in self.told]),
+            'told_R': self._told_R, 'told_z': self._told_z,
         }  # fmt: skip
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
@@ -219,10 +222,7 @@ class FeatureBlock:
         m = self.size
         self._R[:m, :m], self._S[:m] = state['R'], state['C']
         self._data_R[:m, :m], self._data_S[:m] = state['data_R'], state['data_C']
-        self.told = tuple(
-            Information(np.array(R), np.array(z))
-            for R, z in zip(state['told_R'], state['told_z'], strict=True)
-        )
+        self._told_R[:], self._told_z[:] = state['told_R'], state['told_z']
 
 
 def remainder_of(features: Whitening) -> float:

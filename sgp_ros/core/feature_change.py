@@ -64,9 +64,8 @@ def _carried(block: FeatureBlock, group: OutputGroup, weight: float) -> FeatureB
     chosen, ratios = _shares(block, group)
     p = len(block.told[0].z)
     fresh = FeatureBlock(group, p, block.capacity)
-    fresh.told = tuple(
-        block.told[i].scaled(weight * ratio) for i, ratio in zip(chosen, ratios, strict=True)
-    )
+    for told, i, ratio in zip(fresh.told, chosen, ratios, strict=True):
+        told.add(block.told[i].scaled(weight * float(ratio)))
     m = block.size
     if not m:
         return fresh
@@ -89,8 +88,7 @@ def _relearned(block: FeatureBlock, group: OutputGroup, samples: SampleBuffer) -
         one.learn_anew(samples.inputs, samples.data, samples.weights)
     whole, part = block.on_coefficients(), at_hand.on_coefficients()
     for told, i, ratio in zip(fresh.told, *_shares(block, group), strict=True):
-        gone = whole[i].less(part[i]).scaled(float(ratio))
-        told.absorb(np.column_stack([gone.R, gone.z]))
+        told.add(whole[i].less(part[i]).scaled(float(ratio)))
     return fresh
 
 

@@ -63,6 +63,10 @@ class Information:
         absorb_rows(self.R, self.z, rows.copy())
         self._solved = None
 
+    def add(self, other: Information) -> None:
+        """Add what another state tells, of independent samples. O(p^3)."""
+        self.absorb(np.column_stack([other.R, other.z]))
+
     def fade(self, factor: float) -> None:
         """Let all equations count `factor` times as much as before, their noise still one."""
         self.R *= factor

@@ -53,6 +53,17 @@ def absorb_rows(R: np.ndarray, z: np.ndarray, rows: np.ndarray) -> None:
 
 
 @_compiled
+def absorb_each(R: np.ndarray, z: np.ndarray, rows: np.ndarray) -> None:
+    """Add row i of `rows` (k, p + 1), used up, to system i of R (k, p, p) and z (k, p).
+
+    As `absorb_row` for each. O(k p^2).
+    """
+    p = z.shape[1]
+    for i in range(len(rows)):
+        absorb_row(R[i], z[i], rows[i, :p], rows[i, p])
+
+
+@_compiled
 def has_safe_diagonal(R: np.ndarray, zero: float, rank: float) -> bool:
     """Whether a triangular R (p, p) may be solved with as it is. O(p^2 / 2).
 

@@ -180,7 +180,7 @@ def test_w_is_calibrated_on_long_streams_that_return():
     2000 samples, each place seen forty times, a buffer of 20 that holds a tenth of one return.
     The mean of 40 draws of chi2_3 / 3 has standard deviation sqrt(2 / 3 / 40) = 0.129; four of
     these bound it. Of 120 intervals of 95 % at least 105 hold W: fewer are one chance in 2000.
-    Counting what Z does at a place as news at each return gives a mean square of thirty.
+    Counting what Z does at a place as news at each return gives a mean square above ten.
     """
     squares, inside = [], 0
     for seed in range(40):

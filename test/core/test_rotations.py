@@ -7,7 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sgp_ros.core.rotations import has_safe_diagonal, solve_rows, solve_upper
+from sgp_ros.core.rotations import (
+    absorb_each,
+    absorbed_rows_numpy,
+    has_safe_diagonal,
+    solve_rows,
+    solve_upper,
+)
 
 
 @given(st.integers(0, 10_000), st.integers(1, 8))
@@ -21,6 +27,21 @@ def test_compiled_solves_equal_the_library(seed, p):
     solve_rows(R, X)
     np.testing.assert_allclose(x, np.linalg.solve(R, z), atol=1e-10)
     np.testing.assert_allclose(X, rows @ np.linalg.inv(R), atol=1e-10)
+
+
+@given(st.integers(0, 10_000), st.integers(0, 4), st.integers(0, 5))
+def test_each_row_enters_its_own_system(seed, k, p):
+    """Systems side by side are what each would be alone."""
+    rng = np.random.default_rng(seed)
+    R, z, rows = rng.normal(size=(k, p, p)), rng.normal(size=(k, p)), rng.normal(size=(k, p + 1))
+    R = np.triu(R)
+    expected = [
+        absorbed_rows_numpy(R[i], z[i], rows[i : i + 1, :p], rows[i, p:]) for i in range(k)
+    ]
+    absorb_each(R, z, rows)
+    for found, value, (wanted, target) in zip(R, z, expected, strict=True):
+        np.testing.assert_allclose(found.T @ found, wanted.T @ wanted, atol=1e-9)
+        np.testing.assert_allclose(found.T @ value, wanted.T @ target, atol=1e-9)
 
 
 @pytest.mark.parametrize(
