@@ -38,7 +38,7 @@ from sgp_ros.simulation.recording import simulate
 
 RESULT = Path(__file__).parent / 'results' / 'calibration.json'
 WORLDS, LENGTH, FIRST, BUDGET, FEATURES = 200, 400, 100, 60, 60
-WHEELS, WHEEL_S = 40, 20.0
+WHEELS, WHEEL_S = 200, 20.0
 TRUE = Model((SquaredExponential(1.0, (0.5, 1.5), (0, 1)),), (0.05,))
 PRIOR = CoefficientPrior.from_std(np.zeros(3), np.full(3, 2.0))
 SETTLED = 100
@@ -61,7 +61,10 @@ def _world(seed):
 
 def _ways(model):
     yield from (
-        (f'exact, {policy}', OnlineRegression(model, PRIOR, BUDGET, policy=policy))
+        (
+            f'exact, {policy}',
+            OnlineRegression(model, PRIOR, BUDGET, features=FEATURES, policy=policy),
+        )
         for policy in ('oldest', 'least_informative', 'coverage')
     )
     yield 'basis', BasisRegression(model, PRIOR, BUDGET, FEATURES)

@@ -44,4 +44,4 @@ class IncrementalFeatures:
     def learn(self, u, y):
         """Learn observation y at input u (d,)."""
         root = np.sqrt(self._noise)
-        self._information.absorb(self._features(u) / root, float(y) / root)
+        self._information.absorb(np.append(self._features(u), y)[None] / root)

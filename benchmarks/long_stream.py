@@ -79,7 +79,7 @@ def _resident_mb():
 def _ways(model):
     ways = {
         f'exact, {policy}': lambda policy=policy: OnlineRegression(
-            model, PRIOR, BUDGET, policy=policy
+            model, PRIOR, BUDGET, features=FEATURES, policy=policy
         )
         for policy in ('oldest', 'least_informative', 'coverage')
     }

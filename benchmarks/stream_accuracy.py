@@ -160,7 +160,7 @@ def _methods(data, prior, inputs, every, first):
         'RLS, then ISSGPR': _Features(fits['PRGP'].model, physics(), first),
     }
     for policy in ('oldest', 'least_informative', 'coverage'):
-        online = OnlineRegression(sgp_model, prior, BUDGET, policy=policy)
+        online = OnlineRegression(sgp_model, prior, BUDGET, features=FEATURES, policy=policy)
         methods[f'SGP, exact, {policy}'] = _Joint(online)
     methods['SGP, basis'] = _Joint(BasisRegression(sgp_model, prior, BUDGET, FEATURES))
     return methods, sgp_model
