@@ -149,7 +149,8 @@ class EngineConfig:
         choices=('exact', 'basis'), read_only=True,
     )  # fmt: skip
     basis_features: int = _setting(
-        'basis.features', 'int', 100, 'Most features of the basis of each joint.',
+        'basis.features', 'int', 100,
+        'Most features of the basis of each joint, which tells W in both modes.',
         low=1, high=2000, read_only=True,
     )  # fmt: skip
     forgetting_samples: float = _setting(
