@@ -35,7 +35,13 @@ if TYPE_CHECKING:
 
 REMAINDER = 0.01
 """Share of the noise variance above which the remainder makes an input join. The features then
-leave out a hundredth of the noise, and the squares of the pivots of L stay above that."""
+leave out a hundredth of the noise."""
+
+JITTER = 1e-12
+"""Share of the variance of Z by which inducing values stray from Z, so that L keeps its digits."""
+
+LEAST = 1e-9
+"""Share of the variance of Z below which a remainder is rounding: no input joins for it."""
 
 
 class FeatureBlock:
@@ -61,7 +67,10 @@ class FeatureBlock:
         self._told_R, self._told_z = np.zeros((k, p, p)), np.zeros((k, p))
         self._scales = np.array(group.scales)[:, None]  # (k, 1)
         self._capacity = dense = capacity if group.kernel is not None else 0
-        self._factor = GrowingFactor(OutputGroup(group.kernel, 0.0, (0,), (1.0,)), 0, dense)
+        variance = 0.0 if group.kernel is None else group.kernel.variance
+        own = OutputGroup(group.kernel, JITTER * variance, (0,), (1.0,))
+        self._factor = GrowingFactor(own, 0, dense)
+        self._least = max(REMAINDER * group.noise, LEAST * variance)
         self._R, self._S = np.zeros((dense, dense)), np.zeros((dense, k * (p + 1)))
         self._data_R, self._data_S = np.zeros_like(self._R), np.zeros_like(self._S)
 
@@ -124,15 +133,16 @@ class FeatureBlock:
             The features of u afterwards, with what they still leave out.
         """
         remainder = remainder_of(features)
-        is_new = remainder > REMAINDER * self.group.noise
-        self.is_resolved = not is_new or self.size < self._capacity
-        if not (is_new and self.is_resolved):
+        self.is_resolved = remainder <= REMAINDER * self.group.noise
+        if remainder <= self._least or self.size == self._capacity:
             return features
+        self.is_resolved = True
+        own = remainder / self._factor.pivot(features)
         self._factor.append(features, np.zeros((1, 1)))
         self.inputs.append(u.copy())
         self._R[self.size - 1, self.size - 1] = 1.0
-        v = np.append(features.v, math.sqrt(remainder))
-        return replace(features, v=v, reduction=features.prior)
+        v = np.append(features.v, own)
+        return replace(features, v=v, reduction=features.reduction + own * own)
 
     def absorb(
         self, u: np.ndarray, features: Whitening, data: np.ndarray, weight: float = 1.0

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sgp_ros.core.basis import BasisRegression
+from sgp_ros.core.feature_block import JITTER
 from sgp_ros.core.feature_change import interpolation_error
 from sgp_ros.core.kernels import SquaredExponential
 from sgp_ros.core.model import Model, Observations
@@ -133,7 +134,8 @@ def test_the_interpolation_error_is_the_variance_of_a_difference(length):
     own, other = block.group.kernel, SquaredExponential(1.3, (length,), (0,))
     B, squares = np.array(block.inputs), []
     for u in data.U:
-        a = np.linalg.solve(own.matrix(B), own.matrix(B, u[None])[:, 0])
+        K = own.matrix(B) + JITTER * own.variance * np.eye(len(B))
+        a = np.linalg.solve(K, own.matrix(B, u[None])[:, 0])
         difference = np.append(-a, 1.0)
         squares.append(difference @ other.matrix(np.vstack([B, u])) @ difference)
     expected = np.mean(squares)
