@@ -84,8 +84,8 @@ class BasisRegression:
     def unresolved(self) -> int:
         """Samples at which the features of a component had no room for what Z may do there.
 
-        Such a remainder counts as noise that is new at each sample, though it is the same at each
-        return to the place: where there are many, the intervals of W are too narrow.
+        Such samples tell W and Z little: what Z does there may be the same at each return, so
+        they count as if it were.
         """
         return self._basis.unresolved
 

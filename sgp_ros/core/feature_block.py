@@ -4,7 +4,9 @@ The features at u are `phi(u) = L^-1 k(B, u)` with inducing inputs B and `L L^T 
 weights standard normal: Z as the values at B predict it. What they cannot predict, the remainder
 `kappa(u, u) - phi phi^T`, counts as noise of its own at each sample (Snelson and Ghahramani 2006).
 An input joins B when its remainder is no longer small beside the noise; features that exist do not
-change by that, so nothing absorbed before has to be seen again.
+change by that, so nothing absorbed before has to be seen again. Where B has no room for it, the
+remainder may be the same at each return, and n samples with the same error of variance r
+tell no more than one: the n-th counts with the variance n r.
 
 Two systems are kept: one that holds the prior of the weights, which W and predictions need, and
 one of the data alone, which other hyper-parameters need (`core.feature_change`). The second could
@@ -51,6 +53,8 @@ class FeatureBlock:
         group: the outputs, their kernel and noise.
         inputs: inducing inputs, (d,) each.
         is_resolved: whether the last sample left a remainder that is small beside the noise.
+        tally: of the samples, as much as they count: their number, their variances over that of
+            the noise, and the number of those without room.
 
     Args:
         group: of outputs.
@@ -62,6 +66,7 @@ class FeatureBlock:
         self.group = group
         self.inputs: list[np.ndarray] = []
         self.is_resolved = True
+        self.tally = np.zeros(3)
         k = len(group.outputs)
         self._shape = (k, p + 1)
         self._told_R, self._told_z = np.zeros((k, p, p)), np.zeros((k, p))
@@ -159,7 +164,11 @@ class FeatureBlock:
             What they tell of W alone: rows of unit noise and their values, (k, p + 1).
         """
         found = self.join(u, features)
-        scale = weight / math.sqrt(self.group.noise + remainder_of(found))
+        remainder, noise = remainder_of(found), self.group.noise
+        self.tally += weight**2 * np.array([1.0, 1.0 + remainder / noise, not self.is_resolved])
+        if not self.is_resolved:
+            remainder *= max(self.tally[2], 1.0)
+        scale = weight / math.sqrt(noise + remainder)
         rest = (scale / self._scales * data).reshape(-1)
         alone = rest.copy()
         absorb_equation(self._R, self._S, scale * found.v, rest)
@@ -204,6 +213,7 @@ class FeatureBlock:
             What that leaves on W: rows of unit noise and their values, (r, p + 1).
         """
         m = self.size
+        self.tally *= forgetting.factor**2
         if not m:
             return np.zeros((0, self._shape[1]))
         for R, S in ((self._R, self._S), (self._data_R, self._data_S)):
@@ -220,6 +230,7 @@ class FeatureBlock:
         arrays = {f'inducing_{name}': array for name, array in self._factor.state().items()}
         return arrays | {
             'outputs': np.array(self.group.outputs), 'inputs': np.array(self.inputs),
+            'tally': self.tally,
             'R': self._R[:m, :m], 'C': self._S[:m],
             'data_R': self._data_R[:m, :m], 'data_C': self._data_S[:m],
             'told_R': self._told_R, 'told_z': self._told_z,
@@ -229,6 +240,7 @@ class FeatureBlock:
         """Continue exactly where `state` was taken."""
         self._factor.restore(part_of(state, 'inducing_'))
         self.inputs = [np.array(u) for u in state['inputs']]
+        self.tally[:] = state['tally']
         m = self.size
         self._R[:m, :m], self._S[:m] = state['R'], state['C']
         self._data_R[:m, :m], self._data_S[:m] = state['data_R'], state['data_C']

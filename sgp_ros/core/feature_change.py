@@ -5,9 +5,9 @@ the prior of the weights has no part, therefore hold for the features of another
 `theta = L^-1 Phi theta'` where Phi are the new features at the old inducing inputs B. Then the new
 prior is added. What this neglects is that the old kernel had interpolated between the inducing
 inputs: how far the new one lets Z be from that is measured at the samples at hand. It counts as
-noise, as remainders do; where it would exceed all other noise, as for far shorter length scales,
-the old equations say too little of Z, and Z is learned from the samples at hand again. W
-keeps what the stream told of it.
+noise in place of the remainders that were counted; where it would exceed all other noise, as for
+far shorter length scales, the old equations say too little of Z, and Z is learned from the
+samples at hand again. W keeps what the stream told of it.
 """
 
 from __future__ import annotations
@@ -36,12 +36,14 @@ def changed_block(block: FeatureBlock, group: OutputGroup, samples: SampleBuffer
         group: outputs of the block, with other hyper-parameters.
         samples: of the stream that are at hand.
     """
-    before = interpolation_error(block, block.group.kernel, samples.inputs) / block.group.noise
-    after = interpolation_error(block, group.kernel, samples.inputs) / group.noise
-    growth = (1.0 + after) / (1.0 + before)
+    count, counted, _ = block.tally
+    after = 1.0 + interpolation_error(block, group.kernel, samples.inputs) / group.noise
+    growth = after * count / counted if count else 1.0
     if growth > WORST:
         return _relearned(block, group, samples)
-    return _carried(block, group, 1.0 / np.sqrt(growth))
+    carried = _carried(block, group, 1.0 / np.sqrt(growth))
+    carried.tally[:] = block.tally * [1.0, growth, 1.0]
+    return carried
 
 
 def interpolation_error(block: FeatureBlock, kernel: Kernel | None, U: np.ndarray) -> float:

@@ -33,6 +33,7 @@ class StreamBasis:
         blocks: square-root information on the weights.
         total: on W, the prior among it.
         unresolved: samples at which the features of an output had no room for what Z may do there.
+            They tell W little, as if what Z does there were one and the same.
 
     Args:
         model: hyper-parameters.

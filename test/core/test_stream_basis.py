@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sgp_ros.core.forgetting import Forgetting
 from sgp_ros.core.information import Information
 from sgp_ros.core.posterior import Posterior
 from sgp_ros.core.stream_basis import StreamBasis
-from test.core.worlds import returning
+from test.core.worlds import plane, returning
 
 
 def _learned(model, prior, data, features):
@@ -16,6 +17,22 @@ def _learned(model, prior, data, features):
     for u, f, y in zip(data.U, data.F, data.y, strict=True):
         basis.absorb(u, basis.features(u), np.column_stack([f, y]))
     return basis
+
+
+def test_without_room_the_intervals_of_w_still_hold():
+    """A tenth of the features that Z would need make W less certain, not too certain.
+
+    The mean of 40 draws of chi2_3 / 3 has standard deviation 0.129; four of these bound it from
+    above. Remainders that counted as news at each sample would give a mean square above ten.
+    """
+    squares = []
+    for seed in range(40):
+        model, prior, w, data = plane(seed, 400, 0.01)
+        basis = _learned(model, prior, data, 20)
+        assert basis.unresolved > 300
+        error = basis.total.R @ (basis.total.coefficients - w)
+        squares.append(error @ error / 3)
+    assert np.mean(squares) < 1.0 + 4 * 0.129
 
 
 @pytest.mark.parametrize('noise', [1e-2, 1e-4, 1e-6, 1e-8])
@@ -37,3 +54,14 @@ def test_little_noise_costs_no_digit_that_w_needs(noise):
     deviations = np.sqrt(np.diag(batch.covariance))
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), deviations, rtol=0.02)
     assert np.all(np.abs(found.coefficients - batch.coefficients) < 0.2 * deviations)
+
+
+def test_what_fades_no_longer_stands_for_the_same_remainder():
+    """Samples without room are numbered by as much as they still count."""
+    model, prior, _, data = plane(0, 300, 0.01)
+    basis = _learned(model, prior, data, 5)
+    block = basis.blocks[0]
+    before = block.tally.copy()
+    forgetting = Forgetting(2.0, Information.of_prior(prior))
+    basis.fade(forgetting)
+    np.testing.assert_allclose(block.tally, np.exp(-0.5) * before)

@@ -30,6 +30,22 @@ def random_problem(seed, n=12, k=2, p=3, d=3, gain=None, noise_like=None):
     return Model(kernels, tuple(rng.uniform(0.1, 0.5, size=m))), Observations(U, F, y, G)
 
 
+def plane(seed, n, noise):
+    """Return model, prior, W and n samples that cross a plane, so that Z needs many features."""
+    kernel = SquaredExponential(1.0, (0.5, 0.5), (0, 1))
+    rng = np.random.default_rng(seed)
+    t = np.arange(n)
+    start = rng.uniform(0.0, 6.0)
+    U = np.stack([2.0 * np.sin(t / 15.4 + start), 1.3 * np.cos(t / 9.8)], axis=1)
+    values, vectors = np.linalg.eigh(kernel.matrix(U))
+    z = vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.normal(size=n))
+    F = np.stack([np.ones(n), U[:, 0], rng.normal(size=n)], axis=1)[:, None]
+    w = rng.normal(size=3)
+    y = F[:, 0] @ w + z + np.sqrt(noise) * rng.normal(size=n)
+    prior = CoefficientPrior.from_std(np.zeros(3), np.ones(3))
+    return Model((kernel,), (noise,)), prior, w, Observations(U, F, y[:, None])
+
+
 def returning(seed, n=700):
     """Return model, prior, W and n samples of a robot that comes by each place every 50 or so."""
     kernel = SquaredExponential(1.0, (0.5,), (0,))
