@@ -185,3 +185,19 @@ def test_far_shorter_length_scales_learn_z_from_the_kept_samples():
 
 def _tail(data):
     return Observations(data.U[-20:], data.F[-20:], data.y[-20:])
+
+
+@pytest.mark.parametrize('way', WAYS)
+def test_outputs_that_come_to_share_a_kernel_are_restored_apart(way):
+    """What was told of each stays in a block of its own, also in a state that is restored."""
+    model = _model((1.0, 2.0), (0.8, 0.7), (0.1, 0.3))
+    shared = _model((1.0, 3.0), (0.6, 0.6), (0.1, 0.3))
+    data = _spread_out()
+    one, other = _learn(way(model, PRIOR), data), way(shared, PRIOR)
+    one.change(model=shared)
+    other.restore(one.state())
+    for online in (one, other):
+        _learn(online, data)
+    assert len(one._basis.blocks) == 2
+    for name, array in other.state().items():
+        np.testing.assert_array_equal(array, one.state()[name])
