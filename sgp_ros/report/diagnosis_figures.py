@@ -128,8 +128,8 @@ def draw_time(found: Diagnosis) -> Figure:
 
 
 def draw_laws(found: Diagnosis) -> Figure:
-    """Draw each finding's force over what it depends on, and the data without all else."""
-    shown = [(f, force) for f, force in _forces(found) if f.effect != 'unknown'][:_LARGE]
+    """Draw the forces of the largest findings over what they depend on, beside the data."""
+    shown = sorted(_forces(found), key=lambda pair: -pair[0].share)[:_LARGE]
     figure = Figure(figsize=(10 if len(shown) > 1 else 6.5, 3.6), layout='constrained')
     for i, (finding, force) in enumerate(shown):
         axes = figure.add_subplot(1, len(shown), i + 1)
@@ -210,8 +210,8 @@ def _trace(axes: Axes, found: Diagnosis, j: int, shown: slice) -> None:
 
 def _forces(found: Diagnosis) -> list[tuple[Finding, np.ndarray]]:
     """Return the findings that exert forces, with these."""
-    exerting = [f for f in found.findings if f.effect not in {'velocity_filter_lag', 'unknown'}]
-    return list(zip(exerting, found.traces.forces, strict=False))
+    pairs = zip(found.findings, found.traces.forces, strict=False)
+    return [(f, x) for f, x in pairs if f.effect not in {'velocity_filter_lag', 'unknown'}]
 
 
 def _strongest(found: Diagnosis, finding: Finding, force: np.ndarray) -> int:

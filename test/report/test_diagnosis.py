@@ -232,6 +232,20 @@ def test_a_lag_of_the_velocity_claims_no_force():
     assert 'of the variance of the velocity' in render(found, {})
 
 
+def test_a_force_is_drawn_beside_its_own_finding():
+    """Also where a finding without force is more probable."""
+    alone = diagnosis('missing_physics', [COULOMB])
+    lag = replace(
+        COULOMB, effect='velocity_filter_lag', parameters={'time_constant': Parameter(0.01, 1e-3)}
+    )
+    (force,) = alone.traces.forces
+    traces = replace(alone.traces, forces=(0.0 * force, force))
+    both = replace(alone, findings=(lag, *alone.findings), traces=traces)
+    laws = [draw_laws(found).axes[0].lines[1].get_ydata() for found in (alone, both)]
+    assert abs(laws[0]).max() > 0.0
+    assert (laws[0] == laws[1]).all()
+
+
 def test_a_joint_that_is_never_driven_hides_no_finding():
     """Its error over the variance of its effort is no number; the other joints still speak."""
     found = diagnosis('missing_physics', [COULOMB])
