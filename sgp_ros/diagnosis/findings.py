@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.diagnosis.confinement import ENERGY, region
 from sgp_ros.diagnosis.places import joint_name
 from sgp_ros.diagnosis.result import Finding, Location, Parameter, ParameterError
 from sgp_ros.diagnosis.suspects import Columns
@@ -128,8 +129,13 @@ def _unknown(
     seen = [r for r in remainders if r.joint == decision.worst]
     on = f'it depends on {", ".join(seen[0].inputs)}' if seen else 'no function of the motion'
     share = float(decision.model.mean_square[decision.worst] / equations.power[decision.worst])
+    where = region(equations, decision.model.residual[:, decision.worst], decision.worst)
+    if where.variables:
+        (name,) = where.variables
+        ((lo, hi),) = where.intervals.get(name, where.time)
+        on += f'; {100 * ENERGY:.0f} % of it lies where {name} is between {lo:.3g} and {hi:.3g}'
     return Finding(
-        names[decision.worst], 'unknown', {}, Location(), 0.0, chances.unknown, share, '', on
+        names[decision.worst], 'unknown', {}, where, 0.0, chances.unknown, share, '', on
     )
 
 
