@@ -74,7 +74,8 @@ and need the YAML.
      Noise of a measured effort, or of impacts, is no reason against a name, nor for the verdict that something is
      missing. Z does not see the effort here: where friction takes all of an effort, it would explain itself.
    * Else the verdict is `unexplained`, and Z is learned for the joint, now of the effort too; the inputs that
-     evidence keeps are what the discrepancy depends on.
+     evidence keeps are what the discrepancy depends on. Where an interval of position, velocity or time with less
+     than half of the rows holds 95 % of its energy, that is its region.
 7. **Cannot tell.** Rivals whose odds the data move by less than twenty are carried over to other motions: the whole
    range of the joints, faster, slower, elsewhere. Those that differ nowhere by 0.4 % are the same law under a richer
    name, and count for the finding; the others are reported with the motion on which they differ most.
