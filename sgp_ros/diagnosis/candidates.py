@@ -111,11 +111,17 @@ class Model:
     def shares(self) -> list[float]:
         """Greatest shares that the effects have of the mean squared effort of a joint.
 
-        Before any filter, as the schema has it: what lies above the cut-off counts.
+        Before any filter, as the schema has it: what lies above the cut-off counts. Not so where
+        an effect follows the measured acceleration, which is mostly noise up there.
         """
         equations = self.frame.equations
         found = []
-        for s, c in zip(self.suspects, self.coefficients, strict=True):
+        for s, c, filtered in zip(
+            self.suspects, self.coefficients, self.filtered_shares, strict=True
+        ):
+            if s.effect.sees_acceleration and not s.effect.has_memory:
+                found.append(filtered)
+                continue
             force = s.effect.columns(equations.motion, s.place, s.shape) @ c
             power = equations.power if force.ndim == 2 else equations.power[s.place.joint]
             found.append(float(((force**2).mean(axis=0) / power).max()))

@@ -37,6 +37,8 @@ def screen(columns: Columns, model: Model, effects: Iterable[Effect]) -> list[Tr
     known = {s.key for s in model.suspects}
     found: list[Trial] = []
     for effect in effects:
+        if effect.is_body and model.is_free:
+            continue
         for place in effect.places(columns.equations(held).motion):
             if (effect.name, place) in known:
                 continue

@@ -162,6 +162,17 @@ def test_no_larger_effect_takes_the_place_of_a_better_one_that_is_too_small(damp
     assert decide(damped, competition).verdict != 'missing_physics'
 
 
+def test_noise_of_the_acceleration_makes_no_rotor_large(equations_for):
+    """Coarse encoders: above the cut-off a rotor would follow their noise."""
+    world = simulate(CHAINS[1], 3, 10.0)
+    _, equations = equations_for(world, quantum=2e-3)
+    model = fitted(equations, 'armature')
+    force = model.suspects[0].effect.columns(equations.motion, Place(0), np.zeros(0))
+    raw = float(np.mean((force @ model.coefficients[0]) ** 2) / equations.power[0])
+    assert model.shares[0] == pytest.approx(model.filtered_shares[0])
+    assert raw > 2.0 * model.shares[0]
+
+
 def test_a_weak_motor_and_heavy_bodies_fit_alike(tmp_path):
     """Half of the effort, or twice the inertia and weight: what is left of the motion is equal."""
     (link,) = CHAINS[1]

@@ -19,6 +19,17 @@ def _names(model):
     return {s.effect.name for s in model.suspects}
 
 
+def test_a_load_does_not_compete_with_bodies_that_may_differ(equations_for, heavy):
+    """It is one of their changes, with a freedom that has no price."""
+    _, equations = equations_for(heavy[1])
+    competition = hypotheses.compete(equations, lambda _share: None)
+    loaded = [
+        m for m in (*competition.singles, *competition.pairs) if 'payload' in _names(m)
+    ]  # fmt: skip
+    assert loaded
+    assert not any(m.is_free for m in loaded)
+
+
 def test_effects_that_show_only_together_are_found_by_exchange(equations_for):
     """From two that are neither: one gives way, then the other."""
     world = simulate(CHAINS[1], 4, 12.0, force=_falling_friction, dry=lambda t, q, s: 0.3)

@@ -113,6 +113,7 @@ class Effect:
         is_inertial: proportional to the acceleration.
         uses_bodies: its columns depend on the inertial parameters of the robot.
         sees_acceleration: its force depends on the acceleration.
+        is_body: it changes a body; where bodies may differ, it adds nothing.
         has_memory: its force at a time depends on other times too, of the motion or the commands.
         bounds: of the shape, (s,) each.
         small: to first order in its size; None where starts are shapes.
@@ -132,6 +133,7 @@ class Effect:
     is_inertial: bool = False
     uses_bodies: bool = False
     sees_acceleration: bool = False
+    is_body: bool = False
     has_memory: bool = False
     bounds: Callable[[ObservedMotion, Place], tuple[np.ndarray, np.ndarray]] | None = None
     small: SmallEffect | None = None

@@ -256,7 +256,7 @@ PAYLOAD = Effect(
     (Quantity('mass', 'kg'), Quantity('x', 'm'), Quantity('y', 'm'), Quantity('z', 'm')),
     _payload, _last, _payloads, shaped('mass', 'x', 'y', 'z'),
     lambda f: bool(f.shape[0] > 0.0), 'a point mass that is fixed to the last link',
-    is_given=True, sees_acceleration=True, bounds=_payload_bounds,
+    is_given=True, sees_acceleration=True, is_body=True, bounds=_payload_bounds,
 )  # fmt: skip
 TIP_FORCE = Effect(
     'tip_force', (Quantity('fx', 'N'), Quantity('fy', 'N'), Quantity('fz', 'N')), _tip, _tools,
