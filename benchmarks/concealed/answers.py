@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benchmarks.concealed.kinds import SCORED
+from benchmarks.concealed.concealed_effect import SCORED
 
 
 def effects_entry(concealed, bodies):

@@ -22,7 +22,8 @@ import numpy as np
 
 from benchmarks.concealed import answers, scores, sizes
 from benchmarks.concealed import world as worlds
-from benchmarks.concealed.kinds import UnsuitableError, draw_effect
+from benchmarks.concealed.concealed_effect import UnsuitableError
+from benchmarks.concealed.kinds import draw_effect
 from benchmarks.concealed.robots import urdf
 from sgp_ros.experiments.simulated_files import write_simulated
 from sgp_ros.simulation.registry import EFFECTS

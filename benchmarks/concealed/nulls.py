@@ -6,8 +6,8 @@ Draws robots without concealed physics: as the nominal one, with wrong inertial 
 something unlisted that makes less of the squared effort than counts as physics. Then robots with
 one effect of the list, to which nothing is to be added, and robots with an unlisted one, for which
 nothing is adequate. Every model that competes is fitted; its statistics go to
-`benchmarks/results/nulls_<tier>.json`. The thresholds of `sgp_ros.diagnosis.decision` follow from
-these; a test holds them to that.
+`benchmarks/results/nulls_<tier>.json`. A test holds the thresholds of
+`sgp_ros.diagnosis.decide.decision` to these.
 """
 
 from __future__ import annotations
@@ -25,15 +25,16 @@ import numpy as np
 
 from benchmarks.concealed import draw, scores, sizes
 from benchmarks.concealed import world as worlds
-from benchmarks.concealed.kinds import UnsuitableError, draw_effect
+from benchmarks.concealed.concealed_effect import UnsuitableError
+from benchmarks.concealed.kinds import draw_effect
 from benchmarks.concealed.robots import urdf
 from benchmarks.environment import environment
-from sgp_ros.diagnosis.decision import Scale, decide
-from sgp_ros.diagnosis.equations import make_equations
-from sgp_ros.diagnosis.hypotheses import compete
+from sgp_ros.diagnosis.compare.equations import make_equations
+from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.decide.decision import Scale, decide
+from sgp_ros.diagnosis.decide.referee import structure
+from sgp_ros.diagnosis.explain.hypotheses import compete
 from sgp_ros.diagnosis.places import joint_name
-from sgp_ros.diagnosis.referee import structure
-from sgp_ros.diagnosis.trajectory import choose_bandwidth, collect
 from sgp_ros.experiments.simulated_files import write_simulated
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot

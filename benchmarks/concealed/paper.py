@@ -26,7 +26,7 @@ import numpy as np
 
 from benchmarks.concealed import draw, sizes
 from benchmarks.concealed import world as worlds
-from benchmarks.concealed.kinds import Concealed, UnsuitableError
+from benchmarks.concealed.concealed_effect import Concealed, UnsuitableError
 from benchmarks.concealed.robots import DOWN, UP, Body, Y, Z
 from benchmarks.concealed.run import RESULTS, scored_case, summary
 from benchmarks.environment import environment

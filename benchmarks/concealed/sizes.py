@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from benchmarks.concealed import world as worlds
-from benchmarks.concealed.kinds import UnsuitableError
+from benchmarks.concealed.concealed_effect import UnsuitableError
 
 SMALLEST_SHARE = 0.0042
 _PILOT_S = 10.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.concealed import robots
-from benchmarks.concealed.kinds import Motion, UnsuitableError
+from benchmarks.concealed.concealed_effect import Motion, UnsuitableError
 from sgp_ros.errors import NumericalError
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.controllers import ControllerChoice

@@ -6,22 +6,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.diagnosis.confinement import ENERGY, region
+from sgp_ros.diagnosis.explain.suspects import Columns
+from sgp_ros.diagnosis.explain.uncertainty import reported_std
+from sgp_ros.diagnosis.locate.confinement import ENERGY, region
 from sgp_ros.diagnosis.places import joint_name
 from sgp_ros.diagnosis.result import Finding, Location, Parameter, ParameterError
-from sgp_ros.diagnosis.suspects import Columns
-from sgp_ros.diagnosis.uncertainty import reported_std
 from sgp_ros.robots.effects.effect import Fitted, Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sgp_ros.diagnosis.candidates import Model
-    from sgp_ros.diagnosis.certainty import Probabilities
-    from sgp_ros.diagnosis.decision import Decision
-    from sgp_ros.diagnosis.equations import Equations
-    from sgp_ros.diagnosis.remainder import Remainder
-    from sgp_ros.diagnosis.velocity_sensor import SensorLag
+    from sgp_ros.diagnosis.compare.equations import Equations
+    from sgp_ros.diagnosis.compare.velocity_sensor import SensorLag
+    from sgp_ros.diagnosis.decide.certainty import Probabilities
+    from sgp_ros.diagnosis.decide.decision import Decision
+    from sgp_ros.diagnosis.explain.fitted_model import Model
+    from sgp_ros.diagnosis.locate.remainder import Remainder
     from sgp_ros.robots.effects.effect import Value
 
 MODEL_ERROR = 0.003

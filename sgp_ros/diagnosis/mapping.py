@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from sgp_ros.diagnosis.rollouts import HORIZON_S
+from sgp_ros.diagnosis.prove.rollouts import HORIZON_S
 
 if TYPE_CHECKING:
     from sgp_ros.diagnosis.result import Diagnosis, Finding, Parameter, Proof

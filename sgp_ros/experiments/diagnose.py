@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.simulation_check import disagreement, nominal_shares
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
-from sgp_ros.diagnosis.simulation_check import disagreement, nominal_shares
 from sgp_ros.engine.samples import JointSample
 from sgp_ros.errors import ConfigError, NumericalError, RecordingError
 from sgp_ros.experiments.diagnosed_robot import write_diagnosed

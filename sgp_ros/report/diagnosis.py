@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from sgp_ros.core.scores import INTERVAL_95
-from sgp_ros.diagnosis.held_out import HELD_OUT
+from sgp_ros.diagnosis.prove.held_out import HELD_OUT
 from sgp_ros.report.diagnosis_figures import draw_diagnosis, important_joints
 from sgp_ros.report.diagnosis_proof import (
     densities,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from sgp_ros.diagnosis.decision import LEAST_SHARE
+from sgp_ros.diagnosis.decide.decision import LEAST_SHARE
 from sgp_ros.report.diagnosis_charts import draw_dependence, draw_proof
 from sgp_ros.report.diagnosis_text import effect_name, scored_joints, worst_joint
 from sgp_ros.report.figures import BAND, GREY, MEASURED, PREDICTED

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from sgp_ros.diagnosis.held_out import HELD_OUT
-from sgp_ros.diagnosis.rollouts import HORIZON_S
+from sgp_ros.diagnosis.prove.held_out import HELD_OUT
+from sgp_ros.diagnosis.prove.rollouts import HORIZON_S
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

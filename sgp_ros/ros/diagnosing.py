@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from sgp_ros.diagnosis.trajectory import SHORTEST_ROWS
+from sgp_ros.diagnosis.compare.trajectory import SHORTEST_ROWS
 from sgp_ros.engine.samples import CommandSample, JointSample
 from sgp_ros.errors import ConfigError
 from sgp_ros.recordings.writer import Status

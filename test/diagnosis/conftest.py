@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from sgp_ros.diagnosis.equations import make_equations
-from sgp_ros.diagnosis.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.compare.equations import make_equations
+from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from test.diagnosis.worlds import CHAINS, events_of, heavier, robot_of, simulate
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sgp_ros.diagnosis.candidates import fit, floors
-from sgp_ros.diagnosis.suspects import Columns, Suspect
+from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.fitted_model import floors
+from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
 from sgp_ros.robots.effects.catalogue import EFFECTS
 from sgp_ros.robots.effects.effect import Place
 

@@ -161,7 +161,7 @@ def test_what_no_effect_describes_is_unexplained_at_its_joint(robots):
 
 def test_a_slow_velocity_field_is_the_finding_where_nothing_else_is(robots):
     """The dynamics are right: what is missing is in the sensor."""
-    from sgp_ros.diagnosis.velocity_sensor import lagged
+    from sgp_ros.diagnosis.compare.velocity_sensor import lagged
     from test.diagnosis.worlds import PERIOD
 
     world = simulate(CHAINS[1], 14, 6.0)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.equations import make_equations
+from sgp_ros.diagnosis.compare.equations import make_equations
+from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.compare.velocity_sensor import lagged, sensor_lags
 from sgp_ros.diagnosis.pipeline import diagnose
-from sgp_ros.diagnosis.trajectory import choose_bandwidth, collect
-from sgp_ros.diagnosis.velocity_sensor import lagged, sensor_lags
 from sgp_ros.robots.stated_effects import read_effects
 from test.diagnosis.worlds import CHAINS, PERIOD, delayed, events_of, simulate
 

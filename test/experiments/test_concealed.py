@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.concealed import draw, paper, robots, scoring, sizes
-from benchmarks.concealed.kinds import SCORED
+from benchmarks.concealed.concealed_effect import SCORED
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.rigid_body import mass_matrix

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sgp_ros.diagnosis.decision import LEAST_SHARE
+from sgp_ros.diagnosis.decide.decision import LEAST_SHARE
 from sgp_ros.diagnosis.result import Equivalent, Parameter
 from sgp_ros.report.diagnosis import render, write_diagnosis
 from sgp_ros.report.diagnosis_charts import draw_proof

@@ -1,0 +1,1 @@
+"""The nominal robot and a recording: signals, filters, the discrepancy as equations."""

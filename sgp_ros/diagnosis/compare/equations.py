@@ -1,0 +1,232 @@
+"""The discrepancy of a recording from the nominal robot as filtered linear equations.
+
+For every joint `d = tau_nominal(q, v, a) - tau_stated - tau_commanded = sum tau_x - Y dpi +
+noise`: what the motion takes beyond what was commanded, and beyond the effects that the nominal
+robot states, comes from effects tau_x, and from wrong inertial parameters. These have a prior: a
+body may have another mass, another centre, another inertia.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.diagnosis.compare.trajectory import (
+    Bandwidth,
+    RawTrajectory,
+    observe,
+    parallel_filter,
+)
+from sgp_ros.robots.rigid_body import mass_matrix, torque_regressor
+
+if TYPE_CHECKING:
+    from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
+    from sgp_ros.robots.effects.observed_motion import ObservedMotion
+    from sgp_ros.robots.tree import Tree
+
+SPREAD = 0.25
+"""Prior standard deviation of mass and inertia, relative; of the centre, to the radius."""
+
+
+POSES = 32
+"""Positions over which the inertia of a robot is averaged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """N rows of k joints.
+
+    Attributes:
+        motion: at the full rate, n rows.
+        filter: from n to N rows.
+        time: (N,) [s].
+        d: (N, k) discrepancy [N m or N].
+        base: (N, k, p) force per standard deviation of each inertial parameter's change.
+        directions: (p, 10 b) change of the inertial parameters per unit of the coefficients.
+        power: (k,) mean squared effort that shares refer to [N^2 m^2 or N^2].
+        noise: (k,) standard deviation that the encoders' noise gives d [N m or N].
+        moving: (n, k) 0 where a joint rests that dry friction may hold, 1 elsewhere; all 1
+            unless the joint has, or is supposed to have, dry friction.
+        rests: (n, k) whether a joint rests.
+        model_error: (k,) mean square by which d changes with the smoothing of the states: what
+            filters leave of a perfect model where the motion is fast.
+    """
+
+    motion: ObservedMotion
+    filter: ParallelFilter
+    time: np.ndarray
+    d: np.ndarray
+    base: np.ndarray
+    directions: np.ndarray
+    power: np.ndarray
+    noise: np.ndarray
+    moving: np.ndarray
+    rests: np.ndarray
+    model_error: np.ndarray
+
+    def filtered(self, columns: np.ndarray, joint: int, *, is_inertial: bool) -> np.ndarray:
+        """Return columns (n, m) of one joint, or (n, k, m), as rows (N, k, m).
+
+        What acts on a joint that dry friction holds is taken up by it, except inertial forces:
+        their smoothed share of the stop belongs to the motion before and after.
+        """
+        moving = np.ones_like(self.moving) if is_inertial else self.moving
+        if columns.ndim == 3:
+            return self.filter(columns * moving[:, :, None])
+        x = self.filter(columns * moving[:, joint, None])
+        result = np.zeros((len(x), self.d.shape[1], x.shape[1]))
+        result[:, joint] = x
+        return result
+
+    def with_dry_friction(self, joints: frozenset[int]) -> Equations:
+        """Return the equations under the hypothesis that dry friction may hold these joints.
+
+        While it does, it takes up whatever is needed: such rows ask nothing of anything else.
+        """
+        held = [j for j in sorted(joints) if self.moving[self.rests[:, j], j].any()]
+        if not held:
+            return self
+        motion, tree = self.motion, self.motion.tree
+        d, base, moving = self.d.copy(), self.base.copy(), self.moving.copy()
+        for j in held:
+            rows = self.rests[:, j]
+            q = motion.position[rows]
+            v, a = motion.velocity[rows].copy(), motion.acceleration[rows].copy()
+            v[:, j] = 0.0
+            a[:, j] = 0.0
+            needed = np.zeros(len(motion.time))
+            acting = motion.effort[rows, j] + motion.stated_force[rows, j]
+            needed[rows] = motion.effort_for(q, v, a)[:, j] - acting
+            d[:, j] -= self.filter(needed)
+            Y = np.zeros((len(motion.time), len(self.directions)))
+            Y[rows] = torque_regressor(tree, q, v, a)[:, j] @ self.directions.T
+            base[:, j] += self.filter(Y)
+            moving[rows, j] = 0.0
+        return replace(self, d=d, base=base, moving=moving)
+
+    @cached_property
+    def poses(self) -> tuple[ObservedMotion, ...]:
+        """Positions over the recording, at rest, and with a unit acceleration of each joint.
+
+        k + 1 motions of `POSES` rows.
+        """
+        rows = np.linspace(0, len(self.motion.time) - 1, POSES).astype(int)
+        q = self.motion.position[rows]
+        still = replace(
+            self.motion, time=self.motion.time[rows], position=q, velocity=np.zeros_like(q),
+            acceleration=np.zeros_like(q), effort=np.zeros_like(q), drive=None, starts=(0,),
+        )  # fmt: skip
+        units = np.eye(q.shape[1])
+        pushed = (replace(still, acceleration=np.tile(unit, (len(q), 1))) for unit in units)
+        return still, *pushed
+
+    def log_inertia(self, w: np.ndarray, added: np.ndarray) -> float:
+        """Return the mean of log det(M / M nominal) for changed bodies and what is added to M.
+
+        What is measured is the motion: a model of other inertia must not gain from residuals in
+        smaller units of effort. Minus infinity where the mass matrix is not positive.
+
+        Args:
+            w: (p,) change of the bodies.
+            added: (k, k), or (`POSES`, k, k) for the poses [kg m^2 or kg].
+        """
+        tree, q = self.motion.tree, self.poses[0].position
+        nominal = mass_matrix(tree, tree.parameters, q)
+        changed = tree.parameters + (w @ self.directions).reshape(tree.parameters.shape)
+        M = mass_matrix(tree, changed, q) + added
+        if np.linalg.eigvalsh(M)[:, 0].min() <= 0.0:
+            return -np.inf
+        return float((np.linalg.slogdet(M)[1] - np.linalg.slogdet(nominal)[1]).mean())
+
+
+def resting(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) -> np.ndarray:
+    """Return where joints rest: slower than the noise of the velocity for some time, (n, k)."""
+    noise = np.sqrt((2 * np.pi) ** 2 * raw.noise_density * bandwidth.state_cutoff**3 / 3.0)
+    speed = np.abs(motion.velocity)
+    threshold = np.maximum(4.0 * noise, 1e-3 * np.sqrt((speed**2).mean(axis=0)))
+    shortest = max(4, round(0.03 / raw.step))
+    rests = np.zeros(speed.shape, dtype=bool)
+    for j in range(speed.shape[1]):
+        wide = np.concatenate([[False], speed[:, j] < 3.0 * threshold[j], [False]])
+        edges = np.flatnonzero(np.diff(wide.astype(int)))
+        for start, stop in zip(edges[::2], edges[1::2], strict=True):
+            if np.sum(speed[start:stop, j] < threshold[j]) >= shortest:
+                rests[start:stop, j] = True
+    return rests
+
+
+def body_directions(tree: Tree) -> np.ndarray:
+    """Return changes of the inertial parameters, one standard deviation each, (p, 10 b).
+
+    Per body: mass at the same centre and size, the centre along three axes, six entries of the
+    inertia about the centre.
+    """
+    rows = []
+    for body, values in enumerate(tree.parameters):
+        mass = max(float(values[0]), 1e-6)
+        c = values[1:4] / mass
+        about = 0.5 * (values[4] + values[6] + values[9])
+        radius = float(np.sqrt(max(about / mass, 1e-6)))
+        shift = np.array(_point(c))
+        own = values[4:] - mass * shift
+        size = float(np.clip(own[[0, 2, 5]].mean(), 1e-3 * mass * radius**2, None))
+        changes = np.zeros((10, 10))
+        changes[0] = SPREAD * values
+        for axis in range(3):
+            e = np.eye(3)[axis] * 0.5 * SPREAD * radius
+            changes[1 + axis, 1:4] = mass * e
+            changes[1 + axis, 4:] = mass * (_point(c + e) - _point(c - e)) / 2.0
+        for entry in range(6):
+            changes[4 + entry, 4 + entry] = SPREAD * size
+        full = np.zeros((10, tree.parameters.size))
+        full[:, 10 * body : 10 * body + 10] = changes
+        rows.append(full)
+    return np.concatenate(rows)
+
+
+def _point(c: np.ndarray) -> np.ndarray:
+    """Return xx, xy, yy, xz, yz, zz of a unit mass at c."""
+    x, y, z = c
+    return np.array([y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y])
+
+
+def _smoothing_error(
+    raw: RawTrajectory, motion: ObservedMotion, low: ParallelFilter, bandwidth: Bandwidth
+) -> np.ndarray:
+    """Return the mean square by which the nominal efforts depend on the light smoothing, (k,)."""
+    less = replace(bandwidth, state_cutoff=0.7 * bandwidth.state_cutoff)
+    other = observe(raw, motion.tree, less)
+    change = low(
+        (motion.nominal_effort - motion.stated_force) - (other.nominal_effort - other.stated_force)
+    )
+    return np.asarray((change**2).mean(axis=0))
+
+
+def make_equations(raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth) -> Equations:
+    """Return the equations of a recording; a joint that does not move is asked nothing."""
+    motion = observe(raw, tree, bandwidth)
+    low = parallel_filter(raw, bandwidth)
+    k = tree.size
+    d = low(motion.nominal_effort - motion.effort - motion.stated_force) * motion.moves
+    directions = body_directions(tree)
+    base = np.empty((len(d), k, len(directions)))
+    Y = torque_regressor(tree, motion.position, motion.velocity, motion.acceleration)
+    for j in range(k):
+        base[:, j] = -low(Y[:, j] @ directions.T) * motion.moves[j]
+    power = np.where(
+        tree.is_actuated[:k],
+        (motion.effort**2).mean(axis=0),
+        (low(motion.mass_diagonal * motion.acceleration) ** 2).mean(axis=0),
+    )
+    power = np.where(motion.moves & (power > 0.0), power, 1.0)
+    inertia = motion.mass_diagonal.mean(axis=0)
+    variance = inertia**2 * (2 * np.pi) ** 4 * raw.noise_density * bandwidth.cutoff**5 / 5.0
+    equations = Equations(
+        motion, low, motion.time[low.rows], d, base, directions, power, np.sqrt(variance),
+        np.ones(motion.position.shape), resting(raw, motion, bandwidth),
+        _smoothing_error(raw, motion, low, bandwidth),
+    )  # fmt: skip
+    return equations.with_dry_friction(motion.dry_joints)

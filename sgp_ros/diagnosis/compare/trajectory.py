@@ -1,0 +1,218 @@
+"""A recording on one uniform grid, as the diagnosis sees it.
+
+Positions are joined by a cubic spline, commands are averaged as exactly as `Drive` does it.
+The bandwidth follows from the noise of the encoders: noise of density S in the position becomes a
+force of variance `M^2 (2 pi)^4 S f^5 / 5` below f. The cut-off is the frequency at which that
+reaches `NOISE_SHARE` of the commanded effort, or the highest that motion and rate give sense to.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import interpolate
+
+from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
+from sgp_ros.engine.samples import JointSample
+from sgp_ros.errors import RecordingError
+from sgp_ros.offline.acceptance import accept
+from sgp_ros.offline.zero_phase import ZeroPhase
+from sgp_ros.robots.effects.drive import Drive
+from sgp_ros.robots.effects.observed_motion import ObservedMotion
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from sgp_ros.engine.samples import Event
+    from sgp_ros.robots.robot import Robot
+    from sgp_ros.robots.stated_effects import StatedEffect
+    from sgp_ros.robots.tree import Tree
+
+LONGEST_PAUSE_S = 0.5
+SHORTEST_ROWS = 64
+NOISE_SHARE = 3e-6
+"""Share of the mean square of the effort that noise may take below the cut-off."""
+LOWEST_CUTOFF_HZ, HIGHEST_CUTOFF_HZ = 3.0, 25.0
+
+
+@dataclass(frozen=True, eq=False)
+class RawTrajectory:
+    """n rows on a uniform grid before any smoothing.
+
+    Attributes:
+        time: (n,) [s] since the first state of the recording.
+        step: [s].
+        position: (n, k) [rad or m].
+        velocity: (n, k) measured; None without.
+        effort: (n, k) measured; None without.
+        drive: commands; None without.
+        segments: stretches without a pause.
+        refused: states by reason.
+        noise_density: (k,) of the positions, one-sided [rad^2/Hz or m^2/Hz].
+        start_ns: stamp of the first state of the recording.
+        stated: effects that the nominal robot has, beside those of its tree.
+    """
+
+    time: np.ndarray
+    step: float
+    position: np.ndarray
+    velocity: np.ndarray | None
+    effort: np.ndarray | None
+    drive: Drive | None
+    segments: tuple[slice, ...]
+    refused: dict[str, int]
+    noise_density: np.ndarray
+    start_ns: int
+    stated: tuple[StatedEffect, ...] = ()
+
+
+def collect(
+    events: Iterable[Event], robot: Robot, stated: tuple[StatedEffect, ...] = ()
+) -> RawTrajectory:
+    """Bring a recording to its uniform grid.
+
+    Args:
+        events: of the recording.
+        robot: names, actuated joints and gains.
+        stated: effects that the nominal robot has, beside those of its tree.
+
+    Raises:
+        RecordingError: too little is left.
+    """
+    known_events = list(events)
+    accepted = accept(known_events, robot, 'auto', 1.0, None)
+    stamps = accepted.stamps_ns
+    start_ns = min(e.stamp_ns for e in known_events if isinstance(e, JointSample))
+    seconds = (stamps - start_ns) * 1e-9
+    breaks = np.flatnonzero(np.diff(seconds) > LONGEST_PAUSE_S) + 1
+    stretches = [
+        rows for rows in np.split(np.arange(len(stamps)), breaks) if len(rows) >= SHORTEST_ROWS
+    ]
+    if not stretches:
+        raise RecordingError(
+            f'{len(stamps)} states, no {SHORTEST_ROWS} without a pause of {LONGEST_PAUSE_S:g} s',
+            'at least some seconds of motion', 'take a longer recording',
+        )  # fmt: skip
+    step = float(np.median(np.concatenate([np.diff(seconds[rows]) for rows in stretches])))
+    times, positions, grids, segments = [], [], [], []
+    velocities: list[np.ndarray] = []
+    efforts: list[np.ndarray] = []
+    row = 0
+    for rows in stretches:
+        known = seconds[rows]
+        n = int((known[-1] - known[0]) / step + 1e-6) + 1
+        t = known[0] + step * np.arange(n)
+        inner = np.minimum(t, known[-1])
+        times.append(t)
+        positions.append(interpolate.CubicSpline(known, accepted.position[rows])(inner))
+        for source, target in ((accepted.velocity, velocities), (accepted.effort, efforts)):
+            if source is not None:
+                target.append(interpolate.interp1d(known, source[rows], axis=0)(inner))
+        grids.append((float(known[0]), n))
+        segments.append(slice(row, row + n))
+        row += n
+    commands = accepted.commands
+    drive = None
+    if commands is not None and len(commands.stamps_ns) > 1:
+        drive = Drive((commands.stamps_ns - start_ns) * 1e-9, commands.effort, tuple(grids), step)
+    position = np.concatenate(positions)
+    return RawTrajectory(
+        np.concatenate(times), step, position,
+        np.concatenate(velocities) if velocities else None,
+        np.concatenate(efforts) if efforts else None,
+        drive, tuple(segments), dict(accepted.refused), noise_density(position, segments, step),
+        start_ns, stated,
+    )  # fmt: skip
+
+
+def noise_density(position: np.ndarray, segments: Sequence[slice], step: float) -> np.ndarray:
+    """Return the level of the spectra where no robot moves: the upper third, (k,).
+
+    Args:
+        position: (n, k) [rad or m].
+        segments: stretches of rows without a pause; the longest is looked at.
+        step: of the grid [s].
+    """
+    longest = max(segments, key=lambda s: s.stop - s.start)
+    q = position[longest]
+    window = np.hanning(len(q))[:, None]
+    spectrum = np.abs(np.fft.rfft((q - q.mean(axis=0)) * window, axis=0)) ** 2
+    density = 2.0 * spectrum * step / np.sum(window**2)
+    frequency = np.fft.rfftfreq(len(q), step)
+    upper = (frequency > 0.3 / step) & (frequency < 0.48 / step)
+    # the median of an exponential variable is ln 2 of its mean
+    return np.asarray(np.median(density[upper], axis=0) / math.log(2.0))
+
+
+@dataclass(frozen=True)
+class Bandwidth:
+    """Filters of a diagnosis.
+
+    Attributes:
+        cutoff: of the parallel filter [Hz].
+        state_cutoff: of the light smoothing of the states [Hz].
+    """
+
+    cutoff: float
+    state_cutoff: float
+
+
+def choose_bandwidth(raw: RawTrajectory, tree: Tree) -> Bandwidth:
+    """Return the filters that noise, rate and motion of a recording ask for."""
+    rate = 1.0 / raw.step
+    highest = min(HIGHEST_CUTOFF_HZ, 0.15 * rate)
+    k = tree.size
+    motion = observe(raw, tree, Bandwidth(highest, min(2.0 * highest, 0.4 * rate)))
+    inertia = motion.mass_diagonal.mean(axis=0)
+    effort = np.maximum(motion.effort.var(axis=0), 0.0)
+    driven = np.where(tree.is_actuated[:k], effort, _driven(motion))
+    noise = inertia**2 * (2.0 * math.pi) ** 4 * raw.noise_density / 5.0
+    limits = (NOISE_SHARE * np.maximum(driven, 1e-30) / np.maximum(noise, 1e-30)) ** 0.2
+    limits = limits[motion.moves] if motion.moves.any() else limits
+    cutoff = float(np.clip(limits.min(), LOWEST_CUTOFF_HZ, highest))
+    return Bandwidth(cutoff, min(2.5 * cutoff, 0.4 * rate))
+
+
+def _driven(motion: ObservedMotion) -> np.ndarray:
+    force = motion.mass_diagonal * motion.acceleration
+    return np.asarray(force.var(axis=0))
+
+
+def observe(raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth) -> ObservedMotion:
+    """Return the lightly smoothed motion of a trajectory."""
+    light = ZeroPhase(1.0 / raw.step, bandwidth.state_cutoff)
+    states = [light.states(raw.position[s]) for s in raw.segments]
+    position, velocity, acceleration = (np.concatenate(x) for x in zip(*states, strict=True))
+    k = tree.size
+    if raw.drive is not None:
+        effort = np.column_stack(
+            [
+                raw.drive.effort(j) if tree.is_actuated[j] else np.zeros(len(raw.time))
+                for j in range(k)
+            ]
+        )
+    elif raw.effort is not None:
+        effort = np.where(tree.is_actuated[:k], raw.effort, 0.0)
+    else:
+        effort = np.zeros((len(raw.time), k))
+    starts = tuple(s.start for s in raw.segments)
+    return ObservedMotion(
+        tree,
+        raw.time,
+        raw.step,
+        position,
+        velocity,
+        acceleration,
+        effort,
+        raw.drive,
+        starts,
+        raw.stated,
+    )
+
+
+def parallel_filter(raw: RawTrajectory, bandwidth: Bandwidth) -> ParallelFilter:
+    """Return the filter for target and columns."""
+    return ParallelFilter(1.0 / raw.step, bandwidth.cutoff, raw.segments)

@@ -1,0 +1,97 @@
+"""Probabilities of the verdict and of each finding.
+
+Scores of models differ by hundreds of nats where the signals are clean, yet the shape of a column
+is only approximate; so the odds of rivals are tempered: their difference in log rest counts, not
+the number of rows. `benchmarks/concealed` measures how the probabilities keep what they say.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.diagnosis.decide.decision import TEMPER, Scale
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sgp_ros.diagnosis.compare.equations import Equations
+    from sgp_ros.diagnosis.decide.decision import Decision
+    from sgp_ros.diagnosis.decide.equivalence import Contrasts
+    from sgp_ros.diagnosis.explain.fitted_model import Model
+    from sgp_ros.diagnosis.explain.hypotheses import Competition
+    from sgp_ros.diagnosis.result import Finding
+
+LEAST_ODDS = 0.01
+"""A rival below this, relative to the asserted model, is not looked at closely."""
+
+
+@dataclass(frozen=True, eq=False)
+class Probabilities:
+    """Of effects at joints, and of something unknown."""
+
+    by_key: dict[object, float]
+    unknown: float
+    asserted: Model
+    power: np.ndarray
+
+    def of(self, model: Model, index: int) -> float:
+        """Return the probability of one effect of a model."""
+        return self.by_key.get(model.suspects[index].key, 0.0)
+
+    def why(self, model: Model) -> str:
+        """Return why a rival was not asserted."""
+        rest = float((model.mean_square / self.power).max())
+        best = float((self.asserted.mean_square / self.power).max())
+        return (
+            f'leaves {100 * rest:.3g} % of the mean squared effort, '
+            f'the asserted model {100 * best:.3g} %'
+        )
+
+
+def probabilities(
+    equations: Equations, competition: Competition, decision: Decision, contrasts: Contrasts
+) -> Probabilities:
+    """Return the tempered probabilities of all effects.
+
+    A richer law whose numbers make it the asserted one is no rival to it.
+    """
+    scale, asserted = Scale.of(equations, competition), decision.model
+    least = scale.worth(asserted) + math.log(LEAST_ODDS) / TEMPER
+    models = [
+        m
+        for m in (*competition.singles, *competition.pairs, *competition.more)
+        if scale.counts(m)
+        and not (m.key != asserted.key and scale.worth(m) > least and contrasts.is_same_law(m))
+    ]
+    adequate = 1.0 / (1.0 + decision.excess**2)
+    by_key: dict[object, float] = {}
+    worth = TEMPER * np.array([scale.worth(m) for m in (competition.base, *models)])
+    odds = np.exp(worth - worth.max())
+    for model, p in zip(models, odds[1:] / odds.sum(), strict=True):
+        for s in model.suspects:
+            by_key[s.key] = by_key.get(s.key, 0.0) + float(p) * adequate
+    unknown = float(np.clip(decision.excess / (decision.excess + 1.0), 0.05, 0.97))
+    return Probabilities(
+        {key: min(p, 0.99) for key, p in by_key.items()},
+        unknown,
+        decision.model,
+        equations.power,
+    )
+
+
+def certainty_of(
+    findings: Sequence[Finding],
+    decision: Decision,
+    equations: Equations,
+    competition: Competition,
+) -> float:
+    """Return the probability that the verdict is right."""
+    if findings:
+        return max(f.probability for f in findings)
+    del decision
+    left = float((competition.parameters.mean_square / equations.power).max())
+    return float(np.clip(1.0 / (1.0 + (left / 0.002) ** 2), 0.5, 0.99))

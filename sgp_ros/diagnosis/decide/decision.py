@@ -1,0 +1,208 @@
+"""What the competition of models lets us assert.
+
+Statistical significance is not enough: the schema calls physics what makes at least 0.4 % of the
+mean squared effort of some joint. Among models of nearly the same residual the one with the fewest
+parameters is asserted, if each of its effects predicts parts of the recording that were left out
+(`second_opinion`). It is adequate when what it leaves, as far as that is no noise (`referee`), is
+small against what it explains.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.diagnosis.decide.referee import structure
+from sgp_ros.diagnosis.decide.second_opinion import support
+from sgp_ros.diagnosis.explain.fitted_model import FLOOR_SHARE
+from sgp_ros.diagnosis.explain.suspects import Columns
+
+if TYPE_CHECKING:
+    from sgp_ros.diagnosis.compare.equations import Equations
+    from sgp_ros.diagnosis.explain.fitted_model import Model
+    from sgp_ros.diagnosis.explain.hypotheses import Competition
+
+LEAST_SHARE = 0.004
+"""Share of the mean squared effort below which nothing counts as physics (schema)."""
+SHARE_TOLERANCE = 0.6
+"""An estimated share may be this much smaller than the least one."""
+NATS = 10.0
+"""Evidence that an effect must have beside practical weight, and on parts left out."""
+ADEQUATE_REST = 0.025
+"""Greatest structured rest of an adequate model, relative to what it explains."""
+SLIGHT_REST = 0.1 * LEAST_SHARE
+"""A rest below this share of the mean squared effort is adequate in any case."""
+ROWS = 100.0
+"""Most rows that count as independent when rests are compared.
+
+The shape of a column is only nearly right, and what is wrong with it repeats in every row.
+"""
+SHAPE_ERROR = 0.001
+"""Part of the discrepancy that the right column may leave for the same reason."""
+PER_EFFECT, PER_PARAMETER = 10.0, 3.0
+"""What an effect, and each number that the data determine, must be worth [nats]."""
+TEMPER = 0.3
+"""Weight of a nat of `Scale.worth` in the odds of rivals."""
+MOST_OPPOSED = 5.0
+"""Greatest ratio of the effects' mean squares, added up, to that of their sum, or of all there is
+to explain.
+"""
+_NOTHING = 1.0 / ADEQUATE_REST
+"""Excess of a model that explains nothing."""
+FILTER_ERRORS = 1.0
+"""Multiple of the measured errors of smoothing that a perfect model may leave."""
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """The verdict and the models behind it.
+
+    Attributes:
+        verdict: as in the schema.
+        model: that is asserted; for `unexplained` the inertial parameters alone.
+        rivals: models that were not asserted, best first.
+        excess: what the best model leaves, relative to what an adequate one may.
+        worst: index of the joint where most is left.
+        tentative: best model where nothing is adequate.
+        against: score of the best model without effects [nats].
+    """
+
+    verdict: str
+    model: Model
+    rivals: tuple[Model, ...]
+    excess: float
+    worst: int
+    tentative: Model | None = None
+    against: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """What mean squares are measured against.
+
+    Attributes:
+        power: (k,) mean squared efforts.
+        error: (k,) what filters and smoothing leave of a perfect model, as mean squares.
+        base: rest of the best model without effects, (k,) shares.
+        nominal: discrepancy of the nominal robot, (k,) shares.
+        rows: that count as independent.
+    """
+
+    power: np.ndarray
+    error: np.ndarray
+    base: np.ndarray
+    nominal: np.ndarray
+    rows: float
+
+    @classmethod
+    def of(cls, equations: Equations, competition: Competition) -> Scale:
+        """Return the scale of a recording."""
+        power, error = equations.power, FILTER_ERRORS * equations.model_error
+        base = np.maximum(competition.base.mean_square - error, 0.0) / power
+        nominal = competition.nominal.mean_square / power
+        return cls(power, error, base, nominal, min(ROWS, len(equations.d)))
+
+    @property
+    def floor(self) -> np.ndarray:
+        """What the right model may leave, (k,) shares."""
+        return np.asarray(FLOOR_SHARE + SHAPE_ERROR * self.nominal + self.error / self.power)
+
+    def shares(self, model: Model) -> np.ndarray:
+        """Return what a model leaves beyond the errors of the filters, (k,) shares."""
+        return np.maximum(model.mean_square - self.error, 0.0) / self.power
+
+    def explained(self, model: Model) -> float:
+        """Return the size of what is to explain.
+
+        That is the rest of the parameters, or the effects where changed parameters could imitate
+        them, but never more than the nominal robot leaves.
+        """
+        effects = min(model.net_share, float(self.nominal.sum()))
+        return max(float(self.base.sum()), effects, 1e-12)
+
+    def rest(self, model: Model, structured: np.ndarray | float = 1.0) -> float:
+        """Return the rest of a model relative to what it explains.
+
+        Args:
+            model: fitted.
+            structured: share of each joint's rest that is no noise, (k,).
+        """
+        return float((structured * self.shares(model)).sum()) / self.explained(model)
+
+    def excess(self, model: Model, structured: np.ndarray | float = 1.0) -> float:
+        """Return what a model leaves, relative to what an adequate one may."""
+        slight = float((structured * self.shares(model)).max()) / SLIGHT_REST
+        return min(self.rest(model, structured) / ADEQUATE_REST, slight)
+
+    def counts(self, model: Model) -> bool:
+        """Return whether effects are large enough and do not cancel each other, or the bodies."""
+        return self.is_sound(model) and min(model.shares) > SHARE_TOLERANCE * LEAST_SHARE
+
+    def is_sound(self, model: Model) -> bool:
+        """Return whether effects do not merely cancel each other, or the bodies."""
+        there = max(min(model.net_share, float(self.nominal.sum())), 1e-12)
+        return sum(model.filtered_shares) < MOST_OPPOSED * there
+
+    def fit(self, model: Model) -> float:
+        """Return the tempered log likelihood, with the prior of the bodies' change [nats].
+
+        It is one of the motion, which is what was measured: a residual of effort, and what a
+        perfect model would leave of it, is the larger the heavier the robot of a model is.
+        """
+        floor = self.floor * np.exp(2.0 * max(model.heavier, -50.0) / len(self.power))
+        share = model.mean_square / self.power + floor
+        likelihood = self.rows * (model.heavier - 0.5 * float(np.log(share).sum()))
+        return likelihood - 0.5 * float(model.w @ model.w)
+
+    def worth(self, model: Model) -> float:
+        """Return the fit of a model, less the price of its freedom [nats]."""
+        return self.fit(model) - PER_EFFECT * len(model.suspects) - PER_PARAMETER * model.freedom
+
+
+def _ranked(competition: Competition, scale: Scale) -> list[Model]:
+    """Return the models that could be asserted, best first.
+
+    There are none where the best explanation of all is too small to be physics: a worse one that
+    is larger, because bodies undo most of it, is not to be preferred for that.
+    """
+    models = (*competition.singles, *competition.pairs, *competition.more)
+    least = competition.base.score + NATS
+    sound = [m for m in models if m.score > least and scale.is_sound(m)]
+    ranked = sorted(sound, key=scale.worth, reverse=True)
+    if ranked and max(ranked[0].shares) < SHARE_TOLERANCE * LEAST_SHARE:
+        return []
+    return [m for m in ranked if scale.counts(m)]
+
+
+def decide(equations: Equations, competition: Competition) -> Decision:
+    """Return the verdict on a recording."""
+    scale, base = Scale.of(equations, competition), competition.base
+    ranked = _ranked(competition, scale)
+    best = _supported(equations, scale, [m for m in ranked if scale.worth(m) > scale.worth(base)])
+    rivals = tuple(m for m in ranked if m is not best)
+    worst = int(np.argmax(scale.base))
+    left = scale.shares(competition.parameters)
+    if best is not None:
+        excess = scale.excess(best, structure(equations, best.residual))
+        if excess < 1.0:
+            return Decision('missing_physics', best, rivals, excess, worst, against=base.score)
+        if left.max() > SHARE_TOLERANCE * LEAST_SHARE:
+            found = (best, *rivals)
+            return Decision('unexplained', base, found, excess, worst, best, base.score)
+    elif left.max() > LEAST_SHARE:
+        left = left * structure(equations, competition.parameters.residual)
+        if left.max() > LEAST_SHARE:
+            return Decision('unexplained', base, rivals, _NOTHING, worst, against=base.score)
+    verdict = 'parameters_only' if base.is_free else 'no_mismatch'
+    return Decision(verdict, base, rivals, _NOTHING, worst, against=base.score)
+
+
+def _supported(equations: Equations, scale: Scale, ranked: list[Model]) -> Model | None:
+    """Return the first model whose effects all predict parts of the recording left out."""
+    columns, floor = Columns(equations), scale.floor * scale.power
+    for model in ranked:
+        if scale.rows * min(support(columns, model, floor)) > NATS:
+            return model
+    return None

@@ -1,0 +1,209 @@
+"""Rivals that explain a recording as well as the asserted model, and a motion that would tell.
+
+Two models are told apart by what they leave. Where the likelihoods differ by less than the odds
+of one to twenty, the recording prefers none; only their size does. Such rivals are carried over
+to other motions, and the one on which their efforts differ most is the excitation to ask for.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.diagnosis.decide.decision import LEAST_SHARE, TEMPER, Scale
+from sgp_ros.diagnosis.places import joint_name
+from sgp_ros.diagnosis.prove.prediction import imbalance
+from sgp_ros.diagnosis.result import Equivalent
+from sgp_ros.robots.effects.drive import Drive
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sgp_ros.diagnosis.compare.equations import Equations
+    from sgp_ros.diagnosis.decide.decision import Decision
+    from sgp_ros.diagnosis.explain.fitted_model import Model
+    from sgp_ros.diagnosis.explain.hypotheses import Competition
+    from sgp_ros.robots.effects.observed_motion import ObservedMotion
+
+ALIKE = math.log(20.0) / TEMPER
+"""Difference of the fits below which a recording prefers neither model [nats]."""
+MOST = 3
+CLEARER = 2.0
+"""A motion separates models if their efforts differ this many times more, as mean squares."""
+LONGEST = 4000
+"""Rows of the recording that are carried over to other motions."""
+RECORDED = 'the motion of the recording'
+MOTIONS = {
+    'a motion over the whole range of the joints': (np.inf, 1.0, 0.0),
+    'a motion half as wide': (0.5, 1.0, 0.0),
+    'a motion twice as fast': (1.0, 2.0, 0.0),
+    'a motion half as fast': (1.0, 0.5, 0.0),
+    'the same motion about another position': (1.0, 1.0, 1.5),
+}
+"""Width and speed relative to the recording, shift of the middle in standard deviations.
+
+A width without bound is what the limits of the joints allow, a turn where there are none.
+"""
+
+
+class Contrasts:
+    """How far rivals differ from the asserted model, on the recorded motion and on others.
+
+    What the asserted model takes for these motions is computed once.
+
+    Args:
+        equations: of the recording.
+        asserted: the model to compare with.
+    """
+
+    def __init__(self, equations: Equations, asserted: Model) -> None:
+        self._equations = equations
+        self._asserted = asserted
+        self._known: dict[Model, dict[str, float]] = {}
+
+    def of(self, rival: Model) -> dict[str, float]:
+        """Return the mean square by which the efforts differ, relative, by motion.
+
+        Summed over joints; `RECORDED` is the motion of the recording.
+        """
+        if rival not in self._known:
+            self._known[rival] = {
+                name: self._difference(rival, *there) for name, there in self._motions.items()
+            }
+        return self._known[rival]
+
+    def is_same_law(self, rival: Model) -> bool:
+        """Return whether a rival says the same on any motion, as far as physics counts.
+
+        So does a law with one parameter more whose value makes it the simpler one.
+        """
+        return max(self.of(rival).values()) < LEAST_SHARE
+
+    @cached_property
+    def _motions(self) -> dict[str, tuple[ObservedMotion, np.ndarray, np.ndarray]]:
+        """Motions with the asserted model's imbalance (n, k) and the powers (k,) of efforts."""
+        found = {}
+        for name, how in {RECORDED: (1.0, 1.0, 0.0), **MOTIONS}.items():
+            motion = moved(self._equations.motion, *how)
+            driven = motion.tree.is_actuated[: motion.tree.size]
+            inertial = motion.mass_diagonal * motion.acceleration
+            power = np.where(driven, (motion.effort**2).mean(axis=0), (inertial**2).mean(axis=0))
+            found[name] = motion, imbalance(self._asserted, self._equations, motion), power
+        return found
+
+    def _difference(
+        self, rival: Model, motion: ObservedMotion, asserted: np.ndarray, power: np.ndarray
+    ) -> float:
+        apart = asserted - imbalance(rival, self._equations, motion)
+        share = (apart**2).mean(axis=0) / np.maximum(power, 1e-300)
+        return float(share[motion.moves].sum()) + 1e-300
+
+
+def equivalents(
+    equations: Equations, competition: Competition, decision: Decision, contrasts: Contrasts
+) -> tuple[Equivalent, ...]:
+    """Return what the recording cannot tell from the asserted model, best first.
+
+    Args:
+        equations: of the recording.
+        competition: its models.
+        decision: `unexplained` has no model to tell anything from.
+        contrasts: of the rivals to the asserted model.
+    """
+    if decision.verdict == 'unexplained':
+        return ()
+    scale, best = Scale.of(equations, competition), decision.model
+    unlikely = _without_prior(equations, competition.parameters)
+    others = {*decision.rivals, competition.nominal, competition.parameters} - {best}
+    found: list[Equivalent] = []
+    known: list[Model] = [best]
+    least = scale.fit(best) - ALIKE
+    for rival in (unlikely, *sorted(others, key=scale.worth, reverse=True)):
+        if len(found) == MOST:
+            break
+        prior = 0.5 * float(rival.w @ rival.w) if rival is unlikely else 0.0
+        is_other = not any(_contains(rival, m) for m in known)
+        if is_other and scale.fit(rival) + prior > least:
+            known.append(rival)
+            if not contrasts.is_same_law(rival):
+                found.append(_told(equations, rival, contrasts.of(rival)))
+    return tuple(found)
+
+
+def _without_prior(equations: Equations, parameters: Model) -> Model:
+    """Return the model of the bodies alone that may differ by any amount.
+
+    What the prior thinks unlikely still explains the recording: a motor that delivers a third,
+    or bodies three times as heavy.
+    """
+    base = equations.base / parameters.sigma[:, None]
+    N, k, p = base.shape
+    w = np.linalg.lstsq(
+        base.reshape(N * k, p), (equations.d / parameters.sigma).ravel(), rcond=1e-6
+    )[0]
+    heavier = equations.log_inertia(w, np.zeros((k, k)))
+    return replace(parameters, w=w, heavier=heavier, residual=equations.d - equations.base @ w)
+
+
+def _contains(rival: Model, model: Model) -> bool:
+    """Return whether a rival is a model with more freedom: it fits as well of necessity."""
+    return model.key <= rival.key and (rival.is_free or not model.is_free)
+
+
+def _told(equations: Equations, rival: Model, contrasts: Mapping[str, float]) -> Equivalent:
+    """Return a rival with the motion that would tell it from the asserted model."""
+    name = max(MOTIONS, key=lambda n: contrasts[n])
+    effects = tuple(
+        (joint_name(equations.motion, s.place.joint), s.effect.name) for s in rival.suspects
+    )
+    if contrasts[name] < CLEARER * contrasts[RECORDED]:
+        return Equivalent(effects, '', 1.0)
+    return Equivalent(effects, name, contrasts[name] / contrasts[RECORDED])
+
+
+def moved(motion: ObservedMotion, width: float, speed: float, shift: float) -> ObservedMotion:
+    """Return a motion like a given one, under the efforts that the nominal robot takes for it.
+
+    `q' = c + shift sd + width (q - c)` about the middle c, run `speed` times as fast.
+
+    Args:
+        motion: given; its first stretch without a pause is used.
+        width: factor of the amplitudes; infinite for the whole range of the joints.
+        speed: factor of the speed.
+        shift: of the middle in standard deviations of the position.
+    """
+    ends = [*motion.starts[1:], len(motion.time)]
+    rows = slice(motion.starts[0], min(ends[0], motion.starts[0] + LONGEST))
+    q = motion.position[rows]
+    middle, wide = q.mean(axis=0), np.full(q.shape[1], width)
+    if np.isinf(width):
+        middle, wide = _whole_range(motion, q)
+    time = (motion.time[rows] - motion.time[rows][0]) / speed
+    changed = replace(
+        motion, time=time, step=motion.step / speed, starts=(0,), drive=None,
+        position=middle + shift * q.std(axis=0) + wide * (q - q.mean(axis=0)),
+        velocity=wide * speed * motion.velocity[rows],
+        acceleration=wide * speed**2 * motion.acceleration[rows],
+        effort=np.zeros_like(q),
+    )  # fmt: skip
+    driven = motion.tree.is_actuated[: motion.tree.size]
+    effort = np.where(driven, changed.nominal_effort, 0.0)
+    drive = None
+    if motion.drive is not None:
+        drive = Drive(time, effort, ((0.0, len(time)),), changed.step)
+    return replace(changed, effort=effort, drive=drive)
+
+
+def _whole_range(motion: ObservedMotion, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the middle of the range of each joint, and how much wider it is than a motion."""
+    k = motion.tree.size
+    lower, upper = motion.tree.lower[:k], motion.tree.upper[:k]
+    is_limited = np.isfinite(lower) & np.isfinite(upper)
+    low = np.where(is_limited, lower, q.mean(axis=0) - np.pi)
+    high = np.where(is_limited, upper, q.mean(axis=0) + np.pi)
+    wide = np.where(motion.moves, (high - low) / np.maximum(np.ptp(q, axis=0), 1e-12), 1.0)
+    return 0.5 * (low + high), np.maximum(wide, 1.0)

@@ -1,0 +1,1 @@
+"""Effects that could explain a discrepancy: suspects, fits, the models that compete."""

@@ -1,0 +1,188 @@
+"""Candidate models: effects at places with shapes, fitted jointly with the inertial parameters."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.diagnosis.explain.fitted_model import Model, floors, price_of
+from sgp_ros.diagnosis.explain.regression import Frame
+from sgp_ros.diagnosis.explain.suspects import (
+    Columns,
+    Suspect,
+    dry_joints,
+    shape_bounds,
+    with_shapes,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sgp_ros.diagnosis.compare.equations import Equations
+
+UNSEEN = 1e-12
+"""A column that is this much smaller than the largest acts on nothing; its coefficient is zero."""
+
+
+def fit(
+    columns: Columns,
+    suspects: tuple[Suspect, ...],
+    sigma: np.ndarray,
+    *,
+    is_free: bool = True,
+    w: np.ndarray | None = None,
+    rounds: int = 3,
+    steps: int = 12,
+) -> Model:
+    """Fit shapes, coefficients and inertial parameters; the scale of each joint by iteration.
+
+    Args:
+        columns: of the recording.
+        suspects: effects with the shapes to start from.
+        sigma: (k,) scale to start from [N m or N].
+        is_free: whether inertial parameters may differ.
+        w: (p,) their change to start from; None for none.
+        rounds: iterations.
+        steps: of the search in the first.
+    """
+    equations = columns.equations(dry_joints(suspects))
+    frame = Frame.of(equations, sigma, is_free=is_free)
+    model = None
+    for _ in range(rounds):
+        suspects = _searched(frame, columns, suspects, steps, w)
+        model = _solved(frame, columns, suspects, w)
+        w = model.w if is_free else None
+        frame = Frame.of(equations, model.sigma, is_free=is_free)
+        steps = max(steps // 2, 4)
+    assert model is not None
+    return _solved(frame, columns, suspects, w)
+
+
+def split(
+    frame: Frame, columns: Columns, suspects: tuple[Suspect, ...], w: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray, list[int]]:
+    """Return target less given effects, free columns (projected), and their widths."""
+    y = frame.y
+    free, widths = [], []
+    for suspect in suspects:
+        x = frame.projected(columns.of(suspect, frame.equations, w))
+        if suspect.effect.is_given:
+            y = y - x[:, 0]
+            widths.append(0)
+        else:
+            free.append(x)
+            widths.append(x.shape[1])
+    A = np.concatenate(free, axis=1) if free else np.zeros((len(y), 0))
+    return y, A, widths
+
+
+def _least(A: np.ndarray, y: np.ndarray) -> np.ndarray:
+    if not A.shape[1]:
+        return np.zeros(0)
+    scale = np.sqrt((A * A).sum(axis=0))
+    scale[scale <= UNSEEN * scale.max()] = np.inf
+    c = np.linalg.lstsq(A / scale, y, rcond=1e-7)[0]
+    return np.asarray(c / scale)
+
+
+def residual_of(
+    frame: Frame, columns: Columns, suspects: tuple[Suspect, ...], w: np.ndarray | None = None
+) -> np.ndarray:
+    """Return the scaled residual, (N k + p,)."""
+    y, A, _ = split(frame, columns, suspects, w)
+    return y - A @ _least(A, y)
+
+
+def _searched(
+    frame: Frame,
+    columns: Columns,
+    suspects: tuple[Suspect, ...],
+    steps: int,
+    w: np.ndarray | None,
+) -> tuple[Suspect, ...]:
+    """Improve the shapes by Levenberg-Marquardt within bounds."""
+    low, high = shape_bounds(frame.equations, suspects)
+    if not len(low):
+        return suspects
+    x = np.clip(np.concatenate([s.shape for s in suspects]), low, high)
+    span = np.maximum(high - low, 1e-12)
+    r = residual_of(frame, columns, with_shapes(suspects, x), w)
+    cost, damping = float(r @ r), 1e-2
+    for _ in range(steps):
+        J = np.empty((len(r), len(x)))
+        for i in range(len(x)):
+            h = 2e-4 * span[i] if x[i] + 2e-4 * span[i] <= high[i] else -2e-4 * span[i]
+            moved = x.copy()
+            moved[i] += h
+            J[:, i] = (residual_of(frame, columns, with_shapes(suspects, moved), w) - r) / (
+                h / span[i]
+            )
+        H, g = J.T @ J, J.T @ r
+        improved = False
+        for _ in range(6):
+            step = -np.linalg.solve(
+                H + damping * (np.diag(np.diag(H)) + 1e-12 * np.eye(len(x))), g
+            )
+            trial = np.clip(x + np.clip(step, -0.2, 0.2) * span, low, high)
+            r1 = residual_of(frame, columns, with_shapes(suspects, trial), w)
+            c1 = float(r1 @ r1)
+            if c1 < cost:
+                gain = (cost - c1) / cost
+                x, r, cost, improved = trial, r1, c1, True
+                damping = max(damping / 5.0, 1e-8)
+                break
+            damping *= 6.0
+        if not improved or gain < 1e-6:
+            break
+    return with_shapes(suspects, x)
+
+
+def added_inertia(
+    suspects: Sequence[Suspect], coefficients: Sequence[np.ndarray], equations: Equations
+) -> np.ndarray:
+    """Return what rotors and loads add to the mass matrix, (`POSES`, k, k) [kg m^2 or kg]."""
+    still, *pushed = equations.poses
+    added = np.zeros((*still.position.shape, len(pushed)))
+    for s, c in zip(suspects, coefficients, strict=True):
+        if not s.effect.sees_acceleration or s.effect.uses_bodies:
+            continue
+        before = s.effect.columns(still, s.place, s.shape) @ c
+        for j, motion in enumerate(pushed):
+            force = s.effect.columns(motion, s.place, s.shape) @ c - before
+            added[:, s.place.joint if force.ndim == 1 else slice(None), j] -= force
+    return added
+
+
+def _solved(
+    frame: Frame, columns: Columns, suspects: tuple[Suspect, ...], w_before: np.ndarray | None
+) -> Model:
+    equations = frame.equations
+    y, A, widths = split(frame, columns, suspects, w_before)
+    c = _least(A, y)
+    coefficients, forces, at = [], [], 0
+    for s, m in zip(suspects, widths, strict=True):
+        x = columns.of(s, equations, w_before)
+        own = np.ones(1) if s.effect.is_given else c[at : at + m]
+        at += m
+        coefficients.append(own)
+        forces.append(x @ own)
+    left = equations.d - sum(forces, np.zeros_like(equations.d))
+    w = frame.parameters(left)
+    residual = left - equations.base @ w
+    mean = (residual**2).mean(axis=0)
+    heavier = equations.log_inertia(w, added_inertia(suspects, coefficients, equations))
+    # what is measured is the motion: the floor is one of accelerations
+    variance = mean + floors(equations) * np.exp(2.0 * max(heavier, -50.0) / len(mean))
+    N = len(residual)
+    size = sum(len(s.shape) for s in suspects) + len(c)
+    score = (
+        -0.5 * N * float(np.log(variance).sum())
+        + N * heavier
+        - 0.5 * float(w @ w)
+        - price_of(frame, size)
+    )
+    return Model(
+        suspects, tuple(coefficients), w, np.sqrt(variance), heavier, score, residual,
+        tuple(forces), frame,
+    )  # fmt: skip

@@ -1,0 +1,134 @@
+"""A fitted hypothesis: effects with their numbers, bodies, and what they leave."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.robots.effects.effect import Fitted
+
+if TYPE_CHECKING:
+    from sgp_ros.diagnosis.compare.equations import Equations
+    from sgp_ros.diagnosis.explain.regression import Frame
+    from sgp_ros.diagnosis.explain.suspects import Suspect
+    from sgp_ros.robots.effects.effect import Place
+
+FLOOR_SHARE = 1e-5
+"""Errors of signals and filters that no model explains, as a share of the mean square."""
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A fitted hypothesis.
+
+    Attributes:
+        suspects: effects with their shapes.
+        coefficients: linear coefficients per suspect.
+        w: (p,) inertial parameters' changes in standard deviations.
+        sigma: (k,) root mean square of the residual with its floor.
+        heavier: mean of log det(M / M nominal) of its bodies and rotors.
+        score: log likelihood less penalties [nats].
+        residual: (N, k) [N m or N].
+        forces: filtered force of each suspect, (N, k).
+    """
+
+    suspects: tuple[Suspect, ...]
+    coefficients: tuple[np.ndarray, ...]
+    w: np.ndarray
+    sigma: np.ndarray
+    heavier: float
+    score: float
+    residual: np.ndarray
+    forces: tuple[np.ndarray, ...]
+    frame: Frame = field(repr=False)
+
+    @property
+    def key(self) -> frozenset[tuple[str, Place]]:
+        """Effects and places, without their order."""
+        return frozenset(s.key for s in self.suspects)
+
+    @property
+    def is_free(self) -> bool:
+        """Whether inertial parameters may differ from the nominal ones."""
+        return self.frame.is_free
+
+    @property
+    def mean_square(self) -> np.ndarray:
+        """Mean squares of the residual, (k,)."""
+        return np.asarray((self.residual**2).mean(axis=0))
+
+    @property
+    def size(self) -> int:
+        """Number of fitted parameters of the suspects."""
+        return sum(
+            len(s.shape) + (0 if s.effect.is_given else len(c))
+            for s, c in zip(self.suspects, self.coefficients, strict=True)
+        )
+
+    @property
+    def cost(self) -> float:
+        """What the freedom of the model costs [nats]."""
+        return price_of(self.frame, self.size)
+
+    @property
+    def likelihood(self) -> float:
+        """Score before its freedom is paid for [nats]."""
+        return self.score + self.cost
+
+    def is_possible(self) -> bool:
+        """Return whether every effect has signs and sizes that it can have."""
+        motion = self.frame.equations.motion
+        return all(
+            s.effect.is_possible(Fitted(motion, s.place, s.shape, c))
+            for s, c in zip(self.suspects, self.coefficients, strict=True)
+        )
+
+    @property
+    def freedom(self) -> int:
+        """Number of parameters of effects and bodies that the data determine."""
+        return self.size + self.frame.determined
+
+    @property
+    def net_share(self) -> float:
+        """Share that all effects together have of the mean squared effort, over all joints."""
+        net = sum(self.forces, np.zeros_like(self.residual))
+        return float(((net**2).mean(axis=0) / self.frame.equations.power).sum())
+
+    @property
+    def filtered_shares(self) -> list[float]:
+        """Greatest shares that the filtered effects have of the mean squared effort of a joint."""
+        power = self.frame.equations.power
+        return [float(((force**2).mean(axis=0) / power).max()) for force in self.forces]
+
+    @cached_property
+    def shares(self) -> list[float]:
+        """Greatest shares that the effects have of the mean squared effort of a joint.
+
+        Before any filter, as the schema has it: what lies above the cut-off counts. Not so where
+        an effect follows the measured acceleration, which is mostly noise up there.
+        """
+        equations = self.frame.equations
+        found = []
+        for s, c, filtered in zip(
+            self.suspects, self.coefficients, self.filtered_shares, strict=True
+        ):
+            if s.effect.sees_acceleration and not s.effect.has_memory:
+                found.append(filtered)
+                continue
+            force = s.effect.columns(equations.motion, s.place, s.shape) @ c
+            power = equations.power if force.ndim == 2 else equations.power[s.place.joint]
+            found.append(float(((force**2).mean(axis=0) / power).max()))
+        return found
+
+
+def floors(equations: Equations) -> np.ndarray:
+    """Return the least variance of a residual, (k,)."""
+    return FLOOR_SHARE * equations.power + equations.model_error + 1e-300
+
+
+def price_of(frame: Frame, size: int) -> float:
+    """Return what the freedom of a model costs [nats]."""
+    return 0.5 * size * float(np.log(len(frame.equations.d))) + frame.occam

@@ -1,0 +1,129 @@
+"""Standard deviations of the parameters of a model.
+
+The covariance is that of least squares, `(J^T J)^-1` with J the derivatives of the scaled
+residual by coefficients and shapes after the inertial parameters are projected out, widened by
+the correlation of the residual in time. Reported values follow by the delta method.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.diagnosis.decide.colour import correlation_factor
+from sgp_ros.diagnosis.explain.candidates import UNSEEN
+from sgp_ros.diagnosis.explain.regression import Frame
+from sgp_ros.diagnosis.explain.suspects import Columns, Suspect, shape_bounds, with_shapes
+from sgp_ros.robots.effects.effect import Fitted
+
+if TYPE_CHECKING:
+    from sgp_ros.diagnosis.explain.fitted_model import Model
+    from sgp_ros.robots.effects.observed_motion import ObservedMotion
+
+
+def _force(
+    columns: Columns,
+    frame: Frame,
+    suspects: tuple[Suspect, ...],
+    coefficients: tuple[np.ndarray, ...],
+    w: np.ndarray,
+) -> np.ndarray:
+    total = np.zeros_like(frame.equations.d)
+    for s, c in zip(suspects, coefficients, strict=True):
+        total = total + columns.of(s, frame.equations, w) @ c
+    return total
+
+
+def covariance(model: Model, columns: Columns) -> np.ndarray:
+    """Return the covariance of all free coefficients, then all shapes, (c + s, c + s).
+
+    A shape that nothing depends on may lie anywhere within its bounds.
+    """
+    frame = Frame.of(model.frame.equations, model.sigma, is_free=model.is_free)
+    free = [
+        frame.projected(columns.of(s, frame.equations, model.w))
+        for s in model.suspects if not s.effect.is_given
+    ]  # fmt: skip
+    parts = list(free)
+    low, high = shape_bounds(frame.equations, model.suspects)
+    if len(low):
+        x = np.concatenate([s.shape for s in model.suspects if len(s.shape)])
+        slopes = []
+        for i in range(len(x)):
+            h = 1e-3 * (high[i] - low[i])
+            moved = []
+            for sign in (1.0, -1.0):
+                y = x.copy()
+                y[i] = np.clip(y[i] + sign * h, low[i], high[i])
+                moved.append(
+                    (
+                        y[i],
+                        _force(
+                            columns,
+                            frame,
+                            with_shapes(model.suspects, y),
+                            model.coefficients,
+                            model.w,
+                        ),
+                    )
+                )
+            (a, fa), (b, fb) = moved
+            slopes.append(((fa - fb) / max(a - b, 1e-300))[:, :, None])
+        parts.append(frame.projected(np.concatenate(slopes, axis=2)))
+    J = np.concatenate(parts, axis=1) if parts else np.zeros((1, 0))
+    scale = np.sqrt((J * J).sum(axis=0))
+    is_seen = scale > UNSEEN * scale.max(initial=0.0)
+    scale[~is_seen] = np.inf
+    inverse = np.linalg.pinv((J / scale).T @ (J / scale), rcond=1e-10)
+    C = inverse / scale / scale[:, None] * _inflation(model)
+    spans = np.concatenate([np.zeros(len(scale) - len(low)), high - low])
+    return np.asarray(C + np.diag(np.where(is_seen, 0.0, spans**2 / 12.0)))
+
+
+def _inflation(model: Model) -> float:
+    """Return by how much correlation in time widens the covariance, at least 1."""
+    return max(correlation_factor(r) for r in model.residual.T)
+
+
+def reported_std(model: Model, columns: Columns) -> list[dict[str, float]]:
+    """Return the standard deviation of each reported number of each suspect."""
+    motion = model.frame.equations.motion
+    C = covariance(model, columns)
+    free = sum(
+        len(c)
+        for s, c in zip(model.suspects, model.coefficients, strict=True)
+        if not s.effect.is_given
+    )
+    result, at, shape_at = [], 0, free
+    for s, c in zip(model.suspects, model.coefficients, strict=True):
+        m = 0 if s.effect.is_given else len(c)
+        rows = [*range(at, at + m), *range(shape_at, shape_at + len(s.shape))]
+        at, shape_at = at + m, shape_at + len(s.shape)
+        result.append(_delta(s, c, motion, C[np.ix_(rows, rows)], m))
+    return result
+
+
+def _delta(
+    suspect: Suspect, c: np.ndarray, motion: ObservedMotion, C: np.ndarray, m: int
+) -> dict[str, float]:
+    values = suspect.effect.report(Fitted(motion, suspect.place, suspect.shape, c))
+    numbers = [name for name, value in values.items() if isinstance(value, float)]
+    std = np.sqrt(np.maximum(np.diag(C), 0.0))
+    slopes = np.zeros((len(numbers), len(std)))
+    for i, step in enumerate(std):
+        if step <= 0.0:
+            continue
+        moved_c, moved_s = c.copy(), suspect.shape.copy()
+        if i < m:
+            moved_c[i] += 0.1 * step
+        else:
+            moved_s[i - m] += 0.1 * step
+        after = suspect.effect.report(Fitted(motion, suspect.place, moved_s, moved_c))
+        for row, name in enumerate(numbers):
+            change = float(after[name]) - float(values[name])
+            if name == 'phase':
+                change = (change + np.pi) % (2 * np.pi) - np.pi
+            slopes[row, i] = change / (0.1 * step)
+    variance = np.einsum('ij,jk,ik->i', slopes, C, slopes)
+    return {name: float(np.sqrt(max(v, 0.0))) for name, v in zip(numbers, variance, strict=True)}

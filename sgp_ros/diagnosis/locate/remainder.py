@@ -1,0 +1,92 @@
+"""The Gaussian process Z for what no named effect describes, per joint.
+
+Z is given the position, velocity, direction and effort of its joint and the motion of the others,
+and evidence decides which of these it needs: that is also what the discrepancy depends on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.core.model import Model as Hyperparameters
+from sgp_ros.core.model import Observations
+from sgp_ros.core.posterior import Posterior
+from sgp_ros.core.prior import CoefficientPrior
+from sgp_ros.core.selection import select_inputs
+
+if TYPE_CHECKING:
+    from sgp_ros.diagnosis.compare.equations import Equations
+    from sgp_ros.robots.effects.observed_motion import ObservedMotion
+
+SIZE = 400
+MOST_NEIGHBOURS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Remainder:
+    """Z of one joint.
+
+    Attributes:
+        joint: index.
+        inputs: names of what it depends on.
+        columns: of `process_inputs`.
+        posterior: of Z.
+    """
+
+    joint: int
+    inputs: tuple[str, ...]
+    columns: tuple[int, ...]
+    scale: np.ndarray
+    posterior: Posterior
+
+    def force(self, motion: ObservedMotion) -> np.ndarray:
+        """Return the mean of Z, (n,) [N m or N]."""
+        U = process_inputs(motion, self.joint)[0] / self.scale
+        rows = 2000
+        n = len(U)
+        F = np.zeros((rows, 1, 0))
+        parts = [
+            self.posterior.predict(U[i : i + rows], F[: min(rows, n - i)]).mean[:, 0]
+            for i in range(0, n, rows)
+        ]
+        return np.concatenate(parts)
+
+
+def process_inputs(motion: ObservedMotion, joint: int) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Return what Z of a joint could depend on, (n, d), and the names."""
+    tree = motion.tree
+    columns = [motion.wrapped[:, joint], motion.velocity[:, joint], motion.direction[:, joint]]
+    names = [
+        f'{what} of {tree.joint_names[joint]}' for what in ('position', 'velocity', 'direction')
+    ]
+    if tree.is_actuated[joint]:
+        columns.append(motion.effort[:, joint])
+        names.append(f'effort of {tree.joint_names[joint]}')
+    near = sorted((i for i in range(tree.size) if i != joint), key=lambda i: abs(i - joint))
+    for i in near[:MOST_NEIGHBOURS]:
+        columns += [motion.wrapped[:, i], motion.velocity[:, i]]
+        names += [f'{what} of {tree.joint_names[i]}' for what in ('position', 'velocity')]
+    return np.column_stack(columns), tuple(names)
+
+
+def learn_remainder(equations: Equations, residual: np.ndarray, joint: int) -> Remainder | None:
+    """Return Z of a joint learned from a residual (N, k); None where there is none."""
+    full, names = process_inputs(equations.motion, joint)
+    U = equations.filter(full)
+    scale = U.std(axis=0) + 1e-12
+    U = U / scale
+    y = residual[:, joint, None]
+    F = np.zeros((len(y), 1, 0))
+    prior = CoefficientPrior.flat(0)
+    chosen = select_inputs(Observations(U, F, y), prior, 0, tuple(range(U.shape[1])), 200)
+    if chosen.kernel is None or chosen.inputs is None:
+        return None
+    rows = np.unique(np.linspace(0, len(y) - 1, min(SIZE, len(y))).astype(int))
+    model = Hyperparameters((chosen.kernel,), (chosen.noise,))
+    posterior = Posterior(model, Observations(U[rows], F[rows], y[rows]), prior)
+    return Remainder(
+        joint, tuple(names[i] for i in chosen.inputs), chosen.inputs, scale, posterior
+    )

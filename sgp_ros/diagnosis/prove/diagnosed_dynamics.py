@@ -1,0 +1,191 @@
+"""The forward dynamics of a diagnosed model, for many states at once.
+
+Effects without memory, bodies and processes are evaluated at each state. The force of effects that
+remember is handed in with the efforts: it belongs to a trajectory, not to a state.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.diagnosis.prove.prediction import extra_force
+from sgp_ros.robots.effects.observed_motion import ObservedMotion
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from sgp_ros.diagnosis.compare.equations import Equations
+    from sgp_ros.diagnosis.explain.fitted_model import Model
+    from sgp_ros.diagnosis.locate.remainder import Remainder
+    from sgp_ros.robots.effects.effect import Effect
+    from sgp_ros.robots.stated_effects import StatedEffect
+    from sgp_ros.robots.tree import Tree
+
+_SMALL = 1e-6
+"""Difference of positions and velocities [rad or m, per second]."""
+
+
+@dataclass(frozen=True, eq=False)
+class DiagnosedDynamics:
+    """Equations of motion `M(q) a = drive` of k joints, see `offline.forward.ForcedMotion`.
+
+    What is called loads is, row by row, the commanded effort (k), the force of effects that
+    remember (k), and the time since the first state (1).
+
+    Attributes:
+        model: effects without memory.
+        tree: with the bodies of the model.
+        step: of the recording [s].
+        remainders: processes beside the model.
+        stated: effects without memory that the nominal robot has, beside those of its tree.
+    """
+
+    model: Model
+    tree: Tree
+    step: float
+    remainders: tuple[Remainder, ...] = ()
+    stated: tuple[StatedEffect, ...] = ()
+
+    def equations(
+        self, q: np.ndarray, v: np.ndarray, loads: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return M, (m, k, k), and the drive, (m, k) [N m or N].
+
+        The equation of motion is affine in the acceleration: its value without acceleration is
+        the drive, and what each unit adds a column of M.
+
+        Args:
+            q: (m, k) [rad or m].
+            v: (m, k) [rad/s or m/s].
+            loads: (m, 2 k + 1) [N m or N, s].
+        """
+        m, k = q.shape
+        a = np.repeat(np.vstack([np.zeros((1, k)), np.eye(k)]), m, axis=0)
+        stated = _chosen(self.stated, _sees_acceleration)
+        motion = self._motion(np.tile(q, (k + 1, 1)), np.tile(v, (k + 1, 1)), a, loads, stated)
+        needed = motion.effort_for(motion.position, motion.velocity, a)
+        inertial = extra_force(_part(self.model, _sees_acceleration), motion)
+        e = (needed - motion.effort - inertial).reshape(k + 1, m, k)
+        stated = _chosen(self.stated, _sees_no_acceleration)
+        here = self._motion(q, v, np.zeros_like(q), loads, stated)
+        others = extra_force(_part(self.model, _sees_no_acceleration), here)
+        drive = loads[:, k : 2 * k] - e[0] + others
+        for remainder in self.remainders:
+            drive[:, remainder.joint] += remainder.force(here)
+        return np.moveaxis(e[1:] - e[0], 0, 2), drive
+
+    def level_of_dry_friction(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
+        """Return half the jump of each joint's force as its velocity changes sign, (m, k)."""
+        level = np.zeros_like(q)
+        known = [
+            (s.effect, s.place, s.shape, c)
+            for s, c in zip(self.model.suspects, self.model.coefficients, strict=True)
+        ]
+        known += [
+            (x.effect, x.place, x.shape, x.coefficients)
+            for x in self.stated
+            if x.effect is not None and x.place is not None
+        ]
+        dry = [entry for entry in known if entry[0].holds(entry[1])]
+        if dry:
+            still = np.zeros_like(q)
+            motion = self._motion(q, still, still, loads)
+            up, down = motion.sliding(1.0), motion.sliding(-1.0)
+            for effect, place, shape, c in dry:
+                jump = effect.columns(down, place, shape) - effect.columns(up, place, shape)
+                level[:, place.joint] += 0.5 * (jump @ c)
+        return level
+
+    def fastest_rate(self, q: np.ndarray, v: np.ndarray, loads: np.ndarray) -> float:
+        """Return the fastest rate at which a small deviation changes in these states [1/s].
+
+        The largest eigenvalue of the linearised equations, by differences; infinite where these
+        have no finite solution.
+        """
+        m, k = q.shape
+        M, drive = self.equations(q, v, loads)
+        away = np.where(v < 0.0, -1.0, 1.0)  # a difference never crosses a reversal
+        A = np.zeros((m, 2 * k, 2 * k))
+        A[:, :k, k:] = np.eye(k)
+        for j in range(k):
+            dq, dv = np.zeros_like(q), np.zeros_like(v)
+            dq[:, j], dv[:, j] = _SMALL, _SMALL * away[:, j]
+            by_q = (self.equations(q + dq, v, loads)[1] - drive) / _SMALL
+            by_v = (self.equations(q, v + dv, loads)[1] - drive) / dv[:, j, None]
+            slopes = np.stack([by_q, by_v], axis=2)  # (m, k, 2)
+            A[:, k:, [j, k + j]] = np.linalg.solve(M, slopes)
+        if not np.isfinite(A).all():
+            return np.inf
+        return float(np.abs(np.linalg.eigvals(A)).max())
+
+    def _motion(
+        self,
+        q: np.ndarray,
+        v: np.ndarray,
+        a: np.ndarray,
+        loads: np.ndarray,
+        stated: tuple[StatedEffect, ...] = (),
+    ) -> ObservedMotion:
+        """Return states as the effects see them; loads are repeated as often as needed."""
+        k = q.shape[1]
+        given = np.tile(loads, (len(q) // len(loads), 1))
+        motion = ObservedMotion(
+            self.tree, given[:, 2 * k], self.step, q, v, a, given[:, :k], None, stated=stated
+        )
+        motion.__dict__['direction'] = np.sign(v)
+        return motion
+
+
+def dynamics_of(
+    model: Model,
+    equations: Equations,
+    motion: ObservedMotion,
+    remainders: tuple[Remainder, ...] = (),
+) -> DiagnosedDynamics:
+    """Return the dynamics of a model fitted on `equations` for the recording of a motion."""
+    change = (model.w @ equations.directions).reshape(motion.tree.parameters.shape)
+    tree = replace(motion.tree, parameters=motion.tree.parameters + change)
+    local, stated = _part(model, _is_local), _chosen(motion.stated, _is_local)
+    return DiagnosedDynamics(local, tree, motion.step, remainders, stated)
+
+
+def remembered_force(model: Model, motion: ObservedMotion, tree: Tree) -> np.ndarray:
+    """Return the force of the effects with memory along a motion, (n, k) [N m or N]."""
+    stated = _chosen(motion.stated, _has_memory)
+    return extra_force(_part(model, _has_memory), replace(motion, tree=tree, stated=stated))
+
+
+def _has_memory(effect: Effect) -> bool:
+    return effect.has_memory
+
+
+def _is_local(effect: Effect) -> bool:
+    return not effect.has_memory
+
+
+def _sees_acceleration(effect: Effect) -> bool:
+    return effect.sees_acceleration
+
+
+def _sees_no_acceleration(effect: Effect) -> bool:
+    return not effect.sees_acceleration
+
+
+def _chosen(
+    stated: tuple[StatedEffect, ...], is_in: Callable[[Effect], bool]
+) -> tuple[StatedEffect, ...]:
+    """Return some of the stated effects."""
+    return tuple(x for x in stated if x.effect is not None and is_in(x.effect))
+
+
+def _part(model: Model, is_in: Callable[[Effect], bool]) -> Model:
+    """Return a model of some of the effects."""
+    chosen = [i for i, s in enumerate(model.suspects) if is_in(s.effect)]
+    return replace(
+        model,
+        suspects=tuple(model.suspects[i] for i in chosen),
+        coefficients=tuple(model.coefficients[i] for i in chosen),
+    )

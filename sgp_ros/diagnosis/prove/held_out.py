@@ -1,0 +1,101 @@
+"""Blocks of time that nothing is fitted to, where no other recording proves a diagnosis.
+
+The recording is cut into equal parts, and the last quarter of each is held out. So what is held
+out shows every phase of the recording, and its last block lies behind everything that was
+learned, where a slow drift shows. States are smoothed and filters run within each block alone:
+both sides share no sample.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.diagnosis.compare.trajectory import SHORTEST_ROWS, noise_density
+
+if TYPE_CHECKING:
+    from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
+
+HELD_OUT = 'held_out'
+"""Name of the blocks among the recordings of a proof."""
+SHARE = 0.25
+MOST_BLOCKS = 4
+LEAST_BLOCK_S = 2.4
+"""Eight roll-outs; twice the longest filter and what it loses at both ends."""
+
+
+def block_count(raw: RawTrajectory) -> int:
+    """Return how many blocks are held out; none of a recording too short for one."""
+    return min(MOST_BLOCKS, int(SHARE * len(raw.time) * raw.step / LEAST_BLOCK_S))
+
+
+def split_sentence(raw: RawTrajectory) -> str:
+    """Say what is held out of a recording that comes without others."""
+    whole, blocks = len(raw.time) * raw.step, block_count(raw)
+    if not blocks:
+        least = LEAST_BLOCK_S / SHARE
+        return (
+            f'Nothing was held out: there is no --test, and of {whole:.3g} s nothing can be '
+            f'spared (from {least:.3g} s on a quarter is).'
+        )
+    where = 'the last quarter' if blocks == 1 else f'the last quarter of each of {blocks} parts'
+    return (
+        f'Without --test, {where} of the recording was held out ({SHARE * whole:.3g} of '
+        f'{whole:.3g} s): hypotheses and parameters come from the rest alone, and no fit '
+        'followed, so what is proved is what is written.'
+    )
+
+
+def keep_back(
+    raw: RawTrajectory,
+) -> tuple[RawTrajectory, dict[str, RawTrajectory], tuple[str, ...]]:
+    """Return what to learn from, the blocks to prove it on by name, and what is to be said."""
+    said = (split_sentence(raw),)
+    if not block_count(raw):
+        return raw, {}, said
+    learned, held = split(raw)
+    return learned, {HELD_OUT: held}, said
+
+
+def split(raw: RawTrajectory) -> tuple[RawTrajectory, RawTrajectory]:
+    """Return what to learn from, and what is held out.
+
+    Args:
+        raw: n rows; long enough for a block.
+
+    Raises:
+        ValueError: no block can be held out.
+    """
+    n, blocks = len(raw.time), block_count(raw)
+    if not blocks:
+        raise ValueError(f'{n * raw.step:g} s are too short to hold a block out')
+    place = np.arange(n) * blocks / n  # (n,) in parts
+    is_held = place % 1.0 >= 1.0 - SHARE
+    segment = np.zeros(n, dtype=int)
+    for i, s in enumerate(raw.segments):
+        segment[s] = i
+    edges = np.flatnonzero((np.diff(segment) != 0) | np.diff(is_held)) + 1
+    runs = [run for run in np.split(np.arange(n), edges) if len(run) >= SHORTEST_ROWS]
+    learned = [run for run in runs if not is_held[run[0]]]
+    return _part(raw, learned), _part(raw, [run for run in runs if is_held[run[0]]])
+
+
+def _part(raw: RawTrajectory, runs: list[np.ndarray]) -> RawTrajectory:
+    """Return some stretches of a trajectory, on the clock of the whole."""
+    rows = np.concatenate(runs)
+    ends = np.cumsum([len(run) for run in runs])
+    segments = tuple(slice(end - len(run), end) for run, end in zip(runs, ends, strict=True))
+    grids = tuple((float(raw.time[run[0]]), len(run)) for run in runs)
+    position = raw.position[rows]
+    return replace(
+        raw,
+        time=raw.time[rows],
+        position=position,
+        velocity=None if raw.velocity is None else raw.velocity[rows],
+        effort=None if raw.effort is None else raw.effort[rows],
+        drive=None if raw.drive is None else replace(raw.drive, grids=grids),
+        segments=segments,
+        noise_density=noise_density(position, segments, raw.step),
+    )

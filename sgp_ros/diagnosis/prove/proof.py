@@ -1,0 +1,133 @@
+"""How well the nominal and the final model explain a recording: efforts, motions, roll-outs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import spatial
+
+from sgp_ros.diagnosis.compare.equations import resting
+from sgp_ros.diagnosis.compare.trajectory import Bandwidth, observe, parallel_filter
+from sgp_ros.diagnosis.prove.intervals import mean_interval, ratio_interval
+from sgp_ros.diagnosis.prove.prediction import accelerations
+from sgp_ros.diagnosis.prove.rollouts import cut, roll_out
+from sgp_ros.diagnosis.result import Proof
+from sgp_ros.offline.zero_phase import ZeroPhase
+
+if TYPE_CHECKING:
+    from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
+    from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
+    from sgp_ros.diagnosis.prove.final_model import FinalModel
+    from sgp_ros.diagnosis.prove.intervals import Interval
+    from sgp_ros.robots.effects.observed_motion import ObservedMotion
+    from sgp_ros.robots.tree import Tree
+
+_MOST_STATES = 4000
+
+
+@dataclass
+class _Scores:
+    """Mean squares relative to their yardsticks with their intervals, by name and joint."""
+
+    joints: tuple[str, ...]
+    values: dict[str, dict[str, float]] = field(default_factory=dict)
+    intervals: dict[str, dict[str, Interval]] = field(default_factory=dict)
+
+    def add(self, name: str, squared: np.ndarray, yardstick: np.ndarray) -> None:
+        """Take squared errors (n, k) and what they are measured by (n, k)."""
+        self.values[name], self.intervals[name] = {}, {}
+        for j, joint in enumerate(self.joints):
+            x, y = squared[:, j], yardstick[:, j]
+            self.values[name][joint] = float(x.mean() / (y.mean() + 1e-300))
+            interval = ratio_interval(x, y)
+            if interval is not None:
+                self.intervals[name][joint] = interval
+
+
+def prove(final: FinalModel, raw: RawTrajectory, tree: Tree) -> Proof:
+    """Return the errors on a recording, before and after, with their intervals.
+
+    Args:
+        final: nominal and final model, fitted on the training recording.
+        raw: any recording of the robot.
+        tree: nominal robot.
+    """
+    cutoff, rate = final.equations.filter.cutoff, 1.0 / raw.step
+    bandwidth = Bandwidth(min(cutoff, 0.3 * rate), min(2.5 * cutoff, 0.4 * rate))
+    motion, low = observe(raw, tree, bandwidth), parallel_filter(raw, bandwidth)
+    scores = _Scores(tree.moving_names)
+    densities = _one_step(final, motion, low, resting(raw, motion, bandwidth), scores)
+    counts = _rolled_out(final, motion, ZeroPhase(rate, bandwidth.state_cutoff).trim, scores)
+    values = scores.values
+    return Proof(
+        values['nmse_before'], values['nmse_after'],
+        values['acceleration_nmse_before'], values['acceleration_nmse_after'],
+        float(densities[0].mean()), float(densities[1].mean()),
+        values.get('rollout_nmse_before', {}), values.get('rollout_nmse_after', {}),
+        scores.intervals, (mean_interval(densities[0]), mean_interval(densities[1])),
+        *counts, _distance(final.equations.motion, motion),
+    )  # fmt: skip
+
+
+def _one_step(
+    final: FinalModel,
+    motion: ObservedMotion,
+    low: ParallelFilter,
+    rests: np.ndarray,
+    scores: _Scores,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Score efforts and accelerations; return the negative log densities of the efforts, (N,)."""
+    k = motion.tree.size
+    inertial = low(motion.mass_diagonal * motion.acceleration)
+    driven = np.where(motion.tree.is_actuated[:k], low(motion.effort), inertial)
+    true = low(motion.acceleration)
+    densities = []
+    for when, model, remainders in (
+        ('before', final.nominal, ()), ('after', final.model, final.remainders),
+    ):  # fmt: skip
+        e = low(final.imbalance(model, motion, rests, remainders))
+        scores.add(f'nmse_{when}', e**2, (driven - driven.mean(axis=0)) ** 2)
+        a = low(accelerations(model, final.equations, motion, rests, remainders))
+        scores.add(f'acceleration_nmse_{when}', (a - true) ** 2, (true - true.mean(axis=0)) ** 2)
+        variance = model.sigma**2
+        nats = 0.5 * np.log(2 * np.pi * variance) + 0.5 * e**2 / variance
+        densities.append(nats.mean(axis=1))
+    return densities[0], densities[1]
+
+
+def _rolled_out(
+    final: FinalModel, motion: ObservedMotion, trim: int, scores: _Scores
+) -> tuple[int, int]:
+    """Score the roll-outs that both models finish; return all windows, and the others."""
+    windows = cut(motion, trim)
+    if not len(windows.first):
+        return 0, 0
+    before, ends_before = roll_out(windows, final.nominal, final.equations)
+    after, ends_after = roll_out(windows, final.model, final.equations, final.remainders)
+    both = ends_before & ends_after
+    if both.any():
+        held = windows.held[both]
+        scores.add('rollout_nmse_before', windows.squared(before)[both], held)
+        scores.add('rollout_nmse_after', windows.squared(after)[both], held)
+    return len(both), int((~both).sum())
+
+
+def _distance(learned: ObservedMotion, motion: ObservedMotion) -> float:
+    """Return how far the states of a motion lie from those learned from, the median.
+
+    Positions and velocities in standard deviations of those learned from, Euclidean, over the
+    root of their number: 1 is one standard deviation per coordinate.
+    """
+    known, asked = _states(learned), _states(motion)
+    spread = known.std(axis=0)
+    spread = np.where(spread > 0.0, spread, 1.0)
+    distance, _ = spatial.cKDTree(known / spread).query(asked / spread)
+    return float(np.median(distance) / np.sqrt(known.shape[1]))
+
+
+def _states(motion: ObservedMotion) -> np.ndarray:
+    n = len(motion.time)
+    rows = np.linspace(0, n - 1, min(n, _MOST_STATES)).astype(int)
+    return np.hstack([motion.wrapped[rows], motion.velocity[rows]])

@@ -1,0 +1,141 @@
+"""Laws of the discrepancy from the nominal robot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.compare.equations import body_directions, make_equations
+from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.fitted_model import floors
+from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
+from sgp_ros.robots.effects.catalogue import EFFECTS
+from sgp_ros.robots.effects.effect import Place
+from test.diagnosis.worlds import CHAINS, World, events_of
+
+
+def start(equations):
+    """Return the scale a fit begins with."""
+    return np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
+
+
+@pytest.mark.parametrize('k', [1, 2])
+def test_the_discrepancy_of_the_true_model_is_zero(equations_for, perfect, k):
+    """A hundred-thousandth of the mean squared effort is what encoder and filters leave."""
+    _, equations = equations_for(perfect[k])
+    assert np.all((equations.d**2).mean(axis=0) < 1e-5 * equations.power)
+    np.testing.assert_allclose(equations.power, (perfect[k].command ** 2).mean(axis=0), rtol=0.05)
+
+
+@pytest.mark.parametrize('k', [1, 2])
+def test_a_wrong_mass_appears_in_w_with_its_value(equations_for, heavy, k):
+    """First moment and inertia about the axis are what the last link shows; 30 % more of each."""
+    _, equations = equations_for(heavy[k])
+    assert np.all((equations.d**2).mean(axis=0) > 1e-3 * equations.power)
+    model = fit(Columns(equations), (), start(equations))
+    assert np.all(model.mean_square < 2e-5 * equations.power)
+    change = (model.w @ equations.directions).reshape(k, 10)[k - 1]
+    link = CHAINS[k][-1]
+    about = link.inertia + link.mass * link.centre**2
+    # z of the first moment, iyy about the origin of the link
+    np.testing.assert_allclose(change[3], -0.3 * link.mass * link.centre, rtol=0.02)
+    np.testing.assert_allclose(change[6], 0.3 * about, rtol=0.03)
+
+
+def test_directions_are_one_deviation_of_mass_centre_and_inertia(robots):
+    """A step along the mass scales the body; along the centre keeps its mass and size."""
+    _, tree = robots[2]
+    D = body_directions(tree).reshape(2, 10, 2, 10)
+    for body in range(2):
+        assert not D[body][:, 1 - body].any()
+        own = D[body][:, body]
+        np.testing.assert_allclose(own[0], 0.25 * tree.parameters[body])
+        assert not own[1:, 0].any()
+        moved = tree.parameters[body] + own[3]
+        centre = moved[1:4] / moved[0]
+        before = tree.parameters[body, 1:4] / moved[0]
+        assert centre[2] > before[2]
+        about = moved[6] - moved[0] * centre[2] ** 2
+        size = tree.parameters[body, 6] - moved[0] * before[2] ** 2
+        # the same size, but for the square of the step
+        step = centre[2] - before[2]
+        assert about + moved[0] * step**2 == pytest.approx(size, rel=1e-9)
+        assert np.linalg.matrix_rank(own) == 10
+
+
+def test_rows_in_which_dry_friction_holds_ask_nothing(equations_for, dry):
+    """There the target is zero and no effect, except inertia, may push."""
+    _, equations = equations_for(dry)
+    share = equations.rests[:, 0].mean()
+    assert 0.02 < share < 0.9
+    held = equations.with_dry_friction(frozenset([0]))
+    assert equations.with_dry_friction(frozenset()) is equations
+    low = equations.filter
+    half = len(low.taps) // 2
+    rests = equations.rests[:, 0]
+    inside = np.array([rests[i - half : i + half + 1].all() for i in low.rows])
+    assert inside.any()
+    assert held.d[inside].std() < 0.1 * equations.d[inside].std()
+    column = np.ones((len(equations.motion.time), 1))
+    assert np.abs(held.filtered(column, 0, is_inertial=False)[inside]).max() < 1e-12
+    assert np.abs(held.filtered(column, 0, is_inertial=True)[inside]).min() > 0.99
+
+
+def test_a_robot_that_never_rests_has_no_held_rows(equations_for, perfect):
+    """Reversals are no rest: asking for dry friction changes nothing."""
+    _, equations = equations_for(perfect[2])
+    assert equations.with_dry_friction(frozenset([0, 1])) is equations
+
+
+def test_more_inertia_costs_what_its_determinant_says(equations_for, perfect):
+    """Log of the ratio of inertias of one link; minus infinity where none is left."""
+    _, equations = equations_for(perfect[1])
+    link = CHAINS[1][0]
+    inertia = link.inertia + link.mass * link.centre**2
+    w = np.zeros(10)
+    assert equations.log_inertia(w, np.zeros((1, 1))) == pytest.approx(0.0, abs=1e-12)
+    assert equations.log_inertia(w, np.full((1, 1), inertia)) == pytest.approx(np.log(2.0))
+    assert equations.log_inertia(w, np.full((1, 1), -2.0 * inertia)) == -np.inf
+    w[0] = 1.0
+    assert equations.log_inertia(w, np.zeros((1, 1))) == pytest.approx(np.log(1.25))
+
+
+def _beside_a_still_joint(world):
+    def wide(x):
+        return np.column_stack([x, np.zeros(len(x))])
+
+    return World(world.time, *(wide(getattr(world, name)) for name in (
+        'position', 'velocity', 'acceleration', 'command',
+    )))  # fmt: skip
+
+
+def test_a_joint_that_does_not_move_is_asked_nothing(robots, viscous):
+    """Whatever holds it; no suspect has a place there."""
+    robot, tree = robots[2]
+    world = _beside_a_still_joint(viscous)
+    raw = collect(events_of(world), robot)
+    equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
+    assert not equations.d[:, 1].any()
+    assert not equations.base[:, 1].any()
+    assert np.isfinite(equations.power).all()
+    assert equations.motion.moving_joints == (0,)
+
+
+def test_columns_know_whom_they_were_made_for(equations_for, viscous):
+    """Other bodies, other columns; the same question, the same array."""
+    _, equations = equations_for(viscous)
+    columns = Columns(equations)
+    tilt = Suspect(EFFECTS['gravity_tilt'], Place(-1), np.array([0.0, 0.1]))
+    w = np.zeros(10)
+    nominal = columns.of(tilt, equations, w)
+    assert columns.of(tilt, equations, w) is nominal
+    w[0] = 1.0
+    np.testing.assert_allclose(columns.of(tilt, equations, w), 1.25 * nominal, atol=1e-12)
+    rub = Suspect(EFFECTS['viscous_friction'], Place(0), np.zeros(0))
+    assert columns.of(rub, equations, w) is columns.of(rub, equations)
+    for i in range(450):
+        columns.of(replace(tilt, shape=np.array([0.0, 0.001 * i])), equations, w)
+    assert len(columns._known) <= 401

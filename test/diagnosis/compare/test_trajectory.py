@@ -1,0 +1,155 @@
+"""Laws of the grid that a recording is brought to."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.compare.trajectory import (
+    HIGHEST_CUTOFF_HZ,
+    LOWEST_CUTOFF_HZ,
+    SHORTEST_ROWS,
+    choose_bandwidth,
+    collect,
+    observe,
+)
+from sgp_ros.engine.samples import JointSample, frozen_array
+from sgp_ros.errors import RecordingError
+from test.diagnosis.worlds import (
+    CHAINS,
+    PERIOD,
+    START_NS,
+    World,
+    events_of,
+    robot_of,
+    shown,
+)
+
+
+def _states(events):
+    return [i for i, e in enumerate(events) if isinstance(e, JointSample)]
+
+
+def test_time_zero_is_the_first_stamp_though_its_state_is_refused(robots, perfect):
+    """As the schema counts; the refused state shows up in the counts."""
+    robot, _ = robots[1]
+    events = events_of(perfect[1])
+    whole = collect(events, robot)
+    first = _states(events)[0]
+    events[first] = replace(events[first], position=frozen_array([np.nan]))
+    raw = collect(events, robot)
+    assert raw.refused['nonfinite'] == 1
+    assert whole.time[0] == 0.0
+    assert raw.time[0] == pytest.approx(PERIOD)
+    assert raw.start_ns == whole.start_ns == START_NS
+    np.testing.assert_allclose(raw.drive.effort(0), whole.drive.effort(0)[1:], atol=1e-9)
+
+
+def test_the_grid_is_uniform_and_passes_through_the_states(robots, perfect):
+    """Positions as they were measured where the stamps are even."""
+    raw = collect(events_of(perfect[2]), robots[2][0])
+    np.testing.assert_allclose(np.diff(raw.time), raw.step, rtol=1e-9)
+    np.testing.assert_allclose(raw.position, shown(perfect[2].position), atol=1e-9)
+    assert raw.segments == (slice(0, len(raw.time)),)
+    assert raw.velocity is None
+    assert raw.effort is None
+
+
+def test_a_pause_splits_the_recording_and_short_pieces_are_left_out(robots, perfect):
+    """No row of the grid stands in a pause."""
+    world = perfect[1]
+    events = events_of(world)
+    gone = ((world.time > 3.0) & (world.time < 4.0)) | (
+        (world.time > 4.0 + 0.9 * SHORTEST_ROWS * PERIOD) & (world.time < 5.5)
+    )
+    kept = [e for e in events if not (
+        isinstance(e, JointSample) and gone[round((e.stamp_ns - START_NS) * 1e-9 / PERIOD)]
+    )]  # fmt: skip
+    raw = collect(kept, robots[1][0])
+    assert len(raw.segments) == 2
+    ends = [(raw.time[s.start], raw.time[s.stop - 1]) for s in raw.segments]
+    assert ends[0][1] == pytest.approx(3.0)
+    assert ends[1][0] == pytest.approx(5.5)
+    motion = observe(raw, robots[1][1], choose_bandwidth(raw, robots[1][1]))
+    assert motion.starts == tuple(s.start for s in raw.segments)
+
+
+def test_too_short_a_recording_is_refused(robots, perfect):
+    """With what was found and what to do."""
+    events = events_of(perfect[1])[: 2 * SHORTEST_ROWS - 4]
+    with pytest.raises(RecordingError, match='longer recording') as caught:
+        collect(events, robots[1][0])
+    assert str(SHORTEST_ROWS - 2) in caught.value.found
+
+
+def test_velocity_and_effort_are_kept_where_they_were_measured(robots, perfect):
+    """A measured effort takes the place of commands."""
+    world = perfect[1]
+    events = events_of(world, velocity=world.velocity, effort=world.command, commands=False)
+    raw = collect(events, robots[1][0])
+    np.testing.assert_allclose(raw.velocity, world.velocity, atol=1e-9)
+    np.testing.assert_allclose(raw.effort, world.command, atol=1e-9)
+    assert raw.drive is None
+    motion = observe(raw, robots[1][1], choose_bandwidth(raw, robots[1][1]))
+    np.testing.assert_array_equal(motion.effort, raw.effort)
+
+
+def test_a_passive_joint_has_no_effort(tmp_path, perfect):
+    """Whatever was commanded to it."""
+    robot, tree = robot_of(tmp_path, CHAINS[2], passive=(1,))
+    world = replace(perfect[2], command=perfect[2].command[:, :1])
+    raw = collect(events_of(world), robot)
+    motion = observe(raw, tree, choose_bandwidth(raw, tree))
+    assert not motion.effort[:, 1].any()
+    assert motion.effort[:, 0].any()
+
+
+@pytest.mark.parametrize('sigma', [1e-5, 1e-3])
+def test_the_density_of_white_noise_is_its_variance_over_half_the_rate(robots, perfect, sigma):
+    """One-sided; the motion is far below the third of the spectrum that is looked at."""
+    world = perfect[1]
+    noise = np.random.default_rng(0).normal(0.0, sigma, world.position.shape)
+    noisy = replace(world, position=world.position + noise)
+    raw = collect(events_of(noisy, quantum=0.0), robots[1][0])
+    # a median of some 300 exponential variables
+    np.testing.assert_allclose(raw.noise_density, 2.0 * sigma**2 * PERIOD, rtol=0.35)
+
+
+def test_more_noise_lowers_the_cutoff_within_its_range(robots, perfect):
+    """And the states are smoothed less than the rows."""
+    robot, tree = robots[1]
+    found = []
+    for quantum in (1e-6, 1e-3, 1e-1):
+        raw = collect(events_of(perfect[1], quantum=quantum), robot)
+        bandwidth = choose_bandwidth(raw, tree)
+        assert LOWEST_CUTOFF_HZ <= bandwidth.cutoff <= HIGHEST_CUTOFF_HZ
+        assert bandwidth.cutoff < bandwidth.state_cutoff < 0.5 / raw.step
+        found.append(bandwidth.cutoff)
+    assert found == sorted(found, reverse=True)
+    assert found[0] > found[-1]
+
+
+def test_smoothed_states_are_those_of_the_truth(robots, perfect):
+    """Position and velocity; accelerations jump with the commands and are not smooth."""
+    for k, world in perfect.items():
+        raw = collect(events_of(world), robots[k][0])
+        motion = observe(raw, robots[k][1], choose_bandwidth(raw, robots[k][1]))
+        inner = slice(60, -60)
+        for seen, true, share in (
+            (motion.position, world.position, 1e-4), (motion.velocity, world.velocity, 3e-3),
+        ):  # fmt: skip
+            error = np.sqrt(((seen - true)[inner] ** 2).mean(axis=0))
+            assert np.all(error < share * true.std(axis=0))
+
+
+def test_a_robot_without_inertia_or_motion_still_gets_a_filter(robots, perfect):
+    """No division by what is zero."""
+    robot, tree = robots[1]
+    raw = collect(events_of(perfect[1]), robot)
+    empty = replace(tree, parameters=np.zeros_like(tree.parameters))
+    assert choose_bandwidth(raw, empty).cutoff == pytest.approx(HIGHEST_CUTOFF_HZ)
+    zeros = World(*(np.zeros_like(x) for x in vars(perfect[1]).values()))
+    still = collect(events_of(replace(zeros, time=perfect[1].time)), robot)
+    assert choose_bandwidth(still, tree).cutoff > 0.0

@@ -1,0 +1,207 @@
+"""What is asserted, and what is not although it fits."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.compare.equations import make_equations
+from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.decide.decision import LEAST_SHARE, NATS, SHARE_TOLERANCE, Scale, decide
+from sgp_ros.diagnosis.explain.candidates import added_inertia, fit
+from sgp_ros.diagnosis.explain.fitted_model import floors
+from sgp_ros.diagnosis.explain.hypotheses import Competition, compete
+from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
+from sgp_ros.robots.effects.catalogue import EFFECTS
+from sgp_ros.robots.effects.effect import Place
+from sgp_ros.robots.rigid_body import mass_matrix
+from test.diagnosis.fitted_models import fitted
+from test.diagnosis.worlds import CHAINS, events_of, robot_of, simulate
+
+
+def _competition(equations, *models):
+    bases = (fitted(equations, is_free=f) for f in (False, True))
+    return Competition(*bases, tuple(m for m in models if m), ())
+
+
+@pytest.fixture(scope='module')
+def damped(equations_for, viscous):
+    return equations_for(viscous)[1]
+
+
+def test_an_effect_that_explains_all_is_asserted(damped):
+    right, wrong = fitted(damped, 'viscous_friction'), fitted(damped, 'spring')
+    decision = decide(damped, _competition(damped, wrong, right))
+    assert decision.verdict == 'missing_physics'
+    assert decision.model is right
+    assert wrong not in decision.rivals[:1] or decision.excess < 0.5
+
+
+def test_among_equal_fits_the_simpler_is_asserted(damped):
+    """The richer model leaves no more, and loses."""
+    simple = fitted(damped, 'viscous_friction')
+    rich = fitted(damped, 'viscous_friction', 'quadratic_drag')
+    assert rich.mean_square[0] <= simple.mean_square[0] * (1.0 + 1e-9)
+    assert decide(damped, _competition(damped, rich, simple)).model is simple
+
+
+def test_what_leaves_much_is_not_asserted(damped):
+    """A spring where friction is missing: nothing adequate is there, on joint 0."""
+    decision = decide(damped, _competition(damped, fitted(damped, 'spring')))
+    assert decision.verdict == 'unexplained'
+    assert decision.worst == 0
+
+
+def test_an_effect_too_small_to_be_physics_is_not_asserted(equations_for):
+    """It is significant by far, and makes less than the schema counts."""
+    world = simulate(CHAINS[1], 3, 10.0, force=lambda t, q, v: (-0.02 * v[0],))
+    _, equations = equations_for(world)
+    small = fitted(equations, 'viscous_friction')
+    competition = _competition(equations, small)
+    assert small.score > competition.base.score + NATS
+    assert small.shares[0] < SHARE_TOLERANCE * LEAST_SHARE
+    decision = decide(equations, competition)
+    assert decision.verdict in {'no_mismatch', 'parameters_only'}
+    assert decision.model is competition.base
+
+
+def test_noise_of_the_effort_leaves_an_adequate_model(damped):
+    """White noise that is a tenth of what friction makes is no physics; a pattern is."""
+    right = fitted(damped, 'viscous_friction')
+    discrepancy = damped.d.std()
+    noise = 0.3 * discrepancy * np.random.default_rng(0).normal(size=damped.d.shape)
+    noisy = replace(damped, d=damped.d + noise)
+    decision = decide(noisy, _competition(noisy, fitted(noisy, 'viscous_friction')))
+    assert decision.verdict == 'missing_physics'
+    q = damped.motion.position[damped.filter.rows]
+    wavy = replace(damped, d=damped.d + 0.4 * discrepancy * np.sin(5.0 * q))
+    decision = decide(wavy, _competition(wavy, fitted(wavy, 'viscous_friction')))
+    assert decision.verdict == 'unexplained'
+    assert right.mean_square[0] < 1e-3 * discrepancy**2
+
+
+def test_noise_alone_is_not_unexplained(equations_for, perfect):
+    """It leaves more than counts as physics, and nothing foretells it."""
+    _, equations = equations_for(perfect[1])
+    rng = np.random.default_rng(1)
+    noise = 0.1 * np.sqrt(equations.power) * rng.normal(size=equations.d.shape)
+    noisy = replace(equations, d=equations.d + noise)
+    assert decide(noisy, _competition(noisy)).verdict in {'no_mismatch', 'parameters_only'}
+
+
+def test_effects_that_cancel_each_other_do_not_count(damped):
+    model = fitted(damped, 'viscous_friction', 'quadratic_drag')
+    (net,) = [sum(model.forces)]
+    opposed = replace(model, forces=(10.0 * net, -9.0 * net))
+    agreeing = replace(model, forces=(0.5 * net, 0.5 * net))
+    scale = Scale.of(damped, _competition(damped))
+    opposed.__dict__['shares'] = agreeing.__dict__['shares'] = [1.0, 1.0]
+    assert opposed.net_share == pytest.approx(agreeing.net_share)
+    assert scale.counts(agreeing)
+    assert not scale.counts(opposed)
+
+
+def test_a_share_is_measured_before_the_filter(equations_for):
+    """A ripple above the cut-off is physics too."""
+    world = simulate(CHAINS[1], 6, 10.0, force=lambda t, q, v: (-0.3 * v[0],))
+    _, equations = equations_for(world)
+    at = EFFECTS['cogging'].starts(equations.motion, Place(0))[0]
+    start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
+    ripple = Suspect(EFFECTS['cogging'], Place(0), np.full_like(at, 150.0))
+    model = fit(Columns(equations), (ripple,), start, is_free=False, rounds=1, steps=1)
+    loud = replace(model, coefficients=(np.array([1.0, 0.0]),))
+    assert loud.shares[0] > 0.05
+    assert loud.filtered_shares[0] < 0.2 * loud.shares[0]
+
+
+def test_more_than_two_effects_are_found_where_joints_lack_several(equations_for):
+    """Three effects on two joints, each found by the extension of the best pair."""
+    world = simulate(
+        CHAINS[2], 7, 12.0,
+        force=lambda t, q, v: (-4.0 * (q[0] - 0.3) - 1.5 * v[0], -0.8 * v[1]),
+    )  # fmt: skip
+    _, equations = equations_for(world)
+    competition = compete(equations, lambda _share: None)
+    found = {(s.effect.name, s.place.joint) for m in competition.more for s in m.suspects}
+    decision = decide(equations, competition)
+    asserted = {(s.effect.name, s.place.joint) for s in decision.model.suspects}
+    truth = {('spring', 0), ('viscous_friction', 0), ('viscous_friction', 1)}
+    assert truth <= found
+    assert asserted == truth
+
+
+def test_what_leaves_next_to_nothing_is_adequate_whatever_it_explained(damped):
+    """A rest that is no physics condemns no model, though there was little to explain."""
+    competition = _competition(damped, fitted(damped, 'viscous_friction'))
+    scale, (model,) = Scale.of(damped, competition), competition.singles
+    small = replace(scale, base=10.0 * scale.shares(model), nominal=10.0 * scale.shares(model))
+    assert small.rest(model) > 0.05
+    assert small.excess(model) < 0.1
+
+
+def test_few_rows_tell_less(damped):
+    """A recording of fewer rows than count as independent weighs a fit by what it has."""
+    competition = _competition(damped, fitted(damped, 'viscous_friction'))
+    few = replace(damped, d=damped.d[:40])
+    whole, part = (Scale.of(e, competition) for e in (damped, few))
+    (model,) = competition.singles
+    gains = [s.fit(model) - s.fit(competition.nominal) for s in (whole, part)]
+    assert gains[1] == pytest.approx(gains[0] * 40.0 / whole.rows)
+
+
+def test_no_larger_effect_takes_the_place_of_a_better_one_that_is_too_small(damped):
+    small = fitted(damped, 'viscous_friction')
+    large = fitted(damped, 'viscous_friction', 'quadratic_drag')
+    small.__dict__['shares'], large.__dict__['shares'] = [0.1 * LEAST_SHARE], [1.0, 1.0]
+    competition = _competition(damped, small, large)
+    scale = Scale.of(damped, competition)
+    assert scale.worth(small) > scale.worth(large)
+    assert scale.excess(large) < 1.0
+    assert decide(damped, competition).verdict != 'missing_physics'
+
+
+def test_noise_of_the_acceleration_makes_no_rotor_large(equations_for):
+    """Coarse encoders: above the cut-off a rotor would follow their noise."""
+    world = simulate(CHAINS[1], 3, 10.0)
+    _, equations = equations_for(world, quantum=2e-3)
+    model = fitted(equations, 'armature')
+    force = model.suspects[0].effect.columns(equations.motion, Place(0), np.zeros(0))
+    raw = float(np.mean((force @ model.coefficients[0]) ** 2) / equations.power[0])
+    assert model.shares[0] == pytest.approx(model.filtered_shares[0])
+    assert raw > 2.0 * model.shares[0]
+
+
+def test_a_weak_motor_and_heavy_bodies_fit_alike(tmp_path):
+    """Half of the effort, or twice the inertia and weight: what is left of the motion is equal."""
+    (link,) = CHAINS[1]
+    chain = (replace(link, damping=0.0),)
+    world = simulate(
+        chain, 6, 10.0, motor=lambda commands, t: (0.5 * commands[-1][0],),
+        force=lambda t, q, v: (0.1 * math.sin(37.0 * t),),
+    )  # fmt: skip
+    robot, tree = robot_of(tmp_path, chain)
+    raw = collect(events_of(world), robot)
+    equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
+    weak, heavy = fitted(equations, 'torque_gain'), fitted(equations, is_free=True)
+    scale = Scale.of(equations, _competition(equations, weak))
+    prior = 0.5 * float(heavy.w @ heavy.w)
+    assert heavy.heavier == pytest.approx(math.log(2.0), abs=0.05)
+    assert weak.heavier == 0.0
+    assert heavy.mean_square[0] > 3.0 * weak.mean_square[0]
+    assert scale.fit(heavy) + prior == pytest.approx(scale.fit(weak), abs=5.0)
+
+
+def test_a_load_and_a_heavier_body_have_the_same_inertia(equations_for):
+    """What a point mass adds to the mass matrix is what its body parameters add."""
+    _, equations = equations_for(simulate(CHAINS[2], 2, 6.0))
+    load = Suspect(EFFECTS['payload'], Place(1), np.array([0.4, 0.0, 0.0, -0.2]))
+    rotor = Suspect(EFFECTS['armature'], Place(0), np.zeros(0))
+    added = added_inertia((load, rotor), (np.ones(1), np.array([0.03])), equations)
+    tree, q = equations.motion.tree, equations.poses[0].position
+    heavier = tree.parameters.copy()
+    heavier[1] += 0.4 * np.array([1.0, 0.0, 0.0, -0.2, 0.04, 0.0, 0.04, 0.0, 0.0, 0.0])
+    wanted = mass_matrix(tree, heavier, q) - mass_matrix(tree, tree.parameters, q)
+    np.testing.assert_allclose(added, wanted + np.diag([0.03, 0.0]), atol=1e-12)

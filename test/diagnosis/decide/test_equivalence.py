@@ -1,0 +1,112 @@
+"""What a motion cannot tell apart is said, with the motion that would."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.decide.decision import Decision, decide
+from sgp_ros.diagnosis.decide.equivalence import CLEARER, MOTIONS, Contrasts, equivalents, moved
+from sgp_ros.diagnosis.explain.hypotheses import Competition, compete
+from sgp_ros.diagnosis.pipeline import diagnose
+from test.diagnosis.fitted_models import fitted
+from test.diagnosis.worlds import CHAINS, events_of, robot_of, simulate
+
+
+def _told(equations, best, rivals):
+    bases = fitted(equations), fitted(equations, is_free=True)
+    competition = Competition(*bases, (best, *rivals), ())
+    decision = Decision('missing_physics', best, tuple(rivals), 0.0, 0)
+    return equivalents(equations, competition, decision, Contrasts(equations, best))
+
+
+@pytest.fixture(scope='module')
+def narrow(equations_for):
+    """One link with a spring that hardly leaves the middle: sin q is a straight line."""
+    world = simulate(CHAINS[1], 5, 10.0, force=lambda t, q, v: (-0.6 * q[0],), reach=0.2)
+    return equations_for(world)[1]
+
+
+def test_a_spring_seen_at_small_angles_may_be_a_wrong_body(narrow):
+    """The wider motion separates them, for the weight follows the sine."""
+    found = _told(narrow, fitted(narrow, 'spring'), [])
+    assert [e.effects for e in found] == [()]
+    assert found[0].motion == 'a motion over the whole range of the joints'
+    assert found[0].contrast > CLEARER
+
+
+def test_a_spring_seen_at_large_angles_has_no_equivalent(equations_for):
+    world = simulate(CHAINS[1], 5, 10.0, force=lambda t, q, v: (-0.6 * q[0],), reach=3.0)
+    equations = equations_for(world)[1]
+    rivals = [fitted(equations, name) for name in ('viscous_friction', 'armature')]
+    assert _told(equations, fitted(equations, 'spring'), rivals) == ()
+
+
+def test_what_contains_the_finding_is_no_other_explanation(narrow):
+    spring, more = fitted(narrow, 'spring'), fitted(narrow, 'spring', 'viscous_friction')
+    found = _told(narrow, spring, [more, fitted(narrow, 'spring', is_free=True)])
+    assert all(('joint0', 'spring') not in e.effects for e in found)
+
+
+def test_the_diagnosis_says_what_it_cannot_tell(robots):
+    """Whatever it asserts of a spring at small angles, the other explanation is named."""
+    world = simulate(CHAINS[1], 5, 10.0, force=lambda t, q, v: (-0.6 * q[0],), reach=0.2)
+    robot, tree = robots[1]
+    found = diagnose(events_of(world), robot, tree, {})
+    named = {f.effect for f in found.findings} or {'bodies'}
+    others = {effect for e in found.equivalents for _, effect in e.effects or (('', 'bodies'),)}
+    assert named | others >= {'spring', 'bodies'}
+
+
+def test_nothing_is_equivalent_to_what_is_unexplained(narrow):
+    competition = compete(narrow, lambda _share: None)
+    asserted = decide(narrow, competition)
+    unknown = Decision('unexplained', competition.base, asserted.rivals, 1.0, 0)
+    contrasts = Contrasts(narrow, competition.base)
+    assert equivalents(narrow, competition, unknown, contrasts) == ()
+
+
+@pytest.mark.parametrize('how', MOTIONS.values())
+def test_a_moved_motion_is_consistent(narrow, how):
+    """Velocity and acceleration are the slopes of position and velocity; it keeps its rows."""
+    motion = moved(narrow.motion, *how)
+    for signal, slope in (
+        (motion.position, motion.velocity), (motion.velocity, motion.acceleration),
+    ):  # fmt: skip
+        found = np.gradient(signal, motion.step, axis=0)[50:-50]
+        np.testing.assert_allclose(found, slope[50:-50], atol=0.02 * np.abs(slope).max())
+    np.testing.assert_allclose(np.diff(motion.time), motion.step)
+
+
+def test_a_weak_motor_may_be_heavy_bodies_that_the_prior_thinks_unlikely(tmp_path):
+    """With one joint without damping `gain u = J a + G sin q`: no motion separates the two."""
+    (link,) = CHAINS[1]
+    chain = (replace(link, damping=0.0),)
+    world = simulate(chain, 5, 10.0, motor=lambda commands, t: (0.4 * commands[-1][0],))
+    found = diagnose(events_of(world), *robot_of(tmp_path, chain), {})
+    assert [f.effect for f in found.findings] == ['torque_gain']
+    assert found.equivalents[0].effects == ()
+    assert found.equivalents[0].motion == ''
+
+
+def test_a_richer_name_of_the_same_law_is_no_other_explanation(equations_for):
+    """Friction that differs with direction, but does not, is Coulomb friction."""
+    world = simulate(CHAINS[1], 4, 10.0, dry=lambda t, q, s: 0.5)
+    equations = equations_for(world)[1]
+    best, richer = (fitted(equations, n) for n in ('coulomb_friction', 'asymmetric_coulomb'))
+    contrasts = Contrasts(equations, best)
+    assert contrasts.is_same_law(richer)
+    assert not contrasts.is_same_law(fitted(equations, 'viscous_friction'))
+    assert _told(equations, best, [richer]) == ()
+
+
+def test_noise_does_not_hide_that_bodies_may_be_heavier(tmp_path):
+    """Their residual of effort is larger because they are heavier: the motion fits as well."""
+    (link,) = CHAINS[1]
+    chain = (replace(link, damping=0.0),)
+    world = simulate(chain, 5, 10.0, motor=lambda commands, t: (0.35 * commands[-1][0],))
+    found = diagnose(events_of(world, quantum=0.1), *robot_of(tmp_path, chain), {})
+    assert 'torque_gain' in {f.effect for f in found.findings}
+    assert () in [e.effects for e in found.equivalents]

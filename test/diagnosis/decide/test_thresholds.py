@@ -1,0 +1,58 @@
+"""The thresholds of the decision against the committed statistics of null worlds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.decide.decision import ADEQUATE_REST, PER_EFFECT, PER_PARAMETER
+
+RESULTS = Path(__file__).parents[3] / 'benchmarks' / 'results'
+FALSE_ALARMS, UNKNOWN_CALLED = 0.05, 0.7
+"""What is promised: at most so many, at least so many."""
+
+
+@pytest.fixture(scope='module')
+def worlds():
+    """Null worlds of both tiers, by kind."""
+    found = {}
+    for tier in 'ab':
+        for world in json.loads((RESULTS / f'nulls_{tier}.json').read_text())['worlds']:
+            found.setdefault(world['kind'], []).append(world)
+    return found
+
+
+def test_robots_that_lack_nothing_are_left_in_peace(worlds):
+    calm = [*worlds['nothing'], *worlds['wrong parameters'], *worlds['slight unlisted effect']]
+    alarms = sum(w['verdict'] in {'missing_physics', 'unexplained'} for w in calm)
+    assert len(calm) >= 40
+    assert alarms <= FALSE_ALARMS * len(calm)
+
+
+def test_an_effect_that_is_not_there_is_never_worth_its_price(worlds):
+    gains = [
+        m['fit'] - w['base']['fit'] for w in worlds['nothing'] for m in w['models']
+    ]  # fmt: skip
+    assert max(gains, default=0.0) < PER_EFFECT + PER_PARAMETER
+
+
+@pytest.mark.parametrize(('name', 'effects'), [('superfluous', 1), ('richer', 0)])
+def test_more_than_there_is_costs_more_than_it_gains(worlds, name, effects):
+    """In 95 of 100 worlds with one effect."""
+    paid = [
+        w[name]['gain'] < effects * PER_EFFECT + w[name]['parameters'] * PER_PARAMETER
+        for w in worlds['one effect of the list']
+        if 'right' in w and w[name]
+    ]
+    assert len(paid) >= 10
+    assert np.mean(paid) >= 1.0 - FALSE_ALARMS
+
+
+def test_what_is_adequate_separates_right_models_from_wrong_lists(worlds):
+    right = [w['right_structured_rest'] for w in worlds['one effect of the list'] if 'right' in w]
+    wrong = [w['structured_rest'] for w in worlds['unlisted effect'] if w['structured_rest']]
+    assert np.mean(np.array(right) < ADEQUATE_REST) >= 0.9
+    assert np.mean(np.array(wrong) > ADEQUATE_REST) >= UNKNOWN_CALLED

@@ -1,0 +1,62 @@
+"""Which models compete."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sgp_ros.diagnosis.explain import hypotheses
+from sgp_ros.diagnosis.explain.suspects import Columns
+from test.diagnosis.fitted_models import fitted
+from test.diagnosis.worlds import CHAINS, simulate
+
+
+def _falling_friction(t, q, v):
+    """Stribeck friction less its Coulomb part, and drag."""
+    return (-0.1 * abs(v[0]) * v[0] - 0.9 * np.exp(-((v[0] / 0.4) ** 2)) * np.sign(v[0]),)
+
+
+def _names(model):
+    return {s.effect.name for s in model.suspects}
+
+
+def test_a_load_does_not_compete_with_bodies_that_may_differ(equations_for, heavy):
+    """It is one of their changes, with a freedom that has no price."""
+    _, equations = equations_for(heavy[1])
+    competition = hypotheses.compete(equations, lambda _share: None)
+    loaded = [
+        m for m in (*competition.singles, *competition.pairs) if 'payload' in _names(m)
+    ]  # fmt: skip
+    assert loaded
+    assert not any(m.is_free for m in loaded)
+
+
+def test_effects_that_show_only_together_are_found_by_exchange(equations_for):
+    """From two that are neither: one gives way, then the other."""
+    world = simulate(CHAINS[1], 4, 12.0, force=_falling_friction, dry=lambda t, q, s: 0.3)
+    _, equations = equations_for(world)
+    start = fitted(equations, 'coulomb_friction', 'viscous_friction')
+    found = hypotheses._exchanged(Columns(equations), [start])
+    best = max(found, key=lambda m: m.score)
+    assert _names(best) == {'stribeck_friction', 'quadratic_drag'}
+    assert best.score > start.score + 100.0
+
+
+def test_a_pair_that_leaves_nothing_is_not_exchanged(equations_for, viscous):
+    _, equations = equations_for(viscous)
+    pair = fitted(equations, 'viscous_friction', 'spring')
+    assert hypotheses._exchanged(Columns(equations), [pair]) == []
+    assert hypotheses._exchanged(Columns(equations), []) == []
+
+
+def test_a_law_of_one_number_is_tried_in_place_of_a_richer_one(equations_for):
+    """Friction that was taken to differ with direction is Coulomb friction when all is there."""
+    world = simulate(
+        CHAINS[1], 4, 10.0, force=lambda t, q, v: (-0.3 * v[0],), dry=lambda t, q, s: 0.6
+    )  # fmt: skip
+    _, equations = equations_for(world)
+    rich = fitted(equations, 'asymmetric_coulomb', 'viscous_friction')
+    found = hypotheses._simpler(Columns(equations), rich)
+    assert {'coulomb_friction', 'viscous_friction'} in [_names(m) for m in found]
+    assert all(m.size < rich.size for m in found)
+    plain = fitted(equations, 'coulomb_friction', 'viscous_friction')
+    assert hypotheses._simpler(Columns(equations), plain) == []

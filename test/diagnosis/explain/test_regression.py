@@ -1,0 +1,124 @@
+"""Laws of the projection of inertial parameters, and of the models fitted with it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.fitted_model import floors
+from sgp_ros.diagnosis.explain.regression import Frame
+from sgp_ros.diagnosis.explain.screening import screen
+from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
+from sgp_ros.robots.effects.catalogue import EFFECTS
+from sgp_ros.robots.effects.effect import Place
+from test.diagnosis.worlds import CHAINS, simulate
+
+NONE = np.zeros(0)
+
+
+def _start(equations):
+    return np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
+
+
+def _suspect(name, joint, shape=()):
+    return Suspect(EFFECTS[name], Place(joint), np.array(shape, dtype=float))
+
+
+@pytest.mark.parametrize('k', [1, 2])
+def test_projection_equals_dense_ridge_regression(equations_for, heavy, k):
+    """Columns and w together by normal equations with the prior of w as a ridge."""
+    _, equations = equations_for(heavy[k])
+    sigma = _start(equations)
+    frame = Frame.of(equations, sigma, is_free=True)
+    N, _, p = equations.base.shape
+    x = Columns(equations).of(_suspect('viscous_friction', k - 1), equations)
+    X = np.concatenate([x, equations.base], axis=2) / sigma[:, None]
+    X = X.reshape(N * k, 1 + p)
+    y = (equations.d / sigma).ravel()
+    ridge = np.diag([0.0, *np.ones(p)])
+    dense = np.linalg.solve(X.T @ X + ridge, X.T @ y)
+    projected = frame.projected(x)
+    c = np.linalg.lstsq(projected, frame.y, rcond=None)[0]
+    np.testing.assert_allclose(c, dense[:1], rtol=1e-6, atol=1e-9)
+    w = frame.parameters(equations.d - x @ c)
+    np.testing.assert_allclose(w, dense[1:], rtol=1e-5, atol=1e-7)
+    np.testing.assert_allclose(
+        np.linalg.slogdet(X[:, 1:].T @ X[:, 1:] + np.eye(p))[1], 2.0 * frame.occam, rtol=1e-9
+    )
+
+
+def test_what_remains_is_told_apart_by_joint(equations_for, heavy):
+    """Mean squares in the units of the efforts, the rows of the prior left out."""
+    _, equations = equations_for(heavy[2])
+    frame = Frame.of(equations, _start(equations), is_free=False)
+    np.testing.assert_allclose(frame.by_joint(frame.y), (equations.d**2).mean(axis=0))
+    assert frame.determined == 0
+    assert not frame.parameters(equations.d).any()
+    free = Frame.of(equations, _start(equations), is_free=True)
+    assert 0 < free.determined <= 20
+
+
+def test_viscous_friction_is_found_with_its_size(equations_for, viscous):
+    """The linear coefficient and nothing else; the residual is that of a perfect model."""
+    _, equations = equations_for(viscous)
+    model = fit(Columns(equations), (_suspect('viscous_friction', 0),), _start(equations),
+                is_free=False)  # fmt: skip
+    np.testing.assert_allclose(model.coefficients[0], [0.3], rtol=2e-3)
+    assert model.mean_square[0] < 2e-5 * equations.power[0]
+    assert model.size == 1
+    assert model.is_possible()
+    assert model.filtered_shares == [pytest.approx(model.net_share)]
+    np.testing.assert_allclose(equations.d, model.forces[0] + model.residual, atol=1e-12)
+
+
+def test_free_bodies_do_not_fit_worse_and_cost_evidence(equations_for, viscous):
+    """The score is what remains less the price of freedom."""
+    _, equations = equations_for(viscous)
+    suspects = (_suspect('viscous_friction', 0),)
+    tight = fit(Columns(equations), suspects, _start(equations), is_free=False)
+    free = fit(Columns(equations), suspects, _start(equations))
+    assert free.mean_square[0] <= tight.mean_square[0] * (1.0 + 1e-9)
+    assert free.freedom > tight.freedom
+    assert tight.score > free.score
+
+
+def test_a_search_finds_the_shape_from_a_distant_start(equations_for):
+    """The delay by Levenberg-Marquardt, within its bounds."""
+    from test.diagnosis.worlds import delayed
+
+    world = simulate(CHAINS[1], 5, 8.0, motor=delayed(0.012))
+    _, equations = equations_for(world)
+    model = fit(Columns(equations), (_suspect('command_delay', 0, [0.03]),), _start(equations),
+                is_free=False)  # fmt: skip
+    assert model.suspects[0].shape[0] == pytest.approx(0.012, rel=0.02)
+    assert model.size == 1
+
+
+def test_screening_ranks_what_is_there_first(equations_for, viscous):
+    """And does not offer what the model has already."""
+    _, equations = equations_for(viscous)
+    columns = Columns(equations)
+    base = fit(columns, (), _start(equations), is_free=False)
+    trials = screen(columns, base, EFFECTS.values())
+    assert trials[0][1].key == ('viscous_friction', Place(0))
+    assert [gain for gain, _ in trials] == sorted((g for g, _ in trials), reverse=True)
+    model = fit(columns, (trials[0][1],), base.sigma, is_free=False)
+    again = screen(columns, model, EFFECTS.values())
+    assert ('viscous_friction', Place(0)) not in {s.key for _, s in again}
+    assert again[0][0] < 0.05 * trials[0][0]
+
+
+def test_screening_finds_the_interval_of_friction_in_a_place(equations_for):
+    """By bins of the range, to the width of one or two of them."""
+    world = simulate(
+        CHAINS[1], 6, 10.0,
+        force=lambda t, q, v: (-0.6 * v[0] if 0.1 < q[0] < 0.5 else 0.0,),
+    )  # fmt: skip
+    _, equations = equations_for(world)
+    columns = Columns(equations)
+    base = fit(columns, (), _start(equations), is_free=False)
+    best = screen(columns, base, [EFFECTS['position_friction']])[0][1]
+    assert best.place == Place(0, 'viscous')
+    bin_width = np.ptp(world.position) / 40
+    np.testing.assert_allclose(best.shape, [0.1, 0.5], atol=2.0 * bin_width)

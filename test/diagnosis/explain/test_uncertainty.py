@@ -1,0 +1,102 @@
+"""Standard deviations against the spread over recordings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.compare.equations import make_equations
+from sgp_ros.diagnosis.compare.trajectory import Bandwidth, collect
+from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.fitted_model import floors
+from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
+from sgp_ros.diagnosis.explain.uncertainty import covariance, reported_std
+from sgp_ros.robots.effects.catalogue import EFFECTS
+from sgp_ros.robots.effects.effect import Fitted, Place
+from test.diagnosis.fitted_models import fitted
+from test.diagnosis.worlds import CHAINS, events_of, simulate
+
+RUNS = 40
+
+
+@pytest.mark.parametrize(
+    ('name', 'shape', 'force', 'what'),
+    [
+        ('viscous_friction', (), lambda t, q, v: (-0.3 * v[0],), 'b'),
+        ('spring', (), lambda t, q, v: (-2.0 * (q[0] - 0.3),), 'rest'),
+    ],
+    ids=['viscous', 'spring'],
+)
+def test_the_std_is_the_spread_over_noises(robots, name, shape, force, what):
+    """White noise on the residual; 30 % are 2.7 deviations of the spread of 40 runs."""
+    robot, tree = robots[1]
+    raw = collect(events_of(simulate(CHAINS[1], 7, 8.0, force=force)), robot)
+    equations = make_equations(raw, tree, Bandwidth(10.0, 25.0))
+    rng = np.random.default_rng(0)
+    suspect = Suspect(EFFECTS[name], Place(0), np.array(shape, dtype=float))
+    values, stds = [], []
+    for _ in range(RUNS):
+        noisy = replace(equations, d=equations.d + rng.normal(0.0, 0.1, equations.d.shape))
+        columns = Columns(noisy)
+        model = fit(columns, (suspect,), np.sqrt(floors(noisy) + 0.01), is_free=False, rounds=1)
+        fitted = Fitted(equations.motion, Place(0), suspect.shape, model.coefficients[0])
+        values.append(EFFECTS[name].report(fitted)[what])
+        stds.append(reported_std(model, columns)[0][what])
+    spread = np.std(values, ddof=1)
+    assert 0.7 < np.median(stds) / spread < 1.4
+    assert abs(np.mean(values) - (0.3)) < 4.0 * spread / np.sqrt(RUNS) + 0.003
+
+
+def test_correlation_in_time_widens_it(equations_for, viscous):
+    """The same noise in runs of eight rows counts for fewer rows."""
+    _, equations = equations_for(viscous)
+    rng = np.random.default_rng(1)
+    suspect = Suspect(EFFECTS['viscous_friction'], Place(0), np.zeros(0))
+    N = len(equations.d)
+    white = rng.normal(0.0, 0.1, (N, 1))
+    slow = np.repeat(rng.normal(0.0, 0.1, (N // 8 + 1, 1)), 8, axis=0)[:N]
+    found = []
+    for noise in (white, slow):
+        noisy = replace(equations, d=equations.d + noise)
+        columns = Columns(noisy)
+        model = fit(columns, (suspect,), np.full(1, 0.1), is_free=False)
+        found.append(float(covariance(model, columns)[0, 0] / model.mean_square[0]))
+    assert found[1] > 3.0 * found[0]
+
+
+def test_shapes_have_a_std_and_a_covariance_is_symmetric(equations_for, dry):
+    """Two coefficients and a shape of Stribeck friction."""
+    _, equations = equations_for(dry)
+    columns = Columns(equations)
+    suspect = Suspect(EFFECTS['stribeck_friction'], Place(0), np.array([0.5]))
+    model = fit(columns, (suspect,), np.full(1, 0.1), is_free=False)
+    C = covariance(model, columns)
+    assert C.shape == (3, 3)
+    np.testing.assert_allclose(C, C.T, rtol=1e-6, atol=1e-12 * np.abs(C).max())
+    assert np.linalg.eigvalsh(C)[0] > -1e-9 * np.abs(C).max()
+    std = reported_std(model, columns)[0]
+    assert set(std) == {'coulomb', 'static', 'stribeck_velocity'}
+    assert all(np.isfinite(x) and x >= 0.0 for x in std.values())
+
+
+def test_without_effects_there_is_nothing_to_be_uncertain_of(equations_for, viscous):
+    """An empty covariance, an empty list."""
+    _, equations = equations_for(viscous)
+    columns = Columns(equations)
+    model = fit(columns, (), np.full(1, 0.1), is_free=False)
+    assert covariance(model, columns).shape == (0, 0)
+    assert reported_std(model, columns) == []
+
+
+def test_a_number_that_nothing_depends_on_may_be_anything(equations_for, viscous):
+    """One link cannot tell where a load sits along its axis: a flat distribution in its bounds."""
+    _, equations = equations_for(viscous)
+    model = fitted(equations, 'payload')
+    (std,) = reported_std(model, Columns(equations))
+    low, high = EFFECTS['payload'].bounds(equations.motion, Place(0))
+    axis = int(np.flatnonzero(np.abs(equations.motion.tree.axes[0]) > 0.5)[0])
+    name = 'xyz'[axis]
+    assert std[name] == pytest.approx((high - low)[1 + axis] / np.sqrt(12.0), rel=1e-3)
+    assert all(np.isfinite(x) for x in std.values())

@@ -1,0 +1,87 @@
+"""Intervals of means over time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from sgp_ros.diagnosis.prove.intervals import correlation_time, mean_interval, ratio_interval
+
+SEEDS = 200
+
+
+def _coloured(seed, n, phi):
+    """An autoregression of variance one."""
+    noise = np.random.default_rng(seed).standard_normal(n + 500) * math.sqrt(1.0 - phi**2)
+    return signal.lfilter([1.0], [1.0, -phi], noise)[500:]
+
+
+def _coverage(intervals, truth):
+    assert None not in intervals
+    return np.mean([low <= truth <= high for low, high in intervals])
+
+
+@pytest.mark.parametrize('phi', [0.0, 0.9])
+def test_the_interval_of_a_mean_holds_it_as_often_as_it_says(phi):
+    """95 % of the time, within three standard errors of that share; neighbours may be alike."""
+    found = [mean_interval(_coloured(seed, 3000, phi)) for seed in range(SEEDS)]
+    assert _coverage(found, 0.0) == pytest.approx(0.95, abs=3 * math.sqrt(0.95 * 0.05 / SEEDS))
+
+
+@pytest.mark.parametrize('phi', [0.0, 0.9])
+def test_the_interval_of_a_ratio_holds_it_as_often_as_it_says(phi):
+    """Of the variances of two processes; squares are skewed, so two per cent are given away."""
+    found = [
+        ratio_interval(
+            0.04 * _coloured(seed, 3000, phi) ** 2, _coloured(seed + SEEDS, 3000, phi) ** 2
+        )
+        for seed in range(SEEDS)
+    ]
+    assert 0.90 <= _coverage(found, 0.04) <= 1.0
+
+
+def test_neighbours_that_are_alike_widen_the_interval():
+    """As many samples tell less than independent ones."""
+    wide, narrow = (mean_interval(_coloured(1, 3000, phi)) for phi in (0.95, 0.0))
+    assert wide[1] - wide[0] > 3.0 * (narrow[1] - narrow[0])
+
+
+@pytest.mark.parametrize('phi', [0.0, 0.5, 0.9])
+def test_the_correlation_time_is_that_of_the_process(phi):
+    """`(1 + phi) / (1 - phi)` of an autoregression."""
+    assert correlation_time(_coloured(2, 200_000, phi)) == pytest.approx(
+        (1.0 + phi) / (1.0 - phi), rel=0.1
+    )
+
+
+def test_a_ratio_has_no_unit_and_is_never_negative():
+    """Scaling both changes nothing, scaling one scales the interval; the ratio lies inside."""
+    x, y = _coloured(3, 400, 0.5) ** 4, _coloured(4, 400, 0.5) ** 2
+    low, high = ratio_interval(x, y)
+    assert 0.0 < low < x.mean() / y.mean() < high
+    assert ratio_interval(7.0 * x, 7.0 * y) == pytest.approx((low, high))
+    assert ratio_interval(7.0 * x, y) == pytest.approx((7.0 * low, 7.0 * high))
+
+
+def test_what_is_proportional_has_a_sure_ratio():
+    """However both scatter."""
+    y = _coloured(5, 400, 0.5) ** 2
+    assert ratio_interval(0.3 * y, y) == pytest.approx((0.3, 0.3))
+
+
+@pytest.mark.parametrize(
+    'x', [np.zeros(0), np.ones(3), np.linspace(0.0, 1.0, 100)], ids=['none', 'three', 'a drift']
+)
+def test_too_little_gives_no_interval(x):
+    """A drift as long as the recording is one event, not a hundred."""
+    assert mean_interval(x) is None
+    assert ratio_interval(x, np.ones(len(x))) is None
+
+
+def test_nothing_over_nothing_has_no_interval():
+    """A joint that does not move has no error relative to its motion."""
+    assert ratio_interval(np.zeros(100), np.ones(100)) is None
+    assert ratio_interval(np.ones(100), np.zeros(100)) is None

@@ -1,0 +1,185 @@
+"""Roll-outs of diagnosed models from measured states."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.fitted_model import floors
+from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
+from sgp_ros.diagnosis.prove import rollouts
+from sgp_ros.diagnosis.prove.diagnosed_dynamics import dynamics_of
+from sgp_ros.diagnosis.prove.rollouts import cut, roll_out
+from sgp_ros.robots.effects.catalogue import EFFECTS
+from sgp_ros.robots.effects.effect import Place
+from test.diagnosis.worlds import CHAINS, PERIOD, World, acceleration, delayed, simulate
+
+TRIM = 40
+FINE = 100
+"""Steps a period in which the hysteretic pendulum is integrated."""
+LEVEL, PRESLIDING = 0.6, 0.05
+
+
+def _model(equations, *suspects, is_free=False):
+    start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
+    return fit(Columns(equations), suspects, start, is_free=is_free)
+
+
+def _suspect(name, joint, *shape):
+    return Suspect(EFFECTS[name], Place(joint), np.array(shape))
+
+
+def _errors(windows, q, ends):
+    assert ends.all()
+    return windows.squared(q).sum(axis=0) / windows.held.sum(axis=0)
+
+
+@pytest.fixture(scope='module')
+def hysteretic():
+    """A pendulum whose friction is a bristle, integrated with the bristle as a state."""
+    (link,), rng = CHAINS[1], np.random.default_rng(6)
+    omega, phase = rng.uniform(2.0, 9.0, 4), rng.uniform(0.0, 6.0, 4)
+    q, v, z = 0.0, 0.0, 0.0
+    kept, commands, h = [], [], PERIOD / FINE
+    for i in range(round(10.0 / PERIOD)):
+        goal = float(np.sin(omega * i * PERIOD + phase).sum()) / 2.0
+        u = 12.0 * (goal - q) - 1.0 * v
+        commands.append((u,))
+        kept.append((q, v, acceleration((link,), (q,), (v,), (u - LEVEL * z,))[0]))
+        for _ in range(FINE):
+            v += h * acceleration((link,), (q,), (v,), (u - LEVEL * z,))[0]
+            q += h * v
+            sign = math.copysign(1.0, v)
+            z = sign + (z - sign) * math.exp(-abs(v) * h / PRESLIDING)
+    at, speed, rise = (np.array(x)[:, None] for x in zip(*kept, strict=True))
+    return World(PERIOD * np.arange(len(kept)), at, speed, rise, np.array(commands))
+
+
+@pytest.mark.parametrize('k', [1, 2])
+def test_the_true_model_ends_where_the_robot_did(equations_for, perfect, k):
+    """In all windows, to a ten-thousandth of the way."""
+    _, equations = equations_for(perfect[k])
+    windows = cut(equations.motion, TRIM)
+    q, ends = roll_out(windows, _model(equations), equations)
+    assert len(ends) > 20
+    assert np.all(_errors(windows, q, ends) < 1e-4)
+
+
+def test_wrong_bodies_are_rolled_out_with_what_was_found(equations_for, heavy):
+    """The mass matrix of the model, not the nominal one."""
+    _, equations = equations_for(heavy[2])
+    windows = cut(equations.motion, TRIM)
+    nominal = _errors(windows, *roll_out(windows, _model(equations), equations))
+    found = _errors(windows, *roll_out(windows, _model(equations, is_free=True), equations))
+    assert np.all(found < 1e-4)
+    assert np.all(nominal > 100.0 * found)
+
+
+def test_dry_friction_holds_and_releases_in_a_roll_out(equations_for, dry):
+    """Without it the joint slides where it rested, and 0.3 s later is somewhere else."""
+    _, equations = equations_for(dry)
+    windows = cut(equations.motion, TRIM)
+    nominal = _errors(windows, *roll_out(windows, _model(equations), equations))
+    model = _model(equations, _suspect('coulomb_friction', 0))
+    found = _errors(windows, *roll_out(windows, model, equations))
+    assert found < 1e-3
+    assert nominal > 0.1
+
+
+def test_a_joint_that_friction_holds_does_not_creep(equations_for, dry):
+    """Its level is the jump of the force; below it the joint stands, to the last digit."""
+    _, equations = equations_for(dry)
+    model = _model(equations, _suspect('coulomb_friction', 0), _suspect('viscous_friction', 0))
+    motion = equations.motion
+    dynamics = dynamics_of(model, equations, motion)
+    loads = np.column_stack([motion.effort, np.zeros_like(motion.effort), motion.time])
+    level = dynamics.level_of_dry_friction(motion.position, loads)
+    np.testing.assert_allclose(level, model.coefficients[0][0])
+    windows = cut(motion, TRIM, horizon=0.05)
+    q, _ = roll_out(windows, model, equations)
+    steps = np.abs(np.diff(q[:, :, 0], axis=1))
+    truly = np.array([(dry.velocity[rows, 0] == 0.0).all() for rows in windows.rows])
+    assert truly.sum() > 3
+    assert np.all(steps[truly, -1] == 0.0)
+    assert np.all(steps[~truly].max(axis=1) > 0.0)
+
+
+def test_what_remembers_commands_needs_no_iteration(equations_for, monkeypatch):
+    """A delay is a function of time: one round settles all windows."""
+    world = simulate(CHAINS[1], 7, 10.0, motor=delayed(0.012))
+    _, equations = equations_for(world)
+    model = _model(equations, _suspect('command_delay', 0, 0.01))
+    windows = cut(equations.motion, TRIM)
+    monkeypatch.setattr(rollouts, 'MOST_ROUNDS', 1)
+    assert _errors(windows, *roll_out(windows, model, equations)) < 1e-4
+
+
+def test_what_remembers_the_motion_is_iterated_to_a_fixed_point(equations_for, hysteretic):
+    """The bristle along the roll-out, from the one measured before its window."""
+    _, equations = equations_for(hysteretic)
+    model = _model(equations, _suspect('hysteresis', 0, 0.8 * PRESLIDING))
+    assert model.coefficients[0][0] == pytest.approx(LEVEL, rel=0.02)
+    windows = cut(equations.motion, TRIM)
+    nominal = _errors(windows, *roll_out(windows, _model(equations), equations))
+    found = _errors(windows, *roll_out(windows, model, equations))
+    assert found < 1e-3
+    assert nominal > 100.0 * found
+
+
+def test_a_window_without_a_fixed_point_is_counted(equations_for, hysteretic, monkeypatch):
+    """One round tells nothing of convergence."""
+    _, equations = equations_for(hysteretic)
+    model = _model(equations, _suspect('hysteresis', 0, PRESLIDING))
+    monkeypatch.setattr(rollouts, 'MOST_ROUNDS', 1)
+    _, ends = roll_out(cut(equations.motion, TRIM), model, equations)
+    assert not ends.any()
+
+
+def test_a_roll_out_that_runs_away_is_counted(equations_for, viscous):
+    """Friction that drives, beyond what numbers can hold."""
+    _, equations = equations_for(viscous)
+    model = _model(equations, _suspect('quadratic_drag', 0))
+    mad = replace(model, coefficients=(np.array([-1e5]),))
+    _, ends = roll_out(cut(equations.motion, TRIM), mad, equations)
+    assert not ends.all()
+
+
+def test_stiff_friction_is_integrated_in_smaller_steps(equations_for, perfect):
+    """A time constant a tenth of the step: the joint creeps, it does not explode."""
+    _, equations = equations_for(perfect[1])
+    model = _model(equations, _suspect('viscous_friction', 0))
+    inertia = float(equations.motion.mass_diagonal.mean())
+    stiff = replace(model, coefficients=(np.array([10.0 / PERIOD * inertia]),))
+    windows = cut(equations.motion, TRIM)
+    q, ends = roll_out(windows, stiff, equations)
+    assert ends.all()
+    assert np.ptp(q[:, 5:], axis=1).max() < 0.05 * np.sqrt(windows.held.max())
+
+
+def test_windows_follow_each_other_and_cross_no_pause(equations_for, perfect):
+    """No sample in two windows, none near the ends of a stretch, all of the horizon's length."""
+    _, equations = equations_for(perfect[1])
+    motion = replace(equations.motion, starts=(0, 700))
+    windows = cut(motion, TRIM)
+    last = windows.rows[:, -1]
+    assert np.all(windows.first[1:] >= last[:-1])
+    assert np.all((last < 700 - TRIM) | (windows.first >= 700 + TRIM))
+    assert windows.first[0] == TRIM
+    length = windows.steps * windows.stride * motion.step
+    assert length == pytest.approx(rollouts.HORIZON_S, rel=0.05)
+
+
+def test_a_long_recording_is_sampled_evenly(equations_for, perfect, monkeypatch):
+    """From its beginning to its end."""
+    _, equations = equations_for(perfect[1])
+    everything = cut(equations.motion, TRIM).first
+    monkeypatch.setattr(rollouts, 'MOST_WINDOWS', 5)
+    some = cut(equations.motion, TRIM).first
+    assert len(some) == 5
+    assert set(some) <= set(everything)
+    assert (some[0], some[-1]) == (everything[0], everything[-1])
+    assert np.ptp(np.diff(some)) <= everything[1] - everything[0]
