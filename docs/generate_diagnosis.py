@@ -123,7 +123,8 @@ price of its freedom; left is the greatest share of the squared effort that the 
 """
 EFFECT_HEAD = """
 Where there is one effect, the null hypothesis is that there is not another, and that no richer law is needed. Where
-there is an unlisted one, it is that no model of the list is adequate. The same command draws both.
+there is an unlisted one, it is that no model of the list is adequate. The same command draws both. Loads are left
+out: they are changes of bodies, and bodies alone are right there too.
 """
 TAIL = """
 ## Where it fails, and why
@@ -276,12 +277,13 @@ def _nulls(worlds):
         f'\nTogether {_percent(alarms)} raise a false alarm. The cheapest effect costs '
         f'{price:g} nats, the verdict `unexplained` needs {100 * LEAST_SHARE:g} % left.'
     )
-    return '\n'.join(lines) + '\n' + EFFECT_HEAD + '\n'.join(_effects(worlds)) + '\n'
+    return '\n'.join(lines) + '\n' + EFFECT_HEAD + '\n' + '\n'.join(_effects(worlds)) + '\n'
 
 
 def _effects(worlds):
     """Return lines of the table on worlds with one effect, of the list or not."""
-    listed = [w for w in worlds if w['kind'] == LISTED and 'right' in w]
+    of_list = [w for w in worlds if w['kind'] == LISTED and w['extra'] != 'payload']
+    listed = [w for w in of_list if 'right' in w]
     unlisted = [w for w in worlds if w['kind'] == UNLISTED]
     rests = [w['right_structured_rest'] for w in listed]
     others = [w['structured_rest'] for w in unlisted if w['structured_rest'] is not None]
@@ -306,7 +308,7 @@ def _effects(worlds):
         )
     passed = _rate(r < ADEQUATE_REST for r in rests)
     refused = _rate(r > ADEQUATE_REST for r in others)
-    missing = sum(w['kind'] == LISTED for w in worlds) - len(listed)
+    missing = len(of_list) - len(listed)
     lines.append(
         f'\nThe right model is adequate in {_percent(passed)}, the best of a wrong list is not in '
         f'{_percent(refused)}. Of the worlds with one listed effect, {missing} are not in the '
