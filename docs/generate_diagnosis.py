@@ -110,9 +110,9 @@ leaves, not by its evidence, and why odds are tempered.
 prismatic, some passive), conceals an effect, a pair, an unknown effect, wrong bodies or nothing, simulates them
 with MuJoCo and sensors, runs the command above in a process that cannot see the answer, and scores. Tier A is
 clean; tier B has smaller effects, coarse encoders, jitter, lost messages, wrong bodies, closed loops that mask.
-Intervals are 95 %, by Wilson's formula. The worlds were drawn after the tool was made. Two
+Intervals are 95 %, by Wilson's formula. The worlds of the first two tables were drawn after the tool was made. Two
 were wrong when first scored; one of them led to a correction (a load no longer competes where bodies may differ) and
-all were scored anew. Pairs are drawn from all 26 effects.
+all were scored anew. Those of pairs alone were looked at before. Pairs are drawn from all 26 effects.
 """
 NULL_HEAD = """
 ## Null worlds, and the thresholds
