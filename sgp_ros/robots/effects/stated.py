@@ -97,6 +97,9 @@ def coefficient_std(effect: str, kind: str, numbers: Numbers, std: Numbers) -> n
     `var c_i = sum_k (dc_i / dx_k)^2 var x_k`. Infinite where one that matters is not known, or
     none does.
     """
+    if effect == 'encoder_eccentricity':  # its coefficient scales the whole
+        relative = std.get('amplitude', math.inf) / max(abs(numbers['amplitude']), 1e-300)
+        return np.array([relative])
     _, c = shape_and_coefficients(effect, kind, numbers)
     variance = np.zeros(len(c))
     for name, value in numbers.items():
@@ -205,6 +208,7 @@ _COEFFICIENTS = {
     'stribeck_friction': (Quantity('coulomb', 'N m'), Quantity('stribeck', 'N m')),
     'spring': (Quantity('stiffness', 'N m/rad'), Quantity('preload', 'N m')),
     'cogging': (Quantity('sine', 'N m'), Quantity('cosine', 'N m')),
+    'encoder_eccentricity': (Quantity('scale', '1'),),
 }
 """Of effects whose coefficients are no stated numbers."""
 _LINEAR = {

@@ -79,6 +79,8 @@ def test_what_was_reported_is_stated_at_the_same_place(effect, place):
     rng = np.random.default_rng(1)
     starts = effect.starts(MOTION, place)
     shape = starts[0] if len(starts) else np.array([-0.5, 0.5])
+    if effect.small is not None:
+        shape = effect.small.shape(shape, np.array([0.02, -0.01]))
     c = np.ones(1)
     if not effect.is_given:
         columns = effect.columns(MOTION, place, shape)
@@ -133,3 +135,14 @@ def test_a_coefficient_is_unknown_where_a_value_that_matters_is():
     std = coefficient_std('spring', '', {'stiffness': 2.0, 'rest': 0.5}, {'stiffness': 0.1})
     assert std[0] == pytest.approx(0.1)
     assert std[1] == math.inf
+
+
+def test_an_eccentric_encoder_is_as_uncertain_as_its_amplitude():
+    """Its one coefficient scales what the stated numbers say."""
+    numbers = {'amplitude': 0.05, 'periods': 3.0, 'phase': 0.4}
+    shape, c = shape_and_coefficients('encoder_eccentricity', '', numbers)
+    assert c == pytest.approx([1.0])
+    assert shape == pytest.approx([3.0, 0.05 * np.cos(0.4), 0.05 * np.sin(0.4)])
+    std = coefficient_std('encoder_eccentricity', '', numbers, {'amplitude': 0.005})
+    assert std == pytest.approx([0.1])
+    assert np.isinf(coefficient_std('encoder_eccentricity', '', numbers, {})).all()
