@@ -52,29 +52,53 @@ def _play(graph: Graph, seconds: float) -> int:
     events = list(open_recording(CASE / 'real.mcap').events())
     commands = graph.client.create_publisher(JointState, '/command', 5000)
     states = graph.client.create_publisher(JointState, '/joint_states', 5000)
-    graph.wait_until(
-        lambda: commands.get_subscription_count() and states.get_subscription_count(), 'the node'
-    )
-    first, sent = events[0].stamp_ns, 0
+    command = next(event for event in events if isinstance(event, CommandSample))
+    state = next(event for event in events if isinstance(event, JointSample))
+    _publish_until_read(graph, commands, _command(command), 'commands_read')
+    _publish_until_read(graph, states, _state(state), 'read')
+    before, first, sent = graph.count('read'), events[0].stamp_ns, 0
     for event in events:
         if event.stamp_ns - first > seconds * 1e9:
             break
-        stamp = header(event.stamp_ns)
         if isinstance(event, CommandSample):
-            names = event.names or ('shoulder', 'elbow')
-            commands.publish(
-                JointState(header=stamp, name=list(names), effort=event.effort.tolist())
-            )
+            commands.publish(_command(event))
         elif isinstance(event, JointSample):
-            velocity = [] if event.velocity is None else event.velocity.tolist()
-            states.publish(JointState(
-                header=stamp, name=list(event.names), position=event.position.tolist(),
-                velocity=velocity,
-            ))  # fmt: skip
+            states.publish(_state(event))
             sent += 1
             if sent % 25 == 0:  # a burst could let states overtake their commands
-                graph.wait_until(lambda n=sent: graph.count('read') > n - 50, 'the node to read')
+                graph.wait_until(
+                    lambda n=before + sent: graph.count('read') > n - 50, 'the node to read'
+                )
     return sent
+
+
+def _publish_until_read(graph: Graph, publisher: Any, message: JointState, key: str) -> None:
+    """Publish a message again and again until the node has read one.
+
+    A publisher may find a listener before the listener finds it; what it sends meanwhile is lost.
+    """
+
+    def is_read() -> bool:
+        if graph.count(key):
+            return True
+        publisher.publish(message)
+        return False
+
+    graph.wait_until(is_read, f'{key} on {publisher.topic_name}')
+
+
+def _command(event: CommandSample) -> JointState:
+    names = event.names or ('shoulder', 'elbow')
+    stamp = header(event.stamp_ns)
+    return JointState(header=stamp, name=list(names), effort=event.effort.tolist())
+
+
+def _state(event: JointSample) -> JointState:
+    velocity = [] if event.velocity is None else event.velocity.tolist()
+    return JointState(
+        header=header(event.stamp_ns), name=list(event.names),
+        position=event.position.tolist(), velocity=velocity,
+    )  # fmt: skip
 
 
 def test_a_diagnosis_of_the_recent_past_is_published(graph: Graph) -> None:
