@@ -161,9 +161,8 @@ def _simpler(columns: Columns, model: Model) -> list[Model]:
         if len(suspect.effect.quantities) == 1:
             continue
         place = Place(suspect.place.joint)
-        kept = {s.key for s in model.suspects}
         others = [Suspect(e, place, np.zeros(0)) for e in simple if place in e.places(motion)]
-        trials = [_replaced(columns, model, i, s) for s in others if s.key not in kept]
+        trials = [_replaced(columns, model, i, s) for s in others if s.key not in model.key]
         best = _ranked(trials)
         if best:
             found.append(best[0])

@@ -97,9 +97,9 @@ def coefficient_std(effect: str, kind: str, numbers: Numbers, std: Numbers) -> n
     `var c_i = sum_k (dc_i / dx_k)^2 var x_k`. Infinite where one that matters is not known, or
     none does.
     """
-    if effect == 'encoder_eccentricity':  # its coefficient scales the whole
-        relative = std.get('amplitude', math.inf) / max(abs(numbers['amplitude']), 1e-300)
-        return np.array([relative])
+    if effect in _SIZE:  # its coefficient scales the whole
+        size = _SIZE[effect]
+        return np.array([std.get(size, math.inf) / max(abs(numbers[size]), 1e-300)])
     _, c = shape_and_coefficients(effect, kind, numbers)
     variance = np.zeros(len(c))
     for name, value in numbers.items():
@@ -211,6 +211,8 @@ _COEFFICIENTS = {
     'encoder_eccentricity': (Quantity('scale', '1'),),
 }
 """Of effects whose coefficients are no stated numbers."""
+_SIZE = {'encoder_eccentricity': 'amplitude'}
+"""Of effects whose shape says all, but which are linear in one number: that number."""
 _LINEAR = {
     'position_friction': ('amplitude',), 'limit_friction': ('amplitude',),
     'friction_drift': ('end', 'start'), 'hysteresis': ('level',),
