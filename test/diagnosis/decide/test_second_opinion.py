@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.decide.decision import NATS, ROWS, Scale, decide
+from sgp_ros.diagnosis.decide.decision import NATS, ROWS, Scale, _supported, decide
 from sgp_ros.diagnosis.decide.second_opinion import PARTS, PIECES, left_out, parts_of, support
 from sgp_ros.diagnosis.explain.hypotheses import Competition
 from sgp_ros.diagnosis.explain.suspects import Columns
@@ -51,6 +51,18 @@ def test_an_effect_that_is_there_has_support_and_one_beside_it_none(damped):
     there, beside = support(Columns(damped), model, floor)
     assert ROWS * there > 10.0 * NATS
     assert ROWS * beside < NATS
+
+
+def test_a_model_with_an_effect_without_support_gives_way(damped):
+    """To the next of which every effect predicts parts left out; to none where there is none."""
+    bases = (fitted(damped, is_free=f) for f in (False, True))
+    rich, right = (
+        fitted(damped, *names)
+        for names in (('viscous_friction', 'cogging'), ('viscous_friction',))
+    )
+    scale = Scale.of(damped, Competition(*bases, (right,), (rich,)))
+    assert _supported(damped, scale, [rich, right]) is right
+    assert _supported(damped, scale, [rich]) is None
 
 
 def test_an_effect_without_support_is_not_asserted(equations_for):

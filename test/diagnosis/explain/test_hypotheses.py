@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from sgp_ros.diagnosis.explain import hypotheses
+from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.diagnosis.explain.suspects import Columns
+from sgp_ros.robots.effects.catalogue import EFFECTS
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
 
@@ -22,12 +24,9 @@ def _names(model):
 def test_a_load_does_not_compete_with_bodies_that_may_differ(equations_for, heavy):
     """It is one of their changes, with a freedom that has no price."""
     _, equations = equations_for(heavy[1])
-    competition = hypotheses.compete(equations, lambda _share: None)
-    loaded = [
-        m for m in (*competition.singles, *competition.pairs) if 'payload' in _names(m)
-    ]  # fmt: skip
-    assert loaded
-    assert not any(m.is_free for m in loaded)
+    columns, load = Columns(equations), [EFFECTS['payload']]
+    assert screen(columns, fitted(equations), load)
+    assert screen(columns, fitted(equations, is_free=True), load) == []
 
 
 def test_effects_that_show_only_together_are_found_by_exchange(equations_for):
