@@ -1,8 +1,8 @@
 """What is known of W: a triangular system `R w = z` with unit noise, which grows by rows.
 
 The posterior is N(R^-1 z, (R^T R)^-1). A row of zeros in R is a direction nothing has determined
-yet; until there is none, a singular value decomposition with scaled columns takes the place of
-the triangular solve.
+yet; until there is none, an orthogonal decomposition with scaled columns takes the place of the
+triangular solve.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import linalg
 
 from sgp_ros.core.posterior import NULL_TOLERANCE, RANK_TOLERANCE, ZERO_COLUMN
 from sgp_ros.core.rotations import (
@@ -174,8 +175,22 @@ class _Solved:
         self.scale = np.sqrt((R * R).sum(axis=0))
         is_zero = self.scale <= ZERO_COLUMN * self.scale.max(initial=0.0)
         self.scale[is_zero] = 1.0
-        U, S, Vt = np.linalg.svd(np.where(is_zero, 0.0, R / self.scale))
-        rank = int((RANK_TOLERANCE * max(S[0], 1e-300) < S).sum())
-        self.spread = Vt[:rank].T / S[:rank] / self.scale[:, None]
-        self.null = Vt[rank:].T
-        self.w = self.spread @ (U[:, :rank].T @ z)
+        self._decompose(np.where(is_zero, 0.0, R / self.scale), z)
+
+    def _decompose(self, A: np.ndarray, z: np.ndarray) -> None:
+        """Solve `A x = z` for A (p, p) with columns of norm one, or zero, with the shortest x.
+
+        Complete orthogonal decomposition `A P = Q [L^T; 0] Z^T`: a QR with column pivoting tells
+        the rank, one of what it leaves the null space (Golub and Van Loan, section 5.4.7).
+        """
+        p = len(z)
+        factored, order, tau, _, _ = linalg.lapack.dgeqp3(A)
+        diagonal = np.abs(factored.diagonal())
+        rank = int((RANK_TOLERANCE * max(diagonal[0], 1e-300) < diagonal).sum())
+        Z, L = np.linalg.qr(np.triu(factored[:rank]).T, mode='complete')  # (p, p), (p, rank)
+        Z = Z[np.argsort(order)]
+        roots = linalg.solve_triangular(L[:rank], Z[:, :rank].T, check_finite=False)
+        self.spread = roots.T / self.scale[:, None]
+        self.null = Z[:, rank:]
+        turned = linalg.lapack.dormqr('L', 'T', factored, tau, z[:, None], 64 * p)[0][:rank, 0]
+        self.w = self.spread @ turned

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -36,3 +37,26 @@ def test_a_difference_never_takes_anything_away():
 def test_without_coefficients_there_is_no_difference():
     """GP is the case p = 0."""
     assert Information.nothing(0).less(Information.nothing(0)).R.shape == (0, 0)
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_without_full_rank_the_shortest_solution_counts(seed):
+    """As the pseudo-inverse of the scaled columns, which nothing but its cost speaks against."""
+    rng = np.random.default_rng(seed)
+    p, rank = 9, 4 + seed % 3
+    rows = rng.normal(size=(40, rank)) @ rng.normal(size=(rank, p)) * 10.0 ** rng.uniform(-3, 3, p)
+    rows[:, 2] = 0.0
+    y = rng.normal(size=40)
+    found = Information.nothing(p).with_rows(rows, y)
+    scale = np.linalg.norm(rows, axis=0)
+    scale[2] = 1.0
+    inverse = np.linalg.pinv(rows / scale, rcond=1e-9)
+    np.testing.assert_allclose(found.coefficients * scale, inverse @ y, rtol=1e-8, atol=1e-10)
+    expected = inverse @ inverse.T
+    np.testing.assert_allclose(
+        found.covariance * np.outer(scale, scale), expected, atol=1e-9 * expected.max()
+    )
+    within, outside = rows[:2], np.eye(p)[:2] * scale
+    assert found.is_determined(within).all()
+    assert not found.is_determined(outside).any()
+    assert not found.is_identifiable[2]
