@@ -32,6 +32,7 @@ class Intake:
         self._is_driven = any(joint.is_actuated for joint in robot.joints)
         self._actuated = np.array([joint.is_actuated for joint in robot.joints])
         self._gains = np.array([joint.effort_gain for joint in robot.joints])
+        self._last_order: tuple[tuple[str, ...], np.ndarray | None] = ((), None)
         self.commands = CommandHistory()
         self.last_state_ns: int | None = None
         self.configure(config)
@@ -94,12 +95,12 @@ class Intake:
 
     def _state(self, sample: JointSample) -> State | None:
         """Return the state in the robot's order; None where no effort belongs to it."""
-        order = [sample.names.index(name) for name in self._robot.joint_names]
+        order = self._order(sample.names)
         velocity = _chosen(sample.velocity, order)
-        if velocity is not None and not np.all(np.isfinite(velocity)):
+        if velocity is not None and not np.isfinite(velocity).all():
             velocity = None
         effort = _chosen(sample.effort, order)
-        if effort is not None and not np.all(np.isfinite(effort[self._actuated])):
+        if effort is not None and not np.isfinite(effort[self._actuated]).all():
             effort = None
         if self._config.effort_source == 'command':
             effort = None
@@ -116,20 +117,32 @@ class Intake:
         return age is not None and age <= self._config.command_timeout * 1e9
 
     def _state_problem(self, sample: JointSample) -> str | None:
-        if any(name not in sample.names for name in self._robot.joint_names):
+        order = self._order(sample.names)
+        if order is None:
             return 'unknown_joint'
-        order = [sample.names.index(name) for name in self._robot.joint_names]
-        if not np.all(np.isfinite(sample.position[order])):
+        if not np.isfinite(sample.position[order]).all():
             return 'nonfinite'
         velocity, effort = _chosen(sample.velocity, order), _chosen(sample.effort, order)
-        if velocity is not None and np.any(np.isinf(velocity)):
+        if velocity is not None and np.isinf(velocity).any():
             return 'nonfinite'
-        if effort is not None and np.any(np.isinf(effort[self._actuated])):
+        if effort is not None and np.isinf(effort[self._actuated]).any():
             return 'nonfinite'
-        is_missing = velocity is None or np.any(np.isnan(velocity))
+        is_missing = velocity is None or np.isnan(velocity).any()
         if self._config.filter_velocity == 'measured' and is_missing:
             return 'nonfinite'
         return None
+
+    def _order(self, names: tuple[str, ...]) -> np.ndarray | None:
+        """Return the places of the robot's joints among `names`, (k,); None where one is missing.
+
+        Sources keep their order, so the last one is kept.
+        """
+        if names != self._last_order[0]:
+            wanted = self._robot.joint_names
+            is_whole = set(wanted) <= set(names)
+            order = np.array([names.index(name) for name in wanted]) if is_whole else None
+            self._last_order = names, order
+        return self._last_order[1]
 
     def _command_problem(self, command: CommandSample) -> str | None:
         if len(command.effort) != len(command.names or self._command_joints):
@@ -141,5 +154,5 @@ class Intake:
         return None
 
 
-def _chosen(values: np.ndarray | None, order: list[int]) -> np.ndarray | None:
+def _chosen(values: np.ndarray | None, order: np.ndarray | None) -> np.ndarray | None:
     return None if values is None else values[order]

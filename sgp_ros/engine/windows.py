@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -109,7 +110,7 @@ class WindowFilter:
     def _forget(self, commands: CommandHistory) -> None:
         assert self.next_ns is not None
         first = self.next_ns - self._half_ns
-        keep = sum(state.stamp_ns < first for state in self.states)
+        keep = bisect_left(self.states, first, key=lambda state: state.stamp_ns)
         # One state before the window may still be the left neighbour of its centre.
         del self.states[: max(keep - 1, 0)]
         commands.forget_before(self.states[0].stamp_ns)
