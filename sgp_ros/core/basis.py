@@ -136,13 +136,21 @@ class BasisRegression:
         """
         if prediction.version != self._version:
             raise ValueError('the prediction was made before the last change of the model')
+        data = np.concatenate([prediction.f, y[:, None]], axis=1)  # (k, p + 1)
+        self._learn(prediction.u, prediction.whitenings, data)
+
+    def learn_all(self, data: Observations) -> None:
+        """Learn samples as `learn` does one by one."""
+        for u, f, y in zip(data.U, data.F, data.y, strict=True):
+            self._learn(u, self._basis.features(u), np.concatenate([f, y[:, None]], axis=1))
+
+    def _learn(self, u: np.ndarray, features: tuple[Whitening, ...], data: np.ndarray) -> None:
         self._version += 1
         if self._forgetting.factor != 1.0:
             self._basis.fade(self._forgetting)
             self._samples.fade(self._forgetting.factor)
-        data = np.concatenate([prediction.f, y[:, None]], axis=1)  # (k, p + 1)
-        self._basis.absorb(prediction.u, prediction.whitenings, data)
-        self._samples.append(prediction.u, data)
+        self._basis.absorb(u, features, data)
+        self._samples.append(u, data)
         self._keep_to_budget()
 
     def _keep_to_budget(self) -> None:
@@ -168,12 +176,13 @@ class BasisRegression:
         del policy
         self._remember = self._remember if remember is None else remember
         if model is not None and model != self._model:
-            if self._remember and self._gone:
-                self._basis = self._basis.under(model, self._samples)
-            else:
+            if self._gone and not self._remember:
                 self._basis = StreamBasis.of_samples(
                     model, self._prior, self._features, self._samples
                 )
+                self._gone = 0
+            else:
+                self._basis = self._basis.under(model, self._samples, is_whole=not self._gone)
             self._model = model
             self._version += 1
         if budget:

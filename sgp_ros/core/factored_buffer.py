@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from sgp_ros.core.factor import Whitening
     from sgp_ros.core.model import Model
+    from sgp_ros.core.output_groups import OutputGroup
 
 
 class FactoredBuffer:
@@ -32,6 +33,7 @@ class FactoredBuffer:
         samples: held, in the order in which they came.
         groups: of outputs that share a factor.
         factors: one per group.
+        room: most samples held at once.
         policy: which sample leaves, a key of `RETENTIONS`.
         rotated: samples dropped since the factors were computed.
 
@@ -40,24 +42,41 @@ class FactoredBuffer:
         samples: to begin with.
         room: most samples held at once.
         policy: which sample leaves.
+        before: the same samples under other hyper-parameters or with other room. Factors of
+            groups that are the same are taken over, and `before` must not learn any more.
 
     Raises:
         NumericalError: the samples have no factor in double precision.
     """
 
-    def __init__(self, model: Model, samples: SampleBuffer, room: int, policy: str) -> None:
+    def __init__(
+        self,
+        model: Model,
+        samples: SampleBuffer,
+        room: int,
+        policy: str,
+        before: FactoredBuffer | None = None,
+    ) -> None:
         self.model = model
         self.samples = samples.with_room(room)
         self.groups = output_groups(model)
-        self.factors = tuple(
-            GrowingFactor(group, samples.data.shape[2] - 1, room) for group in self.groups
+        self.room = room
+        kept: dict[OutputGroup, GrowingFactor] = {}
+        if before is not None and before.room == room:
+            kept = dict(zip(before.groups, before.factors, strict=True))
+        self.factors: tuple[GrowingFactor, ...] = tuple(
+            kept.get(group) or self._factored(group) for group in self.groups
         )
-        for group, factor in zip(self.groups, self.factors, strict=True):
-            factor.fill(samples.inputs, samples.data[:, list(group.outputs)])
         self.policy = policy
         self._retention = RETENTIONS[policy]()
         self._retention.rebuild(model, self.factors, self.samples.inputs)
-        self.rotated = 0
+        is_kept = before is not None and not kept.keys().isdisjoint(self.groups)
+        self.rotated: int = before.rotated if before is not None and is_kept else 0
+
+    def _factored(self, group: OutputGroup) -> GrowingFactor:
+        factor = GrowingFactor(group, self.samples.data.shape[2] - 1, self.room)
+        factor.fill(self.samples.inputs, self.samples.data[:, list(group.outputs)])
+        return factor
 
     @property
     def size(self) -> int:

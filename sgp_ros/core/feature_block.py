@@ -21,6 +21,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import linalg
 
 from sgp_ros.core.factor import GrowingFactor
 from sgp_ros.core.information import Information
@@ -108,6 +109,13 @@ class FeatureBlock:
     def features(self, u: np.ndarray) -> Whitening:
         """Return phi(u), (size,), as `v`, for an input u (d,). O(size^2 / 2)."""
         return self._factor.whiten(u)
+
+    def feature_rows(self, U: np.ndarray) -> np.ndarray:
+        """Return phi at inputs U (n, d), (n, size). O(n size^2 / 2)."""
+        if self.group.kernel is None or not self.inputs:
+            return np.zeros((len(U), 0))
+        K = self.group.kernel.matrix(np.array(self.inputs), U)
+        return np.asarray(linalg.solve_triangular(self.lower, K, lower=True, check_finite=False)).T
 
     def gain(self, features: Whitening) -> np.ndarray:
         """Return g (size,) with `phi theta = g (z - S W)` plus noise of variance g g^T."""

@@ -46,6 +46,15 @@ def changed_block(block: FeatureBlock, group: OutputGroup, samples: SampleBuffer
     return carried
 
 
+def relearned_block(
+    block: FeatureBlock, group: OutputGroup, samples: SampleBuffer
+) -> FeatureBlock:
+    """As `changed_block` where the samples are the whole stream. O(n m (m + k p))."""
+    fresh = FeatureBlock(group, len(block.told[0].z), block.capacity)
+    fresh.learn_anew(samples.inputs, samples.data, samples.weights)
+    return fresh
+
+
 def interpolation_error(block: FeatureBlock, kernel: Kernel | None, U: np.ndarray) -> float:
     """Return the mean variance of Z at U (n, d) about its interpolation by the block's own kernel.
 
@@ -73,7 +82,7 @@ def _carried(block: FeatureBlock, group: OutputGroup, weight: float) -> FeatureB
         return fresh
     for u in block.inputs:
         fresh.join(u, fresh.features(u))
-    Phi = np.array([fresh.features(u).v for u in block.inputs])  # (m, m')
+    Phi = fresh.feature_rows(np.array(block.inputs))  # (m, m')
     R, S = block.data
     S = S.reshape(m, -1, p + 1)[:, chosen] * ratios[:, None]
     R = np.sqrt(block.group.noise / group.noise) * R
@@ -83,11 +92,8 @@ def _carried(block: FeatureBlock, group: OutputGroup, weight: float) -> FeatureB
 
 
 def _relearned(block: FeatureBlock, group: OutputGroup, samples: SampleBuffer) -> FeatureBlock:
-    p = len(block.told[0].z)
-    at_hand = FeatureBlock(block.group, p, block.capacity)
-    fresh = FeatureBlock(group, p, block.capacity)
-    for one in (at_hand, fresh):
-        one.learn_anew(samples.inputs, samples.data, samples.weights)
+    at_hand = relearned_block(block, block.group, samples)
+    fresh = relearned_block(block, group, samples)
     whole, part = block.on_coefficients(), at_hand.on_coefficients()
     for told, i, ratio in zip(fresh.told, *_shares(block, group), strict=True):
         told.add(whole[i].less(part[i]).scaled(float(ratio)))

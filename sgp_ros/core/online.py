@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.core.basis_ahead import BasisAhead
 from sgp_ros.core.factored_buffer import FactoredBuffer
 from sgp_ros.core.forgetting import Forgetting
 from sgp_ros.core.information import Information
@@ -64,6 +65,7 @@ class OnlineRegression:
         self._held = FactoredBuffer(model, samples, budget + 1, policy)
         self._total = self._prior.copy()
         self._basis: StreamBasis | None = None
+        self._ahead = self._nothing_ahead()
 
     @property
     def model(self) -> Model:
@@ -146,6 +148,19 @@ class OnlineRegression:
                 self._total.absorb(row)
         self._keep_to_budget()
 
+    def learn_all(self, data: Observations) -> None:
+        """Learn samples, the first ones, as `learn` does one by one. O(n^3 / 3) per factor."""
+        if self._forgetting.factor != 1.0:
+            for u, f, y in zip(data.U, data.F, data.y, strict=True):
+                self.learn(self.predict(u, f), y)
+            return
+        n = len(data.U)
+        rows = np.concatenate([data.F, data.y[..., None]], axis=2)
+        samples = SampleBuffer(data.U, rows, np.ones(n), n)
+        room = max(self._budget, n) + 1
+        self._take(FactoredBuffer(self.model, samples, room, self._held.policy))
+        self._keep_to_budget()
+
     def _fade(self) -> None:
         self._held.samples.fade(self._forgetting.factor)
         if self._basis is None:
@@ -153,12 +168,21 @@ class OnlineRegression:
         else:
             self._basis.fade(self._forgetting)
 
+    def _nothing_ahead(self) -> BasisAhead:
+        return BasisAhead(StreamBasis(self.model, self._prior, self._features))
+
+    def _look_ahead(self) -> None:
+        if self._basis is None and self._remember:
+            room = self._budget - self.size
+            # What fades as it ages can be absorbed only at the end.
+            if room < 0 or self._forgetting.factor == 1.0:
+                self._ahead.catch_up(self._held.samples, room)
+
     def _keep_to_budget(self) -> None:
+        self._look_ahead()
         while self.size > self._budget:
             if self._remember and self._basis is None:
-                self._basis = StreamBasis.of_samples(
-                    self.model, self._prior, self._features, self._held.samples
-                )
+                self._basis = self._ahead.basis
             self._held.drop()
             if self._basis is None:
                 self._total = self._with_buffer()
@@ -194,7 +218,9 @@ class OnlineRegression:
         policy: str | None = None,
         forgetting: float | None = None,
     ) -> None:
-        """Take other hyper-parameters, budget, memory or policy; refactorises, O(k n^3).
+        """Take other hyper-parameters, budget, memory or policy.
+
+        O(n^3) for each factor whose hyper-parameters or room are others than before.
 
         Raises:
             NumericalError: the buffer has no factor under the new hyper-parameters; nothing has
@@ -204,15 +230,17 @@ class OnlineRegression:
         budget = budget or self._budget
         remember = self._remember if remember is None else remember
         samples = self._held.samples
-        held = FactoredBuffer(model, samples, max(budget, self.size) + 1, policy)
+        room = max(budget, self.size) + 1
+        held = FactoredBuffer(model, samples, room, policy, before=self._held)
         basis = self._basis if remember else None
         if basis is not None and model != self.model:
-            basis = basis.under(model, samples)
+            basis = basis.under(model, samples, is_whole=False)
         self._budget, self._remember, self._basis = budget, remember, basis
         self._take(held)
-        self._keep_to_budget()
         if forgetting is not None:
             self._forgetting = Forgetting(forgetting, self._prior)
+        self._ahead = self._nothing_ahead()
+        self._keep_to_budget()
 
     def state(self) -> dict[str, np.ndarray]:
         """Return everything that was learned, as arrays; `restore` takes it back."""
@@ -234,11 +262,13 @@ class OnlineRegression:
         self._basis = None
         if basis:
             self._basis = StreamBasis.restored(self.model, self._prior, self._features, basis)
+        self._ahead = self._nothing_ahead()
         self._version += 1
 
     def _take(self, held: FactoredBuffer) -> None:
         self._held = held
-        self._total = self._with_buffer()
+        if self._basis is None:
+            self._total = self._with_buffer()
         self._version += 1
 
     def _with_buffer(self) -> Information:

@@ -50,6 +50,9 @@ class Regression(Protocol):
     def learn(self, prediction: OnlinePrediction, y: np.ndarray) -> None:
         """Add the sample that `prediction` was made for, observed as y (k,)."""
 
+    def learn_all(self, data: Observations) -> None:
+        """Learn the first samples of a stream."""
+
     def change(
         self,
         model: Model | None = None,

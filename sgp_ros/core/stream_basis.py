@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sgp_ros.core.feature_block import FeatureBlock
-from sgp_ros.core.feature_change import changed_block
+from sgp_ros.core.feature_change import changed_block, relearned_block
 from sgp_ros.core.information import Information
 from sgp_ros.core.output_groups import group_of, output_groups
 from sgp_ros.core.state_parts import part_of
@@ -56,9 +56,16 @@ class StreamBasis:
     ) -> StreamBasis:
         """Return what these samples tell, absorbed in the order in which they came."""
         basis = cls(model, prior, capacity)
-        for u, data, weight in zip(samples.inputs, samples.data, samples.weights, strict=True):
-            basis.absorb(u, basis.features(u), data, float(weight))
+        basis.absorb_samples(samples, 0, samples.size)
         return basis
+
+    def absorb_samples(self, samples: SampleBuffer, start: int, stop: int) -> None:
+        """Learn samples `start` to `stop`, as much as each counts."""
+        chosen = slice(start, stop)
+        for u, data, weight in zip(
+            samples.inputs[chosen], samples.data[chosen], samples.weights[chosen], strict=True
+        ):
+            self.absorb(u, self.features(u), data, float(weight))
 
     def features(self, u: np.ndarray) -> tuple[Whitening, ...]:
         """Return the features at an input u (d,), one value per block. O(m^2 / 2) each."""
@@ -88,22 +95,30 @@ class StreamBasis:
             for block in self.blocks:
                 self.total.absorb(block.fade(forgetting))
 
-    def under(self, model: Model, samples: SampleBuffer) -> StreamBasis:
-        """Return what the stream tells under other hyper-parameters. O(k m^3 + n k m^2).
+    def under(self, model: Model, samples: SampleBuffer, *, is_whole: bool) -> StreamBasis:
+        """Return what the stream tells under other hyper-parameters.
 
-        Outputs that come to share a kernel keep blocks of their own.
+        O(m^3 + n m^2) for each block whose hyper-parameters change; the others are taken over, so
+        this basis must not learn any more. Outputs that come to share a kernel keep blocks of
+        their own.
 
         Args:
             model: the other hyper-parameters.
             samples: of the stream that are at hand.
+            is_whole: whether these are the whole stream; it is then learned again.
         """
         changed = StreamBasis(model, self._prior, self._capacity)
         changed.unresolved = self.unresolved
-        changed.blocks = tuple(
-            changed_block(block, group_of(model, outputs), samples)
+        change = relearned_block if is_whole else changed_block
+        groups = [
+            (block, group_of(model, outputs))
             for block in self.blocks
             for group in output_groups(model)
             if (outputs := tuple(j for j in group.outputs if j in block.group.outputs))
+        ]
+        changed.blocks = tuple(
+            block if group == block.group else change(block, group, samples)
+            for block, group in groups
         )
         told = [part for block in changed.blocks for part in block.on_coefficients()]
         rows, values = np.vstack([x.R for x in told]), np.concatenate([x.z for x in told])

@@ -64,7 +64,7 @@ def solve_transposed(R: np.ndarray, x: np.ndarray) -> None:
 def absorbed_equations_numpy(
     R: np.ndarray, S: np.ndarray, phi: np.ndarray, rest: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return R (m, m), S (m, c) and what is left on W, by one QR, up to row signs.
+    """Return R (m, m), S (m, c) and what is left on W, by one QR, up to rotations of rows.
 
     Args:
         R: (r, m) before, of any rank.
@@ -73,13 +73,11 @@ def absorbed_equations_numpy(
         rest: (q, c) of these.
 
     Returns:
-        R and S after, and `(r + q - m, c)` equations on W alone.
+        R and S after, and equations on W alone, (r + q - m, c) or (c, c).
     """
     m = R.shape[1]
-    stacked = np.block([[R, S], [phi, rest]])
-    Q, upper = np.linalg.qr(stacked[:, :m], mode='complete')
-    turned = Q.T @ stacked[:, m:]
-    return upper[:m], turned[:m], turned[m:]
+    upper = np.asarray(np.linalg.qr(np.block([[R, S], [phi, rest]]), mode='r'))
+    return upper[:m, :m], upper[:m, m:], upper[m:, m:]
 
 
 def solved_transposed_numpy(R: np.ndarray, x: np.ndarray) -> np.ndarray:

@@ -267,22 +267,21 @@ class Estimator:
 
     def _start(self, arrays: list[Arrays]) -> None:
         """Make the first model from what was gathered, then learn that."""
-        model = self._first_model(arrays)
+        data = None
+        if arrays:
+            data = Observations(*(np.array(column) for column in zip(*arrays, strict=True)))
+        start = None if data is None else initial_model(data, self.inputs)
+        model = model_of_settings(self._config, self.inputs, start)
         self.regression = self.make_regression(model)
         if self._config.model_method == 'SGP':
             plain = Model((None,) * len(model.kernels), model.noise)
             self.baseline = self.make_baseline(plain)
-        for u, f, y in arrays:
-            self._learn(self.regression, self.regression.predict(u, f), y)
-            if self.baseline is not None:
-                self.baseline.learn(self.baseline.predict(u, f), y)
-
-    def _first_model(self, arrays: list[Arrays]) -> Model:
-        if not arrays:
-            return model_of_settings(self._config, self.inputs, None)
-        U, F, y = (np.array(column) for column in zip(*arrays, strict=True))
-        start = initial_model(Observations(U, F, y), self.inputs)
-        return model_of_settings(self._config, self.inputs, start)
+        if data is None:
+            return
+        self.regression.learn_all(data)
+        if self.baseline is not None:
+            self.baseline.learn_all(data)
+        self._counts.learned += len(data.U)
 
     def _unknown(self, equation: Equation) -> Estimate:
         return Estimate(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,6 +16,8 @@ from sgp_ros.core.online import OnlineRegression
 from sgp_ros.core.posterior import Posterior
 from sgp_ros.core.prior import CoefficientPrior
 from sgp_ros.core.rotations import absorb_rows, absorbed_rows_numpy
+from sgp_ros.core.sample_buffer import SampleBuffer
+from sgp_ros.core.stream_basis import StreamBasis
 from sgp_ros.errors import NumericalError
 from test.core.worlds import random_problem, returning
 
@@ -231,6 +235,46 @@ def test_changed_hyperparameters_equal_a_fresh_start():
     np.testing.assert_allclose(online.information.coefficients, batch.coefficients, atol=1e-10)
 
 
+@pytest.mark.parametrize('changed', [(0,), (1,), (0, 1)])
+def test_outputs_may_take_their_hyperparameters_one_after_the_other(changed):
+    """Factors of the others are taken over; the end is that of one change, before and after the
+    buffer is full, and what a basis told is not counted anew."""
+    model, data = random_problem(3, n=60, k=2, d=2)
+    other = Model(tuple(replace(k, variance=1.3 * k.variance) for k in model.kernels), (0.3, 0.2))
+    prior = CoefficientPrior.from_std(np.zeros(3), np.ones(3))
+    for budget in (100, 40):
+        at_once, by_parts = (_stream(model, data, prior, budget) for _ in range(2))
+        at_once.change(other)
+        mixed = Model(
+            tuple((other if j in changed else model).kernels[j] for j in range(2)),
+            tuple((other if j in changed else model).noise[j] for j in range(2)),
+        )
+        by_parts.change(mixed)
+        by_parts.change(other)
+        u, f = data.U[0] + 0.1, data.F[0]
+        one, two = at_once.predict(u, f), by_parts.predict(u, f)
+        np.testing.assert_allclose(two.mean, one.mean, rtol=1e-9)
+        np.testing.assert_allclose(two.covariance, one.covariance, rtol=1e-9)
+
+
+def test_the_basis_is_filled_while_the_buffer_fills():
+    """The first sample that leaves finds it complete, whatever changed before."""
+    model, prior, _, data = returning(0, n=61)
+    online = _stream(model, Observations(data.U[:50], data.F[:50], data.y[:50]), prior, 60)
+    assert online._ahead.count == 50
+    online.change(Model(model.kernels, (0.2,)))
+    counts = []
+    for u, f, y in zip(data.U[50:], data.F[50:], data.y[50:], strict=True):
+        online.learn(online.predict(u, f), y)
+        counts.append(online._ahead.count)
+    assert np.diff(counts).max() <= 7
+    assert counts[-1] == 61
+    rows = np.concatenate([data.F, data.y[..., None]], axis=2)
+    samples = SampleBuffer(data.U, rows, np.ones(61), 61)
+    fresh = StreamBasis.of_samples(online.model, Information.of_prior(prior), 100, samples)
+    np.testing.assert_array_equal(online.information.R, fresh.total.R)
+
+
 def test_stale_predictions_are_refused():
     """Learning reuses the solve of the prediction, so it must belong to the present model."""
     model, data = random_problem(10)
@@ -312,3 +356,18 @@ def test_information_starts_from_the_prior():
     information = Information.of_prior(prior)
     np.testing.assert_allclose(information.coefficients, [1.0, 2.0])
     np.testing.assert_allclose(information.covariance, np.diag([0.25, 9.0]), atol=1e-12)
+
+
+@pytest.mark.parametrize('budget', [100, 20])
+@pytest.mark.parametrize('forgetting', [0.0, 50.0])
+def test_all_at_once_equals_one_by_one(budget, forgetting):
+    """Before and after samples leave, with and without forgetting."""
+    model, prior, _, data = returning(1, n=40)
+    one_by_one = _stream(model, data, prior, budget, forgetting=forgetting)
+    at_once = OnlineRegression(model, prior, budget, forgetting=forgetting)
+    at_once.learn_all(data)
+    assert at_once.size == one_by_one.size
+    u, f = data.U[3] + 0.1, data.F[0]
+    found, expected = at_once.predict(u, f), one_by_one.predict(u, f)
+    np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-8)
+    np.testing.assert_allclose(found.covariance, expected.covariance, rtol=1e-8)
