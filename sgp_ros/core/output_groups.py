@@ -46,6 +46,15 @@ def output_groups(model: Model) -> tuple[OutputGroup, ...]:
     return tuple(found)
 
 
+def separable(one: Model, other: Model) -> tuple[tuple[int, ...], ...]:
+    """Return the finest sets of outputs that share no factor with others under either model."""
+    sets = [{j} for j in range(len(one.noise))]
+    for group in (*output_groups(one), *output_groups(other)):
+        joined = [s for s in sets if s.intersection(group.outputs)]
+        sets = [s for s in sets if s not in joined] + [set().union(*joined)]
+    return tuple(tuple(sorted(s)) for s in sorted(sets, key=min))
+
+
 def group_of(model: Model, outputs: tuple[int, ...]) -> OutputGroup:
     """Return some outputs of one group as a group of their own."""
     first = outputs[0]

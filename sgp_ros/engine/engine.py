@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sgp_ros.engine.estimator import Estimator
-from sgp_ros.engine.fitting import FitRequest, FitResult
+from sgp_ros.engine.fitting import FitRequest
 from sgp_ros.engine.intake import Intake
 from sgp_ros.engine.ordering import ReorderBuffer
 from sgp_ros.engine.readout import read_parameters, read_scores
@@ -20,7 +20,6 @@ from sgp_ros.engine.samples import (
     SettingsChange,
 )
 from sgp_ros.engine.snapshots import fill_from_snapshot, snapshot_config, take_snapshot
-from sgp_ros.errors import NumericalError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -144,25 +143,23 @@ class Engine:
             self.config.seed,
         )
 
-    def accept_fit(self, fit: FitResult) -> SettingsChange | None:
-        """Put a fit in force; return the event to record, None where it is refused and counted."""
-        reason = fit.refusal
-        if not reason:
-            assert fit.model is not None
-            try:
-                change = self.change(self._hyper_settings(fit.model))
-            except NumericalError:
-                reason = 'no_factor'
-            else:
-                self.counts.refits += 1
-                return change
-        self.counts.refits_refused_for[reason] += 1
-        return None
-
     def hyper_settings(self) -> dict[str, SettingValue]:
         """Return the hyper-parameters in force as settings, also those still automatic."""
         regression = self.estimator.regression
-        return {} if regression is None else self._hyper_settings(regression.model)
+        return {} if regression is None else self.settings_of(regression.model)
+
+    def settings_of(self, model: Model) -> dict[str, SettingValue]:
+        """Return hyper-parameters as settings."""
+        settings: dict[str, SettingValue] = {}
+        for joint, kernel, noise in zip(
+            self.robot.joint_names, model.kernels, model.noise, strict=True
+        ):
+            prefix = f'hyper.{joint}.'
+            settings[prefix + 'noise_variance'] = noise
+            if kernel is not None:
+                settings[prefix + 'signal_variance'] = kernel.variance
+                settings[prefix + 'lengthscales'] = kernel.lengthscales
+        return settings
 
     def parameters(self) -> tuple[ParameterEstimate, ...]:
         """Return the posterior of every coefficient, from the source that the settings name."""
@@ -271,18 +268,6 @@ class Engine:
             self.intake.configure_limits(config)
         self.order.window_ns = round(config.reorder_window * 1e9)
         self.config = config
-
-    def _hyper_settings(self, model: Model) -> dict[str, SettingValue]:
-        settings: dict[str, SettingValue] = {}
-        for joint, kernel, noise in zip(
-            self.robot.joint_names, model.kernels, model.noise, strict=True
-        ):
-            prefix = f'hyper.{joint}.'
-            settings[prefix + 'noise_variance'] = noise
-            if kernel is not None:
-                settings[prefix + 'signal_variance'] = kernel.variance
-                settings[prefix + 'lengthscales'] = kernel.lengthscales
-        return settings
 
     def _count_arrival(self, event: Event) -> None:
         if isinstance(event, JointSample):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from sgp_ros.engine.fitting import fit
 from sgp_ros.engine.samples import SettingsChange
+from sgp_ros.engine.swap import Swap
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -21,6 +22,7 @@ def replay(
     on_step: Callable[[Step], None],
     *,
     obey_record: bool = False,
+    push: Callable[[Event], Step] | None = None,
 ) -> None:
     """Push all events, then flush.
 
@@ -30,9 +32,11 @@ def replay(
         on_step: sees what every push gave.
         obey_record: the stream is the record of a live run; its own changes of hyper-parameters
             are applied where they happened, and none is fitted here.
+        push: stands for that of the engine, to watch it.
     """
+    push = push or engine.push
     for event in events:
-        on_step(engine.push(event))
+        on_step(push(event))
         _fit_if_due(engine, obey_record=obey_record)
     on_step(engine.flush())
     _fit_if_due(engine, obey_record=obey_record)
@@ -50,4 +54,4 @@ def is_record(events: Iterable[Event]) -> bool:
 def _fit_if_due(engine: Engine, *, obey_record: bool) -> None:
     request = engine.take_fit_request()
     if request is not None and not obey_record:
-        engine.accept_fit(fit(request))
+        Swap(engine, fit(request)).finish()

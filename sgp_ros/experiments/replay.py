@@ -125,10 +125,11 @@ def run_events(
     stamps: list[int] = []
     began = time.perf_counter()
     replay(
-        _Timed(engine, timing),  # type: ignore[arg-type] # stands for the engine it wraps
+        engine,
         _counted(recording.events(options.joint_states, options.command), total, stamps, progress),
         on_step,
         obey_record=obey,
+        push=_timed(engine.push, timing),
     )
     timing.wall_s = time.perf_counter() - began
     if stamps:
@@ -136,21 +137,14 @@ def run_events(
     progress(1.0)
 
 
-class _Timed:
-    """An engine whose pushes are timed."""
-
-    def __init__(self, engine: Engine, timing: Timing) -> None:
-        self._engine = engine
-        self._timing = timing
-        self.flush = engine.flush
-        self.take_fit_request = engine.take_fit_request
-        self.accept_fit = engine.accept_fit
-
-    def push(self, event: Event) -> Step:
+def _timed(push: Callable[[Event], Step], timing: Timing) -> Callable[[Event], Step]:
+    def timed(event: Event) -> Step:
         began = time.perf_counter()
-        step = self._engine.push(event)
-        self._timing.push_s.append(time.perf_counter() - began)
+        step = push(event)
+        timing.push_s.append(time.perf_counter() - began)
         return step
+
+    return timed
 
 
 def _counted(

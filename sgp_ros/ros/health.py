@@ -49,17 +49,15 @@ class Health:
         """Note how long the engine took for one event [s]."""
         self._durations_s.append(duration_s)
 
-    def note_fit(self, fit: FitResult, *, is_in_force: bool) -> None:
-        """Note what a fit found, and why it was refused if it was."""
+    def note_fit(self, fit: FitResult, refusal: str) -> None:
+        """Note what a fit found, and why it was refused, empty if it was not."""
         gain = fit.log_evidence - fit.log_evidence_before
-        if is_in_force:
-            self.last_fit = f'log evidence rose by {gain:.3g} nat'
-        elif fit.refusal == 'diverged':
-            self.last_fit = 'refused: diverged, nothing that it tried has a usable covariance'
-        elif fit.refusal == 'no_better':
-            self.last_fit = f'refused: no better, its log evidence is {-gain:.3g} nat lower'
-        else:
-            self.last_fit = 'refused: the buffer has no factor under what it found'
+        self.last_fit = {
+            '': f'log evidence rose by {gain:.3g} nat',
+            'diverged': 'refused: diverged, nothing that it tried has a usable covariance',
+            'no_better': f'refused: no better, its log evidence is {-gain:.3g} nat lower',
+            'no_factor': 'refused: the buffer has no factor under what it found for some joint',
+        }[refusal]
 
     def note_unreadable(self, error: MessageError) -> None:
         """Note a message that is no sample."""

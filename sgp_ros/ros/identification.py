@@ -183,11 +183,11 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
         self._overlay.publish(joint_state(outputs.joint_state))
 
     def _poll(self) -> None:
-        refits = self._session.engine.counts.refits
+        before = self._session.engine.config
         warning = self._session.poll_fit()
         if warning:
             self.get_logger().warning(warning)
-        if self._session.engine.counts.refits != refits:
+        if self._session.engine.config is not before:
             self._write_back()
         self._tell_verdict()
 
@@ -236,10 +236,13 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
 
     def _write_back(self) -> None:
         """Show the hyper-parameters in force as parameters."""
-        learned = self._session.engine.hyper_settings()
+        learned = {n: to_ros(v) for n, v in self._session.engine.hyper_settings().items()}
+        shown = {n: self.get_parameter(n).value for n in learned}
         self._is_writing_back = True
         try:
-            self.set_parameters([Parameter(n, value=to_ros(v)) for n, v in learned.items()])
+            self.set_parameters(
+                [Parameter(n, value=v) for n, v in learned.items() if v != shown[n]]
+            )
         finally:
             self._is_writing_back = False
 

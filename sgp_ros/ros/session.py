@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from sgp_ros.engine.fitting import FitResult
 from sgp_ros.engine.samples import JointSample
+from sgp_ros.engine.swap import Swap
 from sgp_ros.recordings.predictions import Outputs, outputs
 from sgp_ros.ros.fit_process import FitProcess, WorkerLost
 from sgp_ros.ros.health import Health
@@ -36,6 +37,7 @@ class Session:
         self.health = Health()
         self._record = record
         self._fits = FitProcess()
+        self._swap: Swap | None = None
 
     def take(self, event: Event) -> list[Outputs]:
         """Push an event; return what is to be published."""
@@ -55,10 +57,14 @@ class Session:
             ConfigError: a wrong setting; nothing has changed.
             NumericalError: impossible hyper-parameters; nothing has changed.
         """
-        self._write_event(self.engine.change(settings))
+        change = self.engine.change(settings)
+        if any(name.startswith('hyper.') for name in settings):
+            self._swap = None  # what the user says is newer than the fit
+        self._write_event(change)
 
     def reset(self) -> None:
         """Forget everything that was learned."""
+        self._swap = None
         self._write_event(self.engine.reset())
 
     def refit(self) -> bool:
@@ -68,18 +74,26 @@ class Session:
         return asked
 
     def poll_fit(self) -> str:
-        """Put a finished fit in force; return a warning for the log, or nothing."""
+        """Put a part of a finished fit in force; return a warning for the log, or nothing."""
         answer = self._fits.poll()
         if isinstance(answer, FitResult):
-            change = self.engine.accept_fit(answer)
-            self.health.note_fit(answer, is_in_force=change is not None)
-            if change is not None:
-                self._write_event(change)
+            self._swap = Swap(self.engine, answer)
+            self._note_fit(self._swap)
         elif isinstance(answer, WorkerLost):
             self.health.last_fit = f'lost: the worker ended with code {answer.exit_code}'
             return f'fit {self.health.last_fit}; another starts with the next fit'
+        elif self._swap is not None:
+            change = self._swap.step()
+            if change is not None:
+                self._write_event(change)
+            self._note_fit(self._swap)
         self._hand_out_fit()
         return ''
+
+    def _note_fit(self, swap: Swap) -> None:
+        if swap.is_done:
+            self.health.note_fit(swap.fit, swap.refusal)
+            self._swap = None
 
     def save(self, path: Path, settings: Mapping[str, SettingValue]) -> None:
         """Save model and settings.
@@ -122,7 +136,7 @@ class Session:
                 self._record = None
 
     def _hand_out_fit(self) -> None:
-        if self._fits.is_free:
+        if self._fits.is_free and self._swap is None:
             request = self.engine.take_fit_request()
             self.health.fit_since_s = None if request is None else time.perf_counter()
             if request is not None:

@@ -21,6 +21,7 @@ from sgp_ros.engine.samples import (
     SettingsChange,
     frozen_array,
 )
+from sgp_ros.engine.swap import Swap
 from sgp_ros.errors import ConfigError
 from test.engine.worlds import (
     INVERSE_PENDULUM,
@@ -112,9 +113,7 @@ def test_released_events_reproduce_the_run():
         keep(engine.push(event))
         request = engine.take_fit_request()
         if request is not None:
-            change = engine.accept_fit(fit(request))
-            if change is not None:
-                record.append(change)
+            record.extend(Swap(engine, fit(request)).finish())
         if i == 300:
             record.append(engine.change({'buffer.budget': 30, 'hyper.hinge.noise_variance': 0.5}))
         if i == 400:
@@ -348,7 +347,7 @@ def test_a_fit_that_is_no_better_is_refused():
         (FitResult(0, lost, 3.0, 2.0, 5), 'no_factor'),
     ):
         before = dict(engine.counts.refits_refused_for)
-        assert engine.accept_fit(fit_) is None
+        assert Swap(engine, fit_).finish() == []
         assert engine.counts.refits_refused_for == before | {reason: before[reason] + 1}
     assert engine.counts.refits_refused == 6
     assert engine.counts.refits == 0
@@ -361,7 +360,7 @@ def test_a_fit_may_find_what_the_scale_of_the_data_allows():
     model = engine.estimator.regression.model
     large = tuple(dataclasses.replace(kernel, variance=1e14) for kernel in model.kernels)
     found = dataclasses.replace(model, kernels=large, noise=(1e4,))
-    assert engine.accept_fit(FitResult(0, found, 3.0, 2.0, 5)) is not None
+    assert len(Swap(engine, FitResult(0, found, 3.0, 2.0, 5)).finish()) == 1
     assert engine.estimator.regression.model == found
 
 

@@ -11,6 +11,7 @@ from sgp_ros.core.model import Model
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitResult
 from sgp_ros.engine.samples import CommandSample
+from sgp_ros.engine.swap import Swap
 from sgp_ros.ros.health import Health
 from sgp_ros.ros.verdict import OK, WARN
 from test.engine.worlds import PENDULUM, config, pendulum_events
@@ -50,23 +51,23 @@ def test_a_robot_that_changed_is_told():
 
 
 @pytest.mark.parametrize(
-    ('model', 'evidence', 'is_in_force', 'said'),
+    ('model', 'evidence', 'refusal', 'said'),
     [
-        ('found', 5.0, True, 'log evidence rose by 3 nat'),
-        ('found', 1.5, False, 'no better, its log evidence is 0.5 nat lower'),
-        (None, -np.inf, False, 'diverged'),
-        ('found', np.nan, False, 'diverged'),
-        ('found', 5.0, False, 'no factor'),
+        ('found', 5.0, '', 'log evidence rose by 3 nat'),
+        ('found', 1.5, 'no_better', 'no better, its log evidence is 0.5 nat lower'),
+        (None, -np.inf, 'diverged', 'diverged'),
+        ('found', np.nan, 'diverged', 'diverged'),
+        ('found', 5.0, 'no_factor', 'no factor'),
     ],
 )
-def test_the_reason_of_a_refused_fit_is_told(model, evidence, is_in_force, said):
+def test_the_reason_of_a_refused_fit_is_told(model, evidence, refusal, said):
     """A fit that diverged asks for another look at the data; one that is no better does not."""
     engine = Engine(PENDULUM, config())
     for event in pendulum_events(100):
         engine.push(event)
     health = Health()
     found = Model((None,), (1.0,)) if model else None
-    health.note_fit(FitResult(0, found, evidence, 2.0, 5), is_in_force=is_in_force)
+    health.note_fit(FitResult(0, found, evidence, 2.0, 5), refusal)
     statuses = health.statuses(engine, 'node', 1.0, SOURCES)
     values = next(status for status in statuses if status.name == 'node: model').values
     assert said in values['last_refit']
@@ -77,7 +78,7 @@ def test_refused_fits_are_counted_by_reason():
     engine = Engine(PENDULUM, config())
     for event in pendulum_events(100):
         engine.push(event)
-    engine.accept_fit(FitResult(0, None, -np.inf, 2.0, 5))
+    Swap(engine, FitResult(0, None, -np.inf, 2.0, 5))
     statuses = Health().statuses(engine, 'node', 1.0, SOURCES)
     values = next(status for status in statuses if status.name == 'node: model').values
     assert values['refits_refused'] == values['refits_refused.diverged'] == '1'
