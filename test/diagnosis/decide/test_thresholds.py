@@ -7,8 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import binomtest
 
-from sgp_ros.diagnosis.decide.decision import ADEQUATE_REST, PER_EFFECT, PER_PARAMETER
+from sgp_ros.diagnosis.decide.decision import (
+    ADEQUATE_REST,
+    PER_EFFECT,
+    PER_PARAMETER,
+    SHAPE_ERROR,
+)
 
 RESULTS = Path(__file__).parents[3] / 'benchmarks' / 'results'
 FALSE_ALARMS, UNKNOWN_CALLED = 0.05, 0.7
@@ -61,3 +67,24 @@ def test_what_is_adequate_separates_right_models_from_wrong_lists(worlds):
     wrong = [w['structured_rest'] for w in worlds['unlisted effect'] if w['structured_rest']]
     assert np.mean(np.array(right) < ADEQUATE_REST) >= 0.9
     assert np.mean(np.array(wrong) > ADEQUATE_REST) >= UNKNOWN_CALLED
+
+
+def test_the_shape_error_covers_what_right_columns_leave(worlds):
+    """Beyond noise; where it were less, rivals would differ by errors of the filters."""
+    right = np.array([w['right_structured_rest'] for w in _right(worlds)])
+    assert np.mean(right < SHAPE_ERROR) >= 0.9
+
+
+def test_certainties_keep_what_they_say():
+    """`ROWS` and `TEMPER` make them: in every band at least as much is right as the band begins
+    with, as far as the number of worlds can tell."""
+    bands = {}
+    for tier in 'ab':
+        report = json.loads((RESULTS / f'concealed_{tier}.json').read_text())
+        for case in report['cases']:
+            if case.get('certainty') is not None:
+                least = max(b for b in (0.0, 0.5, 0.8, 0.95) if b <= case['certainty'])
+                bands.setdefault(least, []).append(case['right'])
+    assert len(bands[0.95]) >= 50
+    for least, right in bands.items():
+        assert binomtest(sum(right), len(right), least, alternative='less').pvalue > FALSE_ALARMS
