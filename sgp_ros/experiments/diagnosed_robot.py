@@ -1,7 +1,8 @@
 """What a diagnosis leaves for the next run: robot_diagnosed.yaml beside its URDF.
 
 The YAML states the effects that were found in the words of diagnosis.json, with their standard
-deviations, behind those that the nominal robot states; the URDF has the bodies of the final model.
+deviations, behind those that the nominal robot states; the URDF has the bodies of the final model,
+and no dry friction, which a diagnosis takes for an effect.
 """
 
 from __future__ import annotations
@@ -12,10 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import yaml
 
+from sgp_ros.core.pseudo_inertia import is_consistent
 from sgp_ros.errors import ConfigError
 from sgp_ros.report.files import write_text
 from sgp_ros.robots.effects.stated import SIDED, effect_names
+from sgp_ros.robots.tree import read_urdf
 from sgp_ros.robots.urdf_robot import nominal_tree, urdf_text
+from sgp_ros.robots.urdf_text import parse_urdf
 from sgp_ros.robots.urdf_writer import write_urdf
 
 if TYPE_CHECKING:
@@ -42,7 +46,7 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis) -> None:
     Raises:
         ConfigError: the URDF is no longer what it was.
     """
-    text = urdf_text(robot)
+    text = _without_friction(urdf_text(robot))
     path = out / URDF_NAME
     if found.bodies is None or not _holds_bodies(path, text, robot, found.bodies):
         write_text(path, text)
@@ -103,15 +107,25 @@ def _physics(robot: Robot) -> dict[str, Any]:
     return {'terms': dict.fromkeys(terms, 'all'), **prior}
 
 
+def _without_friction(text: str) -> str:
+    joints = parse_urdf(text).joints.values()
+    return write_urdf(text, {}, {j.name: (j.damping, 0.0) for j in joints if j.friction})
+
+
 def _holds_bodies(path: Path, text: str, robot: Robot, bodies: np.ndarray) -> bool:
     """Write the URDF with these bodies; return whether the robot read from it has them.
 
-    Behind locked joints, and with a payload, a moving body is more than its link and what is
-    fixed to it, so what was written is read again.
+    A moving body is its link, what is fixed to it, what hangs on locked joints behind it, and
+    the payload that the robot states. Its link takes what is left beside those two.
     """
-    names = nominal_tree(robot).link_names
+    nominal, free = nominal_tree(robot), read_urdf(text)
+    own = [free.parameters[free.link_names.index(link)] for link in nominal.link_names]
+    beside = nominal.parameters - np.array(own)
+    left = bodies - beside
+    if not np.all(is_consistent(left) | ~beside.any(axis=1)):
+        return False
     try:
-        write_text(path, write_urdf(text, dict(zip(names, bodies, strict=True)), {}))
+        write_text(path, write_urdf(text, dict(zip(nominal.link_names, left, strict=True)), {}))
         again = nominal_tree(replace(robot, source={**robot.source, 'urdf': str(path)}))
     except ConfigError:
         return False

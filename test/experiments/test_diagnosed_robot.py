@@ -153,15 +153,43 @@ def test_the_urdf_has_the_bodies_that_were_found(tmp_path):
     assert again.damping.tolist() == tree.damping.tolist()
 
 
-@pytest.mark.parametrize('text', ['locked: {elbow: 0.2}\n', 'payload: {link: tool0, mass: 0.5}\n'])
-def test_a_urdf_that_cannot_hold_the_bodies_stays_as_it_is(tmp_path, text):
-    """Behind a locked joint a body is more than its link; a payload would count twice."""
-    (tmp_path / 'nominal.urdf').write_text(URDF)
-    (tmp_path / 'nominal.yaml').write_text(f'schema: 1\nurdf: nominal.urdf\n{text}')
-    tree = nominal_tree(load_robot(str(tmp_path / 'nominal.yaml')))
-    bodies = 1.2 * tree.parameters
+TEXTS = ['locked: {elbow: 0.2}\n', 'payload: {link: tool0, mass: 0.5}\n']
+
+
+def _heavier(folder, text, factor):
+    """Return the robot of a YAML and its bodies, heavier by a factor and wide enough to exist."""
+    (folder / 'nominal.urdf').write_text(URDF)
+    (folder / 'nominal.yaml').write_text(f'schema: 1\nurdf: nominal.urdf\n{text}')
+    bodies = factor * nominal_tree(load_robot(str(folder / 'nominal.yaml'))).parameters
     bodies[bodies[:, 0] <= 0.0, 0] = 0.01
+    bodies[:, [4, 6, 9]] += 0.1
+    return bodies
+
+
+@pytest.mark.parametrize('text', TEXTS)
+def test_bodies_are_written_less_what_hangs_on_locked_joints_and_the_payload(tmp_path, text):
+    """Read again by the same YAML they are those that were found."""
+    bodies = _heavier(tmp_path, text, 1.2)
     out = _written(tmp_path, URDF, bodies=bodies, yaml_text=text)
-    assert (out / URDF_NAME).read_text() == URDF
     assert yaml.safe_load((out / YAML_NAME).read_text()).items() >= yaml.safe_load(text).items()
+    again = nominal_tree(load_robot(str(out / YAML_NAME)))
+    np.testing.assert_allclose(again.parameters, bodies, atol=1e-9)
+
+
+@pytest.mark.parametrize('text', TEXTS)
+def test_a_urdf_that_cannot_hold_the_bodies_keeps_its_own(tmp_path, text):
+    """A body lighter than what hangs on its link leaves nothing for the link."""
+    bodies = _heavier(tmp_path, text, 0.01)
+    out = _written(tmp_path, URDF, bodies=bodies, yaml_text=text)
+    np.testing.assert_array_equal(
+        read_urdf(out / URDF_NAME).parameters, read_urdf(URDF).parameters
+    )
     load_robot(str(out / YAML_NAME))
+
+
+def test_the_urdf_has_no_dry_friction_for_that_is_an_effect(tmp_path):
+    """A diagnosis finds all of it: with that of the URDF it would count twice in a simulation."""
+    assert read_urdf(URDF).friction.any()
+    again = read_urdf(_written(tmp_path, URDF) / URDF_NAME)
+    assert not again.friction.any()
+    assert again.damping.tolist() == read_urdf(URDF).damping.tolist()
