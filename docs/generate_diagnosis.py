@@ -151,8 +151,8 @@ TAIL = """
 * **The built-in reaction wheel** is commanded in volts. What is said in N m of its wheel takes the motor of the
   simulation, 0.03 N m/V; back-EMF is part of the nominal damping, so a motor of another constant, or a dead zone
   of the current, shows in both.
-* **Stated backlash** is left out when a diagnosed robot is diagnosed or simulated again: its gap does not say how
-  much of the inertia sits on the motor. All other effects of a robot YAML belong to its nominal model, each as if
+* **Stated backlash** is left out when a diagnosed robot is diagnosed again: the share of the inertia that sits on the
+  motor changes with the pose, and one number for it is only enough to simulate it. All other effects of a robot YAML belong to its nominal model, each as if
   it were alone: a delay does not delay what a dead zone passes on.
 """
 

@@ -44,8 +44,10 @@ NOT_ONLINE = (
 """Effects that depend on more than position, velocity, acceleration and effort at one time."""
 _POSITIVE = (
     'stribeck_velocity', 'time_constant', 'presliding', 'mass', 'width', 'limit', 'delay', 'gap',
-    'gain',
+    'gain', 'motor_inertia',
 )  # fmt: skip
+_OPTIONAL = ('motor_inertia',)
+"""Numbers that a model does without."""
 _WHOLE_ROBOT = {'command_delay': 'all'}
 
 
@@ -215,6 +217,8 @@ def _numbers(
     values, std = {}, {}
     for name, unit in quantities.items():
         entry = given.get(name)
+        if entry is None and name in _OPTIONAL:
+            continue
         if not isinstance(entry, dict) or not {'value'} <= set(entry) <= {'value', 'std', 'unit'}:
             problems.append(f'{where}: {name} is {entry!r}, not {{value, std, unit}}')
             continue

@@ -14,6 +14,7 @@ from sgp_ros.robots.effects.drive import Drive
 from sgp_ros.robots.effects.effect import Fitted, Place, Quantity
 from sgp_ros.robots.effects.friction import inside
 from sgp_ros.robots.effects.observed_motion import ObservedMotion
+from sgp_ros.robots.rigid_body import mass_matrix
 from sgp_ros.robots.tree import read_urdf
 
 STEP, ROWS = 0.01, 400
@@ -288,7 +289,8 @@ def test_friction_opposes_the_motion_as_the_formulas_say(j):
         ('joint_coupling', [0.5], [4.0], {'kind': 'spring', 'source': 2},
          {'kind': 'spring', 'stiffness': 4.0, 'ratio': 0.5, 'source_joint': 'j2'}),
         ('hysteresis', [0.05], [0.3], {}, {'level': 0.3, 'presliding': 0.05}),
-        ('backlash', [0.3, 0.01], [1.0], {}, {'gap': 0.01}),
+        ('backlash', [0.1, 0.01], [1.0], {},
+         {'gap': 0.01, 'motor_inertia': 0.1 * float(np.mean(MOTION.mass_diagonal[:, 0]))}),
     ],
     ids=lambda x: x if isinstance(x, str) else '',
 )  # fmt: skip
@@ -565,6 +567,14 @@ def _pressed(effort):
     torque[:, 0] = effort
     level = replace(TREE, gravity=np.zeros(3), damping=np.zeros(4))
     return ObservedMotion(level, STEP * np.arange(n), STEP, flat, flat, flat, torque, None)
+
+
+def test_the_motor_behind_play_has_less_inertia_than_the_joint_moves_alone():
+    """With more, what is left for the link would be no mass matrix and could not be simulated."""
+    values, _ = report('backlash', 0, [0.9, 0.01], [1.0])
+    M = mass_matrix(TREE, TREE.parameters, MOTION.position)
+    M[:, 0, 0] -= values['motor_inertia']
+    assert np.linalg.eigvalsh(M).min() > 0.0
 
 
 def test_play_exerts_no_force_while_the_gear_presses():

@@ -19,6 +19,7 @@ from sgp_ros.robots.effects.effect import (
     is_positive,
 )
 from sgp_ros.robots.effects.loads import per_turn
+from sgp_ros.robots.rigid_body import mass_matrix
 
 if TYPE_CHECKING:
     from sgp_ros.robots.effects.effect import Fitted, Value
@@ -174,6 +175,22 @@ def _second_difference(x: np.ndarray, step: float) -> np.ndarray:
     return np.diff(np.pad(x, 1, mode='edge'), 2) / step**2
 
 
+def _play_of(f: Fitted) -> dict[str, Value]:
+    """Return gap and the motor's inertia, its share of what the joint has over the motion.
+
+    It is less than the joint moves while all others are free: the link keeps some.
+    """
+    joint, rows = f.place.joint, slice(None, None, max(1, len(f.motion.time) // _POSES))
+    M = mass_matrix(f.motion.tree, f.motion.tree.parameters, f.motion.position[rows])
+    least = 1.0 / float(np.linalg.inv(M)[:, joint, joint].max())
+    inertia = float(f.shape[0]) * float(np.mean(f.motion.mass_diagonal[:, joint]))
+    return {'gap': float(f.shape[1]), 'motor_inertia': min(inertia, _MOST_OF_LINK * least)}
+
+
+_POSES = 200
+_MOST_OF_LINK = 0.9
+
+
 def _gaps(motion: ObservedMotion, place: Place) -> np.ndarray:
     span = float(np.ptp(motion.position[:, place.joint]))
     widths = np.geomspace(0.0005, 0.04, 7) * span
@@ -199,8 +216,8 @@ ENCODER_ECCENTRICITY = Effect(
     small=SmallEffect(_slightly_eccentric, lambda start, c: np.array([start[0], *c])),
 )  # fmt: skip
 BACKLASH = Effect(
-    'backlash', (Quantity('gap', 'rad'),), _backlash, every_motor, _gaps,
-    lambda f: {'gap': float(f.shape[1])}, always,
+    'backlash', (Quantity('gap', 'rad'), Quantity('motor_inertia', 'kg m2')), _backlash,
+    every_motor, _gaps, _play_of, always,
     'motor and link play freely within gap; the encoder sits on the motor', is_given=True,
     uses_bodies=True, sees_acceleration=True, has_memory=True,
     bounds=lambda motion, place: (

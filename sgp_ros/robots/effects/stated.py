@@ -198,7 +198,7 @@ _INVERSE: dict[str, Callable[[Numbers], tuple[list[float], list[float]]]] = {
     'saturation': _shaped('limit'),
     'actuator_lag': _shaped('time_constant'),
     'command_delay': _shaped('delay'),
-    # the share of the inertia that sits on the motor's side is not stated
+    # the motor's share of the inertia changes with the pose: its inertia alone does not say it
     'backlash': lambda x: ([math.nan, x['gap']], [1.0]),
     'hysteresis': lambda x: ([x['presliding']], [x['level']]),
     'encoder_eccentricity': lambda x: ([x['periods'], *_wave(x)[1]], [1.0]),

