@@ -140,11 +140,11 @@ def _refuse(problems: list[str], text: str, kind: EffectKind) -> None:
 
 
 def _description(parameter: EffectParameter) -> str:
+    usual = '' if parameter.default is None else f', usually {parameter.default}'
     if parameter.choices:
-        return f'{parameter.name} = ' + ' or '.join(parameter.choices)
+        return f'{parameter.name} = ' + ' or '.join(parameter.choices) + usual
     if parameter.is_joint:
         return f'{parameter.name} = another joint'
     limit = f' >= {parameter.low:g}' if math.isfinite(parameter.low) else ''
     kind = f' for {parameter.only_kind}' if parameter.only_kind else ''
-    usual = '' if parameter.default is None else f', usually {parameter.default:g}'
     return f'{parameter.name}{limit} [{parameter.unit or "1"}]{kind}{usual}'

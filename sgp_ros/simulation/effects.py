@@ -93,6 +93,10 @@ class Place(Enum):
     TOOL = 'tool'
 
 
+NEARER = 'nearer'
+SIDES = (NEARER, 'lower', 'upper')
+"""Ends of a joint's range: the one nearer to where an effect begins, or one by name."""
+
 EVERY_MOTOR = 'all'
 """Joint of an effect that acts on every motor."""
 
@@ -117,7 +121,7 @@ class EffectParameter:
     low: float = -math.inf
     choices: tuple[str, ...] = ()
     unit_by_kind: Mapping[str, str] = field(default_factory=dict)
-    default: float | None = None
+    default: ParameterValue | None = None
     only_kind: str = ''
     is_joint: bool = False
 
@@ -125,6 +129,24 @@ class EffectParameter:
         """Return the unit on this joint for this value of the parameter `kind`."""
         unit = self.unit_by_kind.get(str(kind), self.unit)
         return _LINEAR_UNIT.get(unit, unit) if joint.is_prismatic else unit
+
+
+SIDE = EffectParameter('side', choices=SIDES, default=NEARER)
+"""At which end of its joint's range an effect sits."""
+
+
+def side_of(joint: SimulatedJoint, edge: float, side: ParameterValue) -> int:
+    """Return 1 for the upper end of a joint's range, -1 for the lower one.
+
+    Args:
+        joint: without limits, the nearer end is that of the sign.
+        edge: where the effect begins [rad or m].
+        side: one of `SIDES`.
+    """
+    if side != NEARER:
+        return 1 if side == 'upper' else -1
+    middle = 0.5 * (joint.lower + joint.upper)
+    return 1 if edge >= (middle if math.isfinite(middle) else 0.0) else -1
 
 
 Build = Callable[

@@ -6,7 +6,14 @@ import math
 from typing import TYPE_CHECKING
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.simulation.effects import Action, EffectKind, EffectParameter, Place
+from sgp_ros.simulation.effects import (
+    SIDE,
+    Action,
+    EffectKind,
+    EffectParameter,
+    Place,
+    side_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -49,9 +56,7 @@ def _end_stop(
 ) -> tuple[Action, ...]:
     position = float(values['position'])
     stiffness, damping = float(values['stiffness']), float(values['damping'])
-    lower, upper = joints[joint].lower, joints[joint].upper
-    middle = 0.5 * (lower + upper) if math.isfinite(lower + upper) else 0.0
-    side = 1.0 if position >= middle else -1.0
+    side = side_of(joints[joint], position, values['side'])
 
     def force(moment: Moment) -> float:
         depth = side * (float(moment.position[joint]) - position)
@@ -115,10 +120,11 @@ END_STOP = EffectKind(
         EffectParameter('position', 'rad'),
         EffectParameter('stiffness', 'N m/rad', low=0.0),
         EffectParameter('damping', 'N m s/rad', low=0.0),
+        SIDE,
     ),
     _end_stop,
 )
-"""A contact beyond `position`, seen from the middle of the range, that pushes back, never pulls.
+"""A contact beyond `position` towards the end `side` that pushes back, never pulls.
 
 `|tau_x| = max(stiffness depth + damping d(depth)/dt, 0)`.
 """

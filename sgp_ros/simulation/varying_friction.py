@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.simulation.effects import Action, EffectKind, EffectParameter
+from sgp_ros.simulation.effects import SIDE, Action, EffectKind, EffectParameter, side_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -49,12 +49,14 @@ def _limit(
     joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
     amplitude, onset = float(values['amplitude']), float(values['onset'])
-    lower, upper = joints[joint].lower, joints[joint].upper
-    limit = upper if onset >= 0.5 * (lower + upper) else lower
-    if not math.isfinite(limit) or not lower < onset < upper:
+    description = joints[joint]
+    side = side_of(description, onset, values['side'])
+    limit = description.upper if side > 0 else description.lower
+    if not math.isfinite(limit) or side * (limit - onset) <= 0.0:
         raise ConfigError(
-            f'limit_friction with onset {onset:g} on joint {joints[joint].name!r}',
-            f'a joint with limits and an onset between them, here {lower:g} and {upper:g}',
+            f'limit_friction with onset {onset:g} on joint {description.name!r}',
+            f'a joint with limits and an onset between them, here {description.lower:g} and '
+            f'{description.upper:g}',
         )
 
     def level(moment: Moment, _direction: int) -> float:
@@ -117,10 +119,10 @@ It rises from 0 to `amplitude` over the length `edge`, half way at `lo` and `hi`
 
 LIMIT_FRICTION = EffectKind(
     'limit_friction',
-    (EffectParameter('amplitude', 'N m', low=0.0), EffectParameter('onset', 'rad')),
+    (EffectParameter('amplitude', 'N m', low=0.0), EffectParameter('onset', 'rad'), SIDE),
     _limit,
 )
-"""Dry friction that rises linearly from 0 at `onset` to `amplitude` at the limit on that side."""
+"""Dry friction that rises linearly from 0 at `onset` to `amplitude` at the limit `side`."""
 
 FRICTION_DRIFT = EffectKind(
     'friction_drift',

@@ -69,6 +69,9 @@ LAWS = {
     'limit_friction:amplitude=2,onset=-0.1': lambda t, q, v, r: (
         -2.0 * np.maximum((-0.1 - q) / (1.5 - 0.1), 0.0) * np.sign(v)
     ),
+    'limit_friction:amplitude=2,onset=-0.4,side=upper': lambda t, q, v, r: (
+        -2.0 * np.maximum((q + 0.4) / (1.5 + 0.4), 0.0) * np.sign(v)
+    ),
     'friction_drift:start=0.5,end=0.1,time_constant=0.7,kind=viscous': lambda t, q, v, r: (
         -(0.1 + 0.4 * np.exp(-t / 0.7)) * v
     ),
@@ -80,6 +83,9 @@ LAWS = {
     'cogging:amplitude=0.3,periods=7,phase=0.4': lambda t, q, v, r: 0.3 * np.sin(7 * q + 0.4),
     'end_stop:position=0.1,stiffness=20,damping=0.5': lambda t, q, v, r: (
         -np.maximum(20.0 * (q - 0.1) + 0.5 * v, 0.0) * (q > 0.1)
+    ),
+    'end_stop:position=0.3,stiffness=5,damping=0.1,side=lower': lambda t, q, v, r: (
+        np.maximum(5.0 * (0.3 - q) - 0.1 * v, 0.0) * (q < 0.3)
     ),
     'armature:inertia=0.05': lambda t, q, v, r: -0.05 * r.true_acceleration[:, ELBOW],
     'joint_coupling:source_joint=shoulder,kind=torque,coefficient=0.3': lambda t, q, v, r: (
