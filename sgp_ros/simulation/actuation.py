@@ -115,7 +115,7 @@ DEAD_ZONE = EffectKind(
 """The motor gives `u - clip(u, -width, width)`."""
 
 ACTUATOR_LAG = EffectKind(
-    'actuator_lag', (EffectParameter('time_constant', 's', low=1e-3),), _lag, Place.MOTOR
+    'actuator_lag', (EffectParameter('time_constant', 's', low=1e-4),), _lag, Place.MOTOR
 )
 """First-order lag between the force that the motor should give and the one it gives."""
 

@@ -106,8 +106,8 @@ CONSTANT_LOAD = EffectKind('constant_load', (EffectParameter('force', 'N m'),), 
 COGGING = EffectKind(
     'cogging',
     (
-        EffectParameter('amplitude', 'N m', low=0.0),
-        EffectParameter('periods', '1/revolution', low=0.0),
+        EffectParameter('amplitude', 'N m'),
+        EffectParameter('periods', '1/revolution'),
         EffectParameter('phase', 'rad'),
     ),
     _cogging,

@@ -50,8 +50,8 @@ def _velocity_lag(
 ENCODER_ECCENTRICITY = EffectKind(
     'encoder_eccentricity',
     (
-        EffectParameter('amplitude', 'rad', low=0.0),
-        EffectParameter('periods', '1/revolution', low=0.0),
+        EffectParameter('amplitude', 'rad'),
+        EffectParameter('periods', '1/revolution'),
         EffectParameter('phase', 'rad'),
     ),
     _eccentricity,
@@ -59,6 +59,6 @@ ENCODER_ECCENTRICITY = EffectKind(
 """The encoder shows `q + amplitude sin(periods q + phase)`, its velocity the derivative."""
 
 VELOCITY_FILTER_LAG = EffectKind(
-    'velocity_filter_lag', (EffectParameter('time_constant', 's', low=1e-3),), _velocity_lag
+    'velocity_filter_lag', (EffectParameter('time_constant', 's', low=1e-4),), _velocity_lag
 )
 """The measured velocity is the true one behind a first-order low-pass; the position is right."""

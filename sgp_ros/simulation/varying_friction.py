@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 
 _STIFF_S = 1e-3
+_MOST_DECAY = 2.0
+"""Of a memory within a step: Runge and Kutta are stable up to 2.7."""
 
 
 def _of_kind(
@@ -32,11 +34,12 @@ def _position(
 ) -> tuple[Action, ...]:
     amplitude, lo, hi = (float(values[name]) for name in ('amplitude', 'lo', 'hi'))
     is_continuous, edge = joints[joint].is_continuous, float(values['edge'])
+    centre = 0.5 * (lo + hi)
 
     def strength(moment: Moment) -> float:
         q = float(moment.position[joint])
-        if is_continuous:
-            q = (q + math.pi) % (2.0 * math.pi) - math.pi
+        if is_continuous:  # the turn about the interval, which may cross the wrap
+            q = (q - centre + math.pi) % (2.0 * math.pi) - math.pi + centre
         if edge == 0.0:
             return amplitude if lo <= q <= hi else 0.0
         inside = min(q - lo, hi - q) / edge + 0.5
@@ -81,9 +84,11 @@ def _hysteresis(
     _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
     level, presliding = float(values['level']), float(values['presliding'])
+    fastest = _MOST_DECAY * presliding / _STIFF_S
 
     def rate(moment: Moment) -> tuple[float]:
         v, z = float(moment.velocity[joint]), float(moment.state[0])
+        v = min(max(v, -fastest), fastest)
         return ((v - abs(v) * z) / presliding,)
 
     return (

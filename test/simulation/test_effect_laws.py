@@ -126,6 +126,13 @@ def test_cable_pulls_back_at_the_source():
     np.testing.assert_allclose(found[:, SHOULDER], -0.5 * found[:, ELBOW], atol=1e-8)
 
 
+def test_hysteresis_of_a_fast_joint_stays_within_its_level():
+    """Its memory then decays within a step, where an explicit integration would grow."""
+    recording = run('hysteresis:joint=elbow,level=0.2,presliding=1e-4')
+    force = extra_force(recording)[:, ELBOW]
+    assert 0.19 < np.abs(force).max() < 0.21
+
+
 def test_hysteresis_follows_its_own_equation():
     """z integrated from the recorded velocity by trapezia at 1 kHz."""
     recording = run('hysteresis:joint=elbow,level=0.4,presliding=0.05', rate_hz=1000.0)

@@ -9,10 +9,13 @@ import pytest
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.simulation.assembly import make_simulation
+from sgp_ros.simulation.effects import Moment
+from sgp_ros.simulation.mechanism import SimulatedJoint
 from sgp_ros.simulation.recording import simulate
 from sgp_ros.simulation.registry import EFFECTS, SIMULATORS
 from sgp_ros.simulation.scenario import places
 from sgp_ros.simulation.sensors import Sensors
+from sgp_ros.simulation.varying_friction import POSITION_FRICTION
 
 FREE = {'viscosity': 0.0, 'coulomb': 0.0, 'offset': 0.0, 'mass': 1.0}
 AXIS = {
@@ -109,3 +112,15 @@ def test_every_controller_runs_on_its_robot(robot, name):
     assert set(recording.truth['coefficients']) == {
         c.name for c in SIMULATORS[robot].mechanism.coefficients()
     }
+
+
+@pytest.mark.parametrize('turns', [-2, 0, 1])
+def test_an_interval_across_the_wrap_is_one_interval(turns):
+    """3.0 to 3.4 rad is also -3.28 to -2.88 rad, on every turn."""
+    joint = SimulatedJoint('hinge', is_continuous=True)
+    values = {'amplitude': 1.0, 'lo': 3.0, 'hi': 3.4, 'kind': 'coulomb', 'edge': 0.0}
+    assert POSITION_FRICTION.build is not None
+    (action,) = POSITION_FRICTION.build((joint,), 0, values)
+    q = np.array([2.9, 3.1, 3.3, 3.5, -3.1, -2.8]) + 2.0 * np.pi * turns
+    moments = [Moment(0.0, np.array([x]), np.ones(1), np.zeros(1), np.zeros(0)) for x in q]
+    assert [action.dry_level(m, 1) for m in moments] == [0.0, 1.0, 1.0, 0.0, 1.0, 0.0]
