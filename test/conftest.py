@@ -23,11 +23,11 @@ _NEEDED = {
             'effect_terms', 'effects', 'effects/test_stated', 'inertial', 'pendulums',
             'built_in_nominal', 'ready_robots', 'rigid_body', 'tree', 'urdf_robot', 'urdf_writer',
         ),
-        'simulation': ('random_tree', 'serial_arm', 'tree'),
+        'simulation': ('random_tree', 'serial_arm', 'tree', 'tree_part'),
     },
     'mujoco': {
-        'experiments': ('concealed', 'simulation'),
-        'simulation': ('effect_laws', 'tree'),
+        'experiments': ('built_in_diagnosis', 'concealed', 'simulation', 'stated_simulation'),
+        'simulation': ('effect_laws', 'tree', 'tree_part'),
     },
 }  # fmt: skip
 """No wheel of Pinocchio 3 goes with NumPy 1.26, the oldest that is tested; MuJoCo is optional."""

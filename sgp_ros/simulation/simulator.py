@@ -35,6 +35,7 @@ class Simulator:
         last_joint: that of the last link, for robots whose links are known; else None.
         longest_substep_s: steps of the integration are at most this long [s]; effects may need
             shorter ones.
+        effort_gain: (k,) force per unit of a measured effort [N m or N per unit]; empty for 1.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Simulator:
     description: str = ''
     last_joint: str | None = None
     longest_substep_s: float = 1e-3
+    effort_gain: tuple[float, ...] = ()
 
     @property
     def joint_names(self) -> tuple[str, ...]:

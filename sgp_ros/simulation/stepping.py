@@ -40,8 +40,8 @@ class SimulatedSample:
             noise of the surroundings: what a perfect model predicts [rad/s^2 or m/s^2].
         shown_position: (k,) of the encoders before noise and quantisation [rad or m].
         shown_velocity: (k,) of the encoders before noise [rad/s or m/s].
-        effort: (k,) that the currents of the motors stand for [N m or N]; None when it is not
-            measured.
+        effort: (k,) that the currents of the motors stand for [N m or N, by the robot's
+            `effort_gain`]; None when it is not measured.
         command_stamp_ns: time from which the command holds [ns].
     """
 
@@ -198,6 +198,11 @@ class Simulation:
         rate: np.ndarray = (position - self._last.position) / (1e-9 * max(elapsed_ns, 1))
         return rate
 
+    def _measured(self, effort: np.ndarray) -> np.ndarray:
+        """Return efforts (k,) in the unit in which they are measured."""
+        gains = self.scenario.simulator.effort_gain
+        return effort / gains if gains else effort
+
     def _sample(
         self, shown: Shown, position: np.ndarray, velocity: np.ndarray | None
     ) -> SimulatedSample:
@@ -212,7 +217,7 @@ class Simulation:
             shown.acceleration,
             shown.position,
             shown.velocity,
-            shown.effort if self.scenario.sensors.measures_effort else None,
+            self._measured(shown.effort) if self.scenario.sensors.measures_effort else None,
             now_ns + self._latency_ns,
         )
         for array in (sample.true_position, sample.true_velocity, sample.true_acceleration):

@@ -84,9 +84,15 @@ def computed_force(
 
 
 def multisine_tracking(
-    joints: tuple[SimulatedJoint, ...], motors: tuple[int, ...]
+    joints: tuple[SimulatedJoint, ...], motors: tuple[int, ...], gains: np.ndarray
 ) -> ControllerBuild:
-    """Build the tracking of a random reference about the middle of each motor joint's range."""
+    """Build the tracking of a random reference about the middle of each motor joint's range.
+
+    Args:
+        joints: k of them.
+        motors: index of the joint that each of the m commands drives.
+        gains: (m,) force per unit of the command [N m or N per unit].
+    """
     centre, reach = middle_and_reach(joints)
 
     def build(
@@ -94,7 +100,8 @@ def multisine_tracking(
     ) -> Controller | None:
         index = list(motors)
         reference = random_multisine(rng, centre[index], reach[index])
-        return computed_force(mechanism, joints, motors, reference)
+        force = computed_force(mechanism, joints, motors, reference)
+        return lambda t, q, v: force(t, q, v) / gains
 
     return build
 

@@ -18,13 +18,19 @@ import numpy as np
 from sgp_ros.errors import ConfigError
 from sgp_ros.simulation.effects import ChosenEffect
 from sgp_ros.simulation.mechanism import quantity
+from sgp_ros.simulation.tree_part import part_of_urdf
 from sgp_ros.simulation.tree_text import TreeText, plain_tree, read_tree, tree_link
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from sgp_ros.simulation.mechanism import TrueCoefficient
+    from sgp_ros.simulation.tree_part import TreePart
 
 GRAVITY = 9.81
 """Acceleration of gravity [m/s^2]."""
+LEAST_INERTIA = 1e-12
+"""A joint that moves less is one that moves nothing [kg m^2 or kg]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +39,7 @@ class Tree:
 
     Attributes:
         urdf: text of the file.
+        part: what of it is simulated; None for all.
         base_roll: of the base in the world, whose orientation is `Ry(pitch) Rx(roll)` [rad].
         base_pitch: likewise [rad].
         payload_mass: point mass on the last link [kg].
@@ -43,6 +50,7 @@ class Tree:
     """
 
     urdf: str
+    part: TreePart | None = None
     base_roll: float = quantity(0.0, 'rad', 'roll of the base')
     base_pitch: float = quantity(0.0, 'rad', 'pitch of the base')
     payload_mass: float = quantity(0.0, 'kg', 'point mass on the last link')
@@ -57,7 +65,8 @@ class Tree:
     _model: Any = field(init=False, repr=False)
     _data: Any = field(init=False, repr=False)
     _order: np.ndarray | slice = field(init=False, repr=False)
-    _unit: np.ndarray = field(init=False, repr=False)
+    _geared: np.ndarray = field(init=False, repr=False)
+    _offset: np.ndarray = field(init=False, repr=False)
     _motors: np.ndarray = field(init=False, repr=False)
     _tool: int = field(init=False, repr=False)
 
@@ -67,57 +76,91 @@ class Tree:
         Raises:
             ConfigError: a URDF that is no tree of bodies with inertia, or MuJoCo is missing.
         """
-        library, text = _library(), read_tree(self.urdf)
+        library = _library()
+        urdf = self.urdf if self.part is None else part_of_urdf(self.urdf, self.part)
+        text = read_tree(urdf, self.part)
         payload = (self.payload_mass, self.payload_x, self.payload_y, self.payload_z)
         try:
-            model = library.MjModel.from_xml_string(plain_tree(self.urdf, text, payload))
+            model = library.MjModel.from_xml_string(plain_tree(urdf, text, payload))
         except ValueError as error:
-            problem = ' '.join(str(error).split())
-            raise ConfigError(
-                f'URDF of {text.name!r}: {problem}',
-                'a tree whose moving links have mass and inertia',
-            ) from error
+            raise _impossible(text.name, ' '.join(str(error).split())) from error
         off = library.mjtDisableBit
         for bit in (off.mjDSBL_CONSTRAINT, off.mjDSBL_CONTACT, off.mjDSBL_EQUALITY):
             model.opt.disableflags |= int(bit)
         model.opt.gravity[:] = _gravity(self.base_roll, self.base_pitch)
         names = [joint.name for joint in text.joints]
         motors = np.zeros((len(names), len(text.command_joints)))
+        gains = self.gains(text.command_joints)
         for column, name in enumerate(text.command_joints):
-            motors[names.index(name), column] = 1.0
+            motors[names.index(name), column] = gains[column]
+        geared, offset = _gear(text, lambda name: int(model.joint(name).dofadr[0]))
         built = {
             'text': text,
             '_library': library,
             '_model': model,
             '_data': library.MjData(model),
             '_order': _order([int(model.joint(name).dofadr[0]) for name in names]),
-            '_unit': np.eye(len(names)),
+            '_geared': geared,
+            '_offset': offset,
             '_motors': motors,
             '_tool': int(model.body(tree_link(text.tool_link)).id),
         }
         for name, value in built.items():
             object.__setattr__(self, name, value)
+        still = np.zeros(len(names))
+        if np.diag(self.dynamics(still, still)[0]).max() > 1.0 / LEAST_INERTIA:
+            raise _impossible(text.name, 'a joint moves nothing that has mass and inertia')
+
+    def gains(self, joints: tuple[str, ...]) -> np.ndarray:
+        """Return the force per unit of commanded and measured effort of joints, (n,)."""
+        return np.ones(len(joints)) if self.part is None else self.part.gains(joints)
 
     def dynamics(
         self, position: np.ndarray, velocity: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the inverse mass matrix (k, k) and the forces of the tree (k,), O(k^3)."""
         library, model, data, order = self._library, self._model, self._data, self._order
+        if self.text.followers:
+            return self._geared_dynamics(position, velocity)
         data.qpos[order] = position
         data.qvel[order] = velocity
-        library.mj_fwdPosition(model, data)
-        library.mj_fwdVelocity(model, data)
-        inverse_mass = np.empty_like(self._unit)
-        library.mj_solveM(model, data, inverse_mass, self._unit)
-        force = data.qfrc_passive - data.qfrc_bias
-        tip = (self.tip_fx, self.tip_fy, self.tip_fz)
-        if any(tip):
-            jacobian = np.empty((3, len(self._unit)))
-            library.mj_jac(model, data, jacobian, None, data.xpos[self._tool], self._tool)
-            force = force + jacobian.T @ tip
+        force = self._force()
+        inverse_mass = np.empty((model.nv, model.nv))
+        library.mj_solveM(model, data, inverse_mass, np.eye(model.nv))
         if isinstance(order, slice):
             return inverse_mass, force
         return inverse_mass[order[:, np.newaxis], order], force[order]
+
+    def _geared_dynamics(
+        self, position: np.ndarray, velocity: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the same with followers, all joints being at `G q + offset`.
+
+        By the principle of virtual work M becomes `G^T M G`, the forces `G^T h`.
+        """
+        library, model, data, G = self._library, self._model, self._data, self._geared
+        data.qpos[:] = G @ position + self._offset
+        data.qvel[:] = G @ velocity
+        force = self._force()
+        carried = np.empty_like(G)  # M G
+        for column, gear in zip(carried.T, G.T, strict=True):
+            product = np.empty(model.nv)
+            library.mj_mulM(model, data, product, gear.copy())
+            column[:] = product
+        return np.linalg.inv(G.T @ carried), G.T @ force
+
+    def _force(self) -> np.ndarray:
+        """Return the forces of the tree where it stands, in the library's order."""
+        library, model, data = self._library, self._model, self._data
+        library.mj_fwdPosition(model, data)
+        library.mj_fwdVelocity(model, data)
+        force: np.ndarray = data.qfrc_passive - data.qfrc_bias
+        tip = (self.tip_fx, self.tip_fy, self.tip_fz)
+        if any(tip):
+            jacobian = np.empty((3, model.nv))
+            library.mj_jac(model, data, jacobian, None, data.xpos[self._tool], self._tool)
+            force = force + jacobian.T @ tip
+        return force
 
     def drive(self, command: np.ndarray, velocity: np.ndarray) -> np.ndarray:  # noqa: ARG002 - force sources
         """Return the forces of the motors, (k,); the command (m,) is in N m or N."""
@@ -137,6 +180,19 @@ class Tree:
         return ()
 
 
+def _gear(text: TreeText, place: Callable[[str], int]) -> tuple[np.ndarray, np.ndarray]:
+    """Return G (b, k) and the offset (b,) of all joints, in the library's order."""
+    names = [joint.name for joint in text.joints]
+    G = np.zeros((len(names) + len(text.followers), len(names)))
+    offset = np.zeros(len(G))
+    for column, name in enumerate(names):
+        G[place(name), column] = 1.0
+    for follower in text.followers:
+        G[place(follower.name), names.index(follower.leader)] = follower.multiplier
+        offset[place(follower.name)] = follower.offset
+    return G, offset
+
+
 def _order(places: list[int]) -> np.ndarray | slice:
     """Return the index that puts the library's joints into the order of the file."""
     return slice(None) if places == sorted(places) else np.array(places)
@@ -149,6 +205,12 @@ def _gravity(roll: float, pitch: float) -> tuple[float, float, float]:
         GRAVITY * math.sin(pitch),
         -GRAVITY * level * math.sin(roll),
         -GRAVITY * level * math.cos(roll),
+    )
+
+
+def _impossible(robot: str, problem: str) -> ConfigError:
+    return ConfigError(
+        f'URDF of {robot!r}: {problem}', 'a tree whose moving links have mass and inertia'
     )
 
 

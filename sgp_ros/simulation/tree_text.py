@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.simulation.followers import Follower, read_followers
 from sgp_ros.simulation.mechanism import SimulatedJoint
+from sgp_ros.simulation.urdf_elements import MOVING, link_of, number_of, root_of
 
-_MOVING = ('revolute', 'continuous', 'prismatic')
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sgp_ros.simulation.tree_part import TreePart
+
 _PREFIX = 'link:'
 _PAYLOAD = 'payload'
-_SMALLEST_INERTIA = 1e-12
+_SMALLEST = 1e-14
+"""Mass [kg] and principal inertia [kg m^2] of links without: the library asks for some."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,16 +29,19 @@ class TreeText:
 
     Attributes:
         name: of the robot.
-        joints: k moving ones, in the order of the file.
-        friction: (k,) dry friction of `<dynamics>` [N m or N].
-        command_joints: those with an effort interface in `ros2_control`; all without such a block.
-        last_joint: the moving joint nearest to `tool0`, or the last one of the file.
+        joints: k that move on their own, in the order of the file.
+        followers: joints that follow one of them.
+        friction: (k,) dry friction of `<dynamics>`, with that of followers [N m or N].
+        command_joints: those with an effort interface in `ros2_control`; where none has one, those
+            with any; all without such a block.
+        last_joint: the joint nearest to `tool0`, or the last one of the file.
         last_link: the link on it.
         tool_link: `tool0`, or the last link.
     """
 
     name: str
     joints: tuple[SimulatedJoint, ...]
+    followers: tuple[Follower, ...]
     friction: tuple[float, ...]
     command_joints: tuple[str, ...]
     last_joint: str
@@ -38,44 +49,71 @@ class TreeText:
     tool_link: str
 
 
-def read_tree(urdf: str) -> TreeText:
+def read_tree(urdf: str, part: TreePart | None = None) -> TreeText:
     """Return the joints of a URDF text.
+
+    Args:
+        urdf: the text, of the part where there is one.
+        part: says which joints have motors and which one is the last; None leaves it to the file.
 
     Raises:
         ConfigError: no URDF, or joints that are no single degree of freedom.
     """
-    root = _root(urdf)
-    elements = [j for j in root.findall('joint') if j.get('type') != 'fixed']
-    for joint in elements:
-        if joint.get('type') not in _MOVING or joint.find('mimic') is not None:
-            kind = joint.get('type') if joint.find('mimic') is None else 'mimic'
+    root = root_of(urdf)
+    moving = {j.get('name', ''): j for j in root.findall('joint') if j.get('type') != 'fixed'}
+    for name, joint in moving.items():
+        if joint.get('type') not in MOVING:
             raise ConfigError(
-                f'joint {joint.get("name")!r} of type {kind}', f'one of {[*_MOVING, "fixed"]}'
+                f'joint {name!r} of type {joint.get("type")}', f'one of {[*MOVING, "fixed"]}'
             )
-    if not elements:
+    followers = read_followers(root)
+    own = {name: joint for name, joint in moving.items() if name not in followers}
+    if not own:
         raise ConfigError(f'robot {root.get("name")!r} without a moving joint', 'one at least')
-    carried = {_link(joint, 'child'): joint for joint in root.findall('joint')}
-    tool = 'tool0' if 'tool0' in carried else _link(elements[-1], 'child')
-    last = carried[tool]
-    while last.get('type') == 'fixed' and _link(last, 'parent') in carried:
-        last = carried[_link(last, 'parent')]
-    last = elements[-1] if last.get('type') == 'fixed' else last
-    driven = {
-        joint.get('name')
-        for block in root.iter('ros2_control')
-        for joint in block.iter('joint')
-        if any(x.get('name') == 'effort' for x in joint.iter('command_interface'))
-    }
-    names = [joint.get('name', '') for joint in elements]
+    tool, last = _ends(root, own)
+    last = last if part is None else own[part.joints[-1]]
     return TreeText(
         root.get('name') or 'robot',
-        tuple(_joint(joint) for joint in elements),
-        tuple(_number(joint.find('dynamics'), 'friction', 0.0) for joint in elements),
-        tuple(name for name in names if name in driven or not driven),
+        tuple(_joint(joint) for joint in own.values()),
+        tuple(followers.values()),
+        tuple(_dry(name, moving, followers) for name in own),
+        _driven(root, tuple(own)) if part is None else part.motors,
         last.get('name', ''),
-        _link(last, 'child'),
+        link_of(last, 'child'),
         tool,
     )
+
+
+def _ends(root: ET.Element, own: Mapping[str, ET.Element]) -> tuple[str, ET.Element]:
+    """Return the link of the tool and the joint with a motion of its own that carries it."""
+    carried = {link_of(joint, 'child'): joint for joint in root.findall('joint')}
+    final = list(own.values())[-1]
+    tool = 'tool0' if 'tool0' in carried else link_of(final, 'child')
+    last = carried[tool]
+    while last.get('name') not in own and link_of(last, 'parent') in carried:
+        last = carried[link_of(last, 'parent')]
+    return tool, last if last.get('name') in own else final
+
+
+def _dry(name: str, moving: Mapping[str, ET.Element], followers: Mapping[str, Follower]) -> float:
+    """Return the dry friction of a joint and of those that follow it."""
+    ratios = {f.name: abs(f.multiplier) for f in followers.values() if f.leader == name}
+    return sum(
+        ratio * number_of(moving[joint].find('dynamics'), 'friction', 0.0)
+        for joint, ratio in {name: 1.0, **ratios}.items()
+    )
+
+
+def _driven(root: ET.Element, names: tuple[str, ...]) -> tuple[str, ...]:
+    interfaces = [
+        (joint.get('name', ''), interface.get('name'))
+        for block in root.iter('ros2_control')
+        for joint in block.iter('joint')
+        for interface in joint.iter('command_interface')
+    ]
+    driven = {joint for joint, kind in interfaces if kind == 'effort'}
+    driven = driven or {joint for joint, _ in interfaces}
+    return tuple(name for name in names if name in driven or not driven)
 
 
 def plain_tree(urdf: str, tree: TreeText, payload: tuple[float, float, float, float]) -> str:
@@ -83,9 +121,12 @@ def plain_tree(urdf: str, tree: TreeText, payload: tuple[float, float, float, fl
 
     Links are renamed `link:NAME`: a name such as `world` means something to the library.
     """
-    root = _root(urdf)
+    root = root_of(urdf)
     plain = ET.Element('robot', name='tree')
-    options = {'fusestatic': 'false', 'balanceinertia': 'false', 'discardvisual': 'true'}
+    options = {
+        'fusestatic': 'false', 'balanceinertia': 'false', 'discardvisual': 'true',
+        'boundmass': repr(_SMALLEST), 'boundinertia': repr(_SMALLEST),
+    }  # fmt: skip
     ET.SubElement(ET.SubElement(plain, 'mujoco'), 'compiler', options)
     for link in root.findall('link'):
         copy = ET.SubElement(plain, 'link', name=_PREFIX + link.get('name', ''))
@@ -94,9 +135,9 @@ def plain_tree(urdf: str, tree: TreeText, payload: tuple[float, float, float, fl
         kind = 'continuous' if joint.get('type') == 'revolute' else joint.get('type', '')
         copy = ET.SubElement(plain, 'joint', name=joint.get('name', ''), type=kind)
         for end in ('parent', 'child'):
-            ET.SubElement(copy, end, link=_PREFIX + _link(joint, end))
+            ET.SubElement(copy, end, link=_PREFIX + link_of(joint, end))
         copy.extend(x for tag in ('origin', 'axis') for x in joint.findall(tag))
-        damping = _number(joint.find('dynamics'), 'damping', 0.0)
+        damping = number_of(joint.find('dynamics'), 'damping', 0.0)
         ET.SubElement(copy, 'dynamics', damping=repr(damping))
         if kind == 'prismatic':
             ET.SubElement(copy, 'limit', lower='-1e9', upper='1e9', effort='0', velocity='0')
@@ -113,24 +154,12 @@ def tree_link(name: str) -> str:
 def _add_payload(plain: ET.Element, link: str, payload: tuple[float, float, float, float]) -> None:
     body = ET.SubElement(ET.SubElement(plain, 'link', name=_PAYLOAD), 'inertial')
     ET.SubElement(body, 'mass', value=repr(payload[0]))
-    tensor = {name: repr(_SMALLEST_INERTIA) for name in ('ixx', 'iyy', 'izz')}
-    ET.SubElement(body, 'inertia', {**tensor, 'ixy': '0', 'ixz': '0', 'iyz': '0'})
+    tensor = dict.fromkeys(('ixx', 'iyy', 'izz', 'ixy', 'ixz', 'iyz'), '0')
+    ET.SubElement(body, 'inertia', tensor)
     joint = ET.SubElement(plain, 'joint', name=_PAYLOAD, type='fixed')
     ET.SubElement(joint, 'parent', link=link)
     ET.SubElement(joint, 'child', link=_PAYLOAD)
     ET.SubElement(joint, 'origin', xyz=' '.join(map(repr, payload[1:])))
-
-
-def _root(urdf: str) -> ET.Element:
-    if '<!DOCTYPE' in urdf or '<!ENTITY' in urdf:
-        raise ConfigError('a URDF with a document type', 'one without', 'remove <!DOCTYPE ...>')
-    try:
-        root = ET.fromstring(urdf)  # noqa: S314  # no document type, so no entity to expand
-    except ET.ParseError as error:
-        raise ConfigError(f'the URDF is no XML ({error})', '<robot> ... </robot>') from error
-    if root.tag != 'robot':
-        raise ConfigError(f'<{root.tag}>', 'a URDF with <robot>', 'expand xacro files first')
-    return root
 
 
 def _joint(joint: ET.Element) -> SimulatedJoint:
@@ -140,25 +169,7 @@ def _joint(joint: ET.Element) -> SimulatedJoint:
         joint.get('name', ''),
         is_prismatic=kind == 'prismatic',
         is_continuous=is_free,
-        lower=-math.inf if is_free else _number(limit, 'lower', -math.inf),
-        upper=math.inf if is_free else _number(limit, 'upper', math.inf),
-        effort=_number(limit, 'effort', math.inf),
+        lower=-math.inf if is_free else number_of(limit, 'lower', -math.inf),
+        upper=math.inf if is_free else number_of(limit, 'upper', math.inf),
+        effort=number_of(limit, 'effort', math.inf) or math.inf,
     )
-
-
-def _link(joint: ET.Element, end: str) -> str:
-    element = joint.find(end)
-    name = None if element is None else element.get('link')
-    if not name:
-        raise ConfigError(f'joint {joint.get("name")!r} without <{end}>', 'a link at both ends')
-    return name
-
-
-def _number(element: ET.Element | None, key: str, absent: float) -> float:
-    text = None if element is None else element.get(key)
-    if text is None:
-        return absent
-    try:
-        return float(text)
-    except ValueError as error:
-        raise ConfigError(f'{key}="{text}" in the URDF', 'a number') from error

@@ -35,6 +35,7 @@ def describe_truth(scenario: Scenario) -> dict[str, object]:
         'joints': list(simulator.joint_names),
         'command_joints': list(simulator.command_joints),
         'command_unit': simulator.command_unit,
+        'effort_gain': dict(zip(simulator.joint_names, simulator.effort_gain, strict=False)),
         'start': {'position': list(scenario.position), 'velocity': list(scenario.velocity)},
         'physical': physical_parameters(scenario.mechanism),
         'coefficients': _coefficients(scenario),
