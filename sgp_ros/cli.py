@@ -118,7 +118,7 @@ def _add_simulate(commands: Any) -> None:
     parser.add_argument(
         'robot',
         metavar='ROBOT',
-        help='a built-in robot, a URDF, or a robot YAML of a URDF with effects',
+        help='a built-in robot, a URDF, or a robot YAML such as robot_diagnosed.yaml',
     )
     parser.add_argument('--duration', type=float, default=20.0, metavar='S', help='length [s]')
     parser.add_argument('--rate', type=float, default=None, metavar='HZ', help='sampling rate')

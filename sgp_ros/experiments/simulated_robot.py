@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.robots.effect_terms import ON_TREE
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.registry import load_robot
-from sgp_ros.robots.urdf_robot import urdf_text
+from sgp_ros.robots.urdf_robot import stated_part, urdf_text
 from sgp_ros.simulation.assembly import find_simulator
 from sgp_ros.simulation.effects import ChosenEffect
+from sgp_ros.simulation.tree_part import Load, TreePart
 from sgp_ros.simulation.tree_simulator import tree_simulator
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from sgp_ros.robots.nominal import Nominal
     from sgp_ros.robots.stated_effects import StatedEffect
     from sgp_ros.simulation.simulator import Simulator
 
-_NOT_SIMULATED = ('joints', 'locked', 'passive', 'effort_gain', 'payload')
-"""Keys of a robot YAML that make another mechanism of the URDF."""
+
+_ABOUT_ZERO = (
+    'stribeck_friction', 'asymmetric_coulomb', 'load_friction', 'friction_drift',
+)  # fmt: skip
+"""Effects of which a diagnosis may leave one level just below zero, where it is none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,46 +69,51 @@ def _of_urdf(path: Path) -> Simulator:
 
 
 def _of_yaml(path: Path) -> SimulatedRobot:
-    robot = load_robot(str(path))
-    if 'urdf' not in robot.source:
-        raise ConfigError(
-            f'robot file {path} without the key urdf', 'a URDF with effects',
-            f'simulate {robot.name} by its name, with --effect and --physical',
-        )  # fmt: skip
-    unsuited = [key for key in _NOT_SIMULATED if robot.source.get(key)]
-    if unsuited:
-        raise ConfigError(
-            f'robot file {path} with the keys {unsuited}', 'all joints and motors of the URDF',
-            'write a URDF that has what they say, and leave them out',
-        )  # fmt: skip
-    nominal = nominal_model(robot)
-    effects = tuple(_chosen(effect, nominal) for effect in nominal.effects)
-    return SimulatedRobot(tree_simulator(urdf_text(robot)), path.stem, effects)
+    nominal = nominal_model(load_robot(str(path)))
+    last = {e.name: e for e in nominal.effects if e.name in ON_TREE}
+    before = [e for e in nominal.effects if last.get(e.name, e) is not e]
+    simulator = tree_simulator(urdf_text(nominal.robot), _part(nominal, before))
+    effects = tuple(_chosen(e, nominal) for e in nominal.effects if e not in before)
+    return SimulatedRobot(simulator, path.stem, effects)
+
+
+def _part(nominal: Nominal, before: Iterable[StatedEffect]) -> TreePart:
+    """Return what moves, is driven and carried as a robot from a URDF states it.
+
+    Args:
+        nominal: the robot.
+        before: payloads below the last one, and tilts of the base that a later one replaces.
+    """
+    robot = nominal.robot
+    plan, payload = stated_part(robot)
+    last = nominal.plain.link_names[nominal.plain.size - 1]
+    loads = [] if payload is None else [
+        Load(payload.link, payload.mass, payload.com, payload.inertia)
+    ]  # fmt: skip
+    loads += [
+        Load(last, e.numbers['mass'], tuple(e.numbers[axis] for axis in 'xyz'))
+        for e in before if e.name == 'payload'
+    ]  # fmt: skip
+    return TreePart(
+        robot.joint_names,
+        plan.locked,
+        tuple(joint.name for joint in robot.joints if joint.is_actuated),
+        {joint.name: joint.effort_gain for joint in robot.joints},
+        tuple(loads),
+    )
 
 
 def _chosen(stated: StatedEffect, nominal: Nominal) -> ChosenEffect:
-    values: dict[str, float | str] = dict(stated.numbers)
+    """Return a stated effect in the words of the simulation."""
+    values: dict[str, float | str] = {
+        name: max(number, 0.0) if stated.name in _ABOUT_ZERO else number
+        for name, number in stated.numbers.items()
+    }
     if stated.kind:
         values['kind'] = stated.kind
-    if stated.place is not None and stated.place.source >= 0:
-        values['source_joint'] = nominal.tree.joint_names[stated.place.source]
-    if stated.place is not None and stated.place.side:
-        _check_side(stated, nominal)
+    place = stated.place
+    if place is not None and place.source >= 0:
+        values['source_joint'] = nominal.tree.joint_names[place.source]
+    if place is not None and place.side:
+        values['side'] = 'upper' if place.side > 0 else 'lower'
     return ChosenEffect(stated.name, stated.joint, values)
-
-
-def _check_side(stated: StatedEffect, nominal: Nominal) -> None:
-    """Refuse an effect beyond the middle of the range: the simulation puts it on the nearer end.
-
-    Raises:
-        ConfigError: the stated side is the farther one.
-    """
-    assert stated.place is not None
-    edge = stated.numbers['onset' if stated.name == 'limit_friction' else 'position']
-    lower, upper = (float(x[stated.place.joint]) for x in (nominal.tree.lower, nominal.tree.upper))
-    middle = 0.5 * (lower + upper) if math.isfinite(lower + upper) else 0.0
-    if (edge >= middle) != (stated.place.side > 0):
-        raise ConfigError(
-            f'{stated.name} of {stated.joint} from {edge:g} towards the farther end of the range',
-            f'an edge on its side of {middle:g} for a simulation',
-        )

@@ -37,7 +37,7 @@ def run_simulation(
     """Simulate a robot and write `<robot>.mcap`, `truth.json` and `truth.npz` into `out`.
 
     Args:
-        robot: name of a simulated robot, a URDF file, or a robot YAML of one with effects.
+        robot: name of a simulated robot, a URDF file, or a robot YAML.
         out: folder of the results.
         progress: called with the share that is done.
         duration_s: length [s].

@@ -34,14 +34,17 @@ from sgp_ros.robots.effect_terms import changed_tree, effect_terms, effort_map
 from sgp_ros.robots.entries import Entries
 from sgp_ros.robots.inertial import inertial_term
 from sgp_ros.robots.joint_terms import JOINT_TERMS, Shape, joint_term
+from sgp_ros.robots.locking import plan_joints
 from sgp_ros.robots.nominal_prior import inertial_prior, joint_prior
 from sgp_ros.robots.robot import Joint, Robot
 from sgp_ros.robots.stated_effects import read_effects
 from sgp_ros.robots.tree import Payload, Tree, read_urdf
+from sgp_ros.robots.urdf_text import parse_urdf
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from sgp_ros.robots.locking import Plan
     from sgp_ros.robots.robot import Term
     from sgp_ros.robots.stated_effects import StatedEffect
 
@@ -126,6 +129,13 @@ def nominal_tree(robot: Robot) -> Tree:
     return tree
 
 
+def stated_part(robot: Robot) -> tuple[Plan, Payload | None]:
+    """Return which joints of its URDF a robot lets move, and the load that it states."""
+    entries = Entries(robot.source, [])
+    plan = plan_joints(parse_urdf(urdf_text(robot)), **_joint_entries(entries))
+    return plan, _payload(entries)
+
+
 def urdf_text(robot: Robot) -> str:
     """Return the text of the URDF of a robot from one."""
     place = _place(str(robot.source['urdf']), Path())
@@ -138,17 +148,20 @@ def _place(urdf: str, folder: Path) -> Path | str:
 
 
 def _read_tree(entries: Entries, place: Path | str) -> Tree | None:
-    payload = _payload(entries)
-    arguments = {
+    payload, joints = _payload(entries), _joint_entries(entries)
+    try:
+        return read_urdf(place, **joints, payload=payload)
+    except ConfigError as error:
+        entries.problems.append(str(error))
+        return None
+
+
+def _joint_entries(entries: Entries) -> dict[str, Any]:
+    return {
         'joints': entries.names('joints'),
         'locked': entries.numbers('locked'),
         'passive': entries.names('passive'),
     }
-    try:
-        return read_urdf(place, **arguments, payload=payload)  # type: ignore[arg-type]  # as named
-    except ConfigError as error:
-        entries.problems.append(str(error))
-        return None
 
 
 def _payload(entries: Entries) -> Payload | None:

@@ -81,14 +81,14 @@ STATED = {
     'gravity_tilt:roll=0.1,pitch=-0.05': (
         'gravity_tilt, joint: base, parameters: {roll: {value: 0.1}, pitch: {value: -0.05}}'
     ),
-    'limit_friction:joint=elbow,amplitude=0.5,onset=0.4': STATED_LIMIT,
+    'limit_friction:joint=elbow,amplitude=0.5,onset=0.4,side=upper': STATED_LIMIT,
 }  # fmt: skip
 
 
-def _yaml(urdf, *effects, more=''):
+def _yaml(urdf, *effects):
     path = urdf.with_name('stated.yaml')
     listed = ', '.join(f'{{effect: {effect}}}' for effect in effects)
-    path.write_text(f'schema: 1\nurdf: {urdf.name}\n{more}effects: [{listed}]\n', encoding='utf-8')
+    path.write_text(f'schema: 1\nurdf: {urdf.name}\neffects: [{listed}]\n', encoding='utf-8')
     return path
 
 
@@ -110,26 +110,37 @@ def test_effects_of_the_command_line_come_beside_those_that_are_stated(urdf, tmp
 
 
 @pytest.mark.parametrize(
-    ('effect', 'more', 'said'),
+    ('effect', 'said'),
     [
-        (STATED[EFFECT], 'locked: {shoulder: 0.1}\n', 'locked'),
-        ('backlash, joint: elbow, parameters: {gap: {value: 0.01}}', '', 'motor_inertia is miss'),
-        (STATED_LIMIT.replace('0.4', '-0.4'), '', 'farther end'),
+        ('backlash, joint: elbow, parameters: {gap: {value: 0.01}}', 'motor_inertia is miss'),
+        (STATED_LIMIT.replace('0.4', '4.0'), 'an onset between them'),
     ],
 )
 def test_what_a_simulation_cannot_take_from_a_yaml_ends_in_one_line(
-    urdf, tmp_path, capsys, effect, more, said
+    urdf, tmp_path, capsys, effect, said
 ):
-    path = _yaml(urdf, effect, more=more)
+    path = _yaml(urdf, effect)
     assert main(['simulate', str(path), '--out', str(tmp_path / 'o')]) == 2
     error = capsys.readouterr().err.strip()
     assert said in error
     assert '\n' not in error
 
 
-def test_backlash_is_left_out_of_a_nominal_model_for_its_numbers_say_too_little(urdf):
-    """The share of the inertia on the side of the motor is not among them."""
-    path = _yaml(urdf, 'backlash, joint: elbow, parameters: {gap: {value: 0.01}}', STATED[EFFECT])
+def test_a_robot_yaml_without_urdf_is_simulated_with_its_numbers(tmp_path):
+    """A built-in robot becomes the simplest bodies that have its coefficients."""
+    path = tmp_path / 'wheel.yaml'
+    path.write_text('schema: 1\nrobot: reaction_wheel\njoints: [p, w]\n', encoding='utf-8')
+    truth = json.loads((simulated(path, tmp_path / 'o') / 'truth.json').read_text('utf-8'))
+    assert truth['joints'] == ['p', 'w']
+    assert truth['command_joints'] == ['w']
+    assert truth['effort_gain'] == {'p': 1.0, 'w': 0.03}
+
+
+@pytest.mark.parametrize('more', ['', ', motor_inertia: {value: 0.001}'])
+def test_backlash_is_left_out_of_a_nominal_model_for_its_numbers_say_too_little(urdf, more):
+    """The motor's share of the inertia changes with the pose."""
+    play = f'backlash, joint: elbow, parameters: {{gap: {{value: 0.01}}{more}}}'
+    path = _yaml(urdf, play, STATED[EFFECT])
     nominal = nominal_model(load_robot(str(path)))
     assert 'backlash of elbow' in ' '.join(nominal.remarks)
     assert [e.name for e in nominal.stated] == ['coulomb_friction']
