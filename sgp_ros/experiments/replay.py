@@ -16,7 +16,7 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import is_record, replay
 from sgp_ros.engine.samples import CommandSample, JointSample
-from sgp_ros.errors import ConfigError, RecordingError
+from sgp_ros.errors import ConfigError, NumericalError, RecordingError
 from sgp_ros.experiments.identified_robot import nominal_coefficients, write_identified
 from sgp_ros.experiments.parameter_file import find_shipped, load_parameters
 from sgp_ros.offline.bodies import nearest_bodies
@@ -101,9 +101,12 @@ def run_replay(
         _check_use(engine, recording, options)
     remarks += [f'{count} messages could not be read: {reason}'
                 for reason, count in recording.unreadable.items()]  # fmt: skip
+    values, problem = possible_values(engine)
+    remarks += [problem] if problem else []
     metrics = collect_metrics(engine, Path(bag).name, timing=timing, remarks=remarks)
     write_text(out / 'metrics.json', json.dumps(metrics, indent=1, allow_nan=False) + '\n')
-    write_identified_robot(out, engine)
+    std = np.array([math.inf if p.std is None else p.std for p in engine.parameters()])
+    write_identified(out, engine.robot, values, std)
     save_model(out / 'model.npz', engine.snapshot())
     write_report(out, engine, history, metrics, truth=truth)
     print_summary(metrics, truth)
@@ -195,15 +198,20 @@ def save_model(path: Path, snapshot: Mapping[str, np.ndarray]) -> None:
     growing.replace(path)
 
 
-def write_identified_robot(out: Path, engine: Engine) -> None:
-    """Write the identified robot: of real bodies, where it has bodies."""
-    robot = engine.robot
+def possible_values(engine: Engine) -> tuple[np.ndarray, str]:
+    """Return the coefficients (p,) of bodies that can exist, where the robot has bodies.
+
+    Returns:
+        Where none are found the estimate itself, with a remark that says so.
+    """
     values, root = engine.information()
-    std = np.array([math.inf if p.std is None else p.std for p in engine.parameters()])
-    if len(values):
-        bodies = nearest_bodies(robot, values, root, nominal_coefficients(robot))
-        values = values if bodies is None else bodies.coefficients
-    write_identified(out, robot, values, std)
+    if not len(values):
+        return values, ''
+    try:
+        bodies = nearest_bodies(engine.robot, values, root, nominal_coefficients(engine.robot))
+    except NumericalError as error:
+        return values, f'the identified robot is the estimate, its bodies may not exist: {error}'
+    return (values if bodies is None else bodies.coefficients), ''
 
 
 def print_summary(metrics: Mapping[str, Any], truth: Mapping[str, float] | None) -> None:

@@ -1,0 +1,43 @@
+"""Laws of what a replay leaves behind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip('clarabel')
+
+from sgp_ros.core import consistent
+from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.samples import JointSample
+from sgp_ros.experiments.replay import possible_values
+from sgp_ros.robots.registry import load_robot
+
+PANDA = Path(__file__).parents[2] / 'config' / 'robots' / 'panda.yaml'
+
+
+def test_bodies_that_are_not_found_do_not_cost_the_replay(monkeypatch):
+    """The estimate stays, and a remark says what it is."""
+    robot = load_robot(str(PANDA))
+    settings = {'learning.initial': 20, 'filter.hop': 0.05, 'refit.enabled': False}
+    engine = Engine(robot, EngineConfig.from_mapping(settings, robot))
+    rng = np.random.default_rng(0)
+    for i in range(400):
+        q, v, tau = np.sin(0.3 * i * np.arange(1, 8)), rng.normal(size=7), rng.normal(size=7)
+        engine.push(JointSample(10**18 + 10**7 * i, robot.joint_names, q, v, tau))
+    make = consistent.clarabel.DefaultSettings
+
+    def impatient():
+        found = make()
+        found.max_iter = 1
+        return found
+
+    assert possible_values(engine)[1] == ''
+    monkeypatch.setattr(consistent.clarabel, 'DefaultSettings', impatient)
+    values, remark = possible_values(engine)
+    np.testing.assert_array_equal(values, engine.information()[0])
+    assert 'may not exist' in remark
+    assert '\n' not in remark
