@@ -8,7 +8,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from sgp_ros.core.scores import INTERVAL_95
 from sgp_ros.diagnosis.prove.held_out import HELD_OUT
-from sgp_ros.report.diagnosis_figures import draw_diagnosis, important_joints
+from sgp_ros.report.diagnosis_figures import draw_diagnosis
+from sgp_ros.report.diagnosis_maps import important_joints
 from sgp_ros.report.diagnosis_proof import (
     densities,
     near_and_far,

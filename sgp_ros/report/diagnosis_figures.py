@@ -1,4 +1,4 @@
-"""Figures of a diagnosis over the motion: where, when, after which law."""
+"""Figures of a diagnosis over the motion: when, after which law."""
 
 from __future__ import annotations
 
@@ -8,23 +8,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from sgp_ros.diagnosis.decide.decision import LEAST_SHARE
 from sgp_ros.report.diagnosis_charts import draw_dependence, draw_proof
-from sgp_ros.report.diagnosis_text import effect_name, scored_joints, worst_joint
+from sgp_ros.report.diagnosis_maps import (
+    draw_location,
+    draw_others,
+    effort_scale,
+    important_joints,
+    mark_regions,
+    position_unit,
+    shown_position,
+)
+from sgp_ros.report.diagnosis_text import effect_name
 from sgp_ros.report.figures import BAND, GREY, MEASURED, PREDICTED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.collections import QuadMesh
 
     from sgp_ros.diagnosis.result import Diagnosis, Finding
 
 FORCES = (PREDICTED, '#009E73', '#CC79A7')
 """One colour for each finding (Okabe and Ito 2008)."""
-_CELLS = 24
-_LARGE, _IMPORTANT = 3, 0.1
-_ZOOM_S = 4.0
-_SMALL_COLUMNS = 6
+_LARGE, _ZOOM_S = 3, 4.0
 LAWS = {
     'viscous_friction': 'velocity', 'coulomb_friction': 'velocity',
     'stribeck_friction': 'velocity', 'quadratic_drag': 'velocity',
@@ -36,23 +40,6 @@ LAWS = {
 """Variable over which the force of an effect is drawn; the position for all others."""
 _MEMORY = ('actuator_lag', 'command_delay', 'backlash')
 """Effects whose force is no function of the state: drawn over a few seconds."""
-
-
-def important_joints(found: Diagnosis) -> list[int]:
-    """Return the joints that deserve large pictures, at most three, in order of the robot."""
-    proof = found.proofs['train']
-    worst = worst_joint(proof)
-    if found.verdict == 'no_mismatch':
-        return [found.joints.index(worst)]
-    named = {f.joint for f in found.findings}
-    least = max(_IMPORTANT * proof.nmse_before[worst], _IMPORTANT * LEAST_SHARE)
-    rank = {
-        j: (name in named) + min(proof.nmse_before[name] / max(least, 1e-300), 1e9) * 1e-9
-        for j, name in enumerate(found.joints)
-        if name in named or (name in scored_joints(proof) and proof.nmse_before[name] >= least)
-    }
-    best = sorted(rank, key=lambda j: -rank[j])[:_LARGE]
-    return sorted(best) or [found.joints.index(worst)]
 
 
 def draw_diagnosis(found: Diagnosis) -> dict[str, Figure]:
@@ -70,43 +57,6 @@ def draw_diagnosis(found: Diagnosis) -> dict[str, Figure]:
             figures['shape'] = draw_shape(found, f)
     figures['proof'] = draw_proof(found)
     return figures
-
-
-def draw_location(found: Diagnosis) -> Figure:
-    """Draw what nominal robot and final model leave over position and velocity, on one scale."""
-    joints = important_joints(found)
-    left = [('left by the nominal robot', found.traces.before)]
-    if found.verdict != 'no_mismatch':
-        left.append(('left by the final model', found.traces.after))
-    figure = Figure(figsize=(1.0 + 4.5 * len(left), 0.3 + 3.2 * len(joints)), layout='constrained')
-    grid = figure.subplots(len(joints), len(left), squeeze=False, sharex='row', sharey='row')
-    for row, j in zip(grid, joints, strict=True):
-        reach = _reach(found, j)
-        for axes, (title, values) in zip(row, left, strict=True):
-            mesh = _map(axes, found, j, values[:, j], reach)
-            axes.set_title(f'{found.joints[j]}: {title}', fontsize='medium')
-            axes.set_xlabel(f'position [{_unit(found, j)}]')
-            _mark(axes, found, j)
-        row[0].set_ylabel(f'velocity [{_unit(found, j)}/s]')
-        figure.colorbar(mesh, ax=row, label=f'mean effort left [{found.units[j]}]')
-    return figure
-
-
-def draw_others(found: Diagnosis) -> Figure:
-    """Draw the maps of the other joints small, on the scale of the largest discrepancy."""
-    large = important_joints(found)
-    others = [j for j in range(len(found.joints)) if j not in large]
-    scale = _scale(found)
-    share = max(_reach(found, j) / scale[j] for j in large)
-    columns = min(len(others), _SMALL_COLUMNS)
-    rows = -(-len(others) // columns)
-    figure = Figure(figsize=(0.4 + 1.9 * columns, 0.5 + 1.7 * rows), layout='constrained')
-    for i, j in enumerate(others):
-        axes = figure.add_subplot(rows, columns, i + 1)
-        _map(axes, found, j, found.traces.before[:, j], share * scale[j])
-        axes.set_title(found.joints[j], fontsize='small')
-        axes.tick_params(labelsize='x-small')
-    return figure
 
 
 def draw_time(found: Diagnosis) -> Figure:
@@ -149,7 +99,7 @@ def draw_laws(found: Diagnosis) -> Figure:
         axes.set(xlabel=label, ylabel=f'force on {found.joints[j]} [{found.units[j]}]')
         axes.set_title(fill(effect_name(finding), 26), fontsize='medium')
         if 'position' in label:
-            _mark(axes, found, j)
+            mark_regions(axes, found, j)
         axes.legend(fontsize='small', markerscale=2)
     return figure
 
@@ -170,26 +120,6 @@ def draw_shape(found: Diagnosis, unknown: Finding) -> Figure:
     axes.set(xlabel=label, ylabel=f'left on {unknown.joint} [{found.units[j]}]')
     axes.legend(fontsize='small', markerscale=3)
     return figure
-
-
-def _map(axes: Axes, found: Diagnosis, j: int, values: np.ndarray, reach: float) -> QuadMesh:
-    q, v = _position(found, j), found.traces.velocity[:, j]
-    edges = [np.linspace(x.min(), x.max() + 1e-12, _CELLS + 1) for x in (q, v)]
-    count = np.histogram2d(q, v, edges)[0]
-    total = np.histogram2d(q, v, edges, weights=values)[0]
-    mean = np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
-    axes.set_facecolor('#D4D4D4')
-    return axes.pcolormesh(*edges, mean.T, cmap='RdBu_r', vmin=-reach, vmax=reach)
-
-
-def _mark(axes: Axes, found: Diagnosis, j: int) -> None:
-    """Draw the limits of the region that a finding on this joint is confined to."""
-    for f in found.findings:
-        if f.joint == found.joints[j]:
-            for lo, hi in f.location.intervals.get('position', []):
-                axes.axvspan(lo, hi, fill=False, ec='black', ls='--', lw=1.2)
-            for lo, hi in f.location.intervals.get('velocity', []):
-                axes.axhspan(lo, hi, fill=False, ec='black', ls='--', lw=1.2)
 
 
 def _trace(axes: Axes, found: Diagnosis, j: int, shown: slice) -> None:
@@ -217,13 +147,13 @@ def _forces(found: Diagnosis) -> list[tuple[Finding, np.ndarray]]:
 def _strongest(found: Diagnosis, finding: Finding, force: np.ndarray) -> int:
     if finding.joint in found.joints:
         return found.joints.index(finding.joint)
-    return int(np.argmax((force**2).mean(axis=0) / _scale(found) ** 2))
+    return int(np.argmax((force**2).mean(axis=0) / effort_scale(found) ** 2))
 
 
 def _abscissa(
     found: Diagnosis, finding: Finding, j: int, name: str | None = None
 ) -> tuple[np.ndarray, str]:
-    name, unit = name or LAWS.get(finding.effect, 'position'), _unit(found, j)
+    name, unit = name or LAWS.get(finding.effect, 'position'), position_unit(found, j)
     traces = found.traces
     words = {key: p.value for key, p in finding.parameters.items()}
     if words.get('kind') == 'torque' and words.get('source_joint') in found.joints:
@@ -236,34 +166,9 @@ def _abscissa(
         'acceleration': (
             np.gradient(traces.velocity[:, j], traces.time), f'acceleration [{unit}/s^2]',
         ),
-        'position': (_position(found, j), f'position [{unit}]'),
+        'position': (shown_position(found, j), f'position [{unit}]'),
     }  # fmt: skip
     return curves[name]
-
-
-def _position(found: Diagnosis, j: int) -> np.ndarray:
-    """Return the position, wrapped where the joint made more than a turn [rad or m]."""
-    q = found.traces.position[:, j]
-    if _unit(found, j) == 'rad' and np.ptp(q) > 2.2 * np.pi:
-        return (q + np.pi) % (2 * np.pi) - np.pi
-    return q
-
-
-def _unit(found: Diagnosis, j: int) -> str:
-    return 'm' if found.units[j] == 'N' else 'rad'
-
-
-def _scale(found: Diagnosis) -> np.ndarray:
-    """Return the effort that the errors of each joint are measured by, (k,) [N m or N]."""
-    left = np.sqrt((found.traces.before**2).mean(axis=0))
-    nmse = np.array([found.proofs['train'].nmse_before[name] for name in found.joints])
-    return np.maximum(left, 1e-300) / np.sqrt(np.maximum(nmse, 1e-300))
-
-
-def _reach(found: Diagnosis, j: int) -> float:
-    """Return where the colours end: never below the least that counts as physics [N m or N]."""
-    largest = float(np.quantile(np.abs(found.traces.before[:, j]), 0.98))
-    return max(largest, float(np.sqrt(LEAST_SHARE) * _scale(found)[j]))
 
 
 def _zoom(found: Diagnosis, j: int) -> slice:

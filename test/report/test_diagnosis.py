@@ -14,12 +14,8 @@ from sgp_ros.diagnosis.decide.decision import LEAST_SHARE
 from sgp_ros.diagnosis.result import Equivalent, Parameter
 from sgp_ros.report.diagnosis import render, write_diagnosis
 from sgp_ros.report.diagnosis_charts import draw_proof
-from sgp_ros.report.diagnosis_figures import (
-    draw_diagnosis,
-    draw_laws,
-    draw_location,
-    important_joints,
-)
+from sgp_ros.report.diagnosis_figures import draw_diagnosis, draw_laws
+from sgp_ros.report.diagnosis_maps import draw_location, important_joints
 from sgp_ros.report.diagnosis_text import (
     EFFECT_NAMES,
     equivalence_sentence,

@@ -1,0 +1,121 @@
+"""Maps of a diagnosis: what is left on each joint over its own motion."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from sgp_ros.diagnosis.decide.decision import LEAST_SHARE
+from sgp_ros.report.diagnosis_text import scored_joints, worst_joint
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import QuadMesh
+
+    from sgp_ros.diagnosis.result import Diagnosis
+
+_CELLS = 24
+_LARGE, _IMPORTANT = 3, 0.1
+_SMALL_COLUMNS = 6
+
+
+def important_joints(found: Diagnosis) -> list[int]:
+    """Return the joints that deserve large pictures, at most three, in order of the robot."""
+    proof = found.proofs['train']
+    worst = worst_joint(proof)
+    if found.verdict == 'no_mismatch':
+        return [found.joints.index(worst)]
+    named = {f.joint for f in found.findings}
+    least = max(_IMPORTANT * proof.nmse_before[worst], _IMPORTANT * LEAST_SHARE)
+    rank = {
+        j: (name in named) + min(proof.nmse_before[name] / max(least, 1e-300), 1e9) * 1e-9
+        for j, name in enumerate(found.joints)
+        if name in named or (name in scored_joints(proof) and proof.nmse_before[name] >= least)
+    }
+    best = sorted(rank, key=lambda j: -rank[j])[:_LARGE]
+    return sorted(best) or [found.joints.index(worst)]
+
+
+def draw_location(found: Diagnosis) -> Figure:
+    """Draw what nominal robot and final model leave over position and velocity, on one scale."""
+    joints = important_joints(found)
+    left = [('left by the nominal robot', found.traces.before)]
+    if found.verdict != 'no_mismatch':
+        left.append(('left by the final model', found.traces.after))
+    figure = Figure(figsize=(1.0 + 4.5 * len(left), 0.3 + 3.2 * len(joints)), layout='constrained')
+    grid = figure.subplots(len(joints), len(left), squeeze=False, sharex='row', sharey='row')
+    for row, j in zip(grid, joints, strict=True):
+        reach = _reach(found, j)
+        for axes, (title, values) in zip(row, left, strict=True):
+            mesh = _map(axes, found, j, values[:, j], reach)
+            axes.set_title(f'{found.joints[j]}: {title}', fontsize='medium')
+            axes.set_xlabel(f'position [{position_unit(found, j)}]')
+            mark_regions(axes, found, j)
+        row[0].set_ylabel(f'velocity [{position_unit(found, j)}/s]')
+        figure.colorbar(mesh, ax=row, label=f'mean effort left [{found.units[j]}]')
+    return figure
+
+
+def draw_others(found: Diagnosis) -> Figure:
+    """Draw the maps of the other joints small, on the scale of the largest discrepancy."""
+    large = important_joints(found)
+    others = [j for j in range(len(found.joints)) if j not in large]
+    scale = effort_scale(found)
+    share = max(_reach(found, j) / scale[j] for j in large)
+    columns = min(len(others), _SMALL_COLUMNS)
+    rows = -(-len(others) // columns)
+    figure = Figure(figsize=(0.4 + 1.9 * columns, 0.5 + 1.7 * rows), layout='constrained')
+    for i, j in enumerate(others):
+        axes = figure.add_subplot(rows, columns, i + 1)
+        _map(axes, found, j, found.traces.before[:, j], share * scale[j])
+        axes.set_title(found.joints[j], fontsize='small')
+        axes.tick_params(labelsize='x-small')
+    return figure
+
+
+def mark_regions(axes: Axes, found: Diagnosis, j: int) -> None:
+    """Draw the limits of the region that a finding on this joint is confined to."""
+    for f in found.findings:
+        if f.joint == found.joints[j]:
+            for lo, hi in f.location.intervals.get('position', []):
+                axes.axvspan(lo, hi, fill=False, ec='black', ls='--', lw=1.2)
+            for lo, hi in f.location.intervals.get('velocity', []):
+                axes.axhspan(lo, hi, fill=False, ec='black', ls='--', lw=1.2)
+
+
+def shown_position(found: Diagnosis, j: int) -> np.ndarray:
+    """Return the position, wrapped where the joint made more than a turn [rad or m]."""
+    q = found.traces.position[:, j]
+    if position_unit(found, j) == 'rad' and np.ptp(q) > 2.2 * np.pi:
+        return (q + np.pi) % (2 * np.pi) - np.pi
+    return q
+
+
+def position_unit(found: Diagnosis, j: int) -> str:
+    """Return the unit of the position of a joint."""
+    return 'm' if found.units[j] == 'N' else 'rad'
+
+
+def effort_scale(found: Diagnosis) -> np.ndarray:
+    """Return the effort that the errors of each joint are measured by, (k,) [N m or N]."""
+    left = np.sqrt((found.traces.before**2).mean(axis=0))
+    nmse = np.array([found.proofs['train'].nmse_before[name] for name in found.joints])
+    return np.maximum(left, 1e-300) / np.sqrt(np.maximum(nmse, 1e-300))
+
+
+def _reach(found: Diagnosis, j: int) -> float:
+    """Return where the colours end: never below the least that counts as physics [N m or N]."""
+    largest = float(np.quantile(np.abs(found.traces.before[:, j]), 0.98))
+    return max(largest, float(np.sqrt(LEAST_SHARE) * effort_scale(found)[j]))
+
+
+def _map(axes: Axes, found: Diagnosis, j: int, values: np.ndarray, reach: float) -> QuadMesh:
+    q, v = shown_position(found, j), found.traces.velocity[:, j]
+    edges = [np.linspace(x.min(), x.max() + 1e-12, _CELLS + 1) for x in (q, v)]
+    count = np.histogram2d(q, v, edges)[0]
+    total = np.histogram2d(q, v, edges, weights=values)[0]
+    mean = np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
+    axes.set_facecolor('#D4D4D4')
+    return axes.pcolormesh(*edges, mean.T, cmap='RdBu_r', vmin=-reach, vmax=reach)
