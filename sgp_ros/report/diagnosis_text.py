@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -219,8 +220,8 @@ def _count(finding: Finding) -> int:
 def _missing(found: Diagnosis) -> str:
     first = found.findings[0]
     text = f'Missing {place(first)}: {phrase(first)} (probability {first.probability:.2f})'
-    for f in found.findings[1:]:
-        where = '' if f.joint == first.joint else f'{place(f)}: '
+    for previous, f in pairwise(found.findings):
+        where = '' if f.joint == previous.joint else f'{place(f)}: '
         text += f'; and {where}{phrase(f)} (probability {f.probability:.2f})'
     if any(f.effect != 'velocity_filter_lag' for f in found.findings):
         subject = 'it explains' if len(found.findings) == 1 else 'together they explain'

@@ -61,6 +61,13 @@ def test_both_effects_of_a_pair_are_said_with_their_joints():
     assert 'with corrected bodies they explain' in same
 
 
+def test_an_effect_belongs_to_the_joint_named_last_before_it():
+    """Back on an earlier joint that one is named again, or the effect would change its place."""
+    back = verdict_sentence(diagnosis('missing_physics', [COULOMB, SPRING, LOCAL]))
+    assert 'on shoulder: a spring' in back
+    assert 'and on elbow: viscous friction in a part of the range' in back
+
+
 def test_wrong_parameters_are_said_beside_the_nominal_ones():
     """Which body, how much, instead of what; and that nothing else is missing."""
     text = verdict_sentence(diagnosis('parameters_only', errors=[MASS]))
