@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from sgp_ros.diagnosis.result import Diagnosis, Proof
 
 BEFORE, AFTER = '#E69F00', PREDICTED
-_VARIABLES = 7
+_VARIABLES, _SEEN = 7, 0.005
 
 
 def draw_dependence(found: Diagnosis, joints: Container[str]) -> Figure:
@@ -29,6 +29,8 @@ def draw_dependence(found: Diagnosis, joints: Container[str]) -> Figure:
     for axes, d in zip(figure.subplots(1, len(tables), squeeze=False)[0], tables, strict=True):
         best = sorted(d.scores, key=lambda name: d.scores[name])[-_VARIABLES:]
         axes.barh(best, [100.0 * d.scores[name] for name in best], color=PREDICTED)
+        if max(d.scores.values()) < _SEEN:
+            axes.text(50.0, 0.5 * (len(best) - 1), 'none of these alone', ha='center', va='center')
         axes.set(xlim=(0, 100), xlabel='explained [%]')
         axes.set_title(d.joint, fontsize='medium')
         axes.tick_params(labelsize='small')

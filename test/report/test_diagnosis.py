@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from sgp_ros.diagnosis.decide.decision import LEAST_SHARE
 from sgp_ros.diagnosis.result import Equivalent, Parameter
 from sgp_ros.report.diagnosis import render, write_diagnosis
-from sgp_ros.report.diagnosis_charts import draw_proof
+from sgp_ros.report.diagnosis_charts import draw_dependence, draw_proof
 from sgp_ros.report.diagnosis_figures import draw_diagnosis, draw_laws
 from sgp_ros.report.diagnosis_maps import draw_location, important_joints
 from sgp_ros.report.diagnosis_text import (
@@ -247,6 +247,16 @@ def test_a_force_is_drawn_beside_its_own_finding():
     laws = [draw_laws(found).axes[0].lines[1].get_ydata() for found in (alone, both)]
     assert abs(laws[0]).max() > 0.0
     assert (laws[0] == laws[1]).all()
+
+
+def test_a_chart_of_what_explains_nothing_says_so():
+    """An empty frame would look like a fault."""
+    found = diagnosis('missing_physics', [COULOMB])
+    (axes,) = draw_dependence(found, {'elbow'}).axes
+    assert not axes.texts
+    nothing = tuple(replace(d, scores=dict.fromkeys(d.scores, 1e-16)) for d in found.dependences)
+    (axes,) = draw_dependence(replace(found, dependences=nothing), {'elbow'}).axes
+    assert [text.get_text() for text in axes.texts] == ['none of these alone']
 
 
 def test_a_joint_that_is_never_driven_hides_no_finding():
