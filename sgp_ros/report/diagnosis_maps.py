@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from sgp_ros.diagnosis.result import Diagnosis
 
-_CELLS = 24
+_FEWEST_CELLS, _MOST_CELLS = 8, 24
 _LARGE, _IMPORTANT = 3, 0.1
 _SMALL_COLUMNS = 6
 
@@ -59,19 +59,27 @@ def draw_location(found: Diagnosis) -> Figure:
 
 
 def draw_others(found: Diagnosis) -> Figure:
-    """Draw the maps of the other joints small, on the scale of the largest discrepancy."""
+    """Draw the maps of the other joints small, on the scale of the largest discrepancy.
+
+    Each is relative to the effort of its joint.
+    """
     large = important_joints(found)
     others = [j for j in range(len(found.joints)) if j not in large]
     scale = effort_scale(found)
     share = max(_reach(found, j) / scale[j] for j in large)
     columns = min(len(others), _SMALL_COLUMNS)
     rows = -(-len(others) // columns)
-    figure = Figure(figsize=(0.4 + 1.9 * columns, 0.5 + 1.7 * rows), layout='constrained')
+    figure = Figure(figsize=(1.6 + 1.9 * columns, 0.8 + 1.7 * rows), layout='constrained')
     for i, j in enumerate(others):
         axes = figure.add_subplot(rows, columns, i + 1)
-        _map(axes, found, j, found.traces.before[:, j], share * scale[j])
+        mesh = _map(axes, found, j, found.traces.before[:, j] / scale[j], share)
         axes.set_title(found.joints[j], fontsize='small')
         axes.tick_params(labelsize='x-small')
+    units = ' or '.join(dict.fromkeys(position_unit(found, j) for j in others))
+    figure.supxlabel(f'position [{units}]', fontsize='small')
+    figure.supylabel(f'velocity [{units} per s]', fontsize='small')
+    bar = figure.colorbar(mesh, ax=figure.axes)
+    bar.set_label('effort left, relative\nto the effort', fontsize='small')
     return figure
 
 
@@ -113,7 +121,8 @@ def _reach(found: Diagnosis, j: int) -> float:
 
 def _map(axes: Axes, found: Diagnosis, j: int, values: np.ndarray, reach: float) -> QuadMesh:
     q, v = shown_position(found, j), found.traces.velocity[:, j]
-    edges = [np.linspace(x.min(), x.max() + 1e-12, _CELLS + 1) for x in (q, v)]
+    cells = int(np.clip(2.0 * np.sqrt(len(q)), _FEWEST_CELLS, _MOST_CELLS))
+    edges = [np.linspace(x.min(), x.max() + 1e-12, cells + 1) for x in (q, v)]
     count = np.histogram2d(q, v, edges)[0]
     total = np.histogram2d(q, v, edges, weights=values)[0]
     mean = np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
