@@ -22,12 +22,13 @@ from sgp_ros.report.diagnosis_text import effect_name
 from sgp_ros.report.figures import BAND, GREY, MEASURED, PREDICTED
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
     from sgp_ros.diagnosis.result import Diagnosis, Finding
 
 FORCES = (PREDICTED, '#009E73', '#CC79A7')
-"""One colour for each finding (Okabe and Ito 2008)."""
+"""One colour for each finding on a joint (Okabe and Ito 2008)."""
 _LARGE, _ZOOM_S = 3, 4.0
 LAWS = {
     'viscous_friction': 'velocity', 'coulomb_friction': 'velocity',
@@ -35,11 +36,13 @@ LAWS = {
     'asymmetric_coulomb': 'velocity', 'load_friction': 'velocity', 'hysteresis': 'velocity',
     'torque_gain': 'effort', 'dead_zone': 'effort', 'saturation': 'effort',
     'friction_drift': 'time', 'actuator_lag': 'time', 'command_delay': 'time',
-    'backlash': 'time', 'armature': 'acceleration',
+    'backlash': 'time', 'payload': 'time', 'armature': 'acceleration',
 }  # fmt: skip
 """Variable over which the force of an effect is drawn; the position for all others."""
-_MEMORY = ('actuator_lag', 'command_delay', 'backlash')
-"""Effects whose force is no function of the state: drawn over a few seconds."""
+_OVER_SECONDS = ('actuator_lag', 'command_delay', 'backlash', 'payload')
+"""Effects whose force is no function of one variable: drawn over a few seconds."""
+_GAP = 1.5
+"""Sampling periods from which on no line joins two rows."""
 
 
 def draw_diagnosis(found: Diagnosis) -> dict[str, Figure]:
@@ -66,14 +69,17 @@ def draw_time(found: Diagnosis) -> Figure:
     grid = figure.subplots(len(joints), 2, squeeze=False, width_ratios=(3, 2))
     for row, j in zip(grid, joints, strict=True):
         for axes, shown in zip(row, (slice(None), _zoom(found, j)), strict=True):
-            _trace(axes, found, j, shown)
-        row[0].set_ylabel(f'{found.joints[j]} [{found.units[j]}]')
-    for axes in grid[-1]:
-        axes.set_xlabel('time [s]')
-    grid[0][0].set_title('whole recording', fontsize='medium')
-    grid[0][1].set_title('where most is left', fontsize='medium')
-    handles, labels = grid[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc='outside lower center', ncols=5, fontsize='small')
+            alike = _trace(axes, found, j, shown)
+        row[0].set_ylabel(f'effort on {found.joints[j]} [{found.units[j]}]')
+        row[1].locator_params(axis='x', nbins=6)
+        if _acting(found, j):
+            row[0].legend(loc='lower left', bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, ncols=2,
+                          fontsize='small', frameon=False)  # fmt: skip
+    for axes, part in zip(grid[-1], ('whole recording', 'where most is left'), strict=True):
+        axes.set_xlabel(f'time [s], {part}')
+    figure.legend(
+        list(alike.values()), list(alike), loc='outside lower center', ncols=3, fontsize='small'
+    )
     return figure
 
 
@@ -87,16 +93,18 @@ def draw_laws(found: Diagnosis) -> Figure:
         x, label = _abscissa(found, finding, j)
         law, measured = force[:, j], found.traces.after[:, j] + force[:, j]
         style = '.'
-        if finding.effect in _MEMORY:
+        if finding.effect in _OVER_SECONDS:
             zoom, style = _zoom(found, j), '-'
-            x, law, measured = x[zoom], law[zoom], measured[zoom]
+            x, law, measured = (
+                y[zoom] for y in (x, _broken(found, law), _broken(found, measured))
+            )
         elif finding.effect == 'friction_drift':
             law, measured = np.abs(law), np.abs(measured)
-        colour = FORCES[i % len(FORCES)]
+        colour = next((c for f, _, c in _acting(found, j) if f is finding), FORCES[0])
         axes.plot(x, measured, style, ms=6, lw=3.5, color=MEASURED, label='measured')
         axes.plot(x, law, style, ms=1.8, lw=1.2, color=colour, label='the law')
         axes.axhline(0.0, color=GREY, lw=0.6)
-        axes.set(xlabel=label, ylabel=f'force on {found.joints[j]} [{found.units[j]}]')
+        axes.set(xlabel=label, ylabel=f'effort on {found.joints[j]} [{found.units[j]}]')
         axes.set_title(fill(effect_name(finding), 26), fontsize='medium')
         if 'position' in label:
             mark_regions(axes, found, j)
@@ -122,20 +130,34 @@ def draw_shape(found: Diagnosis, unknown: Finding) -> Figure:
     return figure
 
 
-def _trace(axes: Axes, found: Diagnosis, j: int, shown: slice) -> None:
-    traces = found.traces
-    time = traces.time[shown]
+def _trace(axes: Axes, found: Diagnosis, j: int, shown: slice) -> dict[str, Artist]:
+    """Draw one joint over some rows and return, by name, what looks alike on all joints."""
+    traces, time = found.traces, found.traces.time[shown]
     half = 2.0 * float(traces.noise[j])
-    axes.plot(time, traces.before[shown, j], color=MEASURED, lw=3.5, label='nominal robot leaves')
-    for i, (finding, force) in enumerate(_forces(found)):
-        if np.abs(force[:, j]).max() > 0.0:
-            label = effect_name(finding)
-            axes.plot(time, force[shown, j], color=FORCES[i % len(FORCES)], lw=1.1, label=label)
+    before = _broken(found, traces.before[:, j])[shown]
+    alike: dict[str, Artist] = {}
+    (alike['nominal robot leaves'],) = axes.plot(time, before, color=MEASURED, lw=3.5)
+    for finding, force, colour in _acting(found, j):
+        axes.plot(time, _broken(found, force[:, j])[shown], color=colour, lw=1.1,
+                  label=effect_name(finding))  # fmt: skip
     if found.verdict != 'no_mismatch':
-        left = traces.after[shown, j]
-        axes.plot(time, left, color='#D55E00', lw=0.9, label='final model leaves')
-    axes.axhspan(-half, half, color=BAND, lw=0, zorder=0, label='noise (2 std)')
+        left = _broken(found, traces.after[:, j])[shown]
+        (alike['final model leaves'],) = axes.plot(time, left, color='#D55E00', lw=0.9)
+    alike['noise (2 std)'] = axes.axhspan(-half, half, color=BAND, lw=0, zorder=0)
     axes.margins(x=0.01)
+    return alike
+
+
+def _broken(found: Diagnosis, values: np.ndarray) -> np.ndarray:
+    """Return values (N,) with NaN in the last row before a gap, where a line is to break."""
+    step = np.diff(found.traces.time, append=found.traces.time[-1])
+    return np.where(step > _GAP / found.rate_hz, np.nan, values)
+
+
+def _acting(found: Diagnosis, j: int) -> list[tuple[Finding, np.ndarray, str]]:
+    """Return the findings that exert a force on a joint, with these and their colours."""
+    acting = [(f, force) for f, force in _forces(found) if np.abs(force[:, j]).max() > 0.0]
+    return [(f, force, FORCES[i % len(FORCES)]) for i, (f, force) in enumerate(acting)]
 
 
 def _forces(found: Diagnosis) -> list[tuple[Finding, np.ndarray]]:

@@ -6,6 +6,7 @@ import math
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,7 +15,7 @@ from sgp_ros.diagnosis.decide.decision import LEAST_SHARE
 from sgp_ros.diagnosis.result import Equivalent, Parameter
 from sgp_ros.report.diagnosis import render, write_diagnosis
 from sgp_ros.report.diagnosis_charts import draw_dependence, draw_proof
-from sgp_ros.report.diagnosis_figures import draw_diagnosis, draw_laws
+from sgp_ros.report.diagnosis_figures import FORCES, draw_diagnosis, draw_laws, draw_time
 from sgp_ros.report.diagnosis_maps import draw_location, important_joints
 from sgp_ros.report.diagnosis_text import (
     EFFECT_NAMES,
@@ -35,6 +36,7 @@ from test.report.diagnoses import (
     NOISE,
     SPRING,
     UNKNOWN,
+    N,
     diagnosis,
 )
 
@@ -247,6 +249,31 @@ def test_a_force_is_drawn_beside_its_own_finding():
     laws = [draw_laws(found).axes[0].lines[1].get_ydata() for found in (alone, both)]
     assert abs(laws[0]).max() > 0.0
     assert (laws[0] == laws[1]).all()
+
+
+def test_each_row_over_time_names_the_forces_it_shows():
+    """In the colours of their laws, also where joints differ in what acts on them."""
+    found = diagnosis('missing_physics', [COULOMB, SPRING])
+    force = found.traces.forces[0]
+    found = replace(found, traces=replace(found.traces, forces=(force, force[:, ::-1])))
+    rows = [axes for axes in draw_time(found).axes if axes.get_legend() is not None]
+    named = {}
+    for axes in rows:
+        (line,) = axes.get_legend().get_lines()
+        named[axes.get_legend().get_texts()[0].get_text()] = line.get_color()
+        assert line.get_color() in {drawn.get_color() for drawn in axes.lines}
+    laws = {axes.get_title(): axes.lines[1].get_color() for axes in draw_laws(found).axes}
+    assert named == laws == {'Coulomb friction': FORCES[0], 'a spring': FORCES[0]}
+
+
+def test_no_line_joins_rows_with_a_pause_between_them():
+    """What was not recorded is not drawn."""
+    found = diagnosis('missing_physics', [COULOMB])
+    later = found.traces.time + 5.0 * (np.arange(N) >= N // 2)
+    found = replace(found, traces=replace(found.traces, time=later))
+    for axes in draw_time(found).axes[:1]:
+        for line in (x for x in axes.lines if len(x.get_xdata()) == N):
+            assert np.flatnonzero(np.isnan(line.get_ydata())).tolist() == [N // 2 - 1]
 
 
 def test_few_rows_get_large_cells():
