@@ -17,19 +17,21 @@ import shutil
 import tempfile
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from benchmarks.environment import environment
 from benchmarks.withheld import main as withheld
 from sgp_ros.cli import main as sgp
 from sgp_ros.report.metrics import versions
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
 ROOT = Path(__file__).parents[1]
 DATA = ROOT.parent / 'shared' / 'data'
 TARGET = Path(__file__).parent / 'results' / 'real_diagnosis.json'
-IMAGES = ROOT / 'docs' / 'images'
+IMAGES = ROOT / 'docs' / 'images' / 'real_machines'
 SHOWN_RIVALS = 4
-PICTURES = ('law', 'shape', 'location', 'proof')
-"""Figures of a report, the one that tells most first; not every verdict has all."""
 EMPS = (
     'sgp diagnose out/emps_id.mcap --robot config/robots/emps.urdf'
     ' --test out/emps_val_pulses.mcap --out out/diagnosis'
@@ -104,6 +106,17 @@ MACHINES = {
 """Commands from the authors' files to the diagnosis, which is the last one."""
 
 
+_EMPS = 'sgp diagnose out/emps_id.mcap --test out/emps_val_pulses.mcap --robot'
+STEPS = {
+    'emps': (
+        f'{_EMPS} config/robots/emps_viscous.yaml --out out/viscous',
+        f'{_EMPS} config/robots/emps_symmetric.yaml --out out/symmetric',
+        f'{_EMPS} out/diagnosis/robot_diagnosed.yaml --out out/again',
+    ),
+}
+"""Further diagnoses of a machine, of models that lack less."""
+
+
 def execute(command: str, folder: Path) -> str:
     """Run one command line in a folder and return what it printed."""
     program, *words = command.split()
@@ -121,36 +134,68 @@ def execute(command: str, folder: Path) -> str:
     return printed.getvalue()
 
 
-def run(name: str, folder: Path) -> dict:
-    """Carry out the commands of a machine and return what its diagnosis says."""
+def take_pictures(report: Path, target: Path) -> list[str]:
+    """Replace what the target holds by all figures of a report and return their names."""
+    shutil.rmtree(target, ignore_errors=True)
+    target.mkdir(parents=True)
+    pictures = sorted(report.glob('*.png'))
+    for picture in pictures:
+        shutil.copy(picture, target)
+    return [picture.stem for picture in pictures]
+
+
+@contextlib.contextmanager
+def inside(folder: Path) -> Iterator[None]:
+    """Work in a folder with recordings, configuration and room for what comes out."""
     (folder / 'data').symlink_to(DATA)
     (folder / 'config').symlink_to(ROOT / 'config')
     (folder / 'out').mkdir()
-    seconds = {}
     before = Path.cwd()
     os.chdir(folder)
     try:
+        yield
+    finally:
+        os.chdir(before)
+
+
+def run(name: str, folder: Path) -> dict:
+    """Carry out the commands of a machine and return what its diagnosis says."""
+    seconds = {}
+    with inside(folder):
         for command in MACHINES[name]:
             began = time.perf_counter()
             printed = execute(command, folder)
             if command.startswith(('sgp identify', 'sgp diagnose')):
                 seconds[command.split()[1]] = round(time.perf_counter() - began, 1)
-    finally:
-        os.chdir(before)
+        steps = [step(command, folder) for command in STEPS.get(name, ())]
     out = folder / 'out' / 'diagnosis'
-    picture = next(p for p in PICTURES if (out / f'{p}.png').exists())
-    shutil.copy(out / f'{picture}.png', IMAGES / f'diagnosis_{name}.png')
-    found = json.loads((out / 'diagnosis.json').read_text(encoding='utf-8'))
-    kept = ('verdict', 'certainty', 'findings', 'parameter_errors', 'dependence', 'settings')
-    fit = {k: v for k, v in found['fit'].items() if k != 'predictions'}
     return {
         'commands': MACHINES[name],
-        'picture': picture,
+        'pictures': take_pictures(out, IMAGES / name),
+        **read(out, printed),
+        'seconds': seconds,
+        'steps': steps,
+    }
+
+
+def step(command: str, folder: Path) -> dict:
+    """Carry out a further diagnosis and return what it says."""
+    printed = execute(command, folder)
+    return {'command': command, **read(folder / command.rsplit(maxsplit=1)[-1], printed)}
+
+
+def read(out: Path, printed: str) -> dict:
+    """Return what a diagnosis wrote and its sentence, without what no page shows."""
+    found = json.loads((out / 'diagnosis.json').read_text(encoding='utf-8'))
+    kept = (
+        'verdict', 'certainty', 'findings', 'equivalents', 'parameter_errors', 'dependence',
+        'settings',
+    )  # fmt: skip
+    return {
         'sentence': printed.splitlines()[0],
         **{key: found[key] for key in kept},
         'alternatives': found['alternatives'][:SHOWN_RIVALS],
-        'fit': fit,
-        'seconds': seconds,
+        'fit': {k: v for k, v in found['fit'].items() if k != 'predictions'},
     }
 
 

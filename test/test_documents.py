@@ -107,4 +107,23 @@ def test_generated_pages_are_those_of_code_and_results(name):
     spec = importlib.util.spec_from_file_location(f'generate_{name}', path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    assert module.TARGET.read_text(encoding='utf-8') == module.text()
+    pages = module.pages() if hasattr(module, 'pages') else {module.TARGET: module.text()}
+    for target, text in pages.items():
+        assert target.read_text(encoding='utf-8') == text, target.name
+
+
+def test_each_real_machine_has_a_page_with_every_picture_of_its_report():
+    """No picture is taken that nobody sees, and none is shown of a report that lacked it."""
+    path = ROOT / 'benchmarks' / 'results' / 'real_diagnosis.json'
+    machines = json.loads(path.read_text(encoding='utf-8'))['machines']
+    pages, pictures = ROOT / 'docs' / 'real_machines', ROOT / 'docs' / 'images' / 'real_machines'
+    assert {page.stem for page in pages.iterdir()} == set(machines)
+    assert {folder.name for folder in pictures.iterdir()} == set(machines)
+    for name, machine in machines.items():
+        text = (pages / f'{name}.md').read_text(encoding='utf-8')
+        shown = re.findall(rf'\]\(\.\./images/real_machines/{name}/(\w+)\.png\)', text)
+        assert (
+            sorted(shown)
+            == machine['pictures']
+            == sorted(picture.stem for picture in (pictures / name).iterdir())
+        )

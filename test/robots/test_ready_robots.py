@@ -16,6 +16,8 @@ ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / 'config' / 'robots'
 TIAGO = ROOT.parent / 'shared' / 'data' / 'tiago' / 'tiago_48_schunk.urdf'
 READY = {
+    'emps_symmetric': ('axis',),
+    'emps_viscous': ('axis',),
     'panda': tuple(f'panda_joint{i}' for i in range(1, 8)),
     'tiago_arm': tuple(f'arm_{i}_joint' for i in range(1, 5)),
 }
