@@ -17,7 +17,7 @@ from sgp_ros.report.diagnosis_text import EFFECT_NAMES, equivalence_sentence, pe
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / 'docs'
-RESULT = ROOT / 'benchmarks' / 'results' / 'real_diagnosis.json'
+RESULTS = ROOT / 'benchmarks' / 'results'
 TITLES = {
     'emps': 'EMPS',
     'simple_pendulum_1kg': 'Simple pendulum, heavier weight',
@@ -99,21 +99,25 @@ def equivalents(machine):
 
 def scores(machine):
     """Return the table of errors before and after, with the 95 % interval of those after."""
-    joints = list(parts(machine)['learned from']['nmse_before'])
-    lines = [f'| nMSE | {" | ".join(joints)} |', '|---' * (len(joints) + 1) + '|']
-    for name, part in parts(machine).items():
-        for key, what in ERRORS.items():
-            if f'{key}_before' in part:
-                cells = ' | '.join(_error(part, key, joint) for joint in joints)
-                lines.append(f'| {what}, {name} | {cells} |')
+    columns = [(f'{what}, {name}', part, key) for name, part in parts(machine).items()
+               for key, what in ERRORS.items() if f'{key}_before' in part]  # fmt: skip
+    lines = [f'| nMSE | {" | ".join(title for title, *_ in columns)} |']
+    lines.append('|---' * (len(columns) + 1) + '|')
+    for joint in parts(machine)['learned from']['nmse_before']:
+        cells = ' | '.join(_error(part, key, joint) for _, part, key in columns)
+        lines.append(f'| {joint} | {cells} |')
     return '\n'.join(lines)
 
 
 def _error(part, key, joint):
-    before, after = (part[f'{key}_{when}'][joint] for when in ('before', 'after'))
+    before, after = (_short(part[f'{key}_{when}'][joint]) for when in ('before', 'after'))
     interval = part.get(f'{key}_after_interval', {}).get(joint)
-    between = f' ({interval[0]:.2g} to {interval[1]:.2g})' if interval else ''
-    return f'{before:.2g} → {after:.2g}{between}'
+    between = f' ({_short(interval[0])} to {_short(interval[1])})' if interval else ''
+    return f'{before} → {after}{between}'
+
+
+def _short(x):
+    return f'{x:.2g}' if x < 100.0 else f'{x:.0f}'
 
 
 def settings(machine):
@@ -123,6 +127,17 @@ def settings(machine):
     seconds = ', '.join(f'{verb} {s:.0f} s' for verb, s in machine['seconds'].items())
     return (f'Low-pass {given["cutoff_hz"]:.3g} Hz, {given["rows"]} rows; refused samples: '
             f'{refused}; {seconds}.')  # fmt: skip
+
+
+def nearest(machine):
+    """Return the best model that was not asserted, and the share of the effort that it leaves."""
+    top = machine['alternatives'][0]
+    together = [
+        f'{EFFECT_NAMES[f["effect"]]} on {f["joint"]}'
+        for f in machine['alternatives']
+        if f['log_bayes_factor'] == top['log_bayes_factor']
+    ]
+    return ', '.join(together), top['why'].removeprefix('leaves ').partition(' of ')[0]
 
 
 def of(machine, joint, effect, kind='findings'):
@@ -145,7 +160,10 @@ def dry_level(machine, joint):
 
 def pages():
     """Return the text of each page by its path."""
-    result = json.loads(RESULT.read_text(encoding='utf-8'))
+    result, double = (
+        json.loads((RESULTS / f'{name}.json').read_text(encoding='utf-8'))
+        for name in ('real_diagnosis', 'double_pendulum_diagnosis')
+    )
     templates = Environment(  # noqa: S701 - Markdown, and nothing in it is from outside
         loader=FileSystemLoader(DOCS / 'templates' / 'real_machines'), undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
@@ -154,13 +172,13 @@ def pages():
         f.__name__: f
         for f in (percent, quantity, parts, worst, named, effects, bodies, equivalents, scores,
                   settings,
-                  of, dry_level)
+                  nearest, of, dry_level)
     }  # fmt: skip
     templates.globals |= {'titles': TITLES, 'least_share': LEAST_SHARE}
     versions = ', '.join(f'{k} {v}' for k, v in result['versions'].items())
     place, machines = result['environment'], result['machines']
     environment = f'{place["cores"]} cores of {place["processor"]}, {versions}'
-    context = {'environment': environment, 'machines': machines}
+    context = {'environment': environment, 'machines': machines, 'double': double}
     paths = {'overview': DOCS / 'diagnosis_real.md'}
     paths |= {name: DOCS / 'real_machines' / f'{name}.md' for name in machines}
     return {
