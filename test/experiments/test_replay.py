@@ -5,9 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
-
-pytest.importorskip('clarabel')
 
 from sgp_ros.core import consistent
 from sgp_ros.engine.config import EngineConfig
