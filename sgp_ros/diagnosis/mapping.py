@@ -41,7 +41,8 @@ def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
         'simulation': {name: _finite(x) for name, x in found.simulation.items()},
         'dependence': [
             {'joint': d.joint, 'share': _finite(d.share),
-             'scores': {k: _finite(v) for k, v in d.scores.items()}}
+             'scores': {k: _finite(v) for k, v in d.scores.items()},
+             'p_value': {k: _finite(v) for k, v in d.p_values.items()}}
             for d in found.dependences
         ],
         'settings': {

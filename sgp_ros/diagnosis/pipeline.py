@@ -89,7 +89,7 @@ def diagnose(
         parameter_errors=parameter_errors(equations, decision.model),
         proofs=proofs,
         predictions=predictions,
-        dependences=dependences(equations, competition.parameters.residual),
+        dependences=dependences(equations, competition.base.residual),
         traces=_traces(equations, competition, decision.model, remainders, forces),
         cutoff_hz=equations.filter.cutoff,
         rate_hz=1.0 / (raw.step * equations.filter.decimation),

@@ -10,6 +10,8 @@ if TYPE_CHECKING:
 
     import numpy as np
 
+SIGNIFICANT = 0.05
+"""Chance that anything is called significant where the motion has no part in what is left."""
 VERDICTS = ('no_mismatch', 'parameters_only', 'missing_physics', 'unexplained')
 
 
@@ -150,11 +152,18 @@ class Dependence:
         joint: name.
         share: of the mean squared effort that the nominal robot leaves.
         scores: share of what is left that each variable explains on held-out stretches, by name.
+        p_values: chance that a disturbance of the same spectra, which knows nothing of the
+            motion, has a score as remarkable for any joint and variable, by name.
     """
 
     joint: str
     share: float
     scores: Mapping[str, float]
+    p_values: Mapping[str, float] = field(default_factory=dict)
+
+    def is_significant(self, variable: str) -> bool:
+        """Return whether a variable explains something, and more than chance would."""
+        return self.scores[variable] > 0.0 and self.p_values.get(variable, 1.0) <= SIGNIFICANT
 
 
 @dataclass(frozen=True, slots=True, eq=False)

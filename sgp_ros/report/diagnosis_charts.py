@@ -17,18 +17,22 @@ if TYPE_CHECKING:
 
     from sgp_ros.diagnosis.result import Diagnosis, Proof
 
-BEFORE, AFTER = '#E69F00', PREDICTED
+BEFORE, AFTER, BY_CHANCE = '#E69F00', PREDICTED, '#BBBBBB'
 _VARIABLES, _SEEN = 7, 0.005
 
 
 def draw_dependence(found: Diagnosis, joints: Container[str]) -> Figure:
-    """Draw how much of the discrepancy each variable explains on stretches left out."""
+    """Draw how much of the discrepancy each variable explains on stretches left out.
+
+    Bars that chance could have made are pale.
+    """
     tables = [d for d in found.dependences if d.joint in joints]
     rows = max(min(len(d.scores), _VARIABLES) for d in tables)
     figure = Figure(figsize=(10, 0.9 + 0.28 * rows), layout='constrained')
     for axes, d in zip(figure.subplots(1, len(tables), squeeze=False)[0], tables, strict=True):
         best = sorted(d.scores, key=lambda name: d.scores[name])[-_VARIABLES:]
-        axes.barh(best, [100.0 * d.scores[name] for name in best], color=PREDICTED)
+        colours = [PREDICTED if d.is_significant(name) else BY_CHANCE for name in best]
+        axes.barh(best, [100.0 * d.scores[name] for name in best], color=colours)
         if max(d.scores.values()) < _SEEN:
             axes.text(50.0, 0.5 * (len(best) - 1), 'none of these alone', ha='center', va='center')
         axes.set(xlim=(0, 100), xlabel='explained [%]')

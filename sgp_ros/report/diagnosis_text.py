@@ -259,7 +259,8 @@ def _unexplained(found: Diagnosis) -> str:
         f'Unexplained on {joint}: {percent(share)} of the mean squared effort '
         f'(certainty {certainty:.2f})'
     )
-    scores = next((d.scores for d in found.dependences if d.joint == joint), {})
+    of = next((d for d in found.dependences if d.joint == joint), None)
+    scores = {} if of is None else {n: s for n, s in of.scores.items() if of.is_significant(n)}
     leading = sorted(scores, key=lambda name: -scores[name])[:_MOST_VARIABLES]
     on = [f'{name} ({percent(scores[name])})' for name in leading if scores[name] > 0.05]
     text += f'; it depends on {" and ".join(on)}' if on else '; no variable alone explains it'

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.result import VERDICTS
 from test.diagnosis.worlds import (
@@ -155,6 +156,10 @@ def test_what_no_effect_describes_is_unexplained_at_its_joint(robots):
     assert finding.probability >= 0.5
     shares = {d.joint: d for d in found.dependences}
     assert shares['joint1'].share > 100.0 * shares['joint0'].share
+    assert shares['joint1'].is_significant('position of joint0')
+    for entry in diagnosis_mapping(found)['dependence']:
+        assert entry['p_value'].keys() == entry['scores'].keys()
+        assert all(0.0 < p <= 1.0 for p in entry['p_value'].values())
     proof = found.proofs['again']
     assert proof.nmse_after['joint1'] < 0.2 * proof.nmse_before['joint1']
 

@@ -78,10 +78,11 @@ def diagnosis(
     )  # fmt: skip
     far = replace(proof, distance=1.5, failed=3)
     scores = {'position': 0.1, 'velocity': 0.9, 'time': 0.0}
+    chances = {'position': 0.02, 'velocity': 0.005, 'time': 0.7}
     return Diagnosis(
         'arm', tuple(joints), ('N m',) * k, verdict, 0.97, tuple(findings), tuple(alternatives),
         tuple(errors), {'train': proof} | ({'real_test': far} if held else {}), {},
-        tuple(Dependence(name, 0.1, scores) for name in joints),
+        tuple(Dependence(name, 0.1, scores, chances) for name in joints),
         Traces(time, position, velocity, np.ones((N, k)), before, before, after,
                np.full(k, NOISE), tuple(force for f in findings if f is not UNKNOWN)),
         10.0, 40.0, N, {'duplicate': 3},

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.colors import to_hex
 
 from sgp_ros.diagnosis.decide.decision import LEAST_SHARE
 from sgp_ros.diagnosis.result import Equivalent, Parameter
 from sgp_ros.report.diagnosis import render, write_diagnosis
-from sgp_ros.report.diagnosis_charts import draw_dependence, draw_proof
+from sgp_ros.report.diagnosis_charts import BY_CHANCE, draw_dependence, draw_proof
 from sgp_ros.report.diagnosis_figures import FORCES, draw_diagnosis, draw_laws, draw_time
 from sgp_ros.report.diagnosis_maps import draw_location, important_joints
 from sgp_ros.report.diagnosis_text import (
@@ -182,6 +183,25 @@ def test_the_unexplained_is_drawn_over_what_it_depends_on_most():
     forward, backward = (line.get_xdata() for line in axes.lines[:2])
     assert (forward > 0.0).all()
     assert len(forward) + len(backward) == len(found.traces.time)
+
+
+def test_what_may_be_chance_is_pale_and_in_no_sentence():
+    found = diagnosis('unexplained', [UNKNOWN])
+    assert 'velocity (90 %) and position (10 %)' in verdict_sentence(found)
+    weak = tuple(
+        replace(d, p_values={'position': 0.2, 'velocity': 0.005}) for d in found.dependences
+    )
+    found = replace(found, dependences=weak)
+    sentence = verdict_sentence(found)
+    assert 'velocity (90 %)' in sentence
+    assert 'position' not in sentence
+    (axes,) = draw_dependence(found, {'elbow'}).axes
+    bars = {
+        label.get_text(): to_hex(bar.get_facecolor()).upper()
+        for label, bar in zip(axes.get_yticklabels(), axes.patches, strict=True)
+    }
+    assert bars['position'] == bars['time'] == BY_CHANCE
+    assert bars['velocity'] != BY_CHANCE
 
 
 def test_texts_from_outside_bring_no_markup():

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.diagnosis.locate.variables import own_variables
 from sgp_ros.diagnosis.result import Location
 
 if TYPE_CHECKING:
@@ -31,13 +32,8 @@ def region(equations: Equations, r: np.ndarray, joint: int) -> Location:
     Intervals of position are of the wrapped one [rad or m], of velocity [rad/s or m/s], of time
     since the first state [s].
     """
-    motion, low = equations.motion, equations.filter
-    variables = {
-        'position': motion.wrapped[low.rows, joint],
-        'velocity': low(motion.velocity)[:, joint],
-        'time': equations.time,
-    }
-    found = {name: confined(x, r) for name, x in variables.items()}
+    variables = own_variables(equations, joint)
+    found = {name: confined(variables[name], r) for name in ('position', 'velocity', 'time')}
     name = min(found, key=lambda n: found[n][2])
     lo, hi, rows = found[name]
     if len(r) < LEAST_ROWS or rows > ROWS:
