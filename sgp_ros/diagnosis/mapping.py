@@ -42,7 +42,9 @@ def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
         'dependence': [
             {'joint': d.joint, 'share': _finite(d.share),
              'scores': {k: _finite(v) for k, v in d.scores.items()},
-             'p_value': {k: _finite(v) for k, v in d.p_values.items()}}
+             'p_value': {k: _finite(v) for k, v in d.p_values.items()},
+             'regions': {b.variable: [list(ends) for ends in b.regions]
+                         for b in found.bands if b.joint == d.joint}}
             for d in found.dependences
         ],
         'settings': {

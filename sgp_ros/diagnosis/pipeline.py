@@ -14,6 +14,7 @@ from sgp_ros.diagnosis.decide.decision import Decision, decide
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, equivalents
 from sgp_ros.diagnosis.explain.hypotheses import compete
 from sgp_ros.diagnosis.findings import alternatives, asserted, parameter_errors
+from sgp_ros.diagnosis.locate.bands import bands
 from sgp_ros.diagnosis.locate.dependence import dependences
 from sgp_ros.diagnosis.locate.remainder import learn_remainder
 from sgp_ros.diagnosis.prove.bodies import diagnosed_bodies
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from sgp_ros.diagnosis.explain.fitted_model import Model
     from sgp_ros.diagnosis.explain.hypotheses import Competition
     from sgp_ros.diagnosis.locate.remainder import Remainder
+    from sgp_ros.diagnosis.result import Band, Dependence
     from sgp_ros.engine.samples import Event
     from sgp_ros.robots.robot import Robot
     from sgp_ros.robots.stated_effects import StatedEffect
@@ -73,23 +75,23 @@ def diagnose(
     contrasts = Contrasts(equations, decision.model)
     recordings = {'train': raw, **kept, **held}
     proofs = {stem: prove(final, part, tree) for stem, part in recordings.items()}
-    predictions = {stem: final.predict(part, tree) for stem, part in held.items()}
     chances = probabilities(equations, competition, decision, contrasts)
     findings, forces = asserted(equations, decision, lags, remainders, chances)
-    verdict = 'missing_physics' if lags and decision.verdict in _CALM else decision.verdict
+    depends, seen = _located(equations, competition.base.residual)
     progress(1.0)
     return Diagnosis(
         robot=robot.name,
         joints=tree.moving_names,
         units=tuple('N' if p else 'N m' for p in tree.is_prismatic[: tree.size]),
-        verdict=verdict,
+        verdict='missing_physics' if lags and decision.verdict in _CALM else decision.verdict,
         certainty=certainty_of(findings, decision, equations, competition),
         findings=findings,
         alternatives=alternatives(decision, chances),
         parameter_errors=parameter_errors(equations, decision.model),
         proofs=proofs,
-        predictions=predictions,
-        dependences=dependences(equations, competition.base.residual),
+        predictions={stem: final.predict(part, tree) for stem, part in held.items()},
+        dependences=depends,
+        bands=seen,
         traces=_traces(equations, competition, decision.model, remainders, forces),
         cutoff_hz=equations.filter.cutoff,
         rate_hz=1.0 / (raw.step * equations.filter.decimation),
@@ -102,6 +104,13 @@ def diagnose(
 
 
 _CALM = ('no_mismatch', 'parameters_only')
+
+
+def _located(
+    equations: Equations, residual: np.ndarray
+) -> tuple[tuple[Dependence, ...], tuple[Band, ...]]:
+    depends = dependences(equations, residual)
+    return depends, bands(equations, residual, depends)
 
 
 def _remainders(equations: Equations, decision: Decision) -> tuple[Remainder, ...]:

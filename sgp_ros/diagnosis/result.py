@@ -167,6 +167,29 @@ class Dependence:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Band:
+    """Z of one joint over one variable, backward and forward, at m values.
+
+    Attributes:
+        joint: name.
+        variable: `position`, `velocity`, `effort` or `time`.
+        x: (m,) values, in the units of the variable.
+        mean: (m, 2) of Z, backward and forward [N m or N]; NaN where the joint never moved so.
+        half: (m, 2) half width of the band that holds everywhere at once [N m or N].
+        regions: intervals of x where the mean leaves the band.
+        rows: share of the rows that lie in them.
+    """
+
+    joint: str
+    variable: str
+    x: np.ndarray
+    mean: np.ndarray
+    half: np.ndarray
+    regions: tuple[tuple[float, float], ...]
+    rows: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Traces:
     """Filtered signals of the training recording, for pictures.
 
@@ -228,6 +251,7 @@ class Diagnosis:
             recording of its simulation, by joint; empty without one.
         remarks: for the user.
         equivalents: what this motion cannot tell from the findings, best first.
+        bands: Z over each variable of each joint; empty where too few rows were had.
         bodies: (b, 10) inertial parameters of the final model, of bodies that can exist, in the
             order of the tree; None for the nominal ones.
     """
@@ -252,3 +276,4 @@ class Diagnosis:
     remarks: tuple[str, ...] = ()
     bodies: np.ndarray | None = None
     equivalents: tuple[Equivalent, ...] = ()
+    bands: tuple[Band, ...] = ()

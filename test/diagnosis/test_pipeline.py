@@ -160,6 +160,7 @@ def test_what_no_effect_describes_is_unexplained_at_its_joint(robots):
     for entry in diagnosis_mapping(found)['dependence']:
         assert entry['p_value'].keys() == entry['scores'].keys()
         assert all(0.0 < p <= 1.0 for p in entry['p_value'].values())
+        assert set(entry['regions']) == {'position', 'velocity', 'effort', 'time'}
     proof = found.proofs['again']
     assert proof.nmse_after['joint1'] < 0.2 * proof.nmse_before['joint1']
 
