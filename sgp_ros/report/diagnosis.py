@@ -8,6 +8,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from sgp_ros.core.scores import INTERVAL_95
 from sgp_ros.diagnosis.prove.held_out import HELD_OUT
+from sgp_ros.report.diagnosis_bands import band_sentences
 from sgp_ros.report.diagnosis_figures import draw_diagnosis
 from sgp_ros.report.diagnosis_maps import important_joints
 from sgp_ros.report.diagnosis_proof import (
@@ -75,6 +76,7 @@ def render(found: Diagnosis, figures: Mapping[str, bytes]) -> str:
         held_out='' if len(found.proofs) > 1 else held_out_sentence(found),
         cards=_cards(found),
         large=', '.join(large),
+        regions=band_sentences(found, large),
         others=', '.join(name for name in found.joints if name not in large),
         is_calm=found.verdict == 'no_mismatch',
         findings=[_finding(f) for f in found.findings],

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from sgp_ros.report.diagnosis_bands import draw_bands
 from sgp_ros.report.diagnosis_charts import draw_dependence, draw_proof
 from sgp_ros.report.diagnosis_maps import (
     draw_location,
@@ -50,6 +51,9 @@ def draw_diagnosis(found: Diagnosis) -> dict[str, Figure]:
     figures = {'location': draw_location(found), 'time': draw_time(found)}
     if len(important_joints(found)) < len(found.joints):
         figures['others'] = draw_others(found)
+    if found.bands:
+        reach = {found.joints[j]: _reach(found, j) for j in important_joints(found)}
+        figures['bands'] = draw_bands(found, reach)
     if any(f.effect != 'unknown' for f, _ in _forces(found)):
         figures['law'] = draw_laws(found)
     if found.findings:

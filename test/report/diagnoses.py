@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sgp_ros.diagnosis.result import (
+    Band,
     Dependence,
     Diagnosis,
     Finding,
@@ -85,5 +86,18 @@ def diagnosis(
         tuple(Dependence(name, 0.1, scores, chances) for name in joints),
         Traces(time, position, velocity, np.ones((N, k)), before, before, after,
                np.full(k, NOISE), tuple(force for f in findings if f is not UNKNOWN)),
-        10.0, 40.0, N, {'duplicate': 3},
+        10.0, 40.0, N, {'duplicate': 3}, bands=tuple(_bands(joints)),
     )  # fmt: skip
+
+
+def _bands(joints):
+    """Yield Z of friction on `elbow`, with a gap where the joint never moved backward."""
+    for joint in joints:
+        level = LEVEL if joint == 'elbow' else 0.0
+        for variable in ('position', 'velocity', 'time'):
+            mean = np.tile([level, -level], (9, 1))
+            mean[:2, 0] = np.nan
+            regions = ((-2.0, -0.5), (0.5, 2.0)) if level and variable == 'velocity' else ()
+            rows = 0.8 if regions else 0.0
+            half = np.full((9, 2), 0.1)
+            yield Band(joint, variable, np.linspace(-2.0, 2.0, 9), mean, half, regions, rows)

@@ -158,7 +158,7 @@ def test_the_page_opens_with_the_sentence_and_needs_no_other_file(tmp_path):
     assert at == sorted(at)
     assert 'http' not in page.replace('http-equiv', '')
     stems = {path.stem for path in tmp_path.glob('*.png')}
-    assert stems == {'location', 'others', 'time', 'law', 'dependence', 'proof'}
+    assert stems == {'location', 'others', 'time', 'bands', 'law', 'dependence', 'proof'}
     assert page.count('src="data:image/png;base64,') == len(stems)
     assert not list(tmp_path.glob('*.part'))
 
@@ -330,7 +330,7 @@ def test_a_joint_that_is_never_driven_hides_no_finding():
     assert explained(found) > 0.99
     assert important_joints(found) == [1]
     assert 'shoulder' not in held_out_sentence(found)
-    assert len(draw_diagnosis(found)) == 6
+    assert len(draw_diagnosis(found)) == 7
 
 
 def test_many_joints_stay_readable():
