@@ -43,8 +43,11 @@ def draw_bands(found: Diagnosis, reach: Mapping[str, float]) -> Figure:
                 _mark(axes, found, joint, variable)
                 axes.set_xlabel(f'{variable} [{_units(unit)[variable]}]')
         row[0].set(ylabel=f'Z on {joint} [{unit}]', ylim=(-reach[joint], reach[joint]))
-    handles, labels = grid[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc='outside lower center', ncols=3, fontsize='small')
+    parts = [axes.get_legend_handles_labels() for axes in grid.flat]
+    by_label = {label: h for hs, labels in parts for h, label in zip(hs, labels, strict=True)}
+    figure.legend(
+        by_label.values(), by_label, loc='outside lower center', ncols=3, fontsize='small'
+    )
     return figure
 
 

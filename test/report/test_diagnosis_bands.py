@@ -43,6 +43,9 @@ def test_regions_are_shaded_and_said_significant():
     ]
     assert np.array(ends) == pytest.approx(np.array([(-2.0, -0.5), (0.5, 2.0)]))
     assert not _axes(figure, 'shoulder', 'velocity').patches
+    (legend,) = figure.legends
+    words = sorted(text.get_text() for text in legend.get_texts())
+    assert words == ['backward', 'forward', 'not zero']
     assert _axes(figure, 'elbow', 'velocity').get_title() == 'significant (p 0.005)'
     assert _axes(figure, 'elbow', 'time').get_title() == 'not significant (p 0.7)'
 
