@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from sgp_ros.diagnosis.decide.decision import Decision
     from sgp_ros.diagnosis.explain.fitted_model import Model
     from sgp_ros.diagnosis.locate.remainder import Remainder
+    from sgp_ros.diagnosis.result import Dependence
     from sgp_ros.robots.effects.effect import Value
 
 MODEL_ERROR = 0.003
@@ -35,6 +36,7 @@ def asserted(
     lags: Sequence[SensorLag],
     remainders: Sequence[Remainder],
     chances: Probabilities,
+    depends: Sequence[Dependence],
 ) -> tuple[tuple[Finding, ...], tuple[np.ndarray, ...]]:
     """Return the findings of a verdict, most probable first, and the force of each (N, k)."""
     findings: list[Finding] = []
@@ -46,7 +48,7 @@ def asserted(
             for i in range(len(decision.model.suspects))
         ]
     if decision.verdict == 'unexplained':
-        findings.append(_unknown(equations, decision, remainders, chances))
+        findings.append(_unknown(equations, decision, remainders, chances, depends))
     names = equations.motion.tree.joint_names
     for lag in lags:
         unit = Parameter(lag.time_constant, max(lag.std, MODEL_ERROR * lag.time_constant), 's')
@@ -124,10 +126,14 @@ def _unknown(
     decision: Decision,
     remainders: Sequence[Remainder],
     chances: Probabilities,
+    depends: Sequence[Dependence],
 ) -> Finding:
     names = equations.motion.tree.joint_names
     seen = [r for r in remainders if r.joint == decision.worst]
+    own = depends[decision.worst]
     on = f'it depends on {", ".join(seen[0].inputs)}' if seen else 'no function of the motion'
+    if seen and not any(own.is_significant(name) for name in own.scores):
+        on = f'Z follows {", ".join(seen[0].inputs)}, but no variable alone beyond chance'
     share = float(decision.model.mean_square[decision.worst] / equations.power[decision.worst])
     where = region(equations, decision.model.residual[:, decision.worst], decision.worst)
     if where.variables:

@@ -76,8 +76,8 @@ def diagnose(
     recordings = {'train': raw, **kept, **held}
     proofs = {stem: prove(final, part, tree) for stem, part in recordings.items()}
     chances = probabilities(equations, competition, decision, contrasts)
-    findings, forces = asserted(equations, decision, lags, remainders, chances)
     depends, seen = _located(equations, competition.base.residual)
+    findings, forces = asserted(equations, decision, lags, remainders, chances, depends)
     progress(1.0)
     return Diagnosis(
         robot=robot.name,

@@ -222,3 +222,16 @@ def test_measured_efforts_do_in_place_of_commands(tmp_path):
     assert {(f.joint, f.effect) for f in found.findings} == {('joint0', 'spring')}
     drive = {'dead_zone', 'saturation', 'actuator_lag', 'command_delay'}
     assert not drive & {f.effect for f in found.alternatives}
+
+
+def test_what_follows_the_clock_alone_is_said_to_depend_on_nothing_beyond_chance(robots):
+    """Z may follow the motion by chance; no variable is named as a cause for that."""
+    world = simulate(
+        CHAINS[1], 15, SECONDS, force=lambda t, q, v: (0.8 * math.sin(9.0 * t + 1.0),)
+    )
+    found = diagnose(events_of(world), *robots[1], {})
+    assert found.verdict == 'unexplained'
+    (finding,) = found.findings
+    assert not finding.why.startswith('it depends on')
+    (own,) = found.dependences
+    assert not any(own.is_significant(name) for name in own.scores)
