@@ -77,10 +77,26 @@ and need the YAML.
    * Else the verdict is `unexplained`, and Z is learned for the joint, now of the effort too; the inputs that
      evidence keeps are what the discrepancy depends on. Where an interval of position, velocity or time with less
      than half of the rows holds 95 % of its energy, that is its region.
-7. **Cannot tell.** Rivals whose odds the data move by less than twenty are carried over to other motions: the whole
+7. **Locate.** What the better model without effects leaves, bodies or none, is looked at from every side, so chance
+   is counted over all joints and variables together.
+   * **Dependence.** Position, velocity, effort and time of the joint, and the motion of the others, each with the
+     direction of motion, explain a share on stretches left out. Disturbances with the same spectra but new phases
+     (Theiler and others 1992), which know nothing of motion and clock, give each share its null, and the best of
+     all shares the p-value (Westfall and Young 1993).
+   * **Where Z is not zero.** Over each of the joint's own variables Z is a Gaussian process, with a part common to
+     both directions and a part odd in them, on the means of at most 32 cells a direction. What other variables
+     cause is noise, as dense as the peak of its spectrum: no order in which the cells are visited makes the band too
+     narrow, unless the noise is slower than a twelfth of the recording; then the p-value holds. One factor from draws
+     of all posteriors makes the band hold everywhere at once; beyond it, and where the variable is significant, Z is
+     called not zero. White noise and red leave it in one of twenty recordings at most
+     (`test/diagnosis/locate/test_bands.py`).
+   * Such a region says where Z is seen, not where it ends: cubic drag acts at all speeds and is seen at high ones.
+     So the region that an unknown effect is *confined to* is that of its energy: there is none where it acts
+     everywhere (same file), and a burst is found that oscillates faster than the cells of time resolve.
+8. **Cannot tell.** Rivals whose odds the data move by less than twenty are carried over to other motions: the whole
    range of the joints, faster, slower, elsewhere. Those that differ nowhere by 0.4 % are the same law under a richer
    name, and count for the finding; the others are reported with the motion on which they differ most.
-8. **Prove.** Efforts, one-step accelerations, predictive densities and roll-outs of 0.3 s from measured states,
+9. **Prove.** Efforts, one-step accelerations, predictive densities and roll-outs of 0.3 s from measured states,
    on held-out recordings, before and after, each with a 95 % interval; how far the recording lies from what was
    learned stands beside them.
 
