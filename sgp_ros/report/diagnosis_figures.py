@@ -17,6 +17,7 @@ from sgp_ros.report.diagnosis_maps import (
     important_joints,
     mark_regions,
     position_unit,
+    reach_of,
     shown_position,
 )
 from sgp_ros.report.diagnosis_text import effect_name
@@ -52,7 +53,7 @@ def draw_diagnosis(found: Diagnosis) -> dict[str, Figure]:
     if len(important_joints(found)) < len(found.joints):
         figures['others'] = draw_others(found)
     if found.bands:
-        reach = {found.joints[j]: _reach(found, j) for j in important_joints(found)}
+        reach = {found.joints[j]: reach_of(found, j) for j in important_joints(found)}
         figures['bands'] = draw_bands(found, reach)
     if any(f.effect != 'unknown' for f, _ in _forces(found)):
         figures['law'] = draw_laws(found)

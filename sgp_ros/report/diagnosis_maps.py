@@ -47,7 +47,7 @@ def draw_location(found: Diagnosis) -> Figure:
     figure = Figure(figsize=(1.0 + 4.5 * len(left), 0.3 + 3.2 * len(joints)), layout='constrained')
     grid = figure.subplots(len(joints), len(left), squeeze=False, sharex='row', sharey='row')
     for row, j in zip(grid, joints, strict=True):
-        reach = _reach(found, j)
+        reach = reach_of(found, j)
         for axes, (title, values) in zip(row, left, strict=True):
             mesh = _map(axes, found, j, values[:, j], reach)
             axes.set_title(f'{found.joints[j]}: {title}', fontsize='medium')
@@ -66,7 +66,7 @@ def draw_others(found: Diagnosis) -> Figure:
     large = important_joints(found)
     others = [j for j in range(len(found.joints)) if j not in large]
     scale = effort_scale(found)
-    share = max(_reach(found, j) / scale[j] for j in large)
+    share = max(reach_of(found, j) / scale[j] for j in large)
     columns = min(len(others), _SMALL_COLUMNS)
     rows = -(-len(others) // columns)
     figure = Figure(figsize=(1.6 + 1.9 * columns, 0.8 + 1.7 * rows), layout='constrained')
@@ -113,7 +113,7 @@ def effort_scale(found: Diagnosis) -> np.ndarray:
     return np.maximum(left, 1e-300) / np.sqrt(np.maximum(nmse, 1e-300))
 
 
-def _reach(found: Diagnosis, j: int) -> float:
+def reach_of(found: Diagnosis, j: int) -> float:
     """Return where the colours end: never below the least that counts as physics [N m or N]."""
     largest = float(np.quantile(np.abs(found.traces.before[:, j]), 0.98))
     return max(largest, float(np.sqrt(LEAST_SHARE) * effort_scale(found)[j]))
