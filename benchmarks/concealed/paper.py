@@ -27,8 +27,9 @@ import numpy as np
 from benchmarks.concealed import draw, sizes
 from benchmarks.concealed import world as worlds
 from benchmarks.concealed.concealed_effect import Concealed, UnsuitableError
+from benchmarks.concealed.rates import summary
 from benchmarks.concealed.robots import DOWN, UP, Body, Y, Z
-from benchmarks.concealed.run import RESULTS, scored_case, summary
+from benchmarks.concealed.run import RESULTS, scored_case
 from benchmarks.environment import environment
 from sgp_ros.experiments.reproduction import toy
 from sgp_ros.simulation.figure_eight import ARM
