@@ -58,7 +58,7 @@ def main():
             for name in CONCEALMENTS:
                 drawn = draw_paper_case(seed, name, out)
                 if drawn is not None:
-                    row = scored_case(out, drawn[0], Path(folder))
+                    row = scored_case(out, drawn[0], Path(folder) / 'out' / drawn[0])
                     rows[name].append(with_shares(row, size_of(seed), drawn[1]))
     report = {
         'schema': 1, 'seeds': arguments.seeds, 'environment': environment(),

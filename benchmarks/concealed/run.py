@@ -1,10 +1,12 @@
 """Draw worlds with concealed physics, diagnose them by the command line, unseal, and score.
 
     python -m benchmarks.concealed.run --tier B --seeds 100:137 [--only pair] [--worlds DIR]
+        [--outputs DIR]
 
 The answers lie in another folder than the recordings; `sgp diagnose` is started as a user does,
 in a process of its own, and sees the recordings alone. Results go to
 `benchmarks/results/concealed_<tier>.json`, with `--only pair` to `concealed_<tier>_pair.json`.
+With `--outputs` the diagnoses are kept, and worlds of which one is there are only scored.
 """
 
 from __future__ import annotations
@@ -27,6 +29,8 @@ from benchmarks.concealed.rates import HELD_OUT, summary
 from benchmarks.environment import environment
 
 RESULTS = Path(__file__).parents[1] / 'results'
+OUTCOME = 'outcome.json'
+"""How a diagnosis ended and how long it took, beside what it wrote."""
 
 
 def main():
@@ -35,10 +39,12 @@ def main():
     parser.add_argument('--seeds', default='0:40', help='FIRST:LAST+1[,...]')
     parser.add_argument('--only', help='conceal this in every world, as `draw` has it')
     parser.add_argument('--worlds', type=Path, help='worlds drawn before; else they are drawn')
+    parser.add_argument('--outputs', type=Path, help='where diagnoses are kept; else nowhere')
     parser.add_argument('--processes', type=int, default=2)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         worlds = arguments.worlds or Path(folder) / 'worlds'
+        outputs = arguments.outputs or Path(folder) / 'out'
         cases = []
         for seeds in arguments.seeds.split(','):
             if arguments.worlds is None:
@@ -49,7 +55,7 @@ def main():
             cases += [f'case_{seed:03d}' for seed in range(first, last)]
         cases = [case for case in cases if (worlds / 'answers' / f'{case}.json').exists()]
         with ThreadPoolExecutor(arguments.processes) as pool:
-            scored = list(pool.map(lambda case: scored_case(worlds, case, Path(folder)), cases))
+            scored = list(pool.map(lambda case: scored_case(worlds, case, outputs / case), cases))
     report = {
         'schema': 1, 'tier': arguments.tier, 'seeds': arguments.seeds, 'only': arguments.only,
         'environment': environment(), 'summary': summary(scored), 'cases': scored,
@@ -64,36 +70,47 @@ def _run(module, *words):
     subprocess.run([sys.executable, '-m', module, *words], check=True)
 
 
-def scored_case(worlds, case, scratch):
-    """Diagnose one case where its answer is out of sight, then score it."""
-    sealed, folder, out = worlds / 'cases' / case, scratch / 'open' / case, scratch / 'out' / case
-    shutil.copytree(sealed, folder)
-    words = ['diagnose', str(folder / 'real.mcap'), '--robot', str(folder / 'robot.urdf'),
-             '--sim', str(folder / 'sim.mcap'), '--out', str(out)]  # fmt: skip
-    for name in HELD_OUT:
-        words += ['--test', str(folder / f'{name}.mcap')]
-    begin = time.perf_counter()
-    done = subprocess.run(
-        [sys.executable, '-m', 'sgp_ros.cli', *words], capture_output=True, text=True,
-        env={**os.environ, 'OPENBLAS_NUM_THREADS': '1'}, check=False,
-    )  # fmt: skip
-    seconds = time.perf_counter() - begin
-    shutil.rmtree(folder)
+def scored_case(worlds, case, out):
+    """Score the diagnosis of one case, which is made first where none lies in `out`."""
+    if not (out / OUTCOME).exists():
+        diagnose_case(worlds / 'cases' / case, out)
+    outcome = json.loads((out / OUTCOME).read_text(encoding='utf-8'))
     answer = json.loads((worlds / 'answers' / f'{case}.json').read_text(encoding='utf-8'))
     truth = np.load(worlds / 'answers' / f'{case}_truth.npz')
     row = {
         'case': case, 'key': answer['key'], 'verdict': answer['verdict'],
         'truth': [[e['effect'], e['joint']] for e in answer['effects']],
-        'seconds': round(seconds, 1),
+        'seconds': outcome['seconds'],
     }  # fmt: skip
-    if done.returncode:
-        row |= {'said': 'failed', 'why': done.stderr.strip()[-300:], 'right': False, 'found': []}
+    if outcome['status']:
+        row |= {'said': 'failed', 'why': outcome['why'], 'right': False, 'found': []}
     else:
         diagnosis = json.loads((out / 'diagnosis.json').read_text(encoding='utf-8'))
         row |= _row(answer, diagnosis, out, truth)
     print(case, answer['key'], '->', row['said'], row['found'],
-          'right' if row['right'] else 'WRONG', f'{seconds:.0f} s', flush=True)  # fmt: skip
+          'right' if row['right'] else 'WRONG', f'{row["seconds"]:.0f} s', flush=True)  # fmt: skip
     return row
+
+
+def diagnose_case(sealed, out):
+    """Diagnose one case where its answer is out of sight, and write how that ended."""
+    out.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = shutil.copytree(sealed, Path(scratch) / sealed.name)
+        words = ['diagnose', str(folder / 'real.mcap'), '--robot', str(folder / 'robot.urdf'),
+                 '--sim', str(folder / 'sim.mcap'), '--out', str(out)]  # fmt: skip
+        for name in HELD_OUT:
+            words += ['--test', str(folder / f'{name}.mcap')]
+        begin = time.perf_counter()
+        done = subprocess.run(
+            [sys.executable, '-m', 'sgp_ros.cli', *words], capture_output=True, text=True,
+            env={**os.environ, 'OPENBLAS_NUM_THREADS': '1'}, check=False,
+        )  # fmt: skip
+        seconds = round(time.perf_counter() - begin, 1)
+    outcome = {
+        'status': done.returncode, 'why': done.stderr.strip()[-300:], 'seconds': seconds,
+    }  # fmt: skip
+    (out / OUTCOME).write_text(json.dumps(outcome) + '\n', encoding='utf-8')
 
 
 def _row(answer, diagnosis, out, truth):

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks.concealed import draw, paper, robots, scoring, sizes
+from benchmarks.concealed import draw, paper, robots, run, scoring, sizes
 from benchmarks.concealed.concealed_effect import SCORED
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.registry import load_robot
@@ -120,3 +120,17 @@ def test_two_effects_of_one_name_on_one_joint_are_each_compared_with_their_own()
     assert all(s['covered'] for s in scores)
     assert scoring.components(answer, {'findings': [finding(0.3)]}) == 1
     assert len(scoring.parameter_scores(answer, {'findings': [finding(0.3)]})) == 1
+
+
+def test_a_diagnosis_that_was_kept_is_scored_and_not_made_again(tmp_path):
+    """The recordings are not there any more; what the command said then counts."""
+    answers, out = tmp_path / 'answers', tmp_path / 'out'
+    for folder in (answers, out):
+        folder.mkdir()
+    answer = {'key': 'A_none_pendulum', 'verdict': 'no_mismatch', 'effects': []}
+    (answers / 'case_001.json').write_text(json.dumps(answer), encoding='utf-8')
+    np.savez(answers / 'case_001_truth.npz', real_test_t=np.zeros(1))
+    outcome = {'status': 2, 'why': 'nothing moves', 'seconds': 0.5}
+    (out / run.OUTCOME).write_text(json.dumps(outcome), encoding='utf-8')
+    row = run.scored_case(tmp_path, 'case_001', out)
+    assert (row['said'], row['why'], row['seconds']) == ('failed', 'nothing moves', 0.5)
