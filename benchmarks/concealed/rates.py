@@ -41,14 +41,51 @@ def summary(rows):
         'overlap_median': _median(overlaps),
         'parameter_error_median': _median(errors),
         'within_two_std': _rate(covered),
-        'improvement_median': {
-            s: _median([r['improvement'][s] for r in rows
-                        if r.get('improvement', {}).get(s) is not None]) for s in HELD_OUT
-        },
+        'improvement': {s: _improvement(rows, s) for s in HELD_OUT},
+        'oracle_parameter_error_median': _median(
+            [p['error'] for r in rows for p in r.get('oracle_parameters', [])]
+        ),
         'probability': _reliability(rows),
         'seconds_median': _median([r['seconds'] for r in rows]),
         'confused': dict(confused),
     }  # fmt: skip
+
+
+def _improvement(rows, stem):
+    """Return the shares on one recording held out, and how good the fitted true structure is.
+
+    `above` counts the diagnoses that are better than it; `largest` is the share before clipping.
+    """
+    known = [r for r in rows if _has(r, 'improvement_of_truth', stem)]
+    scored = [r for r in known if _has(r, 'improvement', stem)]
+    errors = [r['errors'][stem] for r in scored]
+    gains = [(e['nominal'] - e['diagnosed']) / (e['nominal'] - e['oracle']) for e in errors]
+    return {
+        'of_oracle': _spread([r['improvement'][stem] for r in scored]),
+        'of_truth': _spread([r['improvement_of_truth'][stem] for r in known]),
+        'above': sum(gain > 1.0 for gain in gains),
+        'largest': max(gains, default=None),
+        'left_by_oracle_median': _median([e['oracle'] / e['nominal'] for e in errors]),
+        'not_scored': {r['case']: _what(r) for r in known if r not in scored},
+        'below_nine_tenths': {
+            r['case']: _what(r) for r in scored if r['improvement'][stem] < 0.9
+        },
+    }  # fmt: skip
+
+
+def _has(row, name, stem):
+    return row.get(name, {}).get(stem) is not None
+
+
+def _what(row):
+    return '+'.join(effect for effect, _ in row['truth']) or row['verdict']
+
+
+def _spread(values):
+    if not values:
+        return {'worlds': 0, 'median': None, 'mean': None, 'least': None}
+    return {'worlds': len(values), 'median': float(np.median(values)),
+            'mean': float(np.mean(values)), 'least': float(min(values))}  # fmt: skip
 
 
 def _hits(count, total):

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections import Counter
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
-_WIDTH_S, _RATE_HZ = 0.012, 200.0
 _RELATIVE_TO_RANGE = {'rest', 'position', 'onset'}
 
 
@@ -111,27 +108,3 @@ def _scale(name, effect, answer):
     if name in {'fx', 'fy', 'fz'}:
         return math.sqrt(sum(values[n] ** 2 for n in ('fx', 'fy', 'fz')))
     return abs(values[name] - 1.0) if name == 'gain' else max(abs(values[name]), 1e-12)
-
-
-def improvement(answer, folder, truth, stem):
-    """Return the share of the best possible improvement of predicted accelerations, or None.
-
-    The best possible is a model without error. None where the effect hardly shows.
-    """
-    nominal = np.mean(list(answer['nmse'][stem]['acceleration_vs_truth']['nominal'].values()))
-    if nominal < 1e-3 or not answer['fit_scored']:
-        return None
-    with (folder / f'pred_{stem}.csv').open(encoding='utf-8') as file:
-        rows = [[float(x) for x in row] for row in list(csv.reader(file))[1:]]
-    table = np.array(rows)
-    t, a = truth[f'{stem}_t'], truth[f'{stem}_a'].astype(float)
-    low, high = max(t[0], table[0, 0]), min(t[-1], table[-1, 0])
-    grid = np.arange(low + 5 * _WIDTH_S, high - 5 * _WIDTH_S, 1.0 / _RATE_HZ)
-    true, found = _smoothed(grid, t, a), _smoothed(grid, table[:, 0], table[:, 1:])
-    error = float(np.mean(((true - found) ** 2).mean(axis=0) / true.var(axis=0)))
-    return float(np.clip((nominal - error) / nominal, -1.0, 1.0))
-
-
-def _smoothed(grid, t, x):
-    even = np.column_stack([np.interp(grid, t, column) for column in x.T])
-    return gaussian_filter1d(even, _WIDTH_S * _RATE_HZ, axis=0, mode='nearest')
