@@ -15,14 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sgp_ros.core.learning import initial_model, learn, screened
-from sgp_ros.core.model import Observations
-from sgp_ros.core.posterior import Posterior
 from sgp_ros.core.prior import CoefficientPrior
-from sgp_ros.diagnosis.decide.second_opinion import PARTS, parts_of
-from sgp_ros.diagnosis.locate.remainder import process_inputs
+from sgp_ros.diagnosis.locate.remainder import foretold, observations, process_inputs, spread
+from sgp_ros.diagnosis.parts import PARTS, parts_of
 
 if TYPE_CHECKING:
-    from sgp_ros.core.model import Model as Hyperparameters
     from sgp_ros.diagnosis.compare.equations import Equations
 
 LEAST_ROWS = 5 * PARTS
@@ -31,8 +28,8 @@ LOOKED_AT = 0.1
 """Joints that leave less than this, relative to the worst one, are not worth a look."""
 ORDER = 8
 """Rows before that may foretell one."""
-LEARNED, CONDITIONED = 200, 500
-"""Rows for the hyper-parameters and for each prediction."""
+LEARNED = 200
+"""Rows for the hyper-parameters."""
 
 
 def structure(equations: Equations, residual: np.ndarray) -> np.ndarray:
@@ -81,29 +78,7 @@ def _by_motion(equations: Equations, r: np.ndarray, joint: int) -> float:
     U = equations.filter(inputs[:, seen])
     U = U / (U.std(axis=0) + 1e-12)
     part = parts_of(len(r))
-    rows = _spread(np.flatnonzero(part > 0), LEARNED)
-    prior, data = CoefficientPrior.flat(0), _observations(U, r, rows)
+    rows = spread(np.flatnonzero(part > 0), LEARNED)
+    prior, data = CoefficientPrior.flat(0), observations(U, r, rows)
     start = screened(data, prior, initial_model(data, (tuple(range(U.shape[1])),)))
-    model = learn(data, prior, start).model
-    error = sum(_error(model, prior, U, r, part == i) for i in range(PARTS))
-    return 1.0 - float(error) / float(r @ r)
-
-
-def _error(
-    model: Hyperparameters, prior: CoefficientPrior, U: np.ndarray, r: np.ndarray, out: np.ndarray
-) -> float:
-    """Return the sum of squared errors on the rows that are out."""
-    known = _observations(U, r, _spread(np.flatnonzero(~out), CONDITIONED))
-    there = U[out]
-    mean = Posterior(model, known, prior).predict(there, np.zeros((len(there), 1, 0))).mean[:, 0]
-    return float(((r[out] - mean) ** 2).sum())
-
-
-def _spread(rows: np.ndarray, count: int) -> np.ndarray:
-    """Return at most `count` of the rows, evenly spread."""
-    chosen = np.linspace(0, len(rows) - 1, min(count, len(rows)))
-    return np.asarray(rows[np.unique(chosen.astype(int))])
-
-
-def _observations(U: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Observations:
-    return Observations(U[rows], np.zeros((len(rows), 1, 0)), r[rows, None])
+    return foretold(learn(data, prior, start).model, U, r, part)

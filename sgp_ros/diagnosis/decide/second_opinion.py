@@ -2,8 +2,7 @@
 
 Shapes stay as they were found; coefficients and bodies are fitted anew without each part. An
 effect whose numbers only follow chance, or one stretch, predicts the others worse than the model
-without it does. Source: cross-validation in blocks, for rows that are correlated in time
-(Burman, Chow and Nolan 1994).
+without it does.
 """
 
 from __future__ import annotations
@@ -12,19 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.diagnosis.parts import PARTS, parts_of
+
 if TYPE_CHECKING:
     from sgp_ros.diagnosis.explain.fitted_model import Model
     from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
-
-PARTS = 6
-"""Parts of the recording that are left out in turn."""
-PIECES = 4
-"""Stretches of each part, spread over the recording."""
-
-
-def parts_of(rows: int) -> np.ndarray:
-    """Return the part that each row belongs to, (rows,)."""
-    return np.asarray(np.arange(rows) * PARTS * PIECES // rows % PARTS)
 
 
 def left_out(columns: Columns, model: Model, suspects: tuple[Suspect, ...]) -> np.ndarray:

@@ -16,12 +16,15 @@ from sgp_ros.core.model import Observations
 from sgp_ros.core.posterior import Posterior
 from sgp_ros.core.prior import CoefficientPrior
 from sgp_ros.core.selection import select_inputs
+from sgp_ros.diagnosis.parts import PARTS, parts_of
 
 if TYPE_CHECKING:
     from sgp_ros.diagnosis.compare.equations import Equations
     from sgp_ros.robots.effects.observed_motion import ObservedMotion
 
 SIZE = 400
+CONDITIONED = 500
+"""Rows that a prediction of a part left out is conditioned on."""
 MOST_NEIGHBOURS = 2
 
 
@@ -73,7 +76,11 @@ def process_inputs(motion: ObservedMotion, joint: int) -> tuple[np.ndarray, tupl
 
 
 def learn_remainder(equations: Equations, residual: np.ndarray, joint: int) -> Remainder | None:
-    """Return Z of a joint learned from a residual (N, k); None where there is none."""
+    """Return Z of a joint learned from a residual (N, k).
+
+    None where there is none, or where it foretells nothing of parts left out: what happens once,
+    such as a burst, is no function of the motion, and predictions elsewhere are better without.
+    """
     full, names = process_inputs(equations.motion, joint)
     U = equations.filter(full)
     scale = U.std(axis=0) + 1e-12
@@ -84,9 +91,40 @@ def learn_remainder(equations: Equations, residual: np.ndarray, joint: int) -> R
     chosen = select_inputs(Observations(U, F, y), prior, 0, tuple(range(U.shape[1])), 200)
     if chosen.kernel is None or chosen.inputs is None:
         return None
-    rows = np.unique(np.linspace(0, len(y) - 1, min(SIZE, len(y))).astype(int))
     model = Hyperparameters((chosen.kernel,), (chosen.noise,))
-    posterior = Posterior(model, Observations(U[rows], F[rows], y[rows]), prior)
+    if foretold(model, U, y[:, 0], parts_of(len(y), 1)) <= 0.0:
+        return None
+    rows = spread(np.arange(len(y)), SIZE)
+    posterior = Posterior(model, observations(U, y[:, 0], rows), prior)
     return Remainder(
         joint, tuple(names[i] for i in chosen.inputs), chosen.inputs, scale, posterior
     )
+
+
+def foretold(model: Hyperparameters, U: np.ndarray, r: np.ndarray, part: np.ndarray) -> float:
+    """Return the share of r (N,) that Z at inputs U (N, d) explains on parts left out.
+
+    Negative where it makes things worse. `part` (N,) is the part of each row.
+    """
+    error = sum(_error(model, U, r, part == i) for i in range(PARTS))
+    return 1.0 - error / max(float(r @ r), 1e-300)
+
+
+def _error(model: Hyperparameters, U: np.ndarray, r: np.ndarray, out: np.ndarray) -> float:
+    """Return the sum of squared errors on the rows that are out."""
+    known = observations(U, r, spread(np.flatnonzero(~out), CONDITIONED))
+    there = U[out]
+    found = Posterior(model, known, CoefficientPrior.flat(0))
+    mean = found.predict(there, np.zeros((len(there), 1, 0))).mean[:, 0]
+    return float(((r[out] - mean) ** 2).sum())
+
+
+def spread(rows: np.ndarray, count: int) -> np.ndarray:
+    """Return at most `count` of the rows, evenly spread."""
+    chosen = np.linspace(0, len(rows) - 1, min(count, len(rows)))
+    return np.asarray(rows[np.unique(chosen.astype(int))])
+
+
+def observations(U: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Observations:
+    """Return some rows of inputs U (N, d) and values r (N,), without physics."""
+    return Observations(U[rows], np.zeros((len(rows), 1, 0)), r[rows, None])

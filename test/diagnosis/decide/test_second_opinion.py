@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.decide.decision import NATS, ROWS, Scale, _supported, decide
-from sgp_ros.diagnosis.decide.second_opinion import PARTS, PIECES, left_out, parts_of, support
+from sgp_ros.diagnosis.decide.second_opinion import left_out, support
 from sgp_ros.diagnosis.explain.hypotheses import Competition
 from sgp_ros.diagnosis.explain.suspects import Columns
+from sgp_ros.diagnosis.parts import PARTS, PIECES, parts_of
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
 

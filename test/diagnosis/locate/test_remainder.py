@@ -84,3 +84,14 @@ def test_white_noise_leaves_no_process(equations_for, perfect):
     noise = np.random.default_rng(1).normal(size=equations.d.shape)
     found = learn_remainder(equations, noise, 0)
     assert found is None or found.force(equations.motion).std() < 0.3
+
+
+def test_what_happens_once_is_no_process_of_the_motion(equations_for, perfect):
+    """A burst teaches Z nothing that helps where it was not seen."""
+    _, equations = equations_for(perfect[2])
+
+    def burst(motion):
+        t = motion.time - 0.42 * motion.time[-1]
+        return np.sin(25.0 * t) * np.exp(-((2.0 * t) ** 2))
+
+    assert learn_remainder(equations, _planted(equations, burst), 1) is None
