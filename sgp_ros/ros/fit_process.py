@@ -3,12 +3,14 @@
 One worker serves one request at a time. It starts when the node does, because its imports take
 longer than most fits; it is killed when the node ends, and ends by itself when the node vanishes.
 It computes only where nothing else wants to run, so on a computer without a free core a fit takes
-as long as that lasts. This module imports nothing of ROS: the worker loads it.
+as long as that lasts. It stands still while the node has a message in hand, because cores share
+caches and memory. This module imports nothing of ROS: the worker loads it.
 """
 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import multiprocessing
 import os
 import signal
@@ -20,11 +22,14 @@ from typing import TYPE_CHECKING
 from sgp_ros.engine.fitting import FitRequest, FitResult, fit
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from multiprocessing.connection import Connection
     from multiprocessing.context import SpawnProcess
 
 _NICENESS = 10
+_SET_PARENT_DEATH_SIGNAL = 1
 _READY = 'ready'
+_STOP = getattr(signal, 'SIGSTOP', None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +84,21 @@ class FitProcess:
         self._is_ready = True
         self._send_waiting()
         return None
+
+    @contextlib.contextmanager
+    def held(self) -> Iterator[None]:
+        """Keep a fit that runs from computing meanwhile (POSIX); two calls of the kernel."""
+        process = self._process
+        if self.is_free or process is None or process.pid is None or _STOP is None:
+            yield
+            return
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(process.pid, _STOP)
+        try:
+            yield
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process.pid, signal.SIGCONT)
 
     def close(self) -> None:
         """Kill the worker at once."""
@@ -143,7 +163,14 @@ def _leave_the_processor() -> None:
             os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
 
 
+def _end_with_parent() -> None:
+    """Ask the kernel for the end when the parent dies (Linux), even while this process is held."""
+    with contextlib.suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(_SET_PARENT_DEATH_SIGNAL, signal.SIGKILL)
+
+
 def _serve(connection: Connection) -> None:
+    _end_with_parent()
     _leave_the_processor()
     try:
         connection.send(_READY)

@@ -43,9 +43,10 @@ class Session:
         """Push an event; return what is to be published."""
         if isinstance(event, JointSample):
             self.health.seen_joints = event.names
-        started = time.perf_counter()
-        step = self.engine.push(event)
-        self.health.note_push(time.perf_counter() - started)
+        with self._fits.held():
+            started = time.perf_counter()
+            step = self.engine.push(event)
+            self.health.note_push(time.perf_counter() - started)
         found = self._settle(step)
         self._hand_out_fit()
         return found

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import select
 import signal
+import subprocess
+import sys
 import threading
 import time
 from multiprocessing import connection
@@ -34,6 +37,7 @@ if TYPE_CHECKING:
 
     from sgp_ros.engine.samples import Event
 
+ROOT = Path(__file__).parents[2]
 START_NS = 1_700_000_000_000_000_000
 DEADLINE_S = 30.0
 SETTINGS = {
@@ -175,6 +179,55 @@ def test_a_worker_that_never_reads_is_closed_at_once(fits: FitProcess) -> None:
     fits.close()
     assert process is not None
     assert process.exitcode == -signal.SIGKILL
+
+
+def test_a_fit_stands_still_while_it_is_held(fits: FitProcess) -> None:
+    """It goes on afterwards to the end; an idle worker is left alone."""
+    request = _too_large_for_a_pipe(fits)
+    process = fits._process
+    assert process is not None
+    assert process.pid is not None
+    changed = os.WSTOPPED | os.WCONTINUED
+    with fits.held():
+        pass
+    assert os.waitid(os.P_PID, process.pid, changed | os.WNOHANG) is None
+    fits.submit(request)
+    with fits.held():
+        stopped = os.waitid(os.P_PID, process.pid, os.WSTOPPED)
+        assert stopped is not None
+        assert stopped.si_status == signal.SIGSTOP
+    assert isinstance(_await(fits), FitResult)
+
+
+_HOLDS_AND_DIES = """
+import os, signal, sys
+sys.path.insert(0, {root!r})
+from test.ros.test_session import _too_large_for_a_pipe
+from sgp_ros.ros.fit_process import FitProcess
+if __name__ == '__main__':
+    fits = FitProcess()
+    fits.submit(_too_large_for_a_pipe(fits))
+    with fits.held():
+        print(fits._process.pid, flush=True)
+        sys.stdin.readline()
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, 'pidfd_open'), reason='a call of Linux')
+def test_a_held_worker_ends_with_its_node(tmp_path: Path) -> None:
+    """It could not find the end of the connection by itself."""
+    script = tmp_path / 'holds.py'
+    script.write_text(_HOLDS_AND_DIES.format(root=str(ROOT)), encoding='utf-8')
+    with subprocess.Popen(
+        [sys.executable, script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as node:
+        assert node.stdout is not None
+        worker = os.pidfd_open(int(node.stdout.readline()))
+        node.communicate('die')
+    assert node.returncode == -signal.SIGKILL
+    assert select.select([worker], [], [], DEADLINE_S)[0] == [worker]
+    os.close(worker)
 
 
 def test_closing_kills_the_worker_at_once(fits: FitProcess) -> None:
