@@ -223,11 +223,16 @@ def test_a_held_worker_ends_with_its_node(tmp_path: Path) -> None:
         [sys.executable, script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as node:
         assert node.stdout is not None
+        assert node.stdin is not None
         worker = os.pidfd_open(int(node.stdout.readline()))
-        node.communicate('die')
-    assert node.returncode == -signal.SIGKILL
-    assert select.select([worker], [], [], DEADLINE_S)[0] == [worker]
+        node.stdin.write('die\n')
+        node.stdin.flush()
+        assert node.wait(DEADLINE_S) == -signal.SIGKILL
+    ended = select.select([worker], [], [], DEADLINE_S)[0] == [worker]
+    if not ended:
+        signal.pidfd_send_signal(worker, signal.SIGKILL)
     os.close(worker)
+    assert ended
 
 
 def test_closing_kills_the_worker_at_once(fits: FitProcess) -> None:
