@@ -8,7 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from sgp_ros.diagnosis.decide.decision import ADEQUATE_REST, LEAST_SHARE, PER_EFFECT, PER_PARAMETER
+from sgp_ros.diagnosis.decide.decision import (
+    ADEQUATE_REST,
+    LEAST_SHARE,
+    PER_EFFECT,
+    PER_PARAMETER,
+    ROWS,
+    SHAPE_ERROR,
+)
 
 ROOT = Path(__file__).parents[1]
 TARGET = Path(__file__).parent / 'diagnosis.md'
@@ -163,12 +170,12 @@ TAIL = """
 * **Backlash** is modelled with a hard contact, and single impacts are not right. In the worlds above the gap is off by
   more than is said, also where the true structure is fitted; accelerations predicted with it can be worse than
   without, with the true gap too. There the fitted true structure is not the best possible, and the shares say little.
-* **What is there for a time.** A burst is named unexplained and its time is found, but Z is a function of the motion
-  and carries it to other times: predictions can be worse than those of the nominal robot.
-* **Probabilities** are tempered odds among the models that were fitted; the table above says how well they hold.
+* **What is there for a time.** A burst is named unexplained and its time is found. Z is a function of the motion and
+  foretells nothing of it, so it is left out, and what is predicted elsewhere is what bodies alone predict.
+* **Probabilities** are tempered odds among the models that were fitted; the table above says how well they hold, and
+  a test holds each band of it to what the band begins with.
 * **The thresholds** of step 6: the least share is the schema's, the others are held to the null worlds above by a
-  test. The weight of a row (at most 100 count, a thousandth of the discrepancy may be left by a right column that is
-  only nearly right) is a statement about models, not measured.
+  test, and so is what a right column may leave.
 * **Noise that looks like physics.** The referee needs 30 rows; below that all of the rest counts. What drifts slower
   than the filters but is no function of the motion counts as structure, and ends in `unexplained`.
 * **Roll-outs** start from smoothed states: noise of the velocity at the start counts against both models. Inside
@@ -375,11 +382,16 @@ def _effects(worlds):
         )
     passed = _rate(r < ADEQUATE_REST for r in rests)
     refused = _rate(r > ADEQUATE_REST for r in others)
+    nearly = _rate(r < SHAPE_ERROR for r in rests)
     missing = len(of_list) - len(listed)
     lines.append(
         f'\nThe right model is adequate in {_percent(passed)}, the best of a wrong list is not in '
         f'{_percent(refused)}. Of the worlds with one listed effect, {missing} are not in the '
-        'table: the right model was not among those fitted.'
+        'table: the right model was not among those fitted.\n\n'
+        f'A model is compared as if a right column left {100 * SHAPE_ERROR:g} % of the discrepancy, '
+        f'for the errors of filters and signals; {_percent(nearly)} of the right models leave less '
+        f'that is no noise. At most {ROWS:g} rows count. Only the ratio of that number to the prices '
+        'matters, and the table says what is gained where nothing is to be gained.'
     )
     return lines
 
