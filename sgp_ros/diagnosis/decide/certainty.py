@@ -46,10 +46,10 @@ class Probabilities:
         """Return why a rival was not asserted."""
         rest = float((model.mean_square / self.power).max())
         best = float((self.asserted.mean_square / self.power).max())
-        return (
-            f'leaves {100 * rest:.3g} % of the mean squared effort, '
-            f'the asserted model {100 * best:.3g} %'
-        )
+        left = f'{100 * rest:.3g} % of the mean squared effort'
+        if self.asserted.key and self.asserted.key < model.key:
+            return f'leaves {left} beside the asserted model, that alone {100 * best:.3g} %'
+        return f'leaves {left}, the asserted model {100 * best:.3g} %'
 
 
 def probabilities(
