@@ -5,9 +5,11 @@ five sixths of the time; the score is the share of its mean square that the aver
 the last sixth, over all six.
 
 Slow noise has scores too, and the best of many is high by chance. So each score is set against
-those of disturbances with the same spectra (`surrogates`), in standard deviations of these, and
-its p-value is the share of disturbances of which the best over all joints and variables reaches
-that far (Westfall and Young 1993, section 2.3): 5 % is 5 % for all of them together.
+those of disturbances with the same spectra (`surrogates`), by the logarithm of what is left
+unexplained, in standard deviations of these. Its p-value is the share of disturbances of which
+the best over all joints and variables reaches that far (Westfall and Young 1993, section 2.3): 5 %
+is 5 % for all of them together. The logarithm, because with a motion that repeats most of such a
+disturbance is explained too, and only what is left tells one law from another.
 """
 
 from __future__ import annotations
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
 BINS, STRETCHES, PARTS = 16, 24, 6
 LEAST_COUNT = 3
 """A bin with no more rows than these foretells nothing."""
+LEAST_LEFT = 1e-6
+"""Share left unexplained below which no difference is made."""
 DISTURBANCES = 199
 """The least p-value is one in `DISTURBANCES` and one."""
 
@@ -90,6 +94,7 @@ def _p_values(looks: list[_Look], found: np.ndarray, residual: np.ndarray) -> np
             for r in surrogates(residual, DISTURBANCES)
         ]
     )
+    by_chance, found = (-np.log(np.maximum(1.0 - s, LEAST_LEFT)) for s in (by_chance, found))
     mean, spread = by_chance.mean(axis=0), by_chance.std(axis=0)
     spread = np.maximum(spread, 1e-9)
     best = ((by_chance - mean) / spread).max(axis=1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -42,6 +44,20 @@ def test_what_is_there_is_as_sure_as_the_disturbances_can_tell(equations, seed):
     assert loud.is_significant('position')
     assert loud.p_values.keys() == loud.scores.keys()
     assert not any(quiet.is_significant(name) for name in quiet.scores)
+
+
+def test_a_law_is_told_from_chance_on_a_motion_that_repeats(equations):
+    """Most of a disturbance in step with it is explained as well; friction leaves far less."""
+    motion, low = equations.motion, equations.filter
+    phase = np.pi * motion.time[:, None] + np.array([0.0, 0.7])
+    position = np.sin(phase) + 0.1 * np.sin(3.0 * phase)
+    velocity = np.gradient(position, motion.step, axis=0)
+    periodic = replace(motion, position=position, velocity=velocity)
+    world = replace(equations, motion=periodic)
+    friction = low(-np.tanh(periodic.velocity / 0.1))
+    residual = friction * [0.0, 1.0] + 0.03 * disturbance(world, 0)
+    _, loud = dependences(world, residual)
+    assert loud.is_significant('velocity')
 
 
 def test_what_explains_nothing_is_not_significant(equations):
