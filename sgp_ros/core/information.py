@@ -187,6 +187,9 @@ class _Solved:
         factored, order, tau, _, _ = linalg.lapack.dgeqp3(A)
         diagonal = np.abs(factored.diagonal())
         rank = int((RANK_TOLERANCE * max(diagonal[0], 1e-300) < diagonal).sum())
+        if not rank:
+            self.spread, self.null, self.w = np.zeros((p, 0)), np.eye(p), np.zeros(p)
+            return
         Z, L = np.linalg.qr(np.triu(factored[:rank]).T, mode='complete')  # (p, p), (p, rank)
         Z = Z[np.argsort(order)]
         roots = linalg.solve_triangular(L[:rank], Z[:, :rank].T, check_finite=False)
