@@ -101,12 +101,10 @@ def run_replay(
         _check_use(engine, recording, options)
     remarks += [f'{count} messages could not be read: {reason}'
                 for reason, count in recording.unreadable.items()]  # fmt: skip
-    values, problem = possible_values(engine)
-    remarks += [problem] if problem else []
+    remark = write_identified_robot(out, engine)
+    remarks += [remark] if remark else []
     metrics = collect_metrics(engine, Path(bag).name, timing=timing, remarks=remarks)
     write_text(out / 'metrics.json', json.dumps(metrics, indent=1, allow_nan=False) + '\n')
-    std = np.array([math.inf if p.std is None else p.std for p in engine.parameters()])
-    write_identified(out, engine.robot, values, std)
     save_model(out / 'model.npz', engine.snapshot())
     write_report(out, engine, history, metrics, truth=truth)
     print_summary(metrics, truth)
@@ -198,20 +196,23 @@ def save_model(path: Path, snapshot: Mapping[str, np.ndarray]) -> None:
     growing.replace(path)
 
 
-def possible_values(engine: Engine) -> tuple[np.ndarray, str]:
-    """Return the coefficients (p,) of bodies that can exist, where the robot has bodies.
+def write_identified_robot(out: Path, engine: Engine) -> str:
+    """Write the identified robot: of real bodies, where it has bodies.
 
     Returns:
-        Where none are found the estimate itself, with a remark that says so.
+        Where none are found the estimate itself is written, and this says so; else empty.
     """
+    robot, remark, bodies = engine.robot, '', None
     values, root = engine.information()
-    if not len(values):
-        return values, ''
-    try:
-        bodies = nearest_bodies(engine.robot, values, root, nominal_coefficients(engine.robot))
-    except NumericalError as error:
-        return values, f'the identified robot is the estimate, its bodies may not exist: {error}'
-    return (values if bodies is None else bodies.coefficients), ''
+    std = np.array([math.inf if p.std is None else p.std for p in engine.parameters()])
+    if len(values):
+        try:
+            bodies = nearest_bodies(robot, values, root, nominal_coefficients(robot))
+        except NumericalError as error:
+            remark = f'the identified robot is the estimate, its bodies may not exist: {error}'
+    values = values if bodies is None else bodies.coefficients
+    write_identified(out, robot, values, std, has_bodies=not remark)
+    return remark
 
 
 def print_summary(metrics: Mapping[str, Any], truth: Mapping[str, float] | None) -> None:

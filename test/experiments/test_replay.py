@@ -10,13 +10,13 @@ from sgp_ros.core import consistent
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.samples import JointSample
-from sgp_ros.experiments.replay import possible_values
+from sgp_ros.experiments.replay import write_identified_robot
 from sgp_ros.robots.registry import load_robot
 
 PANDA = Path(__file__).parents[2] / 'config' / 'robots' / 'panda.yaml'
 
 
-def test_bodies_that_are_not_found_do_not_cost_the_replay(monkeypatch):
+def test_bodies_that_are_not_found_do_not_cost_the_replay(monkeypatch, tmp_path):
     """The estimate stays, and a remark says what it is."""
     robot = load_robot(str(PANDA))
     settings = {'learning.initial': 20, 'filter.hop': 0.05, 'refit.enabled': False}
@@ -32,9 +32,14 @@ def test_bodies_that_are_not_found_do_not_cost_the_replay(monkeypatch):
         found.max_iter = 1
         return found
 
-    assert possible_values(engine)[1] == ''
+    assert write_identified_robot(tmp_path, engine) == ''
+    assert (tmp_path / 'robot_identified.urdf').exists()
     monkeypatch.setattr(consistent.clarabel, 'DefaultSettings', impatient)
-    values, remark = possible_values(engine)
-    np.testing.assert_array_equal(values, engine.information()[0])
+    remark = write_identified_robot(tmp_path, engine)
     assert 'may not exist' in remark
     assert '\n' not in remark
+    assert not (tmp_path / 'robot_identified.urdf').exists()
+    again = load_robot(str(tmp_path / 'robot_identified.yaml'))
+    np.testing.assert_array_equal(
+        [c.prior_mean for c in again.coefficients], engine.information()[0]
+    )
