@@ -149,7 +149,11 @@ class OnlineRegression:
         self._keep_to_budget()
 
     def learn_all(self, data: Observations) -> None:
-        """Learn samples, the first ones, as `learn` does one by one. O(n^3 / 3) per factor."""
+        """Learn samples, the first ones, as `learn` does one by one. O(n^3 / 3) per factor.
+
+        Raises:
+            NumericalError: some repeat others to rounding; this model is of no further use.
+        """
         if self._forgetting.factor != 1.0:
             for u, f, y in zip(data.U, data.F, data.y, strict=True):
                 self.learn(self.predict(u, f), y)

@@ -267,21 +267,25 @@ class Estimator:
 
     def _start(self, arrays: list[Arrays]) -> None:
         """Make the first model from what was gathered, then learn that."""
-        data = None
-        if arrays:
-            data = Observations(*(np.array(column) for column in zip(*arrays, strict=True)))
+        columns = [np.array(column) for column in zip(*arrays, strict=True)]
+        data = Observations(*columns) if arrays else None
         start = None if data is None else initial_model(data, self.inputs)
         model = model_of_settings(self._config, self.inputs, start)
         self.regression = self.make_regression(model)
         if self._config.model_method == 'SGP':
-            plain = Model((None,) * len(model.kernels), model.noise)
-            self.baseline = self.make_baseline(plain)
+            self.baseline = self.make_baseline(Model((None,) * len(model.kernels), model.noise))
         if data is None:
             return
-        self.regression.learn_all(data)
         if self.baseline is not None:
             self.baseline.learn_all(data)
-        self._counts.learned += len(data.U)
+        try:
+            self.regression.learn_all(data)
+        except NumericalError:  # some repeat others to rounding: the rest is learned without them
+            self.regression = self.make_regression(model)
+            for u, f, y in arrays:
+                self._learn(self.regression, self.regression.predict(u, f), y)
+        else:
+            self._counts.learned += len(data.U)
 
     def _unknown(self, equation: Equation) -> Estimate:
         return Estimate(

@@ -554,3 +554,17 @@ def test_nothing_of_a_stamp_enters_after_a_change_at_it():
     engine.change({'learning.enabled': False})
     engine.push(CommandSample(events[99].stamp_ns, frozen_array([1.0])))
     assert engine.counts.commands_refused['late'] == 1
+
+
+def test_first_samples_that_repeat_are_learned_without_those_that_do():
+    """A robot that stands still while the first are gathered: no error, and each is counted."""
+    settings_ = {'hyper.hinge.noise_variance': 1e-20, 'hyper.hinge.signal_variance': 1.0}
+    engine = Engine(PENDULUM, config(refit__enabled=False, filter__hop=0.0, **settings_))
+    for i in range(100):
+        stamp = START_NS + 10**7 * i
+        engine.push(CommandSample(stamp, frozen_array([0.0])))
+        engine.push(JointSample(stamp, ('hinge',), frozen_array([0.5])))
+    counts = engine.counts
+    assert engine.is_ready
+    assert counts.unlearnable > 0
+    assert counts.learned + counts.unlearnable == counts.estimated
