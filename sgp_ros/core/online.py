@@ -65,7 +65,7 @@ class OnlineRegression:
         self._held = FactoredBuffer(model, samples, budget + 1, policy)
         self._total = self._prior.copy()
         self._basis: StreamBasis | None = None
-        self._ahead = self._nothing_ahead()
+        self._ahead: BasisAhead | None = None
 
     @property
     def model(self) -> Model:
@@ -172,21 +172,21 @@ class OnlineRegression:
         else:
             self._basis.fade(self._forgetting)
 
-    def _nothing_ahead(self) -> BasisAhead:
-        return BasisAhead(StreamBasis(self.model, self._prior, self._features))
-
     def _look_ahead(self) -> None:
         if self._basis is None and self._remember:
             room = self._budget - self.size
             # What fades as it ages can be absorbed only at the end.
             if room < 0 or self._forgetting.factor == 1.0:
+                if self._ahead is None:
+                    basis = StreamBasis(self.model, self._prior, self._features)
+                    self._ahead = BasisAhead(basis)
                 self._ahead.catch_up(self._held.samples, room)
 
     def _keep_to_budget(self) -> None:
         self._look_ahead()
         while self.size > self._budget:
-            if self._remember and self._basis is None:
-                self._basis = self._ahead.basis
+            if self._ahead is not None:
+                self._basis, self._ahead = self._ahead.basis, None
             self._held.drop()
             if self._basis is None:
                 self._total = self._with_buffer()
@@ -243,7 +243,7 @@ class OnlineRegression:
         self._take(held)
         if forgetting is not None:
             self._forgetting = Forgetting(forgetting, self._prior)
-        self._ahead = self._nothing_ahead()
+        self._ahead = None
         self._keep_to_budget()
 
     def state(self) -> dict[str, np.ndarray]:
@@ -266,7 +266,7 @@ class OnlineRegression:
         self._basis = None
         if basis:
             self._basis = StreamBasis.restored(self.model, self._prior, self._features, basis)
-        self._ahead = self._nothing_ahead()
+        self._ahead = None
         self._version += 1
 
     def _take(self, held: FactoredBuffer) -> None:
