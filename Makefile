@@ -5,7 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OLDEST := .venv-oldest
-NUMERIC := test/core test/contracts test/robots test/engine test/offline test/simulation
+NUMERIC := test/gp test/contracts test/physics test/rigid test/robots test/engine test/batch test/simulation
 
 # rclpy of .venv and a ROS that was sourced before do not mix: forget the other one.
 ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
@@ -32,9 +32,9 @@ format: $(VENV)/.lint
 
 # Layers whose branches the tests must enter; the pattern keeps those that exist.
 MEASURED := $(patsubst sgp_ros/%/__init__.py,--cov=sgp_ros.%,\
-    $(wildcard $(patsubst %,sgp_ros/%/__init__.py,core engine diagnosis)))
+    $(wildcard $(patsubst %,sgp_ros/%/__init__.py,gp engine diagnosis)))
 coverage: $(VENV)/.test
-	$(BIN)/python -m pytest -q test/core test/contracts test/engine $(wildcard test/diagnosis) \
+	$(BIN)/python -m pytest -q test/gp test/rigid test/contracts test/engine $(wildcard test/diagnosis) \
 	    $(MEASURED) --cov-branch --cov-fail-under=95 --cov-report=term:skip-covered
 
 oldest: $(OLDEST)/.made
@@ -43,8 +43,8 @@ oldest: $(OLDEST)/.made
 
 bench: $(VENV)/.test
 	$(BIN)/sgp bench
-	$(BIN)/python -m benchmarks.filter
-	$(BIN)/python -m benchmarks.regressor
+	$(BIN)/python -m sgp_proof.numerics.filter
+	$(BIN)/python -m sgp_proof.numerics.regressor
 
 reproduce: venv
 	$(BIN)/sgp reproduce

@@ -32,7 +32,7 @@ setup(
     maintainer='The sgp_ros maintainers',
     maintainer_email='maintainers@sgp-ros.example',
     python_requires='>=3.10',
-    packages=find_packages(include=[NAME, f'{NAME}.*']),
+    packages=find_packages(include=[NAME, f'{NAME}.*', 'sgp_proof', 'sgp_proof.*']),
     package_data={NAME: ['py.typed', 'report/templates/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),

@@ -17,7 +17,7 @@ from sgp_ros.report.diagnosis_text import EFFECT_NAMES, equivalence_sentence, pe
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / 'docs'
-RESULTS = ROOT / 'benchmarks' / 'results'
+RESULTS = ROOT / 'sgp_proof' / 'results'
 TITLES = {
     'emps': 'EMPS',
     'simple_pendulum_1kg': 'Simple pendulum, heavier weight',

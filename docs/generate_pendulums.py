@@ -13,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 TARGET = Path(__file__).parent / 'pendulums.md'
 TEMPLATE = Path(__file__).parent / 'templates' / 'pendulums.txt'
-RESULTS = ROOT / 'benchmarks' / 'results'
+RESULTS = ROOT / 'sgp_proof' / 'results'
 BEGIN, END = '<!-- generated -->', '<!-- end of what is generated -->'
 TITLES = {'effort': 'torque from acceleration', 'acceleration': 'acceleration from torque'}
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 TARGET = Path(__file__).parent / 'performance.md'
-RESULT = ROOT / 'benchmarks' / 'results' / 'performance.json'
+RESULT = ROOT / 'sgp_proof' / 'results' / 'performance.json'
 PAGE = (Path(__file__).parent / 'templates' / 'performance.txt').read_text(encoding='utf-8')
 SIZE = 1000
 FLOOR, GPYTORCH, SKLEARN, EVALUATION = 2.5, 100.0, 20.0, 3.0

@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 TARGET = Path(__file__).parent / 'recordings.md'
-RESULTS = ROOT / 'benchmarks' / 'results'
+RESULTS = ROOT / 'sgp_proof' / 'results'
 PUBLISHED = {'M': 95.1089, 'Fv': 203.5034, 'Fc': 20.3935, 'offset': -3.1648}
 """Janot, Gautier, Brunot 2019."""
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 TARGET = Path(__file__).parent / 'reproduction.md'
-RESULTS = ROOT / 'benchmarks' / 'results'
+RESULTS = ROOT / 'sgp_proof' / 'results'
 TITLES = {
     'toy': 'Toy pendulum: 150 samples in [0, pi], 6 in [-2, 0]',
     'toy_40': 'Toy pendulum: 40 samples in [0, pi], 6 in [-2, 0]',
@@ -59,7 +59,7 @@ a squared exponential of the paper's inputs with one length scale each.
 ## Which inputs Z should see
 
 Starting from all candidates, evidence drops what is not worth three nats, then takes Z for linear
-where that raises the evidence (`core/selection.py`). Chosen per component, by column. Wheel: 0 pole
+where that raises the evidence (`gp/selection.py`). Chosen per component, by column. Wheel: 0 pole
 angle, 1 wheel angle, 2 and 3 their velocities, 7 voltage, 8 and 9 their directions. Arm: 0 to 2
 positions, 3 to 5 velocities, 12 to 14 directions of the joints:
 
@@ -105,7 +105,7 @@ Medians over {choice_seeds} worlds; only the named choice differs from the defau
 
 What follows for the defaults of the package: a flat prior of W; standard deviations as starting
 values, screened; one kernel and one noise variance per output; inputs and structure by evidence where
-the recording is at hand (`core/selection.py`), and the inputs that evidence found for the robots that
+the recording is at hand (`gp/selection.py`), and the inputs that evidence found for the robots that
 come with the package (`residual_inputs`); the weak form of 0.1 s with windows that overlap by half.
 
 ## Where the paper is ambiguous
@@ -115,7 +115,7 @@ come with the package (`residual_inputs`); the weak form of 0.1 s with windows t
   60 digits.
 * **Initial length scales** are given as the sample variance of each input, which has the wrong unit. The
   standard deviation is meant, or does not matter: see the table.
-* **Noise, sizes and physical parameters** are not given. They are in `experiments/reproduction/` and in
+* **Noise, sizes and physical parameters** are not given. They are in `sgp_proof/paper/` and in
   `simulation/reaction_wheel.py`; only orderings can be compared with the paper.
 * **Balancing.** The regulator starts a few hundredths of a radian off and first catches the pole. That half second makes most
   of the variance that nMSE upright divides by. Leaving it out multiplied all nMSE upright by about three and

@@ -9,7 +9,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 TARGET = Path(__file__).parent / 'streams.md'
-RESULTS = ROOT / 'benchmarks' / 'results'
+RESULTS = ROOT / 'sgp_proof' / 'results'
 PAGE = (Path(__file__).parent / 'templates' / 'streams.txt').read_text(encoding='utf-8')
 
 

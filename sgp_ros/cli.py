@@ -20,7 +20,7 @@ for _name in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS'):
     os.environ.setdefault(_name, '1')
 
 from sgp_ros import __version__  # noqa: E402 - the environment above comes first
-from sgp_ros import commands as run  # noqa: E402 - the environment above comes first
+from sgp_ros.apps import commands as run  # noqa: E402 - the environment above comes first
 from sgp_ros.errors import SgpError  # noqa: E402 - the environment above comes first
 
 if TYPE_CHECKING:

@@ -18,15 +18,17 @@ settings.load_profile(os.environ.get('HYPOTHESIS_PROFILE', 'dev'))
 _NEEDED = {
     'pinocchio': {
         'contracts': ('robots',),
-        'offline': ('excitation', 'identification', 'real_arms', 'suggestions'),
+        'batch': ('excitation', 'identification', 'real_arms', 'suggestions'),
+        'physics': ('effects', 'stated'),
+        'rigid': ('inertial', 'rigid_body', 'tree', 'urdf_writer'),
         'robots': (
-            'effect_terms', 'effects', 'effects/test_stated', 'inertial', 'pendulums',
-            'built_in_nominal', 'ready_robots', 'rigid_body', 'tree', 'urdf_robot', 'urdf_writer',
+            'effect_terms', 'pendulums', 'built_in_nominal', 'ready_robots', 'urdf_robot',
         ),
         'simulation': ('random_tree', 'serial_arm', 'tree', 'tree_part'),
     },
     'mujoco': {
-        'experiments': ('built_in_diagnosis', 'concealed', 'simulation', 'stated_simulation'),
+        'apps': ('built_in_diagnosis', 'simulation', 'stated_simulation'),
+        'proof/concealed': ('concealed',),
         'simulation': ('effect_laws', 'tree', 'tree_part'),
     },
 }  # fmt: skip

@@ -18,40 +18,37 @@ MESSAGES = {
 }  # fmt: skip
 LAYERS = {
     'errors': set(),
-    'core': NUMERIC | {'clarabel', 'numba', 'errors'},
-    'robots': {'numpy', 'numba', 'pinocchio', 'yaml', 'errors'},
+    'gp': NUMERIC | {'numba', 'errors'},
+    'physics': {'numpy', 'numba', 'rigid', 'errors'},
+    'rigid': NUMERIC | {'numba', 'pinocchio', 'clarabel', 'gp', 'physics', 'errors'},
+    'robots': {'numpy', 'yaml', 'physics', 'rigid', 'errors'},
     'simulation': NUMERIC | {'mujoco', 'errors'},
-    'engine': {'numpy', 'core', 'robots', 'errors'},
-    'offline': NUMERIC | {'numba', 'core', 'robots', 'engine.samples', 'errors'},
+    'engine': {'numpy', 'gp', 'physics', 'rigid', 'robots', 'errors'},
+    'batch': NUMERIC | {
+        'numba', 'gp', 'physics', 'rigid', 'robots', 'engine.samples', 'errors',
+    },
     'recordings': {
         'numpy', 'scipy', 'yaml', 'rosbags', 'mcap', 'zstandard', 'engine.samples',
         'engine.results', 'errors',
     },
-    'diagnosis': NUMERIC | {'core', 'robots', 'engine', 'offline', 'errors'},
+    'diagnosis': NUMERIC | {'gp', 'physics', 'rigid', 'robots', 'engine', 'batch', 'errors'},
     'report': {
-        'numpy', 'matplotlib', 'jinja2', 'core', 'robots', 'engine', 'offline', 'diagnosis',
-        'errors',
+        'numpy', 'matplotlib', 'jinja2', 'gp', 'physics', 'rigid', 'robots', 'engine', 'batch',
+        'diagnosis', 'errors',
     },
     'ros': MESSAGES | {
-        'numpy', 'yaml', 'engine', 'robots', 'simulation', 'diagnosis', 'recordings', 'errors',
+        'numpy', 'yaml', 'engine', 'physics', 'robots', 'simulation', 'diagnosis', 'recordings',
+        'errors',
     },
-    'experiments': {
-        'numpy', 'matplotlib', 'yaml', 'core', 'robots', 'simulation', 'engine', 'recordings',
-        'diagnosis', 'report', 'offline', 'errors', 'scipy', 'gpytorch', 'sklearn', 'torch',
+    'apps': {
+        'numpy', 'yaml', 'gp', 'physics', 'rigid', 'robots', 'simulation', 'engine', 'batch',
+        'recordings', 'diagnosis', 'report', 'errors',
     },
-    'commands': {
-        'core', 'robots', 'simulation', 'engine', 'recordings', 'diagnosis', 'report',
-        'experiments', 'offline', 'errors',
-    },
-    'cli': {
-        'commands',
-        'core', 'robots', 'simulation', 'engine', 'recordings', 'diagnosis', 'report',
-        'experiments', 'offline', 'errors',
-    },
+    'cli': {'apps', 'errors'},
 }  # fmt: skip
 """Layer to what it may import beside the standard library, itself and the package's version."""
 
-PURE = ('core', 'engine', 'robots', 'simulation', 'offline')
+PURE = ('gp', 'physics', 'rigid', 'engine', 'robots', 'simulation', 'batch')
 SILENT = ('errors', *PURE, 'recordings', 'diagnosis')
 IMPURE_MODULES = {
     'asyncio', 'concurrent', 'datetime', 'multiprocessing', 'os', 'random', 'secrets', 'socket',

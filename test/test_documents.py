@@ -46,7 +46,7 @@ def test_commands_in_documents_exist(path):
 
 def test_numbers_in_the_filter_page_are_the_measured_ones():
     """The table is that of the committed result."""
-    result = json.loads((ROOT / 'benchmarks/results/filter.json').read_text(encoding='utf-8'))
+    result = json.loads((ROOT / 'sgp_proof/results/filter.json').read_text(encoding='utf-8'))
     text = (ROOT / 'docs/filter.md').read_text(encoding='utf-8')
     for row in result['median_relative_error'].values():
         assert ' | '.join(f'{100 * x:.2f}' for x in row) in text
@@ -54,7 +54,7 @@ def test_numbers_in_the_filter_page_are_the_measured_ones():
 
 def test_numbers_in_the_emps_page_are_the_measured_ones():
     """Values, intervals and errors are those of the committed result."""
-    result = json.loads((ROOT / 'benchmarks/results/emps.json').read_text(encoding='utf-8'))
+    result = json.loads((ROOT / 'sgp_proof/results/emps.json').read_text(encoding='utf-8'))
     text = (ROOT / 'docs/emps.md').read_text(encoding='utf-8')
     for parameter in result['parameters'].values():
         assert f'{parameter["value"]:.3f} | ± {1.96 * parameter["std"]:.3f}' in text
@@ -67,7 +67,7 @@ def test_numbers_in_the_emps_page_are_the_measured_ones():
 
 def test_numbers_in_the_identifiability_page_are_the_measured_ones():
     """Coverage and flags are those of the committed result."""
-    path = ROOT / 'benchmarks/results/trees.json'
+    path = ROOT / 'sgp_proof/results/trees.json'
     found = json.loads(path.read_text(encoding='utf-8'))['all']
     text = (ROOT / 'docs/identifiability.md').read_text(encoding='utf-8')
     assert (
@@ -80,7 +80,7 @@ def test_numbers_in_the_identifiability_page_are_the_measured_ones():
 def test_numbers_in_the_page_of_pendulums_are_the_measured_ones():
     """Every row of the two tables is that of the committed results."""
     text = (ROOT / 'docs/pendulums.md').read_text(encoding='utf-8')
-    folder = ROOT / 'benchmarks' / 'results'
+    folder = ROOT / 'sgp_proof' / 'results'
     double = json.loads((folder / 'double_pendulum.json').read_text(encoding='utf-8'))
     for design, result in double['designs'].items():
         for name, row in result['held_out'].items():
@@ -114,7 +114,7 @@ def test_generated_pages_are_those_of_code_and_results(name):
 
 def test_each_real_machine_has_a_page_with_every_picture_of_its_report():
     """No picture is taken that nobody sees, and none is shown of a report that lacked it."""
-    path = ROOT / 'benchmarks' / 'results' / 'real_diagnosis.json'
+    path = ROOT / 'sgp_proof' / 'results' / 'real_diagnosis.json'
     machines = json.loads(path.read_text(encoding='utf-8'))['machines']
     pages, pictures = ROOT / 'docs' / 'real_machines', ROOT / 'docs' / 'images' / 'real_machines'
     assert {page.stem for page in pages.iterdir()} == set(machines)

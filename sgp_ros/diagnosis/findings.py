@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.compare.velocity_sensor import SensorLag
+from sgp_ros.diagnosis.decide.certainty import Probabilities
+from sgp_ros.diagnosis.decide.decision import Decision
+from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.suspects import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.locate.confinement import ENERGY, region
+from sgp_ros.diagnosis.locate.remainder import Remainder
 from sgp_ros.diagnosis.places import joint_name
-from sgp_ros.diagnosis.result import Finding, Location, Parameter, ParameterError
-from sgp_ros.robots.effects.effect import Fitted, Quantity
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from sgp_ros.diagnosis.compare.equations import Equations
-    from sgp_ros.diagnosis.compare.velocity_sensor import SensorLag
-    from sgp_ros.diagnosis.decide.certainty import Probabilities
-    from sgp_ros.diagnosis.decide.decision import Decision
-    from sgp_ros.diagnosis.explain.fitted_model import Model
-    from sgp_ros.diagnosis.locate.remainder import Remainder
-    from sgp_ros.diagnosis.result import Dependence
-    from sgp_ros.robots.effects.effect import Value
+from sgp_ros.diagnosis.result import Dependence, Finding, Location, Parameter, ParameterError
+from sgp_ros.physics.effect import Fitted, Quantity, Value
 
 MODEL_ERROR = 0.003
 """Relative standard deviation that approximations of the signals add to every number."""

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sgp_ros.diagnosis.prove.rollouts import HORIZON_S
-
-if TYPE_CHECKING:
-    from sgp_ros.diagnosis.result import Diagnosis, Finding, Parameter, Proof
+from sgp_ros.diagnosis.result import Diagnosis, Finding, Parameter, Proof
 
 
 def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:

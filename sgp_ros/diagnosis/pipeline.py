@@ -2,39 +2,31 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.equations import make_equations
+from sgp_ros.diagnosis.compare.equations import Equations, make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.compare.velocity_sensor import sensor_lags
 from sgp_ros.diagnosis.decide.certainty import certainty_of, probabilities
 from sgp_ros.diagnosis.decide.decision import Decision, decide
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, equivalents
-from sgp_ros.diagnosis.explain.hypotheses import compete
+from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.hypotheses import Competition, compete
 from sgp_ros.diagnosis.findings import alternatives, asserted, parameter_errors
 from sgp_ros.diagnosis.locate.bands import bands
 from sgp_ros.diagnosis.locate.dependence import dependences
-from sgp_ros.diagnosis.locate.remainder import learn_remainder
+from sgp_ros.diagnosis.locate.remainder import Remainder, learn_remainder
 from sgp_ros.diagnosis.prove.bodies import diagnosed_bodies
 from sgp_ros.diagnosis.prove.final_model import FinalModel
 from sgp_ros.diagnosis.prove.held_out import keep_back
 from sgp_ros.diagnosis.prove.proof import prove
-from sgp_ros.diagnosis.result import Diagnosis, Traces
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
-
-    from sgp_ros.diagnosis.compare.equations import Equations
-    from sgp_ros.diagnosis.explain.fitted_model import Model
-    from sgp_ros.diagnosis.explain.hypotheses import Competition
-    from sgp_ros.diagnosis.locate.remainder import Remainder
-    from sgp_ros.diagnosis.result import Band, Dependence
-    from sgp_ros.engine.samples import Event
-    from sgp_ros.robots.robot import Robot
-    from sgp_ros.robots.stated_effects import StatedEffect
-    from sgp_ros.robots.tree import Tree
+from sgp_ros.diagnosis.result import Band, Dependence, Diagnosis, Traces
+from sgp_ros.engine.samples import Event
+from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.robot import Robot
+from sgp_ros.robots.stated_effects import StatedEffect
 
 
 def diagnose(

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from sgp_ros.robots.effects.observed_motion import ObservedMotion
+from sgp_ros.physics.observed_motion import ObservedMotion
 
 PLACES = {-1: 'base', -2: 'tool', -3: 'all'}
 

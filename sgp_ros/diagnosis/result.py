@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import numpy as np
+import numpy as np
 
 SIGNIFICANT = 0.05
 """Chance that anything is called significant where the motion has no part in what is left."""

@@ -8,14 +8,11 @@ iterated from the physics alone, never from the measured c.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from sgp_ros.core.online_prediction import OnlinePrediction
+from sgp_ros.gp.online_prediction import OnlinePrediction
 
 _LEAST_RECIPROCAL_CONDITION = 1e-12
 

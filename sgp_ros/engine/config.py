@@ -8,17 +8,14 @@ and its two neighbours, where 0 means "estimate it from the data".
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from sgp_ros.engine.samples import SettingValue
 from sgp_ros.engine.setting import Setting
 from sgp_ros.errors import ConfigError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from sgp_ros.engine.samples import SettingValue
-    from sgp_ros.robots.robot import Robot
+from sgp_ros.robots.robot import Robot
 
 _LARGEST = 1e12
 """Largest length scale [unit of the input]; of a variance, its square."""

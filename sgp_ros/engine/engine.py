@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.estimator import Estimator
 from sgp_ros.engine.fitting import FitRequest
 from sgp_ros.engine.intake import Intake
@@ -18,17 +19,12 @@ from sgp_ros.engine.samples import (
     JointSample,
     Reset,
     SettingsChange,
+    SettingValue,
 )
 from sgp_ros.engine.snapshots import fill_from_snapshot, snapshot_config, take_snapshot
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from sgp_ros.core.drift import DriftTest
-    from sgp_ros.core.model import Model
-    from sgp_ros.engine.config import EngineConfig
-    from sgp_ros.engine.samples import SettingValue
-    from sgp_ros.robots.robot import Robot
+from sgp_ros.gp.drift import DriftTest
+from sgp_ros.gp.model import Model
+from sgp_ros.robots.robot import Robot
 
 
 class Engine:

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.core.drift import DriftTest
-from sgp_ros.core.learning import initial_model
-from sgp_ros.core.model import Model, Observations
-from sgp_ros.core.online import OnlineRegression
-from sgp_ros.core.scores import RunningScore
 from sgp_ros.engine.complement import solve_complement
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.factor_safety import check_factor, predict_soundly
 from sgp_ros.engine.prior_knowledge import (
     complement_columns,
@@ -21,16 +16,17 @@ from sgp_ros.engine.prior_knowledge import (
     prior_of_robot,
     sample_budget,
 )
-from sgp_ros.engine.results import Channel, Estimate
+from sgp_ros.engine.results import Channel, Counts, Estimate
+from sgp_ros.engine.windows import Equation
 from sgp_ros.errors import NumericalError
-
-if TYPE_CHECKING:
-    from sgp_ros.core.online_prediction import OnlinePrediction
-    from sgp_ros.core.regression import Regression
-    from sgp_ros.engine.config import EngineConfig
-    from sgp_ros.engine.results import Counts
-    from sgp_ros.engine.windows import Equation
-    from sgp_ros.robots.robot import Robot
+from sgp_ros.gp.drift import DriftTest
+from sgp_ros.gp.learning import initial_model
+from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.online import OnlineRegression
+from sgp_ros.gp.online_prediction import OnlinePrediction
+from sgp_ros.gp.regression import Regression
+from sgp_ros.gp.scores import RunningScore
+from sgp_ros.robots.robot import Robot
 
 _BASELINE_BUDGET = 1
 _KEEPING = ('buffer_budget', 'buffer_remember', 'buffer_policy', 'forgetting_samples')

@@ -6,17 +6,13 @@ basis stay as they are, and equations enter its triangles by rotations alone: no
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import numpy as np
 
-from sgp_ros.core.online import OnlineRegression
+from sgp_ros.engine.results import Counts
 from sgp_ros.errors import NumericalError
-
-if TYPE_CHECKING:
-    import numpy as np
-
-    from sgp_ros.core.online_prediction import OnlinePrediction
-    from sgp_ros.core.regression import Regression
-    from sgp_ros.engine.results import Counts
+from sgp_ros.gp.online import OnlineRegression
+from sgp_ros.gp.online_prediction import OnlinePrediction
+from sgp_ros.gp.regression import Regression
 
 
 def predict_soundly(

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.core.learning import initial_model, learn, screened
-from sgp_ros.core.posterior import Posterior
-from sgp_ros.core.prior import CoefficientPrior
 from sgp_ros.errors import NumericalError
-
-if TYPE_CHECKING:
-    from sgp_ros.core.model import Model, Observations
+from sgp_ros.gp.learning import initial_model, learn, screened
+from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.posterior import Posterior
+from sgp_ros.gp.prior import CoefficientPrior
 
 
 @dataclass(frozen=True, slots=True, eq=False)

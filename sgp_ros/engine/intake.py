@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.pairing import CommandHistory
+from sgp_ros.engine.results import Counts
 from sgp_ros.engine.samples import CommandSample, Event, JointSample
-from sgp_ros.engine.windows import State, WindowFilter
-
-if TYPE_CHECKING:
-    from sgp_ros.engine.config import EngineConfig
-    from sgp_ros.engine.results import Counts
-    from sgp_ros.engine.windows import Equation
-    from sgp_ros.robots.robot import Robot
+from sgp_ros.engine.windows import Equation, State, WindowFilter
+from sgp_ros.robots.robot import Robot
 
 
 class Intake:

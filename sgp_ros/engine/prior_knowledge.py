@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from sgp_ros.core.basis import BasisRegression
-from sgp_ros.core.kernels import SquaredExponential
-from sgp_ros.core.model import Model
-from sgp_ros.core.online import OnlineRegression
-from sgp_ros.core.prior import CoefficientPrior
-
-if TYPE_CHECKING:
-    from sgp_ros.core.kernels import Kernel
-    from sgp_ros.core.regression import Regression
-    from sgp_ros.engine.config import EngineConfig, JointHyperparameters
-    from sgp_ros.robots.robot import Robot
+from sgp_ros.engine.config import EngineConfig, JointHyperparameters
+from sgp_ros.gp.basis import BasisRegression
+from sgp_ros.gp.kernels import Kernel, SquaredExponential
+from sgp_ros.gp.model import Model
+from sgp_ros.gp.online import OnlineRegression
+from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.regression import Regression
+from sgp_ros.robots.robot import Robot
 
 
 def model_of_settings(

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.results import ParameterEstimate, Score
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from sgp_ros.core.regression import Regression
-    from sgp_ros.core.scores import RunningScore
-    from sgp_ros.engine.config import EngineConfig
-    from sgp_ros.robots.robot import Robot
+from sgp_ros.gp.regression import Regression
+from sgp_ros.gp.scores import RunningScore
+from sgp_ros.robots.robot import Robot
 
 
 def read_parameters(

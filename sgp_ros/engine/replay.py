@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable
 
+from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import fit
-from sgp_ros.engine.samples import SettingsChange
+from sgp_ros.engine.results import Step
+from sgp_ros.engine.samples import Event, SettingsChange
 from sgp_ros.engine.swap import Swap
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-    from sgp_ros.engine.engine import Engine
-    from sgp_ros.engine.results import Step
-    from sgp_ros.engine.samples import Event
 
 
 def replay(

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from sgp_ros.engine.samples import Event
+from sgp_ros.engine.samples import Event
 
 REFUSALS = ('late', 'duplicate', 'nonfinite', 'unpaired', 'unknown_joint', 'gap')
 """Reasons for which a state is refused; each refused state has exactly one."""

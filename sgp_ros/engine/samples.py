@@ -6,13 +6,10 @@ an array is float64 and read-only. Nothing here knows of messages, files or cloc
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
 
 SettingValue = bool | int | float | str | tuple[float, ...] | tuple[str, ...]
 

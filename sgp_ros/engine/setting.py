@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from sgp_ros.engine.samples import SettingValue
+from sgp_ros.engine.samples import SettingValue
 
 KINDS = {
     'bool': 'true or false',

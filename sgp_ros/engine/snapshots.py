@@ -7,16 +7,14 @@ in which Python writes every float so that it reads back to the same bits.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sgp_ros.core.drift import DriftTest
-from sgp_ros.core.kernels import SquaredExponential
-from sgp_ros.core.model import Model
-from sgp_ros.core.scores import RunningScore
 from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.estimator import Estimator
 from sgp_ros.engine.samples import (
     CommandSample,
     Event,
@@ -27,14 +25,15 @@ from sgp_ros.engine.samples import (
 )
 from sgp_ros.engine.windows import State
 from sgp_ros.errors import ConfigError
+from sgp_ros.gp.drift import DriftTest
+from sgp_ros.gp.kernels import SquaredExponential
+from sgp_ros.gp.model import Model
+from sgp_ros.gp.regression import Regression
+from sgp_ros.gp.scores import RunningScore
+from sgp_ros.robots.robot import Robot
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from sgp_ros.core.regression import Regression
     from sgp_ros.engine.engine import Engine
-    from sgp_ros.engine.estimator import Estimator
-    from sgp_ros.robots.robot import Robot
 
 VERSION = 4
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sgp_ros.core.output_groups import separable
+from sgp_ros.engine.fitting import FitResult
+from sgp_ros.engine.samples import SettingsChange, SettingValue
 from sgp_ros.errors import NumericalError
+from sgp_ros.gp.output_groups import separable
 
 if TYPE_CHECKING:
     from sgp_ros.engine.engine import Engine
-    from sgp_ros.engine.fitting import FitResult
-    from sgp_ros.engine.samples import SettingsChange, SettingValue
 
 
 class Swap:

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.pairing import CommandHistory
 from sgp_ros.engine.weak_form import WeakForm, polynomial_smoother
-from sgp_ros.robots.robot import Motion
-
-if TYPE_CHECKING:
-    from sgp_ros.engine.config import EngineConfig
-    from sgp_ros.engine.pairing import CommandHistory
-    from sgp_ros.robots.robot import Robot
+from sgp_ros.physics.term import Motion
+from sgp_ros.robots.robot import Robot
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import heapq
 import sqlite3
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import closing
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from rosbags.rosbag1 import Reader as Ros1Reader
 from rosbags.rosbag1 import ReaderError as Ros1Error
@@ -16,10 +17,6 @@ from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.mcap_source import RawMessage
 from sgp_ros.recordings.topics import Topic
 from sgp_ros.recordings.typestore import short_type
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
-    from pathlib import Path
 
 
 class SqliteSource:

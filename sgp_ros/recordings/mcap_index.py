@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import struct
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
-from typing import IO, TYPE_CHECKING, NamedTuple
+from pathlib import Path
+from typing import IO, NamedTuple
 
 import zstandard
 from mcap.exceptions import EndOfFile, McapError
@@ -22,10 +24,6 @@ from mcap.stream_reader import StreamReader
 
 from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.typestore import short_type
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 MAGIC = b'\x89MCAP0\r\n'
 DAMAGE = (McapError, struct.error, ValueError, RuntimeError, KeyError, zstandard.ZstdError)

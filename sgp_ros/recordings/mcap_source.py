@@ -7,18 +7,16 @@ recording is; see `mcap_index` for what a segment is.
 from __future__ import annotations
 
 from bisect import bisect_left
+from collections.abc import Collection, Iterator, Sequence
 from operator import itemgetter
-from typing import TYPE_CHECKING, NamedTuple
+from pathlib import Path
+from typing import NamedTuple
 
 from mcap.records import Message
 
 from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.mcap_index import DAMAGE, Segment, index_file, read_records
 from sgp_ros.recordings.topics import Topic
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
-    from pathlib import Path
 
 
 class RawMessage(NamedTuple):

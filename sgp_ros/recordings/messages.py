@@ -7,15 +7,13 @@ sample, the engine refuses and counts it.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
 
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.errors import MessageError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    import numpy as np
 
 Message = Any
 """A ROS message of any library; its fields are those of its definition."""

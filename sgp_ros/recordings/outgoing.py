@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
+from sgp_ros.engine.samples import CommandSample, JointSample
 from sgp_ros.recordings.messages import FLOAT64, FLOAT64_ARRAY, JOINT_STATE, TRAJECTORY, Message
 from sgp_ros.recordings.typestore import new_message
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    from sgp_ros.engine.samples import CommandSample, JointSample
 
 DIAGNOSTICS = 'diagnostic_msgs/DiagnosticArray'
 TEXT = 'std_msgs/String'

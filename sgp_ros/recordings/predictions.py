@@ -6,15 +6,12 @@ The same values go to the topics, into a record and into the result of a replay.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.engine.results import Estimate
 from sgp_ros.engine.samples import JointSample
-
-if TYPE_CHECKING:
-    from sgp_ros.engine.results import Estimate
-    from sgp_ros.recordings.writer import RecordingWriter
+from sgp_ros.recordings.writer import RecordingWriter
 
 _NONE = np.zeros(0)
 

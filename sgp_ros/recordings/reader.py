@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import Protocol, cast
 
 import yaml
 
+from sgp_ros.engine.samples import Event, Reset, SettingsChange
 from sgp_ros.errors import MessageError, RecordingError
 from sgp_ros.recordings.bag_source import RosbagsSource, SqliteSource
 from sgp_ros.recordings.changes import change_from_text
@@ -27,11 +29,6 @@ from sgp_ros.recordings.topics import (
     choose_joint_states,
 )
 from sgp_ros.recordings.typestore import decoder
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator
-
-    from sgp_ros.engine.samples import Event, Reset, SettingsChange
 
 _KINDS = 'an .mcap file, a rosbag2 directory or a ROS 1 .bag'
 

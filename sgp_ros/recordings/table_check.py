@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from contextlib import suppress
 from decimal import Decimal
-from typing import TYPE_CHECKING
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.recordings.messages import FLOAT64_ARRAY, JOINT_STATE
+from sgp_ros.recordings.table_files import Columns
 from sgp_ros.recordings.table_map import TIME_UNITS, UNITS, Quantity, TableMap, TimeBase
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from sgp_ros.recordings.table_files import Columns
 
 
 def check_map(content: Mapping[str, object], columns: Columns) -> TableMap:

@@ -5,17 +5,14 @@ from __future__ import annotations
 import csv
 import zipfile
 import zlib
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 from scipy.io import loadmat
 from scipy.io.matlab import MatReadError
 
 from sgp_ros.errors import RecordingError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 Columns = dict[str, np.ndarray]
 _DELIMITERS = (';', '\t', ',', ' ')

@@ -26,16 +26,13 @@ the unit of effort that the robot states. A member of a MAT structure is written
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import yaml
 
 from sgp_ros.errors import ConfigError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 _ANGLE = math.pi / 180.0
 _POSITION = {'m': 1.0, 'mm': 1e-3, 'rad': 1.0, 'deg': _ANGLE, 'rev': 2.0 * math.pi}

@@ -7,10 +7,10 @@ the map.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,14 +18,9 @@ from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.recordings.messages import JOINT_STATE
 from sgp_ros.recordings.table_check import check_map
-from sgp_ros.recordings.table_files import load_columns
+from sgp_ros.recordings.table_files import Columns, load_columns
 from sgp_ros.recordings.table_map import Quantity, TableMap, TimeBase, read_map
 from sgp_ros.recordings.writer import RecordingWriter
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from sgp_ros.recordings.table_files import Columns
 
 _LATEST_NS = 2**31 * 10**9
 """First stamp that a ROS message cannot hold [ns]."""

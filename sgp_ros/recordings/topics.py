@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.messages import CONVERTERS, FLOAT64, FLOAT64_ARRAY, JOINT_STATE
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 CHANGES_TOPIC = '/sgp/changes'
 """Where a record keeps the changes of settings."""

@@ -6,20 +6,16 @@ another distribution, or of ROS 1, has the same fields in these types.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
 
 from sgp_ros.errors import MessageError, RecordingError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rosbags.typesys.store import Typestore
-
-    from sgp_ros.recordings.messages import Message
+from sgp_ros.recordings.messages import Message
 
 
 def new_message(kind: str, **fields: Any) -> Message:

@@ -8,14 +8,16 @@ survives a crash.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import TracebackType
 
 import numpy as np
 from mcap.writer import Writer
+from typing_extensions import Self
 
-from sgp_ros.engine.samples import CommandSample, JointSample
+from sgp_ros.engine.samples import CommandSample, Event, JointSample
 from sgp_ros.recordings.changes import change_to_text
 from sgp_ros.recordings.messages import (
     CONVERTERS,
@@ -37,14 +39,6 @@ from sgp_ros.recordings.outgoing import (
 )
 from sgp_ros.recordings.topics import CHANGES_TOPIC
 from sgp_ros.recordings.typestore import definition, full_type, serialize
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-    from types import TracebackType
-
-    from typing_extensions import Self
-
-    from sgp_ros.engine.samples import Event
 
 __all__ = ['RecordingWriter', 'Status']
 

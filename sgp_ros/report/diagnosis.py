@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from sgp_ros.core.scores import INTERVAL_95
 from sgp_ros.diagnosis.prove.held_out import HELD_OUT
+from sgp_ros.diagnosis.result import Diagnosis, Finding, ParameterError
+from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.report.diagnosis_bands import band_sentences
 from sgp_ros.report.diagnosis_figures import draw_diagnosis
 from sgp_ros.report.diagnosis_maps import important_joints
@@ -34,12 +37,6 @@ from sgp_ros.report.figures import png
 from sgp_ros.report.files import write_bytes, write_text
 from sgp_ros.report.html import MEANINGS, embedded
 from sgp_ros.report.metrics import versions
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-
-    from sgp_ros.diagnosis.result import Diagnosis, Finding, ParameterError
 
 _NAMED = ('kind', 'source_joint')
 """Parameters that are part of the name of an effect."""

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from sgp_ros.diagnosis.result import Band, Dependence, Diagnosis
 from sgp_ros.report.figures import GREY, PREDICTED
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from matplotlib.axes import Axes
-
-    from sgp_ros.diagnosis.result import Band, Dependence, Diagnosis
 
 VARIABLES = ('position', 'velocity', 'effort', 'time')
 _DIRECTIONS = (('backward', '#CC79A7'), ('forward', PREDICTED))

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Container, Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from sgp_ros.diagnosis.result import Diagnosis, Proof
 from sgp_ros.report.diagnosis_proof import recording_name, tables
 from sgp_ros.report.figures import PREDICTED
-
-if TYPE_CHECKING:
-    from collections.abc import Container, Sequence
-
-    from matplotlib.axes import Axes
-
-    from sgp_ros.diagnosis.result import Diagnosis, Proof
 
 BEFORE, AFTER, BY_CHANCE = '#E69F00', PREDICTED, '#BBBBBB'
 _VARIABLES, _SEEN = 7, 0.005

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from textwrap import fill
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from sgp_ros.diagnosis.result import Diagnosis, Finding
 from sgp_ros.report.diagnosis_bands import draw_bands
 from sgp_ros.report.diagnosis_charts import draw_dependence, draw_proof
 from sgp_ros.report.diagnosis_maps import (
@@ -22,12 +24,6 @@ from sgp_ros.report.diagnosis_maps import (
 )
 from sgp_ros.report.diagnosis_text import effect_name
 from sgp_ros.report.figures import BAND, GREY, MEASURED, PREDICTED
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-
-    from sgp_ros.diagnosis.result import Diagnosis, Finding
 
 FORCES = (PREDICTED, '#009E73', '#CC79A7')
 """One colour for each finding on a joint (Okabe and Ito 2008)."""

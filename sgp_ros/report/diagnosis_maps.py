@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
 from sgp_ros.diagnosis.decide.decision import LEAST_SHARE
+from sgp_ros.diagnosis.result import Diagnosis
 from sgp_ros.report.diagnosis_text import scored_joints, worst_joint
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.collections import QuadMesh
-
-    from sgp_ros.diagnosis.result import Diagnosis
 
 _FEWEST_CELLS, _MOST_CELLS = 8, 24
 _LARGE, _IMPORTANT = 3, 0.1

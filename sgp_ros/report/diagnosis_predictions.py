@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
+from sgp_ros.diagnosis.result import Diagnosis, Predictions
 from sgp_ros.report.files import write_text
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from sgp_ros.diagnosis.result import Diagnosis, Predictions
 
 
 def write_predictions(folder: Path, found: Diagnosis) -> None:

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 from sgp_ros.diagnosis.prove.held_out import HELD_OUT
 from sgp_ros.diagnosis.prove.rollouts import HORIZON_S
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from sgp_ros.diagnosis.result import Diagnosis, Proof
+from sgp_ros.diagnosis.result import Diagnosis, Proof
 
 _NAMES = {'train': 'learned from', HELD_OUT: 'the part held out'}
 

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.core.scores import INTERVAL_95
-from sgp_ros.diagnosis.result import Parameter
+from sgp_ros.diagnosis.result import (
+    Diagnosis,
+    Equivalent,
+    Finding,
+    Parameter,
+    ParameterError,
+    Proof,
+)
+from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.report.diagnosis_proof import recording_name
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from sgp_ros.diagnosis.result import Diagnosis, Equivalent, Finding, ParameterError, Proof
 
 EFFECT_NAMES = {
     'viscous_friction': 'viscous friction',

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sgp_ros.core.scores import INTERVAL_95, pit
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from matplotlib.axes import Axes
-
-    from sgp_ros.engine.engine import Engine
-    from sgp_ros.report.history import History
+from sgp_ros.engine.engine import Engine
+from sgp_ros.gp.scores import INTERVAL_95, pit
+from sgp_ros.report.history import History
 
 # Okabe and Ito 2008: told apart with every kind of colour vision.
 MEASURED, PREDICTED, TRUE, GREY = '#B8B8B8', '#0072B2', '#D55E00', '#555555'

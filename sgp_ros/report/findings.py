@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from sgp_ros.core.scores import coverage95, nlpd
-from sgp_ros.offline.blocks import distance_to
-from sgp_ros.offline.excitation import IDENTIFIABLE
+from sgp_ros.batch.blocks import distance_to
+from sgp_ros.batch.excitation import IDENTIFIABLE
+from sgp_ros.batch.fit import OfflineFit
+from sgp_ros.batch.identification import Identification
+from sgp_ros.batch.regression_data import FilteredData
+from sgp_ros.batch.rollout_scores import RolloutScore
+from sgp_ros.gp.scores import coverage95, nlpd
 from sgp_ros.report.metrics import versions
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from sgp_ros.offline.fit import OfflineFit
-    from sgp_ros.offline.identification import Identification
-    from sgp_ros.offline.regression_data import FilteredData
-    from sgp_ros.offline.rollout_scores import RolloutScore
 
 SCHEMA = 1
 

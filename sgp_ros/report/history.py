@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from sgp_ros.engine.engine import Engine
-    from sgp_ros.engine.results import Estimate, Step
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.results import Estimate, Step
 
 PARAMETER_PERIOD = 5
 """Estimates between two looks at the parameters."""

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import base64
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from sgp_ros.core.scores import INTERVAL_95
+from sgp_ros.engine.engine import Engine
+from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.report.figures import draw_all, png
 from sgp_ros.report.files import write_bytes, write_text
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
-    from sgp_ros.engine.engine import Engine
-    from sgp_ros.report.history import History
+from sgp_ros.report.history import History
 
 MEANINGS = {
     'late': 'older than a state that was already used',

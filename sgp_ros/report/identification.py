@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from sgp_ros.core.scores import INTERVAL_95
-from sgp_ros.offline.identification import HELD_OUT
+from sgp_ros.batch.identification import HELD_OUT, Identification
+from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.report.figures import BAND, GREY, MEASURED, PREDICTED, png
 from sgp_ros.report.files import write_bytes, write_text
 from sgp_ros.report.html import embedded
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
-    from sgp_ros.offline.identification import Identification
 
 _SHOWN_S = 12.0
 _CORRELATED = 0.2

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import math
 import platform
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from sgp_ros import __version__
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from sgp_ros.engine.engine import Engine
-    from sgp_ros.engine.results import ParameterEstimate, Score
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.results import ParameterEstimate, Score
 
 SCHEMA = 1
 _PACKAGES = ('numpy', 'scipy', 'numba')

@@ -11,19 +11,15 @@ simulated robot of the same name. The two driven pendulums have none of their ow
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.robots.chain_urdf import ChainBody, chain_urdf
+from sgp_ros.rigid.chain_urdf import ChainBody, chain_urdf
+from sgp_ros.robots.robot import Robot
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from sgp_ros.robots.robot import Robot
-
-    Values = Mapping[str, float]
-    Entry = dict[str, object]
+Values = Mapping[str, float]
+Entry = dict[str, object]
 
 GRAVITY = 9.81
 """Acceleration of gravity [m/s^2]."""

@@ -12,16 +12,19 @@ alone: the mass matrix is `[[J1 + 2 H cos q2, J12 + H cos q2], [J12 + H cos q2, 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from sgp_ros.robots.robot import Coefficient, Joint, Robot, Term
-from sgp_ros.robots.terms import acceleration, constant, direction, sine, single_column, velocity
-
-if TYPE_CHECKING:
-    from sgp_ros.robots.robot import Motion
-    from sgp_ros.robots.terms import Signal
+from sgp_ros.physics.term import Coefficient, Joint, Motion, Term
+from sgp_ros.robots.robot import Robot
+from sgp_ros.robots.terms import (
+    Signal,
+    acceleration,
+    constant,
+    direction,
+    sine,
+    single_column,
+    velocity,
+)
 
 _SHOULDER, _ELBOW = 0, 1
 _JOINTS = (Joint('shoulder'), Joint('elbow'))

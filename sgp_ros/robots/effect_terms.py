@@ -11,20 +11,16 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.robots.effects.observed_motion import ObservedMotion
-from sgp_ros.robots.effects.stated import coefficient_quantities
-from sgp_ros.robots.robot import Coefficient, Motion, Term
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from sgp_ros.robots.stated_effects import StatedEffect
-    from sgp_ros.robots.tree import Tree
+from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.physics.stated import coefficient_quantities
+from sgp_ros.physics.term import Coefficient, Motion, Term
+from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.stated_effects import StatedEffect
 
 ON_TREE = ('gravity_tilt', 'payload')
 """Effects that change the tree instead of adding a force."""

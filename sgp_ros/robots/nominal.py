@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.built_in_nominal import NOMINAL, built_in_document
 from sgp_ros.robots.effect_terms import ON_TREE, changed_tree
-from sgp_ros.robots.stated_effects import read_effects
+from sgp_ros.robots.robot import Robot
+from sgp_ros.robots.stated_effects import StatedEffect, read_effects
 from sgp_ros.robots.urdf_robot import build_urdf_robot, nominal_tree
-
-if TYPE_CHECKING:
-    import numpy as np
-
-    from sgp_ros.robots.robot import Robot
-    from sgp_ros.robots.stated_effects import StatedEffect
-    from sgp_ros.robots.tree import Tree
 
 
 @dataclass(frozen=True, slots=True, eq=False)

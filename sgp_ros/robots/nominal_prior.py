@@ -13,15 +13,12 @@ effort limit for coefficients of a joint (per rad, rad/s, ...), 0.1 N m or N wit
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.robots.joint_terms import JOINT_TERMS
-
-if TYPE_CHECKING:
-    from sgp_ros.robots.robot import Term
-    from sgp_ros.robots.tree import Tree
+from sgp_ros.physics.joint_terms import JOINT_TERMS
+from sgp_ros.physics.term import Term
+from sgp_ros.rigid.tree import Tree
 
 LEAST_MASS = 0.01
 """Floor of the scale of a mass [kg]."""

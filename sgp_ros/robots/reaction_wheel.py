@@ -7,14 +7,9 @@ back-EMF of the motor; with six it holds none.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from sgp_ros.robots.robot import Coefficient, Joint, Robot
-from sgp_ros.robots.terms import effort, position, sine, single_column, velocity
-
-if TYPE_CHECKING:
-    from sgp_ros.robots.robot import Term
-    from sgp_ros.robots.terms import Signal
+from sgp_ros.physics.term import Coefficient, Joint, Term
+from sgp_ros.robots.robot import Robot
+from sgp_ros.robots.terms import Signal, effort, position, sine, single_column, velocity
 
 _POLE, _WHEEL = 0, 1
 _JOINTS = (Joint('pole', is_actuated=False), Joint('wheel', effort_unit='V'))

@@ -14,8 +14,9 @@ result in the same form, so what was identified on one recording is the prior fo
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import yaml
 
@@ -24,13 +25,9 @@ from sgp_ros.robots.double_pendulum import DOUBLE_PENDULUM
 from sgp_ros.robots.entries import Entries, is_finite
 from sgp_ros.robots.linear_axis import LINEAR_AXIS
 from sgp_ros.robots.reaction_wheel import REACTION_WHEEL, REACTION_WHEEL_6
+from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.simple_pendulum import SIMPLE_PENDULUM
 from sgp_ros.robots.toy_pendulum import TOY_PENDULUM
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from sgp_ros.robots.robot import Robot
 
 ROBOTS: dict[str, Robot] = {
     robot.name: robot

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from sgp_ros.robots.robot import Coefficient, Joint, Robot
+from sgp_ros.physics.term import Coefficient, Joint
+from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.terms import acceleration, constant, direction, sine, single_column, velocity
 
 _SOURCE = 'Wiebe et al. 2022, torque-limited simple pendulum (doi:10.21105/joss.03884)'

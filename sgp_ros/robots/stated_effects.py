@@ -9,15 +9,16 @@ written here as it is. A parameter without `std` is not known before: its value 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from sgp_ros.robots.effects.catalogue import EFFECTS
-from sgp_ros.robots.effects.effect import Fitted
-from sgp_ros.robots.effects.observed_motion import ObservedMotion
-from sgp_ros.robots.effects.stated import (
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect import Effect, Fitted, Place
+from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.physics.stated import (
     KINDS,
     PLACED,
     SIDED,
@@ -29,13 +30,8 @@ from sgp_ros.robots.effects.stated import (
     shape_and_coefficients,
     stated_quantities,
 )
+from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.entries import Entries, is_finite
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from sgp_ros.robots.effects.effect import Effect, Place
-    from sgp_ros.robots.tree import Tree
 
 NOT_ONLINE = (
     'command_delay', 'actuator_lag', 'backlash', 'hysteresis', 'friction_drift',

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
-from sgp_ros.robots.robot import Coefficient, Motion, Term
+from sgp_ros.physics.term import Coefficient, Motion, Term
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    Signal = Callable[[Motion], np.ndarray]
+Signal = Callable[[Motion], np.ndarray]
 
 
 def single_column(coefficient: Coefficient, joint: int, signal: Signal, source: str) -> Term:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from sgp_ros.robots.robot import Coefficient, Joint, Robot
+from sgp_ros.physics.term import Coefficient, Joint
+from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.terms import sine, single_column
 
 TOY_PENDULUM = Robot(

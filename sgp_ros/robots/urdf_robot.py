@@ -25,28 +25,23 @@ as on joints without effort, the engine solves the same equation of motion for t
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.physics.joint_terms import JOINT_TERMS, Shape, joint_term
+from sgp_ros.physics.term import Joint, Term
+from sgp_ros.rigid.inertial import inertial_term
+from sgp_ros.rigid.locking import Plan, plan_joints
+from sgp_ros.rigid.tree import Payload, Tree, read_urdf
+from sgp_ros.rigid.urdf_text import parse_urdf
 from sgp_ros.robots.effect_terms import changed_tree, effect_terms, effort_map
 from sgp_ros.robots.entries import Entries
-from sgp_ros.robots.inertial import inertial_term
-from sgp_ros.robots.joint_terms import JOINT_TERMS, Shape, joint_term
-from sgp_ros.robots.locking import plan_joints
 from sgp_ros.robots.nominal_prior import inertial_prior, joint_prior
-from sgp_ros.robots.robot import Joint, Robot
-from sgp_ros.robots.stated_effects import read_effects
-from sgp_ros.robots.tree import Payload, Tree, read_urdf
-from sgp_ros.robots.urdf_text import parse_urdf
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from sgp_ros.robots.locking import Plan
-    from sgp_ros.robots.robot import Term
-    from sgp_ros.robots.stated_effects import StatedEffect
+from sgp_ros.robots.robot import Robot
+from sgp_ros.robots.stated_effects import StatedEffect, read_effects
 
 DEFAULT_TERMS: Mapping[str, str] = dict.fromkeys(
     ('inertial', 'viscous', 'coulomb', 'offset'), 'all'

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from sgp_ros.diagnosis.compare.trajectory import SHORTEST_ROWS
-from sgp_ros.engine.samples import CommandSample, JointSample
+from sgp_ros.engine.samples import CommandSample, Event, JointSample
 from sgp_ros.errors import ConfigError
 from sgp_ros.recordings.writer import Status
 from sgp_ros.robots.nominal import nominal_model
+from sgp_ros.robots.robot import Robot
 from sgp_ros.ros.diagnosis_process import (
     DiagnosisDone,
     DiagnosisFailed,
@@ -19,17 +23,9 @@ from sgp_ros.ros.diagnosis_process import (
 )
 from sgp_ros.ros.verdict import ERROR, OK, WARN
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import numpy as np
-
-    from sgp_ros.engine.samples import Event
-    from sgp_ros.robots.robot import Robot
-
-    Names = tuple[str, ...]
-    State = tuple[int, Names, np.ndarray, np.ndarray | None, np.ndarray | None]
-    Command = tuple[int, np.ndarray, Names | None]
+Names = tuple[str, ...]
+State = tuple[int, Names, np.ndarray, np.ndarray | None, np.ndarray | None]
+Command = tuple[int, np.ndarray, Names | None]
 
 MOST_EVENTS = 200_000
 """Remembered at most, whatever the window: a minute of states and commands at 1.6 kHz each."""

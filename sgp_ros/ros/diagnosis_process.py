@@ -9,20 +9,17 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+from collections.abc import Mapping
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
-from typing import TYPE_CHECKING, Any
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
+from typing import Any
 
 import numpy as np
 
+from sgp_ros.engine.samples import Event
 from sgp_ros.errors import SgpError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from multiprocessing.connection import Connection
-    from multiprocessing.context import SpawnProcess
-
-    from sgp_ros.engine.samples import Event
 
 _NICENESS = 10
 

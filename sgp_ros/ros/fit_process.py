@@ -15,16 +15,13 @@ import multiprocessing
 import os
 import signal
 import threading
+from collections.abc import Iterator
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
-from typing import TYPE_CHECKING
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
 
 from sgp_ros.engine.fitting import FitRequest, FitResult, fit
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from multiprocessing.connection import Connection
-    from multiprocessing.context import SpawnProcess
 
 _NICENESS = 10
 _SET_PARENT_DEATH_SIGNAL = 1

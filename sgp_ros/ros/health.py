@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.fitting import FitResult
+from sgp_ros.engine.results import Counts, Estimate
+from sgp_ros.errors import MessageError
 from sgp_ros.recordings.writer import Status
 from sgp_ros.ros.verdict import OK, WARN, Arrivals, judge
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from sgp_ros.engine.engine import Engine
-    from sgp_ros.engine.fitting import FitResult
-    from sgp_ros.engine.results import Counts, Estimate
-    from sgp_ros.errors import MessageError
 
 _DURATIONS = 2000
 _MEMORY = 100

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
@@ -24,6 +25,7 @@ from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 from sgp_ros.engine.config import describe_settings
+from sgp_ros.engine.samples import Event
 from sgp_ros.errors import ConfigError, MessageError, NumericalError
 from sgp_ros.recordings.messages import (
     CONVERTERS,
@@ -33,7 +35,7 @@ from sgp_ros.recordings.messages import (
     TRAJECTORY,
     joint_sample,
 )
-from sgp_ros.recordings.predictions import PredictionTopics
+from sgp_ros.recordings.predictions import Outputs, PredictionTopics
 from sgp_ros.ros.diagnosing import Diagnosing
 from sgp_ros.ros.diagnosis_process import DiagnosisFailed
 from sgp_ros.ros.node_settings import NO_COMMAND
@@ -44,12 +46,6 @@ from sgp_ros.ros.record import Record, Topics
 from sgp_ros.ros.session import Session
 from sgp_ros.ros.start import build_engine
 from sgp_ros.ros.verdict import ERROR, WARN
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from sgp_ros.engine.samples import Event
-    from sgp_ros.recordings.predictions import Outputs
 
 COMMAND_MESSAGES: dict[str, type] = {
     FLOAT64_ARRAY: Float64MultiArray,

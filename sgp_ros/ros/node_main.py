@@ -11,15 +11,12 @@ import gc
 import os
 import signal
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+
+from rclpy.executors import Executor
+from rclpy.node import Node
 
 from sgp_ros.errors import SgpError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rclpy.executors import Executor
-    from rclpy.node import Node
 
 THREAD_LIMITS = ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS')
 """Environment variables that hold the number of threads of a linear algebra library."""

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.results import ParameterEstimate
 from sgp_ros.recordings.writer import Status
-
-if TYPE_CHECKING:
-    from sgp_ros.engine.engine import Engine
-    from sgp_ros.engine.results import ParameterEstimate
 
 
 def parameter_statuses(engine: Engine) -> list[Status]:

@@ -7,21 +7,17 @@ A parameter never has an empty list as its value: ROS cannot tell what it is a l
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterException
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from sgp_ros.engine.samples import SettingValue
+from sgp_ros.engine.setting import Setting
 from sgp_ros.errors import ConfigError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from rclpy.node import Node
-
-    from sgp_ros.engine.samples import SettingValue
-    from sgp_ros.engine.setting import Setting
 
 _TYPES = {
     'bool': Parameter.Type.BOOL,

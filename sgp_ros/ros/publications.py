@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -10,12 +10,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from sgp_ros.engine.samples import JointSample
-    from sgp_ros.recordings.predictions import Point
-    from sgp_ros.recordings.writer import Status
+from sgp_ros.engine.samples import JointSample
+from sgp_ros.recordings.predictions import Point
+from sgp_ros.recordings.writer import Status
 
 
 def header(stamp_ns: int) -> Header:

@@ -6,21 +6,15 @@ The record opens with the settings in force, stamped one nanosecond before the f
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from sgp_ros.engine.config import describe_settings
-from sgp_ros.engine.samples import Reset, SettingsChange
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.samples import Event, Reset, SettingsChange, SettingValue
 from sgp_ros.recordings.messages import FLOAT64_ARRAY
-from sgp_ros.recordings.predictions import write_outputs
+from sgp_ros.recordings.predictions import Outputs, PredictionTopics, write_outputs
 from sgp_ros.recordings.writer import RecordingWriter
 from sgp_ros.ros.node_settings import NO_COMMAND
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from sgp_ros.engine.engine import Engine
-    from sgp_ros.engine.samples import Event, SettingValue
-    from sgp_ros.recordings.predictions import Outputs, PredictionTopics
 
 
 @dataclass(frozen=True, slots=True)

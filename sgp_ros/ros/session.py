@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING
+from pathlib import Path
 
+from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitResult
-from sgp_ros.engine.samples import JointSample
+from sgp_ros.engine.results import Step
+from sgp_ros.engine.samples import Event, JointSample, SettingValue
 from sgp_ros.engine.swap import Swap
 from sgp_ros.recordings.predictions import Outputs, outputs
 from sgp_ros.ros.fit_process import FitProcess, WorkerLost
 from sgp_ros.ros.health import Health
 from sgp_ros.ros.record import Record
 from sgp_ros.ros.storage import save_model
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-    from pathlib import Path
-
-    from sgp_ros.engine.engine import Engine
-    from sgp_ros.engine.results import Step
-    from sgp_ros.engine.samples import Event, SettingValue
 
 
 class Session:

@@ -10,7 +10,7 @@ ahead while the node is idle.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from rclpy.node import Node
@@ -18,7 +18,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from sgp_ros.engine.samples import JointSample
+from sgp_ros.engine.samples import JointSample, SettingValue
 from sgp_ros.engine.setting import Setting
 from sgp_ros.errors import MessageError
 from sgp_ros.recordings.messages import CONVERTERS, FLOAT64_ARRAY, JOINT_STATE
@@ -26,10 +26,7 @@ from sgp_ros.ros.parameters import declare
 from sgp_ros.ros.publications import header, joint_state
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.sensors import Sensors
-
-if TYPE_CHECKING:
-    from sgp_ros.engine.samples import SettingValue
-    from sgp_ros.simulation.stepping import SimulatedSample, Simulation
+from sgp_ros.simulation.stepping import SimulatedSample, Simulation
 
 ROBOT = 'reaction_wheel'
 EXTERNAL = 'external'

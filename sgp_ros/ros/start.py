@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+from rclpy.node import Node
 
 from sgp_ros.engine.config import EngineConfig, describe_settings
 from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.samples import SettingValue
+from sgp_ros.engine.setting import Setting
 from sgp_ros.engine.snapshots import snapshot_config
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.ros.node_settings import MODEL_PATH, NODE_SETTINGS, ROBOT
 from sgp_ros.ros.parameters import declare
 from sgp_ros.ros.storage import load_model
 from sgp_ros.ros.warm_up import warm_up
-
-if TYPE_CHECKING:
-    from rclpy.node import Node
-
-    from sgp_ros.engine.samples import SettingValue
-    from sgp_ros.engine.setting import Setting
 
 
 def build_engine(node: Node) -> tuple[Engine, dict[str, SettingValue]]:

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import os
 import zipfile
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 import yaml
 
+from sgp_ros.engine.samples import SettingValue
 from sgp_ros.errors import ConfigError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-    from pathlib import Path
-    from typing import BinaryIO
-
-    from sgp_ros.engine.samples import SettingValue
 
 
 def save_model(

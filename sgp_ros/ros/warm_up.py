@@ -5,16 +5,12 @@ The first call of a compiled loop takes seconds, in which a queue of messages wo
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.samples import JointSample, frozen_array
-
-if TYPE_CHECKING:
-    from sgp_ros.robots.robot import Robot
+from sgp_ros.robots.robot import Robot
 
 _PERIOD_NS = 1_000_000
 _SAMPLES = 40

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.simulation.effect_text import parse_effect
+from sgp_ros.simulation.effects import Action, ChosenEffect
 from sgp_ros.simulation.mechanism import with_physical
 from sgp_ros.simulation.registry import SIMULATORS
 from sgp_ros.simulation.scenario import Scenario, effect_actions, with_effects
+from sgp_ros.simulation.sensors import Sensors
 from sgp_ros.simulation.simulator import Simulator
 from sgp_ros.simulation.stepping import Simulation
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    from sgp_ros.simulation.effects import Action, ChosenEffect
-    from sgp_ros.simulation.sensors import Sensors
 
 _LOWEST_RATE_HZ, _HIGHEST_RATE_HZ = 0.1, 1e5
 

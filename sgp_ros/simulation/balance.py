@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy import linalg
 
-if TYPE_CHECKING:
-    from sgp_ros.simulation.controllers import Controller
-    from sgp_ros.simulation.mechanism import Mechanism
+from sgp_ros.simulation.controllers import Controller
+from sgp_ros.simulation.mechanism import Mechanism
 
 _STATE_COST = (100.0, 1.0, 1e-3)
 _COMMAND_COST = 0.1

@@ -7,16 +7,12 @@ command holds until the next one.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from sgp_ros.simulation.mechanism import Mechanism
+from sgp_ros.simulation.mechanism import Mechanism
 
 _LOWEST_HZ, _HIGHEST_HZ = 0.1, 3.0
 

@@ -8,12 +8,9 @@ matrix: a joint whose friction is inside its range sticks, the others start to s
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 _SWEEPS = 200
 _TOLERANCE = 1e-14

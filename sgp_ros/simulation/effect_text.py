@@ -6,16 +6,17 @@ An effect is `NAME:joint=J,parameter=value,...`, a physical parameter `NAME=valu
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.simulation.effects import ChosenEffect, Place
+from sgp_ros.simulation.effects import (
+    ChosenEffect,
+    EffectKind,
+    EffectParameter,
+    ParameterValue,
+    Place,
+)
 from sgp_ros.simulation.registry import EFFECTS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from sgp_ros.simulation.effects import EffectKind, EffectParameter, ParameterValue
 
 _EXAMPLE = 'write for example coulomb_friction:joint=pole,level=0.01'
 

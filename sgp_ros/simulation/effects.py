@@ -8,17 +8,13 @@ are those of a generalised force: `M a + h = tau + tau_x`, `tau_x` being what th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
+import numpy as np
 
-    import numpy as np
-
-    from sgp_ros.simulation.mechanism import SimulatedJoint
+from sgp_ros.simulation.mechanism import SimulatedJoint
 
 ParameterValue = float | str
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
-from sgp_ros.simulation.effects import Action, EffectKind, EffectParameter, Place
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from sgp_ros.simulation.effects import Moment, ParameterValue
-    from sgp_ros.simulation.mechanism import SimulatedJoint
+from sgp_ros.simulation.effects import (
+    Action,
+    EffectKind,
+    EffectParameter,
+    Moment,
+    ParameterValue,
+    Place,
+)
+from sgp_ros.simulation.mechanism import SimulatedJoint
 
 
 def _viscous(

@@ -8,15 +8,12 @@ A joint that sticks stays at exactly 0: there is nothing that could chatter.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from sgp_ros.simulation.plant import Inputs, Plant
+from sgp_ros.simulation.plant import Inputs, Plant
 
 _AT_REST = 1e-12
 _SAME_TIME = 1e-12

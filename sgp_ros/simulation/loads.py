@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.simulation.effects import (
@@ -11,16 +11,12 @@ from sgp_ros.simulation.effects import (
     Action,
     EffectKind,
     EffectParameter,
+    Moment,
+    ParameterValue,
     Place,
     side_of,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from sgp_ros.simulation.effects import Moment, ParameterValue
-    from sgp_ros.simulation.mechanism import SimulatedJoint
-
+from sgp_ros.simulation.mechanism import SimulatedJoint
 
 _STIFF_S = 1e-3
 

@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
-from sgp_ros.simulation.effects import Action, EffectKind, EffectParameter
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from sgp_ros.simulation.effects import Moment, ParameterValue
-    from sgp_ros.simulation.mechanism import SimulatedJoint
+from sgp_ros.simulation.effects import Action, EffectKind, EffectParameter, Moment, ParameterValue
+from sgp_ros.simulation.mechanism import SimulatedJoint
 
 
 def _eccentricity(

@@ -8,16 +8,15 @@ a parameter can be replaced by name (a viscosity by 0 removes that friction).
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import Field, dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+
+import numpy as np
 
 from sgp_ros.errors import ConfigError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import numpy as np
-
     from sgp_ros.simulation.effects import ChosenEffect
 
 

@@ -6,20 +6,15 @@ switch: the directions, one of -1, 0 (sticks), 1 per joint, are part of its argu
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sgp_ros.errors import NumericalError
 from sgp_ros.simulation.dry_friction import directions_from_rest, hold_still
-from sgp_ros.simulation.effects import Moment
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from sgp_ros.simulation.effects import Action
-    from sgp_ros.simulation.mechanism import Mechanism
+from sgp_ros.simulation.effects import Action, Moment
+from sgp_ros.simulation.mechanism import Mechanism
 
 _SHORT_S = 1e-6
 

@@ -20,18 +20,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sgp_ros.simulation.balance import balance
 from sgp_ros.simulation.controllers import ControllerChoice, external, sinusoids, zero
+from sgp_ros.simulation.effects import ChosenEffect
 from sgp_ros.simulation.mechanism import SimulatedJoint, TrueCoefficient, quantity
 from sgp_ros.simulation.sensors import Sensors, encoder_resolution
 from sgp_ros.simulation.simulator import Simulator
-
-if TYPE_CHECKING:
-    from sgp_ros.simulation.effects import ChosenEffect
 
 _UNITS = ('rad/s^2', '1/s^2', '1/s', '1/s') * 2 + ('rad/s^2/V',) * 2
 

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sgp_ros.errors import ConfigError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from sgp_ros.simulation.stepping import Simulation
+from sgp_ros.simulation.stepping import Simulation
 
 
 @dataclass(frozen=True, slots=True, eq=False)

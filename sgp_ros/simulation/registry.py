@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from sgp_ros.simulation import actuation, friction, loads, measurement, varying_friction
+from sgp_ros.simulation.effects import EffectKind
 from sgp_ros.simulation.linear_axis import LINEAR_AXIS
 from sgp_ros.simulation.reaction_wheel import REACTION_WHEEL
+from sgp_ros.simulation.simulator import Simulator
 from sgp_ros.simulation.toy_pendulum import TOY_PENDULUM
-
-if TYPE_CHECKING:
-    from sgp_ros.simulation.effects import EffectKind
-    from sgp_ros.simulation.simulator import Simulator
 
 SIMULATORS: dict[str, Simulator] = {
     simulator.name: simulator for simulator in (REACTION_WHEEL, TOY_PENDULUM, LINEAR_AXIS)

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.simulation.effect_text import checked_effect
-from sgp_ros.simulation.effects import EVERY_MOTOR, Place
+from sgp_ros.simulation.effects import (
+    EVERY_MOTOR,
+    Action,
+    ChosenEffect,
+    EffectKind,
+    ParameterValue,
+    Place,
+)
+from sgp_ros.simulation.mechanism import Mechanism
 from sgp_ros.simulation.registry import EFFECTS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from sgp_ros.simulation.effects import Action, ChosenEffect, EffectKind, ParameterValue
-    from sgp_ros.simulation.mechanism import Mechanism
-    from sgp_ros.simulation.sensors import Sensors
-    from sgp_ros.simulation.simulator import Simulator
+from sgp_ros.simulation.sensors import Sensors
+from sgp_ros.simulation.simulator import Simulator
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.simulation.mechanism import SimulatedJoint
 from sgp_ros.simulation.sensors import Sensors, encoder_resolution
 from sgp_ros.simulation.transport import Transport
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from sgp_ros.simulation.mechanism import SimulatedJoint
 
 _YES, _NO = ('yes', 'true', '1'), ('no', 'false', '0')
 _MOST_BITS = 40

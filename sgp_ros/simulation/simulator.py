@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from sgp_ros.simulation.controllers import ControllerChoice
-    from sgp_ros.simulation.effects import ChosenEffect
-    from sgp_ros.simulation.mechanism import Mechanism, SimulatedJoint
-    from sgp_ros.simulation.sensors import Sensors
+from sgp_ros.simulation.controllers import ControllerChoice
+from sgp_ros.simulation.effects import ChosenEffect
+from sgp_ros.simulation.mechanism import Mechanism, SimulatedJoint
+from sgp_ros.simulation.sensors import Sensors
 
 
 @dataclass(frozen=True, slots=True, eq=False)

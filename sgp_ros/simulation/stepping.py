@@ -8,8 +8,8 @@ by the time that really passed and a recording by the nominal period.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,12 +17,8 @@ from sgp_ros.errors import NumericalError
 from sgp_ros.simulation.held_commands import HeldCommands
 from sgp_ros.simulation.integration import integrate
 from sgp_ros.simulation.plant import Inputs, Plant, Shown
+from sgp_ros.simulation.scenario import Scenario
 from sgp_ros.simulation.truth import describe_truth
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from sgp_ros.simulation.scenario import Scenario
 
 
 @dataclass(frozen=True, slots=True, eq=False)

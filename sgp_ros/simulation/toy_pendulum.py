@@ -7,18 +7,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sgp_ros.simulation.controllers import ControllerChoice, zero
-from sgp_ros.simulation.effects import ChosenEffect
+from sgp_ros.simulation.effects import ChosenEffect, ParameterValue
 from sgp_ros.simulation.mechanism import SimulatedJoint, TrueCoefficient, quantity
 from sgp_ros.simulation.sensors import Sensors, encoder_resolution
 from sgp_ros.simulation.simulator import Simulator
-
-if TYPE_CHECKING:
-    from sgp_ros.simulation.effects import ParameterValue
 
 
 @dataclass(frozen=True, slots=True)

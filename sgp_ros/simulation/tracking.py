@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.simulation.controllers import Controller, ControllerBuild
+from sgp_ros.simulation.mechanism import Mechanism, SimulatedJoint
 from sgp_ros.simulation.multisine import Multisine, random_multisine
-
-if TYPE_CHECKING:
-    from sgp_ros.simulation.controllers import Controller, ControllerBuild
-    from sgp_ros.simulation.mechanism import Mechanism, SimulatedJoint
 
 _COUNT = 5
 _LOWEST_HZ, _HIGHEST_HZ = 0.1, 0.8

@@ -9,14 +9,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sgp_ros.errors import ConfigError
-
-if TYPE_CHECKING:
-    from sgp_ros.simulation.recording import SimulatedRecording
+from sgp_ros.simulation.recording import SimulatedRecording
 
 
 @dataclass(frozen=True, slots=True)

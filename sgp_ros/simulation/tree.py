@@ -9,23 +9,18 @@ with it.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.simulation.effects import ChosenEffect
-from sgp_ros.simulation.mechanism import quantity
-from sgp_ros.simulation.tree_part import part_of_urdf
+from sgp_ros.simulation.mechanism import TrueCoefficient, quantity
+from sgp_ros.simulation.tree_part import TreePart, part_of_urdf
 from sgp_ros.simulation.tree_text import TreeText, plain_tree, read_tree, tree_link
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from sgp_ros.simulation.mechanism import TrueCoefficient
-    from sgp_ros.simulation.tree_part import TreePart
 
 GRAVITY = 9.81
 """Acceleration of gravity [m/s^2]."""

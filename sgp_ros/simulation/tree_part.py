@@ -7,17 +7,14 @@ load becomes one more link.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sgp_ros.simulation.urdf_elements import root_of, vector_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 _ENTRIES = ('ixx', 'ixy', 'iyy', 'ixz', 'iyz', 'izz')
 

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from sgp_ros.simulation.controllers import ControllerChoice, external, zero
+from sgp_ros.simulation.mechanism import SimulatedJoint
 from sgp_ros.simulation.sensors import Sensors, encoder_resolution
 from sgp_ros.simulation.simulator import Simulator
 from sgp_ros.simulation.tracking import middle_and_reach, multisine_tracking
 from sgp_ros.simulation.tree import Tree
-
-if TYPE_CHECKING:
-    from sgp_ros.simulation.mechanism import SimulatedJoint
-    from sgp_ros.simulation.tree_part import TreePart
+from sgp_ros.simulation.tree_part import TreePart
 
 _BITS = 17
 _LINEAR_RESOLUTION_M = 1e-6

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.simulation.followers import Follower, read_followers
 from sgp_ros.simulation.mechanism import SimulatedJoint
+from sgp_ros.simulation.tree_part import TreePart
 from sgp_ros.simulation.urdf_elements import MOVING, link_of, number_of, root_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from sgp_ros.simulation.tree_part import TreePart
 
 _PREFIX = 'link:'
 _PAYLOAD = 'payload'

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
 from sgp_ros.simulation.effect_text import checked_effect
+from sgp_ros.simulation.effects import ChosenEffect
 from sgp_ros.simulation.mechanism import SimulatedJoint, physical_parameters
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from sgp_ros.simulation.effects import ChosenEffect
-    from sgp_ros.simulation.scenario import Scenario
-    from sgp_ros.simulation.simulator import Simulator
+from sgp_ros.simulation.scenario import Scenario
+from sgp_ros.simulation.simulator import Simulator
 
 
 def describe_truth(scenario: Scenario) -> dict[str, object]:

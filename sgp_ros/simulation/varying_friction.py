@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.simulation.effects import SIDE, Action, EffectKind, EffectParameter, side_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from sgp_ros.simulation.effects import Moment, ParameterValue
-    from sgp_ros.simulation.mechanism import SimulatedJoint
-
+from sgp_ros.simulation.effects import (
+    SIDE,
+    Action,
+    EffectKind,
+    EffectParameter,
+    Moment,
+    ParameterValue,
+    side_of,
+)
+from sgp_ros.simulation.mechanism import SimulatedJoint
 
 _STIFF_S = 1e-3
 _MOST_DECAY = 2.0

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sgp_ros.core.kernels import KERNELS
+from sgp_ros.gp.kernels import KERNELS
 
 NAMES = sorted(KERNELS)
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from sgp_ros.engine.config import EngineConfig, describe_settings
+from sgp_ros.physics.term import Motion
 from sgp_ros.robots.registry import ROBOTS as BUILT_IN
 from sgp_ros.robots.registry import load_robot
-from sgp_ros.robots.robot import Motion
 from test.robots.random_urdf import random_urdf
 
 CHAIN = """

@@ -7,8 +7,8 @@ import numpy as np
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
-from sgp_ros.robots.effects.catalogue import EFFECTS
-from sgp_ros.robots.effects.effect import Place
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect import Place
 
 
 def fitted(equations, *names, is_free=False):

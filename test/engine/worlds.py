@@ -6,7 +6,8 @@ import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
-from sgp_ros.robots.robot import Coefficient, Joint, Robot
+from sgp_ros.physics.term import Coefficient, Joint
+from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.terms import (
     acceleration,
     effort,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from hypothesis import strategies as st
@@ -13,11 +12,9 @@ from mcap.writer import CompressionType, Writer
 
 from sgp_ros.engine.samples import CommandSample, Event, JointSample, Reset, SettingsChange
 from sgp_ros.recordings.outgoing import command_message, joint_state_message
+from sgp_ros.recordings.reader import Recording
 from sgp_ros.recordings.typestore import definition, full_type, serialize
 from sgp_ros.recordings.writer import RecordingWriter
-
-if TYPE_CHECKING:
-    from sgp_ros.recordings.reader import Recording
 
 DATA = Path(__file__).parents[2] / '..' / 'shared' / 'data'
 PRACTICE = DATA.parent / 'practice' / 'cases'

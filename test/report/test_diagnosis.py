@@ -14,6 +14,7 @@ from matplotlib.colors import to_hex
 
 from sgp_ros.diagnosis.decide.decision import LEAST_SHARE
 from sgp_ros.diagnosis.result import Equivalent, Parameter
+from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.report.diagnosis import render, write_diagnosis
 from sgp_ros.report.diagnosis_charts import BY_CHANCE, draw_dependence, draw_proof
 from sgp_ros.report.diagnosis_figures import FORCES, draw_diagnosis, draw_laws, draw_time
@@ -28,7 +29,6 @@ from sgp_ros.report.diagnosis_text import (
     verdict_sentence,
     why_it_lost,
 )
-from sgp_ros.robots.effects.catalogue import EFFECTS
 from test.report.diagnoses import (
     ASYMMETRIC,
     COULOMB,

@@ -11,9 +11,9 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from sgp_ros.offline.blocks import distance_to
-from sgp_ros.offline.identification import IdentificationOptions, identify
-from sgp_ros.offline.regression_data import FilteredData
+from sgp_ros.batch.blocks import distance_to
+from sgp_ros.batch.identification import IdentificationOptions, identify
+from sgp_ros.batch.regression_data import FilteredData
 from sgp_ros.report.findings import collect_findings, far_half
 from sgp_ros.report.identification import (
     cautions,
@@ -24,7 +24,7 @@ from sgp_ros.report.identification import (
     verdict,
 )
 from sgp_ros.robots.linear_axis import LINEAR_AXIS
-from test.offline.worlds import moved_axis
+from test.batch.worlds import moved_axis
 
 
 @pytest.fixture(scope='module')

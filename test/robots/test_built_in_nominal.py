@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.physics.term import Motion
+from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.robots.built_in_nominal import NOMINAL
-from sgp_ros.robots.effects.observed_motion import ObservedMotion
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.registry import ROBOTS
-from sgp_ros.robots.rigid_body import mass_matrix
-from sgp_ros.robots.robot import Motion
 from sgp_ros.simulation.registry import SIMULATORS
 
 PENDULUMS = {

@@ -13,15 +13,15 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.errors import ConfigError
-from sgp_ros.robots.effects.catalogue import EFFECTS
-from sgp_ros.robots.effects.drive import Drive
-from sgp_ros.robots.effects.observed_motion import ObservedMotion
-from sgp_ros.robots.effects.stated import place_of, shape_and_coefficients, stated_quantities
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.drive import Drive
+from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.physics.stated import place_of, shape_and_coefficients, stated_quantities
+from sgp_ros.physics.term import Motion
+from sgp_ros.rigid.rigid_body import inverse_dynamics
+from sgp_ros.rigid.tree import read_urdf
 from sgp_ros.robots.registry import load_robot
-from sgp_ros.robots.rigid_body import inverse_dynamics
-from sgp_ros.robots.robot import Motion
 from sgp_ros.robots.stated_effects import NOT_ONLINE
-from sgp_ros.robots.tree import read_urdf
 from test.robots.effects.test_stated import URDF
 
 WIDTH = 0.01

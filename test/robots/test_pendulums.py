@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sgp_ros.robots.inertial import inertial_term, revolute_chain
+from sgp_ros.physics.term import Motion
+from sgp_ros.rigid.inertial import inertial_term, revolute_chain
 from sgp_ros.robots.registry import ROBOTS
-from sgp_ros.robots.robot import Motion
 
 GRAVITY = 9.81
 M1, R1, I1, M2, R2, I2, L1, GEAR, ROTOR = 0.6, 0.25, 0.05, 0.5, 0.3, 0.06, 0.2, 6.0, 1e-4

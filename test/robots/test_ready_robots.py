@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sgp_ros.robots.inertial import PARAMETERS
+from sgp_ros.rigid.inertial import PARAMETERS
+from sgp_ros.rigid.rigid_body import inverse_dynamics, torque_regressor
+from sgp_ros.rigid.tree import read_urdf
 from sgp_ros.robots.registry import load_robot
-from sgp_ros.robots.rigid_body import inverse_dynamics, torque_regressor
-from sgp_ros.robots.tree import read_urdf
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / 'config' / 'robots'

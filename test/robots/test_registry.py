@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.physics.term import Motion
 from sgp_ros.robots.registry import ROBOTS, load_robot
-from sgp_ros.robots.robot import Motion
 
 
 def _write(tmp_path, text):

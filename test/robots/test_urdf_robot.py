@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 import yaml
 
+from sgp_ros.apps.replay import write_identified_robot
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
 from sgp_ros.engine.samples import JointSample
 from sgp_ros.errors import ConfigError
-from sgp_ros.experiments.replay import write_identified_robot
+from sgp_ros.physics.term import Motion
+from sgp_ros.rigid.rigid_body import inverse_dynamics
+from sgp_ros.rigid.tree import read_urdf
 from sgp_ros.robots.nominal_prior import LEAST_EFFORT, LIMIT_SHARE
 from sgp_ros.robots.registry import load_robot
-from sgp_ros.robots.rigid_body import inverse_dynamics
-from sgp_ros.robots.robot import Motion
-from sgp_ros.robots.tree import read_urdf
 from test.robots.random_urdf import random_urdf
 from test.robots.test_tree import ARM, FINGER
 

@@ -6,17 +6,15 @@ import fcntl
 import os
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 pytest.importorskip('rclpy')
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'  # read when messages are imported
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+from collections.abc import Iterator
 
-    from test.ros.graph import Graph
+from test.ros.graph import Graph
 
 _ROOT = Path(__file__).parents[2]
 _DOMAINS = 101

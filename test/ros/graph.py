@@ -7,18 +7,15 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter_client import AsyncParameterClient
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rclpy.qos import QoSProfile
+from rclpy.qos import QoSProfile
 
 DEADLINE_S = 30.0
 _TURN_S = 0.02

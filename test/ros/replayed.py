@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
 
 from rosbags.highlevel import AnyReader
 from threadpoolctl import threadpool_limits
@@ -10,15 +11,10 @@ from threadpoolctl import threadpool_limits
 from sgp_ros.engine.config import EngineConfig, describe_settings
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
+from sgp_ros.engine.results import Step
 from sgp_ros.recordings.predictions import outputs
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-
-    from sgp_ros.engine.results import Step
 
 Numbers = dict[int, tuple[bytes, bytes]]
 """Stamp [ns] to the bytes of predicted accelerations and efforts."""

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+import numpy as np
 from sensor_msgs.msg import JointState
 
 from sgp_ros.engine.samples import JointSample
 from sgp_ros.ros.publications import header, joint_state
 from sgp_ros.simulation.assembly import make_simulation
-
-if TYPE_CHECKING:
-    import numpy as np
-
-    from test.ros.graph import Graph
+from test.ros.graph import Graph
 
 START_NS = 1_700_000_000_000_000_000
 

@@ -6,7 +6,7 @@ import json
 import os
 import signal
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -17,9 +17,7 @@ from std_srvs.srv import Trigger
 from sgp_ros.engine.samples import CommandSample, JointSample
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.ros.publications import header
-
-if TYPE_CHECKING:
-    from test.ros.graph import Graph, NodeProcess
+from test.ros.graph import Graph, NodeProcess
 
 CASE = Path(__file__).parents[2].parent / 'shared' / 'practice' / 'cases' / 'case_32'
 KEPT = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -7,11 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from sgp_ros.core.model import Model
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitResult
 from sgp_ros.engine.samples import CommandSample
 from sgp_ros.engine.swap import Swap
+from sgp_ros.gp.model import Model
 from sgp_ros.ros.health import Health
 from sgp_ros.ros.verdict import OK, WARN
 from test.engine.worlds import PENDULUM, config, pendulum_events

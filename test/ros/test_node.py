@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import os
 import signal
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,13 +20,9 @@ from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 from sgp_ros.recordings.reader import open_recording
+from test.ros.graph import Graph, NodeProcess
 from test.ros.replayed import recorded_predictions, replayed_predictions
 from test.ros.stream import START_NS, Stream, shuffled, stamp_ns
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from test.ros.graph import Graph, NodeProcess
 
 pytestmark = pytest.mark.ros
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -17,9 +17,6 @@ from sgp_ros.recordings.writer import Status
 from sgp_ros.ros.identification import COMMAND_MESSAGES
 from sgp_ros.ros.parameter_status import parameter_status
 from sgp_ros.ros.publications import diagnostics, joint_state, trajectory
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 STAMP_NS = 1_700_000_000_123_456_789
 NAN = float('nan')

@@ -10,9 +10,9 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
 from multiprocessing import connection
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ import yaml
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitRequest, FitResult, fit
-from sgp_ros.engine.samples import CommandSample, JointSample, SettingsChange
+from sgp_ros.engine.samples import CommandSample, Event, JointSample, SettingsChange
 from sgp_ros.errors import ConfigError
 from sgp_ros.recordings.predictions import PredictionTopics
 from sgp_ros.recordings.reader import open_recording
@@ -31,11 +31,6 @@ from sgp_ros.ros.record import Record, Topics
 from sgp_ros.ros.session import Session
 from sgp_ros.ros.storage import load_model, save_model
 from sgp_ros.simulation.assembly import make_simulation
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from sgp_ros.engine.samples import Event
 
 ROOT = Path(__file__).parents[2]
 START_NS = 1_700_000_000_000_000_000

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
+from test.ros.graph import Graph
 from test.ros.stream import stamp_ns
-
-if TYPE_CHECKING:
-    from test.ros.graph import Graph
 
 pytestmark = pytest.mark.ros
 

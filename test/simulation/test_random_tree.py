@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio
 import pytest
 
-from benchmarks.trees import pinocchio_model
+from sgp_proof.numerics.trees import pinocchio_model
 from sgp_ros.simulation.random_tree import random_tree
 
 

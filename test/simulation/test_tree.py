@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio
 import pytest
 
-from benchmarks.concealed import robots
+from sgp_proof.concealed import robots
 from sgp_ros.errors import ConfigError
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.recording import simulate

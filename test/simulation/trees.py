@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.concealed import robots
+from sgp_proof.concealed import robots
 
 
 def arm(rng_seed=0, limit=None):

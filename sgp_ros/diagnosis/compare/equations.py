@@ -10,22 +10,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
     RawTrajectory,
     observe,
     parallel_filter,
 )
-from sgp_ros.robots.rigid_body import mass_matrix, torque_regressor
-
-if TYPE_CHECKING:
-    from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
-    from sgp_ros.robots.effects.observed_motion import ObservedMotion
-    from sgp_ros.robots.tree import Tree
+from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.rigid.rigid_body import mass_matrix, torque_regressor
+from sgp_ros.rigid.tree import Tree
 
 SPREAD = 0.25
 """Prior standard deviation of mass and inertia, relative; of the centre, to the radius."""

@@ -7,19 +7,15 @@ parameters and findings would no longer be those of the robot that was given.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
 
 from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.decide.decision import LEAST_SHARE
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from sgp_ros.engine.samples import Event
-    from sgp_ros.robots.robot import Robot
-    from sgp_ros.robots.stated_effects import StatedEffect
-    from sgp_ros.robots.tree import Tree
+from sgp_ros.engine.samples import Event
+from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.robot import Robot
+from sgp_ros.robots.stated_effects import StatedEffect
 
 
 def nominal_shares(

@@ -9,27 +9,22 @@ reaches `NOISE_SHARE` of the commanded effort, or the highest that motion and ra
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import interpolate
 
+from sgp_ros.batch.acceptance import accept
+from sgp_ros.batch.zero_phase import ZeroPhase
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
-from sgp_ros.engine.samples import JointSample
+from sgp_ros.engine.samples import Event, JointSample
 from sgp_ros.errors import RecordingError
-from sgp_ros.offline.acceptance import accept
-from sgp_ros.offline.zero_phase import ZeroPhase
-from sgp_ros.robots.effects.drive import Drive
-from sgp_ros.robots.effects.observed_motion import ObservedMotion
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from sgp_ros.engine.samples import Event
-    from sgp_ros.robots.robot import Robot
-    from sgp_ros.robots.stated_effects import StatedEffect
-    from sgp_ros.robots.tree import Tree
+from sgp_ros.physics.drive import Drive
+from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.robot import Robot
+from sgp_ros.robots.stated_effects import StatedEffect
 
 LONGEST_PAUSE_S = 0.5
 SHORTEST_ROWS = 64

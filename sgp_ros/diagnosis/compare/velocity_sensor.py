@@ -8,18 +8,15 @@ squares.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import optimize, signal
 
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.diagnosis.decide.decision import LEAST_SHARE, NATS
-from sgp_ros.robots.effects.stated import VELOCITY_FILTER_LAG
-
-if TYPE_CHECKING:
-    from sgp_ros.diagnosis.compare.equations import Equations
-    from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
-    from sgp_ros.robots.effects.observed_motion import ObservedMotion
+from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.physics.stated import VELOCITY_FILTER_LAG
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,28 +2,23 @@
 
 Scores of models differ by hundreds of nats where the signals are clean, yet the shape of a column
 is only approximate; so the odds of rivals are tempered: their difference in log rest counts, not
-the number of rows. `benchmarks/concealed` measures how the probabilities keep what they say.
+the number of rows. `sgp_proof/concealed` measures how the probabilities keep what they say.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.diagnosis.decide.decision import TEMPER, Scale
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from sgp_ros.diagnosis.compare.equations import Equations
-    from sgp_ros.diagnosis.decide.decision import Decision
-    from sgp_ros.diagnosis.decide.equivalence import Contrasts
-    from sgp_ros.diagnosis.explain.fitted_model import Model
-    from sgp_ros.diagnosis.explain.hypotheses import Competition
-    from sgp_ros.diagnosis.result import Finding
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.decide.decision import TEMPER, Decision, Scale
+from sgp_ros.diagnosis.decide.equivalence import Contrasts
+from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.hypotheses import Competition
+from sgp_ros.diagnosis.result import Finding
 
 LEAST_ODDS = 0.01
 """A rival below this, relative to the asserted model, is not looked at closely."""

@@ -10,19 +10,15 @@ small against what it explains.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.decide.referee import structure
 from sgp_ros.diagnosis.decide.second_opinion import support
-from sgp_ros.diagnosis.explain.fitted_model import FLOOR_SHARE
+from sgp_ros.diagnosis.explain.fitted_model import FLOOR_SHARE, Model
+from sgp_ros.diagnosis.explain.hypotheses import Competition
 from sgp_ros.diagnosis.explain.suspects import Columns
-
-if TYPE_CHECKING:
-    from sgp_ros.diagnosis.compare.equations import Equations
-    from sgp_ros.diagnosis.explain.fitted_model import Model
-    from sgp_ros.diagnosis.explain.hypotheses import Competition
 
 LEAST_SHARE = 0.004
 """Share of the mean squared effort below which nothing counts as physics (schema)."""

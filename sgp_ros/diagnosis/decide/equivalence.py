@@ -8,26 +8,21 @@ to other motions, and the one on which their efforts differ most is the excitati
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.diagnosis.decide.decision import LEAST_SHARE, TEMPER, Scale
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.decide.decision import LEAST_SHARE, TEMPER, Decision, Scale
+from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.hypotheses import Competition
 from sgp_ros.diagnosis.places import joint_name
 from sgp_ros.diagnosis.prove.prediction import imbalance
 from sgp_ros.diagnosis.result import Equivalent
-from sgp_ros.robots.effects.drive import Drive
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from sgp_ros.diagnosis.compare.equations import Equations
-    from sgp_ros.diagnosis.decide.decision import Decision
-    from sgp_ros.diagnosis.explain.fitted_model import Model
-    from sgp_ros.diagnosis.explain.hypotheses import Competition
-    from sgp_ros.robots.effects.observed_motion import ObservedMotion
+from sgp_ros.physics.drive import Drive
+from sgp_ros.physics.observed_motion import ObservedMotion
 
 ALIKE = math.log(20.0) / TEMPER
 """Difference of the fits below which a recording prefers neither model [nats]."""

@@ -10,17 +10,13 @@ before; white noise behind the filter is foretold too, by as much as its correla
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from sgp_ros.core.learning import initial_model, learn, screened
-from sgp_ros.core.prior import CoefficientPrior
+from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.locate.remainder import foretold, observations, process_inputs, spread
 from sgp_ros.diagnosis.parts import PARTS, parts_of
-
-if TYPE_CHECKING:
-    from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.gp.learning import initial_model, learn, screened
+from sgp_ros.gp.prior import CoefficientPrior
 
 LEAST_ROWS = 5 * PARTS
 """Rows below which the referee has no opinion."""

@@ -7,15 +7,11 @@ without it does.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
 from sgp_ros.diagnosis.parts import PARTS, parts_of
-
-if TYPE_CHECKING:
-    from sgp_ros.diagnosis.explain.fitted_model import Model
-    from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
 
 
 def left_out(columns: Columns, model: Model, suspects: tuple[Suspect, ...]) -> np.ndarray:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors, price_of
 from sgp_ros.diagnosis.explain.regression import Frame
 from sgp_ros.diagnosis.explain.suspects import (
@@ -15,11 +16,6 @@ from sgp_ros.diagnosis.explain.suspects import (
     shape_bounds,
     with_shapes,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from sgp_ros.diagnosis.compare.equations import Equations
 
 UNSEEN = 1e-12
 """A column that is this much smaller than the largest acts on nothing; its coefficient is zero."""

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.robots.effects.effect import Fitted
-
-if TYPE_CHECKING:
-    from sgp_ros.diagnosis.compare.equations import Equations
-    from sgp_ros.diagnosis.explain.regression import Frame
-    from sgp_ros.diagnosis.explain.suspects import Suspect
-    from sgp_ros.robots.effects.effect import Place
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.explain.regression import Frame
+from sgp_ros.diagnosis.explain.suspects import Suspect
+from sgp_ros.physics.effect import Fitted, Place
 
 FLOOR_SHARE = 1e-5
 """Errors of signals and filters that no model explains, as a share of the mean square."""

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.decide.colour import correlation_factor
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
-from sgp_ros.robots.effects.catalogue import EFFECTS
-from sgp_ros.robots.effects.effect import Place
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-    from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect import Place
 
 FIRST, SECOND, PARENTS = 12, 5, 6
 """Screened suspects that are fitted alone; as a second effect; first effects that get a second."""

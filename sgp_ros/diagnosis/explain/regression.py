@@ -9,12 +9,10 @@ coefficients while the shapes are searched.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.compare.equations import Equations
 
 
 @dataclass(frozen=True, eq=False)

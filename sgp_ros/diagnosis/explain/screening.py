@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.candidates import split
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
 from sgp_ros.diagnosis.explain.regression import Frame
 from sgp_ros.diagnosis.explain.suspects import Columns, Suspect, dry_joints
-from sgp_ros.robots.effects.effect import Fitted
-from sgp_ros.robots.effects.friction import POSITION_FRICTION, inside, position_edges, rubbing
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from sgp_ros.diagnosis.compare.equations import Equations
-    from sgp_ros.robots.effects.effect import Effect, Place, SmallEffect
-    from sgp_ros.robots.effects.observed_motion import ObservedMotion
+from sgp_ros.physics.effect import Effect, Fitted, Place, SmallEffect
+from sgp_ros.physics.friction import POSITION_FRICTION, inside, position_edges, rubbing
+from sgp_ros.physics.observed_motion import ObservedMotion
 
 TRIALS = 2
 """Shapes per effect and place that are worth a fit."""

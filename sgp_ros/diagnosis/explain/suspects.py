@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from sgp_ros.diagnosis.compare.equations import Equations
-    from sgp_ros.robots.effects.effect import Effect, Place
-    from sgp_ros.robots.effects.observed_motion import ObservedMotion
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.physics.effect import Effect, Place
+from sgp_ros.physics.observed_motion import ObservedMotion
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,19 +7,15 @@ the correlation of the residual in time. Reported values follow by the delta met
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from sgp_ros.diagnosis.decide.colour import correlation_factor
 from sgp_ros.diagnosis.explain.candidates import UNSEEN
+from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Frame
 from sgp_ros.diagnosis.explain.suspects import Columns, Suspect, shape_bounds, with_shapes
-from sgp_ros.robots.effects.effect import Fitted
-
-if TYPE_CHECKING:
-    from sgp_ros.diagnosis.explain.fitted_model import Model
-    from sgp_ros.robots.effects.observed_motion import ObservedMotion
+from sgp_ros.physics.effect import Fitted
+from sgp_ros.physics.observed_motion import ObservedMotion
 
 
 def _force(

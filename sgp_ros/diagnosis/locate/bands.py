@@ -14,20 +14,15 @@ band first where it is strongest. What an effect is confined to is judged by its
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.locate.confinement import LEAST_ROWS
 from sgp_ros.diagnosis.locate.field import Field, cells_of, learn_field, noise_density
 from sgp_ros.diagnosis.locate.variables import own_variables
-from sgp_ros.diagnosis.result import SIGNIFICANT, Band
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from sgp_ros.diagnosis.compare.equations import Equations
-    from sgp_ros.diagnosis.result import Dependence
+from sgp_ros.diagnosis.result import SIGNIFICANT, Band, Dependence
 
 DRAWS = 2000
 

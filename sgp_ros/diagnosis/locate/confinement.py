@@ -8,15 +8,11 @@ it is far from reach for a homogeneous rest, white or correlated (a test simulat
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.locate.variables import own_variables
 from sgp_ros.diagnosis.result import Location
-
-if TYPE_CHECKING:
-    from sgp_ros.diagnosis.compare.equations import Equations
 
 ENERGY = 0.95
 """Share of the energy of the discrepancy that a region holds."""

@@ -15,16 +15,13 @@ disturbance is explained too, and only what is left tells one law from another.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.locate.surrogates import surrogates
 from sgp_ros.diagnosis.locate.variables import own_variables
 from sgp_ros.diagnosis.result import Dependence
-
-if TYPE_CHECKING:
-    from sgp_ros.diagnosis.compare.equations import Equations
 
 BINS, STRETCHES, PARTS = 16, 24, 6
 LEAST_COUNT = 3

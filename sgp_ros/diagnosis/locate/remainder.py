@@ -7,20 +7,17 @@ and evidence decides which of these it needs: that is also what the discrepancy 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.core.model import Model as Hyperparameters
-from sgp_ros.core.model import Observations
-from sgp_ros.core.posterior import Posterior
-from sgp_ros.core.prior import CoefficientPrior
-from sgp_ros.core.selection import select_inputs
+from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.parts import PARTS, parts_of
-
-if TYPE_CHECKING:
-    from sgp_ros.diagnosis.compare.equations import Equations
-    from sgp_ros.robots.effects.observed_motion import ObservedMotion
+from sgp_ros.gp.model import Model as Hyperparameters
+from sgp_ros.gp.model import Observations
+from sgp_ros.gp.posterior import Posterior
+from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.selection import select_inputs
+from sgp_ros.physics.observed_motion import ObservedMotion
 
 SIZE = 400
 CONDITIONED = 500

@@ -7,12 +7,9 @@ the clock (Theiler and others 1992; for several signals Prichard and Theiler 199
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 
 def surrogates(residual: np.ndarray, count: int) -> Iterator[np.ndarray]:

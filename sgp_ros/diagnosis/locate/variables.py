@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import numpy as np
 
-if TYPE_CHECKING:
-    import numpy as np
-
-    from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.compare.equations import Equations
 
 
 def own_variables(equations: Equations, joint: int) -> dict[str, np.ndarray]:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from sgp_ros.core.consistent import project_information
-from sgp_ros.core.pseudo_inertia import is_consistent
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.errors import NumericalError
-
-if TYPE_CHECKING:
-    from sgp_ros.diagnosis.compare.equations import Equations
-    from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.rigid.consistent import project_information
+from sgp_ros.rigid.pseudo_inertia import is_consistent
 
 
 def diagnosed_bodies(equations: Equations, model: Model) -> np.ndarray | None:

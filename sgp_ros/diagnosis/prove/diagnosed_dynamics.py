@@ -6,23 +6,19 @@ remember is handed in with the efforts: it belongs to a trajectory, not to a sta
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.locate.remainder import Remainder
 from sgp_ros.diagnosis.prove.prediction import extra_force
-from sgp_ros.robots.effects.observed_motion import ObservedMotion
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from sgp_ros.diagnosis.compare.equations import Equations
-    from sgp_ros.diagnosis.explain.fitted_model import Model
-    from sgp_ros.diagnosis.locate.remainder import Remainder
-    from sgp_ros.robots.effects.effect import Effect
-    from sgp_ros.robots.stated_effects import StatedEffect
-    from sgp_ros.robots.tree import Tree
+from sgp_ros.physics.effect import Effect
+from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.stated_effects import StatedEffect
 
 _SMALL = 1e-6
 """Difference of positions and velocities [rad or m, per second]."""
@@ -30,7 +26,7 @@ _SMALL = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class DiagnosedDynamics:
-    """Equations of motion `M(q) a = drive` of k joints, see `offline.forward.ForcedMotion`.
+    """Equations of motion `M(q) a = drive` of k joints, see `batch.forward.ForcedMotion`.
 
     What is called loads is, row by row, the commanded effort (k), the force of effects that
     remember (k), and the time since the first state (1).

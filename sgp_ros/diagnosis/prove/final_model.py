@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from sgp_ros.diagnosis.compare.equations import resting
+import numpy as np
+
+from sgp_ros.diagnosis.compare.equations import Equations, resting
 from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, observe
+from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.locate.remainder import Remainder
 from sgp_ros.diagnosis.prove.prediction import accelerations, held_joints, imbalance
 from sgp_ros.diagnosis.result import Predictions
-
-if TYPE_CHECKING:
-    import numpy as np
-
-    from sgp_ros.diagnosis.compare.equations import Equations
-    from sgp_ros.diagnosis.explain.fitted_model import Model
-    from sgp_ros.diagnosis.locate.remainder import Remainder
-    from sgp_ros.robots.effects.observed_motion import ObservedMotion
-    from sgp_ros.robots.tree import Tree
+from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.rigid.tree import Tree
 
 _SHARP = 4.0
 """States are smoothed at this multiple of the cut-off where accelerations are predicted."""

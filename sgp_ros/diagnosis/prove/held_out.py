@@ -9,14 +9,10 @@ both sides share no sample.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.trajectory import SHORTEST_ROWS, noise_density
-
-if TYPE_CHECKING:
-    from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
+from sgp_ros.diagnosis.compare.trajectory import SHORTEST_ROWS, RawTrajectory, noise_density
 
 HELD_OUT = 'held_out'
 """Name of the blocks among the recordings of a proof."""

@@ -7,20 +7,16 @@ A joint that dry friction holds does not accelerate.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.suspects import dry_joints
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from sgp_ros.diagnosis.compare.equations import Equations
-    from sgp_ros.diagnosis.explain.fitted_model import Model
-    from sgp_ros.diagnosis.locate.remainder import Remainder
-    from sgp_ros.robots.effects.observed_motion import ObservedMotion
+from sgp_ros.diagnosis.locate.remainder import Remainder
+from sgp_ros.physics.observed_motion import ObservedMotion
 
 
 def extra_force(model: Model, motion: ObservedMotion) -> np.ndarray:

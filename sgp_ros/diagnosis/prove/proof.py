@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import spatial
 
+from sgp_ros.batch.zero_phase import ZeroPhase
 from sgp_ros.diagnosis.compare.equations import resting
-from sgp_ros.diagnosis.compare.trajectory import Bandwidth, observe, parallel_filter
-from sgp_ros.diagnosis.prove.intervals import mean_interval, ratio_interval
+from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
+from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, observe, parallel_filter
+from sgp_ros.diagnosis.prove.final_model import FinalModel
+from sgp_ros.diagnosis.prove.intervals import Interval, mean_interval, ratio_interval
 from sgp_ros.diagnosis.prove.prediction import accelerations
 from sgp_ros.diagnosis.prove.rollouts import cut, roll_out
 from sgp_ros.diagnosis.result import Proof
-from sgp_ros.offline.zero_phase import ZeroPhase
-
-if TYPE_CHECKING:
-    from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
-    from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
-    from sgp_ros.diagnosis.prove.final_model import FinalModel
-    from sgp_ros.diagnosis.prove.intervals import Interval
-    from sgp_ros.robots.effects.observed_motion import ObservedMotion
-    from sgp_ros.robots.tree import Tree
+from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.rigid.tree import Tree
 
 _MOST_STATES = 4000
 

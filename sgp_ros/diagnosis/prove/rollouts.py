@@ -14,19 +14,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.diagnosis.prove.diagnosed_dynamics import dynamics_of, remembered_force
-from sgp_ros.offline.rollout import advance
-
-if TYPE_CHECKING:
-    from sgp_ros.diagnosis.compare.equations import Equations
-    from sgp_ros.diagnosis.explain.fitted_model import Model
-    from sgp_ros.diagnosis.locate.remainder import Remainder
-    from sgp_ros.diagnosis.prove.diagnosed_dynamics import DiagnosedDynamics
-    from sgp_ros.robots.effects.observed_motion import ObservedMotion
+from sgp_ros.batch.rollout import advance
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.locate.remainder import Remainder
+from sgp_ros.diagnosis.prove.diagnosed_dynamics import (
+    DiagnosedDynamics,
+    dynamics_of,
+    remembered_force,
+)
+from sgp_ros.physics.observed_motion import ObservedMotion
 
 HORIZON_S = 0.3
 STEP_S = 0.005

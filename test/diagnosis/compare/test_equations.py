@@ -12,8 +12,8 @@ from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
-from sgp_ros.robots.effects.catalogue import EFFECTS
-from sgp_ros.robots.effects.effect import Place
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect import Place
 from test.diagnosis.worlds import CHAINS, World, events_of
 
 

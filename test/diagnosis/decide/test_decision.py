@@ -15,9 +15,9 @@ from sgp_ros.diagnosis.explain.candidates import added_inertia, fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.hypotheses import Competition, compete
 from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
-from sgp_ros.robots.effects.catalogue import EFFECTS
-from sgp_ros.robots.effects.effect import Place
-from sgp_ros.robots.rigid_body import mass_matrix
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect import Place
+from sgp_ros.rigid.rigid_body import mass_matrix
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, events_of, robot_of, simulate
 

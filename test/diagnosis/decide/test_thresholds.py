@@ -16,7 +16,7 @@ from sgp_ros.diagnosis.decide.decision import (
     SHAPE_ERROR,
 )
 
-RESULTS = Path(__file__).parents[3] / 'benchmarks' / 'results'
+RESULTS = Path(__file__).parents[3] / 'sgp_proof' / 'results'
 FALSE_ALARMS, UNKNOWN_CALLED = 0.05, 0.7
 """What is promised: at most so many, at least so many."""
 

@@ -7,7 +7,7 @@ import numpy as np
 from sgp_ros.diagnosis.explain import hypotheses
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.diagnosis.explain.suspects import Columns
-from sgp_ros.robots.effects.catalogue import EFFECTS
+from sgp_ros.physics.catalogue import EFFECTS
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
 

@@ -10,8 +10,8 @@ from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.regression import Frame
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
-from sgp_ros.robots.effects.catalogue import EFFECTS
-from sgp_ros.robots.effects.effect import Place
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect import Place
 from test.diagnosis.worlds import CHAINS, simulate
 
 NONE = np.zeros(0)

@@ -13,8 +13,8 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
 from sgp_ros.diagnosis.explain.uncertainty import covariance, reported_std
-from sgp_ros.robots.effects.catalogue import EFFECTS
-from sgp_ros.robots.effects.effect import Fitted, Place
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect import Fitted, Place
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, events_of, simulate
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sgp_ros.core.pseudo_inertia import is_consistent
 from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.suspects import Columns
 from sgp_ros.diagnosis.prove.bodies import diagnosed_bodies
 from sgp_ros.recordings.reader import open_recording
+from sgp_ros.rigid.pseudo_inertia import is_consistent
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import nominal_tree
 

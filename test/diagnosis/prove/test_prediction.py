@@ -11,8 +11,8 @@ from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
 from sgp_ros.diagnosis.prove.final_model import FinalModel
 from sgp_ros.diagnosis.prove.prediction import accelerations, extra_force, imbalance
 from sgp_ros.diagnosis.prove.proof import prove
-from sgp_ros.robots.effects.catalogue import EFFECTS
-from sgp_ros.robots.effects.effect import Place
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect import Place
 from test.diagnosis.worlds import CHAINS, simulate
 
 INNER = slice(80, -80)

@@ -14,8 +14,8 @@ from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
 from sgp_ros.diagnosis.prove import rollouts
 from sgp_ros.diagnosis.prove.diagnosed_dynamics import dynamics_of
 from sgp_ros.diagnosis.prove.rollouts import cut, roll_out
-from sgp_ros.robots.effects.catalogue import EFFECTS
-from sgp_ros.robots.effects.effect import Place
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect import Place
 from test.diagnosis.worlds import CHAINS, PERIOD, World, acceleration, delayed, simulate
 
 TRIM = 40

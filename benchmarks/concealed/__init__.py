@@ -1,1 +1,0 @@
-"""Worlds with concealed physics for `sgp diagnose`, drawn by the hundred."""

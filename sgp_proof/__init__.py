@@ -1,0 +1,1 @@
+"""Proofs of the product, which never imports them: paper, drawn worlds, real machines, speed."""

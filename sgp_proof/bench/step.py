@@ -1,0 +1,103 @@
+"""Time, memory floor and allocations of one step: predict, append, drop, update W."""
+
+from __future__ import annotations
+
+import gc
+import tracemalloc
+from collections.abc import Callable
+from typing import Any
+
+from sgp_proof.bench.parts import part_times
+from sgp_proof.bench.problem import Problem, draw_problem
+from sgp_proof.bench.rivals import Rivals, timed
+from sgp_proof.bench.timing import median_seconds, move_seconds
+from sgp_ros.gp.online import OnlineRegression
+from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.sliding import length_for
+
+SIZES = (250, 500, 1000, 2000)
+SHAPES = ((1, 8), (1, 21), (7, 21))
+"""Outputs and inputs."""
+REPEATS, RIVAL_REPEATS = 9, 3
+
+
+def bench_step(
+    rivals: Rivals, progress: Callable[[float], None], *, is_quick: bool
+) -> list[dict[str, Any]]:
+    """Return one row per size of buffer, number of outputs and number of inputs."""
+    cases = [(n, shape) for n in (SIZES[:1] if is_quick else SIZES) for shape in SHAPES]
+    rows = []
+    for i, (n, (outputs, inputs)) in enumerate(cases):
+        rows.append(step_row(n, outputs, inputs, rivals, 3 if is_quick else REPEATS))
+        progress((i + 1) / len(cases))
+    return rows
+
+
+def step_row(n: int, outputs: int, inputs: int, rivals: Rivals, repeats: int) -> dict[str, Any]:
+    """Time a full buffer of n samples on a stream, and its rivals on the same."""
+    period = length_for(n + 1) - n
+    problem = draw_problem(n + period, outputs, inputs, seed=n)
+    online = _full(problem, n)
+    work = _stepping(online, problem)
+    for _ in range(period):
+        work()
+    p = problem.F.shape[2]
+    data = n * outputs * (p + 1)
+    read, updated = n * n // 2 + data + n * inputs, n * n // 2 + data
+    step_s = median_seconds(work, repeats, period)
+    floor_s = move_seconds(read, updated, repeats)
+    row: dict[str, Any] = {
+        'n': n, 'outputs': outputs, 'inputs': inputs, 'coefficients': p,
+        'step_ms': 1e3 * step_s, 'floor_ms': 1e3 * floor_s, 'times_floor': step_s / floor_s,
+        'megabytes': 8e-6 * (read + 2 * updated),
+    }  # fmt: skip
+    row |= part_times(problem, n, repeats, step_s)
+    until = draw_problem(n + 1, outputs, inputs, seed=n)
+    for name, rival in rivals.items():
+        row |= timed(name, step_s, RIVAL_REPEATS, None if rival is None else rival.step(until))
+    return row | memory_of(work, period)
+
+
+def memory_of(work: Callable[[], object], steps: int) -> dict[str, float]:
+    """Return the blocks that a step leaves allocated, and the most bytes it holds meanwhile."""
+    tracemalloc.start()
+    try:
+        for _ in range(steps):
+            work()
+        before = _blocks()
+        for _ in range(steps):
+            work()
+        kept = _blocks() - before
+        current, _ = tracemalloc.get_traced_memory()
+        tracemalloc.reset_peak()
+        work()
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    return {'allocations': round(kept / steps), 'temporary_kilobytes': 1e-3 * (peak - current)}
+
+
+def _blocks() -> int:
+    gc.collect()
+    return sum(statistic.count for statistic in tracemalloc.take_snapshot().statistics('filename'))
+
+
+def _full(problem: Problem, n: int) -> OnlineRegression:
+    prior = CoefficientPrior.flat(problem.F.shape[2])
+    online = OnlineRegression(problem.model, prior, n)
+    for u, f, y in zip(problem.U[:n], problem.F[:n], problem.y[:n], strict=True):
+        online.learn(online.predict(u, f), y)
+    return online
+
+
+def _stepping(online: OnlineRegression, problem: Problem) -> Callable[[], None]:
+    """Return the work of one step; samples repeat only after they have left the buffer."""
+    count = online.size
+
+    def work() -> None:
+        nonlocal count
+        i = count % len(problem.U)
+        online.learn(online.predict(problem.U[i], problem.F[i]), problem.y[i])
+        count += 1
+
+    return work

@@ -1,0 +1,1 @@
+"""Robots with concealed physics: drawn, diagnosed, scored."""

@@ -1,0 +1,212 @@
+"""What the statistics of the verdict look like where their null hypothesis holds.
+
+    python -m sgp_proof.concealed.nulls --tier B --seeds 1000:1100
+
+Draws robots without concealed physics: as the nominal one, with wrong inertial parameters, or with
+something unlisted that makes less of the squared effort than counts as physics. Then robots with
+one effect of the list, to which nothing is to be added, and robots with an unlisted one, for which
+nothing is adequate. Every model that competes is fitted; its statistics go to
+`sgp_proof/results/nulls_<tier>.json`. A test holds the thresholds of
+`sgp_ros.diagnosis.decide.decision` to these.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from sgp_proof.concealed import draw, scores, sizes
+from sgp_proof.concealed import world as worlds
+from sgp_proof.concealed.concealed_effect import UnsuitableError
+from sgp_proof.concealed.kinds import draw_effect
+from sgp_proof.concealed.robots import urdf
+from sgp_proof.environment import environment
+from sgp_ros.apps.simulated_files import write_simulated
+from sgp_ros.diagnosis.compare.equations import make_equations
+from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.decide.decision import Scale, decide
+from sgp_ros.diagnosis.decide.referee import structure
+from sgp_ros.diagnosis.explain.hypotheses import compete
+from sgp_ros.diagnosis.places import joint_name
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.urdf_robot import nominal_tree
+from sgp_ros.simulation.registry import EFFECTS
+
+RESULTS = Path(__file__).parents[1] / 'results'
+NOTHING, PARAMETERS, SLIGHT = 'nothing', 'wrong parameters', 'slight unlisted effect'
+LISTED, UNLISTED = 'one effect of the list', 'unlisted effect'
+KINDS = (NOTHING, PARAMETERS, SLIGHT, LISTED, UNLISTED)
+NAMES = tuple(name for name in EFFECTS if name != 'velocity_filter_lag')
+"""What is concealed as one effect; the lag of a sensor's velocity does not compete."""
+_CONCEALED = {SLIGHT: (2e-4, 3e-3), LISTED: (0.006, 0.2), UNLISTED: (0.006, 0.2)}
+"""Range of the share of the squared effort that a concealed effect makes."""
+_TRIES = 40
+_KEPT = 3
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
+    parser.add_argument('--tier', choices=('A', 'B'), default='B')
+    parser.add_argument('--seeds', default='1000:1100', help='FIRST:LAST+1')
+    arguments = parser.parse_args()
+    first, last = map(int, arguments.seeds.split(':'))
+    path = RESULTS / f'nulls_{arguments.tier.lower()}.json'
+    rows = []
+    for seed in range(first, last):
+        begin = time.perf_counter()
+        row = drawn(seed, arguments.tier)
+        if row is None:
+            continue
+        rows.append(row)
+        print(seed, row['kind'], row['robot'], row['verdict'],
+              f'{time.perf_counter() - begin:.0f} s', flush=True)  # fmt: skip
+        report = {'schema': 1, 'tier': arguments.tier, 'seeds': arguments.seeds,
+                  'environment': environment(), 'worlds': rows}  # fmt: skip
+        path.write_text(json.dumps(report, allow_nan=False) + '\n', encoding='utf-8')
+
+
+def drawn(seed, tier):
+    """Return the statistics of one world; None where none of `_TRIES` is suitable."""
+    for attempt in range(_TRIES):
+        rng = np.random.default_rng([seed, ord(tier), attempt])
+        try:
+            return _attempt(seed, rng, tier, KINDS[seed % len(KINDS)])
+        except UnsuitableError as problem:
+            print(f'  seed {seed}: {problem}', file=sys.stderr)
+    return None
+
+
+def _attempt(seed, rng, tier, kind):
+    is_wrong = kind == PARAMETERS or (kind in _CONCEALED and rng.random() < 0.5)
+    world = worlds.draw_world(seed, rng, tier, 0.3 if is_wrong else 0.0)
+    motion = worlds.pilot_motion(world.run('near', 12.0, 1), world)
+    relative = 0.002 if tier == 'A' else float(rng.choice([0.01, 0.03]))
+    noise = tuple(float(relative * v) for v in motion.velocity)
+    world = replace(world, sensors=replace(world.sensors, velocity_noise=noise))
+    concealed = []
+    if kind in _CONCEALED:
+        name = str(rng.choice(NAMES)) if kind == LISTED else 'unknown'
+        concealed = [draw_effect(rng, name, world.bodies, motion, tier == 'B')]
+        low, high = _CONCEALED[kind]
+        sizes.sized(world, concealed[0], math.exp(rng.uniform(math.log(low), math.log(high))))
+    recording = world.run('near', 33.0, 1, concealed)
+    share = max(sizes.own_share(recording, world, e) for e in concealed) if concealed else 0.0
+    if concealed and (share < sizes.SMALLEST_SHARE) != (kind == SLIGHT):
+        raise UnsuitableError(f'{concealed[0].name} makes {share:.2e}')
+    error = max(x['nominal'] for x in scores.nominal_share(recording, world).values())
+    if kind == PARAMETERS and error < sizes.SMALLEST_SHARE:
+        raise UnsuitableError(f'wrong parameters make {error:.2e}')
+    what = concealed[0].name if concealed else ''
+    joint = concealed[0].joint if concealed else ''
+    if what == 'unknown':
+        what = concealed[0].parameters['kind']
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder)
+        (path / 'robot.urdf').write_text(urdf(world.family, world.bodies), encoding='utf-8')
+        write_simulated(
+            recording, path / 'real.mcap', draw.draw_transport(rng, tier), seed=10 * seed,
+            command_topic=draw.TOPIC,
+        )  # fmt: skip
+        found = statistics(path, (what, joint) if kind == LISTED else None)
+    return {'seed': seed, 'kind': kind, 'extra': what, 'share': share, 'nominal': error,
+            'robot': world.family, 'rate_hz': world.rate_hz, **found}  # fmt: skip
+
+
+def statistics(folder, truth=None):
+    """Return verdict and statistics of the models that compete on a recording.
+
+    Args:
+        folder: with `robot.urdf` and `real.mcap`.
+        truth: effect and joint that are there; None for none of the list.
+    """
+    robot = load_robot(str(folder / 'robot.urdf'))
+    tree = nominal_tree(robot)
+    raw = collect(open_recording(str(folder / 'real.mcap')).events(None, None), robot)
+    equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
+    competition = compete(equations, lambda _share: None)
+    scale, base = Scale.of(equations, competition), competition.base
+    decision = decide(equations, competition)
+    models = (*competition.singles, *competition.pairs, *competition.more)
+    ranked = sorted(models, key=scale.worth, reverse=True)
+    best = next((m for m in ranked if scale.counts(m)), None)
+    found = {
+        'verdict': decision.verdict,
+        'said': [_key(equations, s) for s in decision.model.suspects],
+        'cutoff_hz': equations.filter.cutoff,
+        'left': float(scale.shares(competition.parameters).max()),
+        'base': _terms(scale, base),
+        'models': [_terms(scale, model) for model in ranked[:_KEPT]],
+        'structured_rest': None if best is None else _structured(equations, scale, best),
+    }
+    right = [m for m in ranked if [_key(equations, s) for s in m.suspects] == [list(truth or ())]]
+    if right:
+        found |= {
+            'right': _terms(scale, right[0]),
+            'right_structured_rest': _structured(equations, scale, right[0]),
+            'superfluous': _superfluous(scale, right[0], ranked),
+            'richer': _richer(scale, right[0], competition.singles),
+        }
+    return found
+
+
+def _key(equations, suspect):
+    return [suspect.effect.name, joint_name(equations.motion, suspect.place.joint)]
+
+
+def _structured(equations, scale, model):
+    return round(scale.rest(model, structure(equations, model.residual)), 6)
+
+
+def _superfluous(scale, right, models):
+    """Return the greatest gain of one more effect than there is, and its parameters."""
+    more = [
+        (scale.fit(m) - scale.fit(right), m.freedom - right.freedom)
+        for m in models
+        if right.key < m.key and len(m.suspects) == 2 and m.is_free == right.is_free
+        and scale.counts(m)
+    ]  # fmt: skip
+    return _most(more)
+
+
+def _richer(scale, right, models):
+    """Return the greatest gain of another effect with more parameters, and how many more."""
+    more = [
+        (scale.fit(m) - scale.fit(right), m.freedom - right.freedom)
+        for m in models
+        if m.key != right.key and m.freedom > right.freedom and m.is_free == right.is_free
+        and scale.counts(m)
+    ]  # fmt: skip
+    return _most(more)
+
+
+def _most(gains):
+    if not gains:
+        return None
+    gain, parameters = max(gains)
+    return {'gain': round(gain, 3), 'parameters': int(parameters)}
+
+
+def _terms(scale, model):
+    return {
+        'effects': [s.effect.name for s in model.suspects],
+        'is_free': bool(model.is_free),
+        'freedom': int(model.freedom),
+        'fit': round(scale.fit(model), 2),
+        'worth': round(scale.worth(model), 2),
+        'shares': [round(share, 6) for share in model.shares],
+        'counts': bool(model.suspects) and scale.counts(model),
+        'rest': round(scale.rest(model), 5),
+    }
+
+
+if __name__ == '__main__':
+    main()

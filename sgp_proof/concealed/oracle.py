@@ -1,0 +1,148 @@
+"""The best possible model of a world: its true structure, fitted to the recording.
+
+Which effects act where, of which kind and from which joint, and whether bodies differ is taken
+from the answer. Their numbers are fitted to `real.mcap` by least squares, with the equations and
+the fitter of the diagnosis. The search starts at the true numbers, so that no other local minimum
+makes the best possible worse than it is, and bounds of the diagnosis make room for them. Bodies
+that are as the nominal robot has them are not fitted, others have the prior of the diagnosis.
+
+Of an effect outside the list the law is known but for its size. A lag of the velocity sensor
+exerts no force; predictions start from positions, so there is nothing to fit. Two effects on one
+command add up, as in the diagnosis; in the simulation a dead zone sees what a delay passes on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sgp_proof.concealed.unknown import UNKNOWN
+from sgp_ros.diagnosis.compare.equations import make_equations
+from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.fitted_model import floors
+from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
+from sgp_ros.diagnosis.places import joint_name
+from sgp_ros.diagnosis.prove.final_model import FinalModel
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect import (
+    Effect,
+    Fitted,
+    Place,
+    always,
+    every_joint,
+    named,
+    no_shape,
+)
+from sgp_ros.physics.stated import (
+    VELOCITY_FILTER_LAG,
+    place_of,
+    shape_and_coefficients,
+)
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.urdf_robot import nominal_tree
+from sgp_ros.simulation.effects import Moment
+
+_WORDS = ('kind', 'source_joint')
+_ROUNDS = 6
+"""Twice as many as the diagnosis takes; more gain less than a nat."""
+
+
+@dataclass(frozen=True)
+class Oracle:
+    """The true structure of a world with fitted numbers."""
+
+    robot: object
+    tree: object
+    final: FinalModel
+
+    @classmethod
+    def fitted(cls, folder, answer):
+        """Fit the structure of an answer to `folder/real.mcap`."""
+        robot = load_robot(str(folder / 'robot.urdf'))
+        tree = nominal_tree(robot)
+        raw = _trajectory(folder / 'real.mcap', robot)
+        equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
+        start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
+        model = fit(
+            Columns(equations), suspects(answer, equations.motion), start,
+            is_free=bool(answer['parameter_errors']), rounds=_ROUNDS,
+        )  # fmt: skip
+        return cls(robot, tree, FinalModel(model, model, equations, ()))
+
+    def predict(self, recording):
+        """Return the accelerations that it predicts on a recording."""
+        return self.final.predict(_trajectory(recording, self.robot), self.tree)
+
+    def findings(self):
+        """Return its effects as `diagnosis.json` has them."""
+        model, found = self.final.model, []
+        motion = model.frame.equations.motion
+        for suspect, c in zip(model.suspects, model.coefficients, strict=True):
+            numbers = suspect.effect.report(Fitted(motion, suspect.place, suspect.shape, c))
+            found.append({
+                'effect': suspect.effect.name, 'joint': joint_name(motion, suspect.place.joint),
+                'parameters': {name: {'value': value} for name, value in numbers.items()},
+            })  # fmt: skip
+        return found
+
+
+def suspects(answer, motion):
+    """Return the effects of an answer where they act, with their true shapes."""
+    return tuple(
+        _suspect(effect, motion)
+        for effect in answer['effects'] if effect['effect'] != VELOCITY_FILTER_LAG
+    )  # fmt: skip
+
+
+def _suspect(effect, motion):
+    name, numbers, tree = effect['effect'], effect['parameters'], motion.tree
+    if name == 'unknown':
+        joint = tree.moving_names.index(effect['joint'])
+        return Suspect(unlisted(joint, numbers, tree.moving_names), Place(joint), np.zeros(0))
+    words = {word: numbers[word] for word in _WORDS if word in numbers}
+    place = place_of(name, effect['joint'], words, numbers, tree)
+    shape, _ = shape_and_coefficients(name, place.kind, numbers)
+    if name == 'backlash':
+        shape[0] = numbers['motor_inertia'] / motion.mass_diagonal[:, place.joint].mean()
+    return Suspect(_reaching(EFFECTS[name], shape), place, shape)
+
+
+def _reaching(effect, shape):
+    """Return an effect with bounds that hold a shape with room on either side."""
+    if effect.bounds is None:
+        return effect
+
+    def bounds(motion, place):
+        low, high = effect.bounds(motion, place)
+        beyond, room = (shape < low) | (shape > high), abs(shape)
+        return (np.where(beyond, np.minimum(low, shape - room), low),
+                np.where(beyond, np.maximum(high, shape + room), high))  # fmt: skip
+
+    return replace(effect, bounds=bounds)
+
+
+def unlisted(joint, numbers, names):
+    """Return an effect outside the list as one whose only coefficient is its size."""
+    source = names.index(numbers['source']) if numbers['source'] in names else -1
+    unit = numbers | {'a': 1.0, 'source': source}
+    (action,) = UNKNOWN[numbers['kind']](joint, unit, names)
+
+    def force(moment):
+        if action.force is not None:
+            return action.force(moment)
+        return action.drive(moment) - moment.drive[joint]
+
+    def columns(motion, _place, _shape):
+        rows = zip(motion.time, motion.position, motion.velocity, motion.effort, strict=True)
+        return np.array([[force(Moment(*row, np.zeros(0)))] for row in rows])
+
+    return Effect(
+        'unknown', (), columns, every_joint, no_shape, named('a'), always, numbers['kind']
+    )
+
+
+def _trajectory(path, robot):
+    return collect(open_recording(str(path)).events(None, None), robot)

@@ -1,0 +1,134 @@
+"""Draw worlds with concealed physics, diagnose them by the command line, unseal, and score.
+
+    python -m sgp_proof.concealed.run --tier B --seeds 100:137 [--only pair] [--worlds DIR]
+        [--outputs DIR]
+
+The answers lie in another folder than the recordings; `sgp diagnose` is started as a user does,
+in a process of its own, and sees the recordings alone. Results go to
+`sgp_proof/results/concealed_<tier>.json`, with `--only pair` to `concealed_<tier>_pair.json`.
+With `--outputs` the diagnoses are kept, and worlds of which one is there are only scored. What is
+predicted of recordings held out is compared with the true structure fitted to the same recording.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from sgp_proof.concealed import scoring
+from sgp_proof.concealed.improvement import improvements
+from sgp_proof.concealed.rates import HELD_OUT, summary
+from sgp_proof.environment import environment
+
+RESULTS = Path(__file__).parents[1] / 'results'
+OUTCOME = 'outcome.json'
+"""How a diagnosis ended and how long it took, beside what it wrote."""
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
+    parser.add_argument('--tier', choices=('A', 'B'), default='A')
+    parser.add_argument('--seeds', default='0:40', help='FIRST:LAST+1[,...]')
+    parser.add_argument('--only', help='conceal this in every world, as `draw` has it')
+    parser.add_argument('--worlds', type=Path, help='worlds drawn before; else they are drawn')
+    parser.add_argument('--outputs', type=Path, help='where diagnoses are kept; else nowhere')
+    parser.add_argument('--processes', type=int, default=2)
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        worlds = arguments.worlds or Path(folder) / 'worlds'
+        outputs = arguments.outputs or Path(folder) / 'out'
+        cases = []
+        for seeds in arguments.seeds.split(','):
+            if arguments.worlds is None:
+                only = ('--only', arguments.only) if arguments.only else ()
+                _run('sgp_proof.concealed.draw', '--seeds', seeds, '--tier', arguments.tier,
+                     '--out', str(worlds), *only)  # fmt: skip
+            first, last = map(int, seeds.split(':'))
+            cases += [f'case_{seed:03d}' for seed in range(first, last)]
+        cases = [case for case in cases if (worlds / 'answers' / f'{case}.json').exists()]
+        with ThreadPoolExecutor(arguments.processes) as pool:
+            scored = list(pool.map(lambda case: scored_case(worlds, case, outputs / case), cases))
+    report = {
+        'schema': 1, 'tier': arguments.tier, 'seeds': arguments.seeds, 'only': arguments.only,
+        'environment': environment(), 'summary': summary(scored), 'cases': scored,
+    }  # fmt: skip
+    kind = f'_{arguments.only}' if arguments.only else ''
+    path = RESULTS / f'concealed_{arguments.tier.lower()}{kind}.json'
+    path.write_text(json.dumps(report, indent=1, allow_nan=False) + '\n', encoding='utf-8')
+    print(json.dumps(report['summary'], indent=1))
+
+
+def _run(module, *words):
+    subprocess.run([sys.executable, '-m', module, *words], check=True)
+
+
+def scored_case(worlds, case, out):
+    """Score the diagnosis of one case, which is made first where none lies in `out`."""
+    if not (out / OUTCOME).exists():
+        diagnose_case(worlds / 'cases' / case, out)
+    outcome = json.loads((out / OUTCOME).read_text(encoding='utf-8'))
+    answer = json.loads((worlds / 'answers' / f'{case}.json').read_text(encoding='utf-8'))
+    truth = np.load(worlds / 'answers' / f'{case}_truth.npz')
+    row = {
+        'case': case, 'key': answer['key'], 'verdict': answer['verdict'],
+        'truth': [[e['effect'], e['joint']] for e in answer['effects']],
+        'seconds': outcome['seconds'],
+    }  # fmt: skip
+    if outcome['status']:
+        row |= {'said': 'failed', 'why': outcome['why'], 'right': False, 'found': []}
+    else:
+        diagnosis = json.loads((out / 'diagnosis.json').read_text(encoding='utf-8'))
+        row |= _row(answer, diagnosis)
+        row |= improvements(worlds / 'cases' / case, answer, truth, out)
+    print(case, answer['key'], '->', row['said'], row['found'],
+          'right' if row['right'] else 'WRONG', f'{row["seconds"]:.0f} s', flush=True)  # fmt: skip
+    return row
+
+
+def diagnose_case(sealed, out):
+    """Diagnose one case where its answer is out of sight, and write how that ended."""
+    out.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = shutil.copytree(sealed, Path(scratch) / sealed.name)
+        words = ['diagnose', str(folder / 'real.mcap'), '--robot', str(folder / 'robot.urdf'),
+                 '--sim', str(folder / 'sim.mcap'), '--out', str(out)]  # fmt: skip
+        for name in HELD_OUT:
+            words += ['--test', str(folder / f'{name}.mcap')]
+        begin = time.perf_counter()
+        done = subprocess.run(
+            [sys.executable, '-m', 'sgp_ros.cli', *words], capture_output=True, text=True,
+            env={**os.environ, 'OPENBLAS_NUM_THREADS': '1'}, check=False,
+        )  # fmt: skip
+        seconds = round(time.perf_counter() - begin, 1)
+    outcome = {
+        'status': done.returncode, 'why': done.stderr.strip()[-300:], 'seconds': seconds,
+    }  # fmt: skip
+    (out / OUTCOME).write_text(json.dumps(outcome) + '\n', encoding='utf-8')
+
+
+def _row(answer, diagnosis):
+    found = scoring.ranked(diagnosis)
+    return {
+        'said': diagnosis['verdict'],
+        'found': [[f['effect'], f['joint'], round(f['probability'], 3)] for f in found],
+        'certainty': diagnosis['certainty'],
+        'right': scoring.is_right(answer, diagnosis),
+        'components': scoring.components(answer, diagnosis),
+        'overlap': scoring.overlap(answer, diagnosis),
+        'parameters': scoring.parameter_scores(answer, diagnosis),
+        'refused': diagnosis['settings']['refused'],
+    }
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,1 @@
+"""Numerics beside exact answers: filters, regressors, identifiable parameters."""

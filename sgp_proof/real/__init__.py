@@ -1,0 +1,1 @@
+"""Real machines, with what is known of them."""

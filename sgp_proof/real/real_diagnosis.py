@@ -1,0 +1,221 @@
+"""What `sgp diagnose` finds on real machines whose friction, or load, is withheld from the model.
+
+    python -m sgp_proof.real.real_diagnosis [NAME ...]
+
+Each machine is a list of commands as a user would give them, run in one folder in which `data` and
+`config` stand for the recordings and the configuration of this repository.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import json
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from sgp_proof.environment import environment
+from sgp_proof.real.withheld import main as withheld
+from sgp_ros.cli import main as sgp
+from sgp_ros.report.metrics import versions
+
+ROOT = Path(__file__).parents[2]
+DATA = ROOT.parent / 'shared' / 'data'
+TARGET = Path(__file__).parent / 'results' / 'real_diagnosis.json'
+IMAGES = ROOT / 'docs' / 'images' / 'real_machines'
+SHOWN_RIVALS = 4
+EMPS = (
+    'sgp diagnose out/emps_id.mcap --robot config/robots/emps.urdf'
+    ' --test out/emps_val_pulses.mcap --out out/diagnosis'
+)
+LOADED = (
+    'sgp diagnose out/energy_shaping_1kg.mcap --robot config/robots/simple_pendulum.urdf'
+    ' --out out/diagnosis'
+)
+UNLOADED = (
+    'sgp diagnose out/energy_shaping.mcap --robot config/robots/simple_pendulum.urdf'
+    ' --test out/sac.mcap --out out/diagnosis'
+)
+DOUBLE = (
+    'sgp diagnose out/learn.mcap --robot config/robots/double_pendulum_a0.urdf'
+    ' --test out/test.mcap --out out/diagnosis'
+)
+_RUNS = 'data/dfki_double_pendulum/design_A.0__20220815__sys_id__trajectory_{}.npz'
+_DOUBLE = {
+    'learn': ' '.join(_RUNS.format(i) for i in ('00', '02', '04', '11', '13')),
+    'test': ' '.join(_RUNS.format(i) for i in ('01', '03', '05', '12')),
+}
+
+
+def _imported(name: str, *files: str) -> tuple[str, ...]:
+    return tuple(f'sgp import {f} --map config/import/{name}.yaml --out out' for f in files)
+
+
+def _pendulum(name: str, stop: float) -> tuple[str, ...]:
+    source = f'data/dfki_simple_pendulum/{name}.csv'
+    cut = f'python -m sgp_proof.real.withheld cut out/{name}.csv {source} --to {stop:g}'
+    return (cut, *_imported('dfki_simple_pendulum', f'out/{name}.csv'))
+
+
+def _arm(name: str, recording: str, robot: str, split: float) -> tuple[str, ...]:
+    """Identify the bodies with friction in the model, then take the friction out of the URDF."""
+    source, identified = f'data/{name}/{recording}.npz', 'out/identified/robot_identified.urdf'
+    diagnose = f'sgp diagnose out/learn.mcap --robot out/{robot}.yaml --test out/test.mcap'
+    return (
+        f'python -m sgp_proof.real.withheld cut out/learn.npz {source} --to {split:g}',
+        f'python -m sgp_proof.real.withheld cut out/test.npz {source} --from {split:g}',
+        *_imported(name, 'out/learn.npz', 'out/test.npz'),
+        f'sgp identify out/learn.mcap --robot config/robots/{robot}.yaml --out out/identified',
+        f'python -m sgp_proof.real.withheld friction out/{robot}.urdf {identified}',
+        f'cp config/robots/{robot}.yaml out',
+        f'{diagnose} --out out/diagnosis',
+    )
+
+
+MACHINES = {
+    'emps': (
+        *_imported('emps', 'data/emps/emps_id.csv', 'data/emps/emps_val_pulses.csv'),
+        EMPS,
+    ),
+    'simple_pendulum_1kg': (
+        *_pendulum('energy_shaping_1kg', 7.0),
+        LOADED,
+    ),
+    'simple_pendulum': (
+        *_pendulum('energy_shaping', 3.9),
+        *_pendulum('sac', 3.9),
+        UNLOADED,
+    ),
+    'double_pendulum': (
+        f'python -m sgp_proof.real.withheld join out/learn.npz {_DOUBLE["learn"]}',
+        f'python -m sgp_proof.real.withheld join out/test.npz {_DOUBLE["test"]}',
+        *_imported('dfki_double_pendulum', 'out/learn.npz', 'out/test.npz'),
+        DOUBLE,
+    ),
+    'panda': _arm('panda', 'panda_exciting', 'panda', 12.6),
+    'tiago': _arm('tiago', 'tiago_dynamic', 'tiago_arm', 48.0),
+}  # fmt: skip
+"""Commands from the authors' files to the diagnosis, which is the last one."""
+
+
+_EMPS = 'sgp diagnose out/emps_id.mcap --test out/emps_val_pulses.mcap --robot'
+STEPS = {
+    'emps': (
+        f'{_EMPS} config/robots/emps_viscous.yaml --out out/viscous',
+        f'{_EMPS} config/robots/emps_symmetric.yaml --out out/symmetric',
+        f'{_EMPS} out/diagnosis/robot_diagnosed.yaml --out out/again',
+    ),
+}
+"""Further diagnoses of a machine, of models that lack less."""
+
+
+def execute(command: str, folder: Path) -> str:
+    """Run one command line in a folder and return what it printed."""
+    program, *words = command.split()
+    if program == 'cp':
+        shutil.copy(folder / words[0], folder / words[1])
+        return ''
+    if program == 'python':
+        withheld(words[2:])
+        return ''
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        status = sgp(words)
+    if status:
+        raise SystemExit(f'{command}: status {status}')
+    return printed.getvalue()
+
+
+def take_pictures(report: Path, target: Path) -> list[str]:
+    """Replace what the target holds by all figures of a report and return their names."""
+    shutil.rmtree(target, ignore_errors=True)
+    target.mkdir(parents=True)
+    pictures = sorted(report.glob('*.png'))
+    for picture in pictures:
+        shutil.copy(picture, target)
+    return [picture.stem for picture in pictures]
+
+
+@contextlib.contextmanager
+def inside(folder: Path) -> Iterator[None]:
+    """Work in a folder with recordings, configuration and room for what comes out."""
+    (folder / 'data').symlink_to(DATA)
+    (folder / 'config').symlink_to(ROOT / 'config')
+    (folder / 'out').mkdir()
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        yield
+    finally:
+        os.chdir(before)
+
+
+def run(name: str, folder: Path) -> dict:
+    """Carry out the commands of a machine and return what its diagnosis says."""
+    seconds = {}
+    with inside(folder):
+        for command in MACHINES[name]:
+            began = time.perf_counter()
+            printed = execute(command, folder)
+            if command.startswith(('sgp identify', 'sgp diagnose')):
+                seconds[command.split()[1]] = round(time.perf_counter() - began, 1)
+        steps = [step(command, folder) for command in STEPS.get(name, ())]
+    out = folder / 'out' / 'diagnosis'
+    return {
+        'commands': MACHINES[name],
+        'pictures': take_pictures(out, IMAGES / name),
+        **read(out, printed),
+        'seconds': seconds,
+        'steps': steps,
+    }
+
+
+def step(command: str, folder: Path) -> dict:
+    """Carry out a further diagnosis and return what it says."""
+    printed = execute(command, folder)
+    return {'command': command, **read(folder / command.rsplit(maxsplit=1)[-1], printed)}
+
+
+def read(out: Path, printed: str) -> dict:
+    """Return what a diagnosis wrote and its sentence, without what no page shows."""
+    found = json.loads((out / 'diagnosis.json').read_text(encoding='utf-8'))
+    kept = (
+        'verdict', 'certainty', 'findings', 'equivalents', 'parameter_errors', 'dependence',
+        'settings',
+    )  # fmt: skip
+    return {
+        'sentence': printed.splitlines()[0],
+        **{key: found[key] for key in kept},
+        'alternatives': found['alternatives'][:SHOWN_RIVALS],
+        'fit': {k: v for k, v in found['fit'].items() if k != 'predictions'},
+    }
+
+
+def main() -> None:
+    """Run the named machines, or all, beside results that are there."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('names', nargs='*', choices=[*MACHINES, []], default=[])
+    for name in parser.parse_args().names or MACHINES:
+        with tempfile.TemporaryDirectory() as folder:
+            machine = run(name, Path(folder))
+        before = json.loads(TARGET.read_text(encoding='utf-8')) if TARGET.exists() else {}
+        machines = {**before.get('machines', {}), name: machine}
+        result = {
+            'schema': 1,
+            'command': 'python -m sgp_proof.real.real_diagnosis',
+            'environment': environment(),
+            'versions': versions(),
+            'machines': {key: machines[key] for key in MACHINES if key in machines},
+        }
+        text = json.dumps(result, indent=1, allow_nan=False)
+        TARGET.write_text(text + '\n', encoding='utf-8')
+        print(name, machine['sentence'])
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,195 @@
+"""Are 95 % intervals 95 % intervals? One-step predictions and parameters, over hundreds of worlds.
+
+    python -m sgp_proof.streams.calibration [worlds|wheels|recordings ...]
+
+`worlds` are draws from the model itself, a joint that comes back to where it was: hyper-parameters
+known and learned, every way to keep the stream. `wheels` are simulated reaction wheels with
+encoders through the whole engine, to a model that holds all of their physics. `recordings` are
+the real ones, through the engine of `sgp replay` in both modes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from sgp_proof.environment import environment
+from sgp_proof.real.live_recordings import CASES, DATA, ROOT, imported
+from sgp_ros.apps.parameter_file import load_parameters
+from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.replay import replay
+from sgp_ros.engine.samples import CommandSample, JointSample
+from sgp_ros.gp.basis import BasisRegression
+from sgp_ros.gp.kernels import SquaredExponential
+from sgp_ros.gp.learning import learn
+from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.online import OnlineRegression
+from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.scores import INTERVAL_95
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.robots.registry import ROBOTS, load_robot
+from sgp_ros.simulation.assembly import make_simulation
+from sgp_ros.simulation.recording import simulate
+
+RESULT = Path(__file__).parent / 'results' / 'calibration.json'
+WORLDS, LENGTH, FIRST, BUDGET, FEATURES = 200, 400, 100, 60, 60
+WHEELS, WHEEL_S = 200, 20.0
+TRUE = Model((SquaredExponential(1.0, (0.5, 1.5), (0, 1)),), (0.05,))
+PRIOR = CoefficientPrior.from_std(np.zeros(3), np.full(3, 2.0))
+SETTLED = 100
+"""Scored predictions of a recording before its coverage counts."""
+
+
+def _world(seed):
+    rng = np.random.default_rng(seed)
+    t = np.arange(LENGTH) * rng.uniform(0.15, 0.25) + rng.uniform(0.0, 6.0)
+    U = np.stack([1.3 * np.sin(t), 2.0 * np.cos(t * np.sqrt(1.7))], axis=1)
+    F = np.stack([U[:, 0], U[:, 1], rng.normal(size=LENGTH)], axis=1)[:, None]
+    w = 2.0 * rng.normal(size=3)
+    kernel = TRUE.kernels[0]
+    directions = rng.normal(size=(2, 2000)) / np.array(kernel.lengthscales)[:, None]
+    angle = U @ directions + rng.uniform(0.0, 2.0 * np.pi, size=2000)
+    z = np.sqrt(2.0 * kernel.variance / 2000) * np.cos(angle).sum(axis=1)
+    y = F[:, 0] @ w + z + np.sqrt(TRUE.noise[0]) * rng.standard_normal(LENGTH)
+    return Observations(U, F, y[:, None]), w
+
+
+def _ways(model):
+    yield from (
+        (
+            f'exact, {policy}',
+            OnlineRegression(model, PRIOR, BUDGET, features=FEATURES, policy=policy),
+        )
+        for policy in ('oldest', 'least_informative', 'coverage')
+    )
+    yield 'basis', BasisRegression(model, PRIOR, BUDGET, FEATURES)
+
+
+def _one_world(online, data, w):
+    inside, losses = [], []
+    for i, (u, f, y) in enumerate(zip(data.U, data.F, data.y, strict=True)):
+        prediction = online.predict(u, f)
+        variance = float(prediction.covariance[0, 0]) + online.model.noise[0]
+        error = float(y[0] - prediction.mean[0])
+        online.learn(prediction, y)
+        if i >= FIRST:
+            inside.append(abs(error) <= INTERVAL_95 * np.sqrt(variance))
+            losses.append(0.5 * (np.log(2.0 * np.pi * variance) + error**2 / variance))
+    information = online.information
+    deviation = np.sqrt(np.diag(information.covariance))
+    error = information.coefficients - w
+    whitened = information.R @ error
+    return (
+        np.mean(inside), np.mean(losses), np.mean(np.abs(error) <= INTERVAL_95 * deviation),
+        whitened @ whitened / len(w),
+    )  # fmt: skip
+
+
+def _worlds():
+    found = {}
+    for seed in range(WORLDS):
+        data, w = _world(seed)
+        head = Observations(data.U[:FIRST], data.F[:FIRST], data.y[:FIRST])
+        learned = learn(head, PRIOR, TRUE).model
+        for kind, model in (('known', TRUE), ('learned', learned)):
+            for name, online in _ways(model):
+                scores = _one_world(online, data, w)
+                found.setdefault(f'{name}, {kind}', []).append(scores)
+    names = ('coverage95', 'nlpd', 'w_coverage95', 'w_msq')
+    return {
+        way: dict(zip(names, np.mean(rows, axis=0).tolist(), strict=True)) | {'worlds': len(rows)}
+        for way, rows in found.items()
+    }
+
+
+def _summary(estimates, engine):
+    """Return coverage and NLPD of the target over all joints, once the model has settled."""
+    channels = [getattr(e, engine.robot.target) for e in estimates if e.is_scored][SETTLED:]
+    error = np.array([c.measured - c.mean for c in channels])
+    variance = np.array([c.variance for c in channels])
+    return {
+        'coverage95': np.mean(np.abs(error) <= INTERVAL_95 * np.sqrt(variance), axis=0).tolist(),
+        'nlpd': np.mean(
+            0.5 * (np.log(2.0 * np.pi * variance) + error**2 / variance), axis=0
+        ).tolist(),
+        'drifting': [test.is_drifting for test in engine.drift], 'n': len(channels),
+    }  # fmt: skip
+
+
+def _engine_run(robot, settings, events):
+    engine, estimates = Engine(robot, EngineConfig.from_mapping(settings, robot)), []
+    replay(engine, events, lambda step: estimates.extend(step.estimates))
+    return _summary(estimates, engine), engine
+
+
+def _wheels():
+    robot = ROBOTS['reaction_wheel']
+    found = {'exact': [], 'basis': []}
+    for seed in range(WHEELS):
+        run = simulate(
+            make_simulation('reaction_wheel', seed=seed, controller='sinusoids', rate_hz=100.0,
+                            start_ns=1), WHEEL_S)  # fmt: skip
+        events = []
+        for stamp, position, command in zip(run.stamps_ns, run.position, run.command, strict=True):
+            events.append(CommandSample(int(stamp), command))
+            events.append(JointSample(int(stamp), run.joint_names, position))
+        for mode, rows in found.items():
+            rows.append(_engine_run(robot, {'buffer.mode': mode}, events)[0])
+    return {
+        mode: {
+            'wheels': len(rows), 'joints': list(robot.joint_names),
+            'coverage95': np.mean([row['coverage95'] for row in rows], axis=0).tolist(),
+            'nlpd': np.mean([row['nlpd'] for row in rows], axis=0).tolist(),
+            'drifting': np.mean([row['drifting'] for row in rows], axis=0).tolist(),
+        }
+        for mode, rows in found.items()
+    }  # fmt: skip
+
+
+def _recordings():
+    found = {}
+    for name, case in CASES.items():
+        if case.seconds is not None:
+            continue  # too short to settle
+        with tempfile.TemporaryDirectory() as folder:
+            bag = DATA / case.file
+            if case.mapping:
+                bag = imported(case.file, case.mapping, Path(folder))
+            events = list(open_recording(bag).events())
+        is_file = case.robot.endswith('.yaml')
+        robot = load_robot(str(ROOT / case.robot) if is_file else case.robot)
+        settings = load_parameters(ROOT / 'config' / f'{case.config}.yaml')
+        settings = {k: v for k, v in settings.items() if k not in ('robot', 'command.type')}
+        found[name] = {'joints': list(robot.joint_names)}
+        for mode in ('exact', 'basis'):
+            summary, _ = _engine_run(robot, {**settings, 'buffer.mode': mode}, events)
+            found[name][mode] = summary
+            print(name, mode, summary, flush=True)
+    return found
+
+
+PARTS = {'worlds': _worlds, 'wheels': _wheels, 'recordings': _recordings}
+
+
+def main():
+    """Run the named parts, or all, and write the result."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('names', nargs='*', choices=[*PARTS, []], default=[])
+    names = parser.parse_args().names or list(PARTS)
+    found = json.loads(RESULT.read_text(encoding='utf-8')) if RESULT.is_file() else {}
+    for name in names:
+        found[name] = PARTS[name]()
+        print(name, json.dumps(found[name], indent=1), flush=True)
+    result = {'schema': 1, 'environment': environment(), 'length': LENGTH, 'budget': BUDGET,
+              'features': FEATURES, 'wheel_s': WHEEL_S}  # fmt: skip
+    result |= {name: found[name] for name in PARTS if name in found}
+    RESULT.write_text(json.dumps(result, indent=1, allow_nan=False) + '\n', encoding='utf-8')
+
+
+if __name__ == '__main__':
+    main()

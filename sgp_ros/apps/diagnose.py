@@ -1,0 +1,227 @@
+"""`sgp diagnose`: what physics a recording has that the nominal robot lacks."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sgp_ros.apps.diagnosed_robot import write_diagnosed
+from sgp_ros.diagnosis.compare.simulation_check import disagreement, nominal_shares
+from sgp_ros.diagnosis.mapping import diagnosis_mapping
+from sgp_ros.diagnosis.pipeline import diagnose
+from sgp_ros.diagnosis.result import Diagnosis, Proof
+from sgp_ros.engine.samples import Event, JointSample
+from sgp_ros.errors import ConfigError, NumericalError, RecordingError
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.report.diagnosis import write_diagnosis
+from sgp_ros.report.diagnosis_predictions import write_predictions
+from sgp_ros.report.diagnosis_proof import interval_text, tables
+from sgp_ros.report.diagnosis_text import (
+    equivalence_sentence,
+    parameter_errors_text,
+    phrase,
+    verdict_sentence,
+    why_it_lost,
+)
+from sgp_ros.report.files import write_text
+from sgp_ros.rigid.rigid_body import mass_matrix
+from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.nominal import Nominal, nominal_model
+from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.robot import Robot
+
+LEAST_POSITIONS = 8
+"""A joint that shows fewer different positions did not move: an encoder at rest flickers."""
+_RIVALS = 3
+_SINGULAR = 1e-12
+"""Least eigenvalue of the mass matrix with a unit diagonal."""
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnoseOptions:
+    """What is read.
+
+    Attributes:
+        sim: recording of the nominal simulation, which the robot is checked with; None without.
+        tests: held-out recordings; a part of the training recording without any.
+        joint_states: topic of the states; None for the one there is.
+        command: topic of the commands; None for the one there is.
+    """
+
+    sim: str | None = None
+    tests: Sequence[str] = ()
+    joint_states: str | None = None
+    command: str | None = None
+
+
+def run_diagnose(
+    bag: str,
+    robot_name: str,
+    out: Path,
+    options: DiagnoseOptions,
+    *,
+    progress: Callable[[float], None],
+) -> dict[str, Any]:
+    """Diagnose a recording and write diagnosis.json, predictions and the report.
+
+    Raises:
+        ConfigError: a robot without nominal bodies or inertias, or a file that is none.
+        RecordingError: nothing in the recording can be used, or nothing moves.
+        NumericalError: the motion leaves the equations without a solution.
+    """
+    nominal = nominal_model(load_robot(robot_name))
+    robot, tree = nominal.robot, nominal.tree
+    if not has_inertia(tree):
+        raise ConfigError(
+            f'the mass matrix of the nominal robot {robot.name} is singular',
+            'a mass and inertias for every moving link of the URDF',
+            'identify it first and give the robot_identified.urdf of sgp identify',
+        )
+    remarks = list(nominal.remarks)
+    events = _events(bag, robot, options, remarks)
+    still = still_joints(events, tree.moving_names)
+    if len(still) == tree.size:
+        raise RecordingError(
+            f'no joint of {robot.name} moves in {Path(bag).name}',
+            f'at least {LEAST_POSITIONS} positions of one of {", ".join(still)}',
+            'take a recording in which the robot moves',
+        )
+    if still:
+        remarks.append(f'Nothing can be said of joints that do not move: {", ".join(still)}.')
+    tests = _held_out(robot, options, remarks)
+    simulation = _simulation(nominal, options, remarks)
+    try:
+        found = diagnose(
+            events, robot, tree, tests, stated=nominal.stated, holds_out=not options.tests,
+            progress=progress,
+        )  # fmt: skip
+    except np.linalg.LinAlgError as error:
+        raise NumericalError(
+            f'the equations of {Path(bag).name} have no solution ({error})',
+            'motion of every joint',
+            f'joints that do not move: {", ".join(still) or "none"}',
+        ) from error
+    remarks = [*found.remarks, *remarks]
+    return _written(out, nominal, replace(found, simulation=simulation, remarks=tuple(remarks)))
+
+
+def _simulation(
+    nominal: Nominal, options: DiagnoseOptions, remarks: list[str]
+) -> dict[str, float]:
+    """Return what the nominal robot leaves of its simulation, by joint; empty without one."""
+    if options.sim is None:
+        return {}
+    events = _events(options.sim, nominal.robot, options, remarks)
+    shares = nominal_shares(events, nominal.robot, nominal.tree, nominal.stated)
+    said = disagreement(shares, Path(options.sim).name)
+    remarks += [said] if said else []
+    return shares
+
+
+def _held_out(
+    robot: Robot, options: DiagnoseOptions, remarks: list[str]
+) -> dict[str, list[Event]]:
+    tests: dict[str, list[Event]] = {}
+    for test in options.tests:
+        stem = Path(test).stem
+        if stem in tests or stem == 'train':
+            raise RecordingError(
+                f'two recordings with the name {stem!r}', 'different names', 'rename one'
+            )
+        tests[stem] = _events(test, robot, options, remarks)
+    return tests
+
+
+def _written(out: Path, nominal: Nominal, found: Diagnosis) -> dict[str, Any]:
+    """Write all files, print the findings and return the content of diagnosis.json."""
+    out.mkdir(parents=True, exist_ok=True)
+    write_predictions(out, found)
+    content = diagnosis_mapping(found)
+    write_text(out / 'diagnosis.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
+    bodies = nominal.without_stated(found.bodies)
+    write_diagnosed(out, nominal.robot, replace(found, bodies=bodies))
+    write_diagnosis(out, found)
+    print_diagnosis(found)
+    print(f'report: {out / "report.html"}')
+    return content
+
+
+def has_inertia(tree: Tree) -> bool:
+    """Return whether every joint of a robot at its zero position resists acceleration."""
+    (M,) = mass_matrix(tree, tree.parameters, np.zeros((1, tree.size)))
+    size = np.sqrt(np.maximum(np.diag(M), 0.0))
+    return bool(size.min() > 0.0 and np.linalg.eigvalsh(M / np.outer(size, size))[0] > _SINGULAR)
+
+
+def still_joints(events: Sequence[Event], names: Sequence[str]) -> list[str]:
+    """Return the joints that are seen but do not move."""
+    seen: dict[str, set[float]] = {name: set() for name in names}
+    for event in events:
+        if not isinstance(event, JointSample):
+            continue
+        for name, position in zip(event.names, event.position, strict=True):
+            if name in seen and len(seen[name]) < LEAST_POSITIONS:
+                seen[name].add(float(position))
+    return [name for name, positions in seen.items() if 0 < len(positions) < LEAST_POSITIONS]
+
+
+def print_diagnosis(found: Diagnosis) -> None:
+    """Print the verdict, the findings, their nearest rivals and the proof; `+-` is for 95 %."""
+    print(verdict_sentence(found))
+    for f in found.findings:
+        where = f'{f.joint}: {phrase(f)}'
+        print(f'  found     p {f.probability:.2f}  {where}{f"; {f.why}" if f.why else ""}')
+        if f.formula:
+            print(f'                    {f.formula}')
+    best = found.findings[0] if found.verdict == 'missing_physics' else None
+    if found.findings:
+        for f in found.alternatives[:_RIVALS]:
+            print(f'  not       p {f.probability:.2f}  {f.joint}: {phrase(f)}: '
+                  f'{why_it_lost(f, best)}')  # fmt: skip
+    for e in found.equivalents:
+        print(f'  or        {equivalence_sentence(e)}')
+    if found.parameter_errors:
+        print(f'  bodies    {parameter_errors_text(found.parameter_errors)}')
+    for stem, proof in found.proofs.items():
+        _print_proof(stem, proof)
+    for remark in found.remarks:
+        print(f'  remark    {remark}')
+
+
+def _print_proof(stem: str, proof: Proof) -> None:
+    """Print the errors of effort and roll-outs before and after, with 95 % intervals."""
+    head = stem
+    for kind, what in (('nmse', 'nMSE of the effort'), ('rollout_nmse', 'nMSE of roll-outs')):
+        before, after = (tables(proof)[f'{kind}_{when}'] for when in ('before', 'after'))
+        each = []
+        for joint, x in before.items():
+            interval = interval_text(proof, f'{kind}_after', joint)
+            each.append(f'{joint} {x:.2g} -> {after[joint]:.2g}')
+            each[-1] += f' ({interval})' if interval else ''
+        if each:
+            print(f'  {head:9s} {what}: {", ".join(each)}')
+        head = ''
+
+
+def _events(bag: str, robot: Robot, options: DiagnoseOptions, remarks: list[str]) -> list[Event]:
+    """Return what a recording holds of a robot."""
+    recording = open_recording(bag)
+    events = list(recording.events(options.joint_states, options.command))
+    seen = {name for event in events if isinstance(event, JointSample) for name in event.names}
+    if seen and not seen & set(robot.joint_names):
+        raise RecordingError(
+            f'{Path(bag).name} shows the joints {sorted(seen)}',
+            f'states of the joints {list(robot.joint_names)} of {robot.name}',
+            'take a recording of this robot, or name its joints in a robot file',
+        )
+    remarks += recording.remarks
+    remarks += [
+        f'{count} messages of {Path(bag).name} could not be read: {why}'
+        for why, count in recording.unreadable.items()
+    ]
+    return events

@@ -1,0 +1,208 @@
+"""`sgp identify`: a robot from a whole recording: parameters, intervals, URDF and a report."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sgp_ros.apps.identified_robot import nominal_coefficients, write_identified
+from sgp_ros.apps.identify_summary import print_findings
+from sgp_ros.batch.identification import HELD_OUT, Identification, IdentificationOptions, identify
+from sgp_ros.batch.regression_data import FilteredData, smoothed_motion
+from sgp_ros.batch.rollout_scores import RolloutScore, score_windows
+from sgp_ros.batch.rollout_windows import cut_windows, joined
+from sgp_ros.batch.signals import Signals, collect_signals
+from sgp_ros.batch.zero_phase import ZeroPhase
+from sgp_ros.errors import ConfigError, RecordingError
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.report.files import write_text
+from sgp_ros.report.findings import collect_findings
+from sgp_ros.report.identification import write_identification
+from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.robot import Robot
+
+Stretch = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+MAX_GAP_S = 0.25
+HORIZONS: tuple[float | None, ...] = (0.0, 0.3, None)
+"""One step, 0.3 s, the longest held-out stretch."""
+_STRIDE_S = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class IdentifyOptions:
+    """How a recording is read and identified.
+
+    Attributes:
+        tests: recordings that are only scored on; without any, a part of the recording.
+        joint_states: topic of the states; None for the one there is.
+        command: topic of the commands; None for the one there is.
+        effort_source: `state`, `command` or `auto`.
+        identification: what is fitted and held out.
+    """
+
+    tests: Sequence[str] = ()
+    joint_states: str | None = None
+    command: str | None = None
+    effort_source: str = 'auto'
+    identification: IdentificationOptions = field(default_factory=IdentificationOptions)
+
+
+def run_identify(
+    bag: str,
+    robot_name: str,
+    out: Path,
+    options: IdentifyOptions,
+    *,
+    progress: Callable[[float], None],
+) -> dict[str, Any]:
+    """Identify a robot and write findings, report, robot YAML and URDF.
+
+    Args:
+        bag: the recording that is learned from.
+        robot_name: built-in name, robot YAML or URDF.
+        out: folder of the results.
+        options: see `IdentifyOptions`.
+        progress: called with the share that is done.
+
+    Raises:
+        ConfigError: a wrong robot, method or hold-out.
+        RecordingError: nothing in the recording can be used.
+    """
+    require_folder(out)
+    robot = load_robot(robot_name)
+    remarks: list[str] = []
+    signals = read_signals(bag, robot, options, remarks)
+    tests = {
+        name: read_signals(path, robot, options, remarks)
+        for name, path in names_of_tests(options.tests).items()
+    }
+    progress(0.1)
+    found = identify(
+        signals, robot, tests, options.identification,
+        nominal=nominal_coefficients(robot), progress=lambda share: progress(0.1 + 0.7 * share),
+    )  # fmt: skip
+    rollouts = roll_out_held(found, signals, tests)
+    progress(0.95)
+    counts = {'states on the grid': len(signals.time)}
+    for what, refused in (('states', signals.refused), ('commands', signals.commands_refused)):
+        counts |= {f'{what} refused: {reason}': n for reason, n in refused.items() if n}
+    findings = collect_findings(found, Path(bag).name, rollouts, counts)
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / 'identification.json', json.dumps(findings, indent=1, allow_nan=False) + '\n')
+    known = found.physics.coefficients
+    std = np.where(known.is_identifiable, known.std, np.inf)
+    values, has_bodies = best_coefficients(found), found.consistent is not None
+    write_identified(out, robot, values, std, has_bodies=has_bodies)
+    write_identification(out, found, findings, remarks)
+    progress(1.0)
+    print_findings(findings)
+    print(f'report: {out / "report.html"}')
+    return findings
+
+
+def require_folder(out: Path) -> None:
+    """Refuse a place where no result can be written, before anything is computed.
+
+    Raises:
+        ConfigError: there is a file of that name.
+    """
+    places = [out, *out.parents]
+    files = [place for place in places if place.exists() and not place.is_dir()]
+    if files:
+        raise ConfigError(f'{files[0]} is a file', 'a folder for the results', 'change --out')
+
+
+def names_of_tests(tests: Sequence[str]) -> dict[str, str]:
+    """Return the recordings to score on by names that differ from each other and from `train`."""
+    named: dict[str, str] = {}
+    for path in tests:
+        stem, name, count = Path(path).stem or path, Path(path).stem or path, 1
+        while name in {*named, 'train', HELD_OUT}:
+            count += 1
+            name = f'{stem} {count}'
+        named[name] = path
+    return named
+
+
+def read_signals(bag: str, robot: Robot, options: IdentifyOptions, remarks: list[str]) -> Signals:
+    """Return the signals of a recording; what is odd about it is appended to `remarks`."""
+    recording = open_recording(bag)
+    events = recording.events(options.joint_states, options.command)
+    try:
+        signals = collect_signals(
+            events, robot, max_gap=MAX_GAP_S, effort_source=options.effort_source
+        )
+    except RecordingError as error:
+        raise RecordingError(f'{bag}: {error.found}', error.expected, error.remedy) from error
+    remarks += recording.remarks
+    remarks += [
+        f'{bag}: {count} messages could not be read: {why}'
+        for why, count in recording.unreadable.items()
+    ]
+    return signals
+
+
+def best_coefficients(found: Identification) -> np.ndarray:
+    """Return those of real bodies where there are bodies, else those of the physics."""
+    if found.consistent is not None:
+        return found.consistent.coefficients
+    return found.physics.coefficients.mean
+
+
+def roll_out_held(
+    found: Identification, signals: Signals, tests: Mapping[str, Signals]
+) -> dict[str, tuple[RolloutScore, ...]]:
+    """Simulate the identified robot over what was held out, from many starts.
+
+    Stretches too short for a horizon are left out, and so is a robot whose mass matrix the
+    coefficients leave singular.
+    """
+    scores = {}
+    for name, data in found.held.items():
+        stretches = _stretches(found, tests.get(name, signals), data)
+        done = [_scored(found, stretches, horizon) for horizon in HORIZONS]
+        scores[name] = tuple(score for score in done if score is not None)
+    return scores
+
+
+def _stretches(found: Identification, signals: Signals, data: FilteredData) -> list[Stretch]:
+    """Return time, position, velocity and effort at the full rate of each held-out stretch."""
+    plan = found.choice.plan
+    light = ZeroPhase(signals.rate, plan.state_cutoff)
+    motions = [
+        (signals.time[s], smoothed_motion(signals, s, plan.velocity_source, light), s)
+        for s in signals.segments
+    ]
+    stretches = []
+    for block in np.unique(data.block):
+        rows = data.time[data.block == block]
+        for time, motion, segment in motions:
+            kept = slice(*np.searchsorted(time, (rows[0], rows[-1])))
+            if kept.stop - kept.start > 1:
+                effort = signals.effort[segment][kept]
+                stretches.append(
+                    (time[kept], motion.position[kept], motion.velocity[kept], effort)
+                )
+    return stretches
+
+
+def _scored(
+    found: Identification, stretches: list[Stretch], horizon: float | None
+) -> RolloutScore | None:
+    if horizon is None:  # as long as the longest one
+        stretches = sorted(stretches, key=lambda s: len(s[0]))[-1:]
+    windows = []
+    for stretch in stretches:
+        with suppress(RecordingError):
+            windows.append(cut_windows(*stretch, horizon, _STRIDE_S))
+    try:
+        return score_windows(joined(windows), found.robot, best_coefficients(found))
+    except (ValueError, np.linalg.LinAlgError):
+        return None

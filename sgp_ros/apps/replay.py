@@ -1,0 +1,287 @@
+"""`sgp replay`: a recording through the online engine, with everything it tells."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sgp_ros.apps.identified_robot import nominal_coefficients, write_identified
+from sgp_ros.apps.parameter_file import find_shipped, load_parameters
+from sgp_ros.batch.bodies import nearest_bodies
+from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.replay import is_record, replay
+from sgp_ros.engine.results import Step
+from sgp_ros.engine.samples import CommandSample, Event, JointSample
+from sgp_ros.errors import ConfigError, NumericalError, RecordingError
+from sgp_ros.recordings.predictions import PredictionTopics, outputs, write_outputs
+from sgp_ros.recordings.reader import Recording, open_recording
+from sgp_ros.recordings.writer import RecordingWriter
+from sgp_ros.report.files import write_text
+from sgp_ros.report.history import History
+from sgp_ros.report.html import write_report
+from sgp_ros.report.metrics import Timing, collect_metrics
+from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.robot import Robot
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayOptions:
+    """Choices of a replay.
+
+    Attributes:
+        joint_states: topic of the states; None chooses it.
+        command: topic of the commands; None chooses it, `none` takes no commands.
+        model: saved model to continue from; None starts anew.
+        is_learning: whether to learn, or only to predict and score.
+        truth: `truth.json` of a simulation to compare the parameters with.
+    """
+
+    joint_states: str | None = None
+    command: str | None = None
+    model: str | None = None
+    is_learning: bool = True
+    truth: str | None = None
+
+
+def run_replay(
+    bag: str,
+    robot_name: str,
+    params: str | None,
+    out: Path,
+    options: ReplayOptions,
+    *,
+    progress: Callable[[float], None],
+) -> dict[str, Any]:
+    """Replay a recording and write predictions, metrics, report, model and identified robot.
+
+    Args:
+        bag: the recording.
+        robot_name: built-in name, robot YAML or URDF.
+        params: ROS 2 parameter file; None takes the shipped one of the robot, if there is one.
+        out: folder of the results.
+        options: see `ReplayOptions`.
+        progress: called with the share that is done.
+
+    Raises:
+        ConfigError: a wrong robot, parameter file, model or truth.
+        RecordingError: nothing in the recording can be used.
+    """
+    robot = load_robot(robot_name)
+    truth = load_truth(options.truth) if options.truth else None
+    recording = open_recording(bag)
+    engine = _make_engine(robot, params, options)
+    remarks = list(recording.remarks)
+    history, timing = History(), Timing()
+    out.mkdir(parents=True, exist_ok=True)
+    with ExitStack() as stack:
+        writer = stack.enter_context(RecordingWriter(out / 'predictions.mcap'))
+
+        def keep(step: Step) -> None:
+            history.take(engine, step)
+            for estimate in step.estimates:
+                found = outputs(estimate)
+                if found is not None:
+                    write_outputs(writer, PredictionTopics(), found)
+
+        run_events(engine, recording, options, keep, timing, progress)
+        _check_use(engine, recording, options)
+    remarks += [f'{count} messages could not be read: {reason}'
+                for reason, count in recording.unreadable.items()]  # fmt: skip
+    remark = write_identified_robot(out, engine)
+    remarks += [remark] if remark else []
+    metrics = collect_metrics(engine, Path(bag).name, timing=timing, remarks=remarks)
+    write_text(out / 'metrics.json', json.dumps(metrics, indent=1, allow_nan=False) + '\n')
+    save_model(out / 'model.npz', engine.snapshot())
+    write_report(out, engine, history, metrics, truth=truth)
+    print_summary(metrics, truth)
+    print(f'report: {out / "report.html"}')
+    return metrics
+
+
+def run_events(
+    engine: Engine,
+    recording: Recording,
+    options: ReplayOptions,
+    on_step: Callable[[Step], None],
+    timing: Timing,
+    progress: Callable[[float], None],
+) -> None:
+    """Push every event of a recording, timing each push; obey the changes of a live record."""
+    obey = is_record(recording.events(options.joint_states, options.command))
+    total = sum(topic.count or 0 for topic in recording.topics)
+    stamps: list[int] = []
+    began = time.perf_counter()
+    replay(
+        engine,
+        _counted(recording.events(options.joint_states, options.command), total, stamps, progress),
+        on_step,
+        obey_record=obey,
+        push=_timed(engine.push, timing),
+    )
+    timing.wall_s = time.perf_counter() - began
+    if stamps:
+        timing.recorded_s = (max(stamps) - min(stamps)) * 1e-9
+    progress(1.0)
+
+
+def _timed(push: Callable[[Event], Step], timing: Timing) -> Callable[[Event], Step]:
+    def timed(event: Event) -> Step:
+        began = time.perf_counter()
+        step = push(event)
+        timing.push_s.append(time.perf_counter() - began)
+        return step
+
+    return timed
+
+
+def _counted(
+    events: Iterator[Event], total: int, stamps: list[int], progress: Callable[[float], None]
+) -> Iterator[Event]:
+    for i, event in enumerate(events):
+        stamps.append(event.stamp_ns)
+        if total and i % 100 == 0:
+            progress(min(i / total, 0.99))
+        yield event
+
+
+def load_model(path: str) -> Mapping[str, np.ndarray]:
+    """Return the arrays of a saved model; objects are refused.
+
+    Raises:
+        ConfigError: no such file, or none of this kind.
+    """
+    if not Path(path).is_file():
+        raise ConfigError(f'no model file {path}', 'a model.npz of `sgp replay` or ~/save')
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return dict(file)
+    except (ValueError, OSError, EOFError) as error:
+        raise ConfigError(f'{path} is no saved model ({error})', 'a model.npz') from error
+
+
+def load_truth(path: str) -> dict[str, float]:
+    """Return the true coefficients of a `truth.json` by name.
+
+    Raises:
+        ConfigError: no such file or no coefficients in it.
+    """
+    try:
+        document = json.loads(Path(path).read_text(encoding='utf-8'))
+        return {name: float(c['value']) for name, c in document['coefficients'].items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise ConfigError(
+            f'{path} holds no coefficients ({error})', 'a truth.json of `sgp simulate`'
+        ) from error
+
+
+def save_model(path: Path, snapshot: Mapping[str, np.ndarray]) -> None:
+    """Write a snapshot under a temporary name, then rename it."""
+    growing = path.with_name(f'{path.name}.part')
+    with growing.open('wb') as file:
+        np.savez(file, allow_pickle=False, **snapshot)
+    growing.replace(path)
+
+
+def write_identified_robot(out: Path, engine: Engine) -> str:
+    """Write the identified robot: of real bodies, where it has bodies.
+
+    Returns:
+        Where none are found the estimate itself is written, and this says so; else empty.
+    """
+    robot, remark, bodies = engine.robot, '', None
+    values, root = engine.information()
+    std = np.array([math.inf if p.std is None else p.std for p in engine.parameters()])
+    if len(values):
+        try:
+            bodies = nearest_bodies(robot, values, root, nominal_coefficients(robot))
+        except NumericalError as error:
+            remark = f'the identified robot is the estimate, its bodies may not exist: {error}'
+    values = values if bodies is None else bodies.coefficients
+    write_identified(out, robot, values, std, has_bodies=not remark)
+    return remark
+
+
+def print_summary(metrics: Mapping[str, Any], truth: Mapping[str, float] | None) -> None:
+    """Print scores per joint and parameters with their intervals."""
+    samples = metrics['samples']
+    refused = {reason: n for reason, n in samples['refused'].items() if n}
+    print(f'{samples["read"]} states read, {samples["used"]} used, refused: {refused or "none"}')
+    for joint, channels in metrics['joints'].items():
+        for channel, score in channels.items():
+            alone = metrics['physics_alone'].get(joint, {}).get(channel)
+            beside = f', physics alone {alone["nmse"]:.3g}' if alone else ''
+            print(
+                f'{joint:12s} {channel:12s} nMSE {score["nmse"]:.3g}{beside}; '
+                f'{100 * score["coverage95"]:.1f} % inside the 95 % interval'
+            )
+    for parameter in metrics['parameters']:
+        print(_parameter_line(parameter, truth))
+
+
+def _parameter_line(parameter: Mapping[str, Any], truth: Mapping[str, float] | None) -> str:
+    name, std = parameter['name'], parameter['std']
+    if std is None:
+        return f'{name:12s} not determined by this motion'
+    text = f'{name:12s} {parameter["value"]:11.5g} +- {1.96 * std:<9.3g} {parameter["unit"]}'
+    if truth and name in truth:
+        text += f'   true {truth[name]:.5g}'
+    return text
+
+
+def _make_engine(robot: Robot, params: str | None, options: ReplayOptions) -> Engine:
+    # settings are shipped for built-in robots; a URDF may have the same name by chance
+    is_built_in = params is None and not robot.source
+    shipped = find_shipped(f'{robot.name}.yaml') if is_built_in else None
+    source = params or shipped
+    settings = load_parameters(source) if source else {}
+    config = EngineConfig.from_mapping(settings, robot)
+    engine = Engine(robot, config)
+    if options.model:
+        engine.restore(load_model(options.model))
+        engine.begin_stream()
+    if not options.is_learning:
+        engine.change({'learning.enabled': False})
+    return engine
+
+
+def _check_use(engine: Engine, recording: Recording, options: ReplayOptions) -> None:
+    """Raise where not one state could be used, saying why."""
+    counts = engine.counts
+    if counts.used > 0:
+        return
+    reasons = {reason: n for reason, n in counts.refused.items() if n}
+    found = f'{recording.path}: none of {counts.read} states can be used, refused: {reasons}'
+    if reasons.get('unknown_joint'):
+        seen: Sequence[str] = next(
+            (
+                event.names
+                for event in recording.events(options.joint_states, options.command)
+                if isinstance(event, JointSample)
+            ),
+            (),
+        )
+        raise RecordingError(
+            f'{found}; its joints are {list(seen)}',
+            f'joints {list(engine.robot.joint_names)} of robot {engine.robot.name}',
+            'rename them with `joints:` in a robot YAML',
+        )
+    if reasons.get('unpaired'):
+        has_commands = any(
+            isinstance(event, CommandSample)
+            for event in recording.events(options.joint_states, options.command)
+        )
+        raise RecordingError(
+            found,
+            'a command before each state (command.timeout) or effort in the states',
+            'raise command.timeout' if has_commands else 'name the topic with --command',
+        )
+    raise RecordingError(found, 'finite positions with increasing stamps')

@@ -1,0 +1,113 @@
+"""The simulator that a name, a URDF or a robot YAML asks for, with the effects that it states."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from sgp_ros.errors import ConfigError
+from sgp_ros.robots.effect_terms import ON_TREE
+from sgp_ros.robots.nominal import Nominal, nominal_model
+from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.stated_effects import StatedEffect
+from sgp_ros.robots.urdf_robot import stated_part, urdf_text
+from sgp_ros.simulation.assembly import find_simulator
+from sgp_ros.simulation.effects import ChosenEffect
+from sgp_ros.simulation.simulator import Simulator
+from sgp_ros.simulation.tree_part import Load, TreePart
+from sgp_ros.simulation.tree_simulator import tree_simulator
+
+_ABOUT_ZERO = (
+    'stribeck_friction', 'asymmetric_coulomb', 'load_friction', 'friction_drift',
+)  # fmt: skip
+"""Effects of which a diagnosis may leave one level just below zero, where it is none."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulatedRobot:
+    """What is simulated.
+
+    Attributes:
+        simulator: of the robot without the effects.
+        name: of its recording.
+        effects: those that its robot YAML states.
+    """
+
+    simulator: Simulator
+    name: str
+    effects: tuple[ChosenEffect, ...] = ()
+
+
+def find_robot(robot: str) -> SimulatedRobot:
+    """Return what to simulate for a name, a URDF file or a robot YAML.
+
+    Raises:
+        ConfigError: nothing of the kind, or an effect that the simulation cannot have.
+    """
+    path = Path(robot)
+    if path.suffix in {'.yaml', '.yml'}:
+        return _of_yaml(path)
+    if path.suffix != '.urdf':
+        return SimulatedRobot(find_simulator(robot), robot)
+    if not path.is_file():
+        raise ConfigError(f'no file {path}', 'a URDF')
+    return SimulatedRobot(_of_urdf(path), path.stem)
+
+
+def _of_urdf(path: Path) -> Simulator:
+    try:
+        return tree_simulator(path.read_text(encoding='utf-8-sig'))
+    except UnicodeDecodeError as error:
+        raise ConfigError(f'URDF {path} is not UTF-8 ({error})', 'a URDF in UTF-8') from error
+
+
+def _of_yaml(path: Path) -> SimulatedRobot:
+    nominal = nominal_model(load_robot(str(path)))
+    last = {e.name: e for e in nominal.effects if e.name in ON_TREE}
+    before = [e for e in nominal.effects if last.get(e.name, e) is not e]
+    simulator = tree_simulator(urdf_text(nominal.robot), _part(nominal, before))
+    effects = tuple(_chosen(e, nominal) for e in nominal.effects if e not in before)
+    return SimulatedRobot(simulator, path.stem, effects)
+
+
+def _part(nominal: Nominal, before: Iterable[StatedEffect]) -> TreePart:
+    """Return what moves, is driven and carried as a robot from a URDF states it.
+
+    Args:
+        nominal: the robot.
+        before: payloads below the last one, and tilts of the base that a later one replaces.
+    """
+    robot = nominal.robot
+    plan, payload = stated_part(robot)
+    last = nominal.plain.link_names[nominal.plain.size - 1]
+    loads = [] if payload is None else [
+        Load(payload.link, payload.mass, payload.com, payload.inertia)
+    ]  # fmt: skip
+    loads += [
+        Load(last, e.numbers['mass'], tuple(e.numbers[axis] for axis in 'xyz'))
+        for e in before if e.name == 'payload'
+    ]  # fmt: skip
+    return TreePart(
+        robot.joint_names,
+        plan.locked,
+        tuple(joint.name for joint in robot.joints if joint.is_actuated),
+        {joint.name: joint.effort_gain for joint in robot.joints},
+        tuple(loads),
+    )
+
+
+def _chosen(stated: StatedEffect, nominal: Nominal) -> ChosenEffect:
+    """Return a stated effect in the words of the simulation."""
+    values: dict[str, float | str] = {
+        name: max(number, 0.0) if stated.name in _ABOUT_ZERO else number
+        for name, number in stated.numbers.items()
+    }
+    if stated.kind:
+        values['kind'] = stated.kind
+    place = stated.place
+    if place is not None and place.source >= 0:
+        values['source_joint'] = nominal.tree.joint_names[place.source]
+    if place is not None and place.side:
+        values['side'] = 'upper' if place.side > 0 else 'lower'
+    return ChosenEffect(stated.name, stated.joint, values)

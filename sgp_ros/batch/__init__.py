@@ -1,0 +1,1 @@
+"""Whole recordings: signals, filters, fits with all rows, roll-outs."""

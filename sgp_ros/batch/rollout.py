@@ -1,0 +1,138 @@
+"""Roll-outs: the identified robot simulated under recorded efforts.
+
+Many roll-outs that start at different times run in lock-step, so that the cost of a step is that
+of one call of the regressor for all of them. The integrator is the classical Runge-Kutta method of
+order four between the moments at which a joint with dry friction stops; these moments are found
+by a linear interpolation of the velocity, exact to the order of the step squared.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sgp_ros.batch.forward import (
+    DryFriction,
+    Dynamics,
+    ForcedMotion,
+    Residual,
+    acceleration_under,
+    dry_friction,
+)
+from sgp_ros.robots.robot import Robot
+
+
+def roll_out(
+    robot: Robot,
+    W: np.ndarray,
+    start_q: np.ndarray,
+    start_v: np.ndarray,
+    effort: np.ndarray,
+    dt: float,
+    substeps: int = 1,
+    residual: Residual | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Simulate m roll-outs of n steps in parallel.
+
+    A substep must resolve what the columns do with velocity: for friction written as
+    `tanh(v / width)` with level F on an inertia J, `dt / substeps < 2.7 J width / F`. Friction
+    written as `sign(v)` has no such limit: a joint at rest sticks, see `dry_friction`. O(n m)
+    regressors.
+
+    Args:
+        robot: physics of k joints, linear in W.
+        W: (p,) [unit of each coefficient].
+        start_q: (m, k) [rad or m].
+        start_v: (m, k) [rad/s or m/s].
+        effort: (m, n, k), constant during each step [N m, N or the joint's command unit].
+        dt: length of a step [s].
+        substeps: of the integrator in each step.
+        residual: mean of Z from q (m, k) and v (m, k) to (m, k) [unit of the target].
+
+    Returns:
+        Positions and velocities at the start and after each step, both (m, n + 1, k); not a
+        number from where a roll-out left the range of floating-point numbers.
+
+    Raises:
+        ValueError: shapes that do not belong together, or no positive step.
+    """
+    m, n, k = effort.shape
+    if start_q.shape != (m, k) or start_v.shape != (m, k) or k != len(robot.joints):
+        raise ValueError(f'start {start_q.shape}, {start_v.shape}, effort {effort.shape}')
+    if not dt > 0.0 or substeps < 1:
+        raise ValueError(f'dt {dt}, substeps {substeps}')
+    dynamics = Dynamics(robot, W, residual)
+    q, v = np.full((2, m, n + 1, k), np.nan)
+    q[:, 0], v[:, 0] = start_q, start_v
+    with np.errstate(all='ignore'):  # a roll-out that diverges overflows, and is reported so
+        for i in range(n):
+            state = q[:, i], v[:, i]
+            for _ in range(substeps):
+                state = advance(dynamics, *state, effort[:, i], dt / substeps)
+            q[:, i + 1], v[:, i + 1] = state
+    return q, v
+
+
+def advance(
+    dynamics: ForcedMotion, q: np.ndarray, v: np.ndarray, effort: np.ndarray, h: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Take one step of m states, cut where joints with dry friction stop, 2 k times at most.
+
+    Args:
+        dynamics: of k joints.
+        q: (m, k) [rad or m].
+        v: (m, k) [rad/s or m/s].
+        effort: (m, ...), constant during the step.
+        h: length of the step [s].
+
+    Returns:
+        positions and velocities after it; those of rows that are not finite stay as they are.
+    """
+    q, v = q.copy(), v.copy()
+    left = np.full((len(q), 1), h)
+    rows = np.flatnonzero(np.isfinite(q).all(axis=1) & np.isfinite(v).all(axis=1))
+    for cuts_left in reversed(range(2 * q.shape[1] + 1)):
+        if not len(rows):
+            break
+        start = q[rows], v[rows], effort[rows]
+        friction = dry_friction(dynamics, *start)
+        q1, v1 = _runge_kutta(dynamics, friction, *start, left[rows])
+        moment = _moment_of_stop(start[1], v1, friction.side)
+        share = moment.min(axis=1, keepdims=True)  # (rows, 1)
+        stops = moment < 1.0
+        if cuts_left and stops.any():
+            q1, v1 = _runge_kutta(dynamics, friction, *start, share * left[rows])
+            stops &= moment == share
+        q[rows], v[rows] = q1, np.where(stops, 0.0, v1)
+        left[rows] *= 1.0 - share
+        rows = rows[share[:, 0] < 1.0]
+    return q, v
+
+
+def _moment_of_stop(v: np.ndarray, v1: np.ndarray, side: np.ndarray) -> np.ndarray:
+    """Share of the step after which each joint with dry friction stops; 1 where none does."""
+    stops = side * v1 < 0.0
+    return np.divide(v, v - v1, out=np.ones_like(v), where=stops)
+
+
+def _runge_kutta(
+    dynamics: ForcedMotion,
+    friction: DryFriction,
+    q: np.ndarray,
+    v: np.ndarray,
+    effort: np.ndarray,
+    h: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Step of the classical method with the state of dry friction held; h is (m, 1)."""
+
+    def a(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return acceleration_under(dynamics, friction, q, v, effort)
+
+    a1 = a(q, v)
+    v2 = v + 0.5 * h * a1
+    a2 = a(q + 0.5 * h * v, v2)
+    v3 = v + 0.5 * h * a2
+    a3 = a(q + 0.5 * h * v2, v3)
+    v4 = v + h * a3
+    a4 = a(q + h * v3, v4)
+    ended = q + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4)
+    return ended, v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)

@@ -1,1 +1,0 @@
-"""The mathematics of semi-parametric Gaussian processes: arrays in, arrays out."""

@@ -1,1 +1,0 @@
-"""Speed and memory beside rivals and the machine's limit."""

@@ -1,1 +1,0 @@
-"""The experiments of Wu and Movellan, with every method through one interface."""

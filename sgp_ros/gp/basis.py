@@ -1,0 +1,208 @@
+"""Joint inference of W and Z over a stream of any length, at constant cost and memory.
+
+W and Z are predicted from what the whole stream told of them (`gp.stream_basis`). No sample has
+to be kept for that. The last ones are kept all the same: hyper-parameters are fitted to them, and
+what other hyper-parameters need beyond what the stream told is learned from them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from sgp_ros.gp.factor import Whitening
+from sgp_ros.gp.forgetting import Forgetting
+from sgp_ros.gp.information import Information
+from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.online_prediction import OnlinePrediction
+from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.sample_buffer import SampleBuffer
+from sgp_ros.gp.state_parts import part_of
+from sgp_ros.gp.stream_basis import StreamBasis
+
+
+class BasisRegression:
+    """The posterior after each sample, in a basis of bounded size.
+
+    Args:
+        model: hyper-parameters, k kernels and k noise variances.
+        prior: of W.
+        budget: most samples kept for fits of the hyper-parameters, the last ones.
+        features: most features of each component.
+        remember: whether other hyper-parameters take over what samples told that are gone.
+        forgetting: samples after which what was learned counts 1/e; 0 never forgets.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        prior: CoefficientPrior,
+        budget: int,
+        features: int,
+        *,
+        remember: bool = True,
+        forgetting: float = 0.0,
+    ) -> None:
+        self._prior = Information.of_prior(prior)
+        self._forgetting = Forgetting(forgetting, self._prior)
+        self._features = features
+        self._budget = budget
+        self._remember = remember
+        self._model = model
+        self._version = 0
+        self._gone = 0
+        self._samples = SampleBuffer.empty(len(model.kernels), prior.size).with_room(budget + 1)
+        self._basis = StreamBasis(model, self._prior, features)
+
+    @property
+    def model(self) -> Model:
+        """Hyper-parameters in force."""
+        return self._model
+
+    @property
+    def information(self) -> Information:
+        """What is known of W."""
+        return self._basis.total
+
+    @property
+    def size(self) -> int:
+        """Number of samples kept for fits."""
+        return self._samples.size
+
+    @property
+    def features(self) -> tuple[int, ...]:
+        """Features in use by each component."""
+        sizes = {j: block.size for block in self._basis.blocks for j in block.group.outputs}
+        return tuple(sizes[j] for j in sorted(sizes))
+
+    @property
+    def unresolved(self) -> int:
+        """Samples at which the features of a component had no room for what Z may do there.
+
+        Such samples tell W and Z little: what Z does there may be the same at each return, so
+        they count as if it were.
+        """
+        return self._basis.unresolved
+
+    @property
+    def buffer(self) -> Observations:
+        """A copy of the kept samples, the last ones of the stream."""
+        return self._samples.observations()
+
+    @property
+    def base(self) -> Information:
+        """What the prior tells of W, and those that are gone beside the kept samples. O(n m^2)."""
+        if not (self._remember and self._gone):
+            return self._prior.copy()
+        kept = StreamBasis.of_samples(self._model, self._prior, self._features, self._samples)
+        gone = self._basis.total.less(kept.total)
+        return self._prior.with_rows(gone.R, gone.z)
+
+    def predict(self, u: np.ndarray, f: np.ndarray) -> OnlinePrediction:
+        """Predict X at input u (d,) with regressor f (k, p). O(k m^2)."""
+        features = self._basis.features(u)
+        pairs = zip(self._basis.blocks, features, strict=True)
+        return self._predict(u, f, features, tuple(block.gain(found) for block, found in pairs))
+
+    def with_regressor(self, prediction: OnlinePrediction, f: np.ndarray) -> OnlinePrediction:
+        """Predict for another regressor f (k, p) at an input that Z sees as the same. O(k m p)."""
+        return self._predict(prediction.u, f, prediction.whitenings, prediction.gains)
+
+    def _predict(
+        self,
+        u: np.ndarray,
+        f: np.ndarray,
+        features: tuple[Whitening, ...],
+        gains: tuple[np.ndarray, ...],
+    ) -> OnlinePrediction:
+        rows, mean, variance = f.copy(), np.zeros(len(f)), np.zeros(len(f))
+        for block, found, gain in zip(self._basis.blocks, features, gains, strict=True):
+            outputs = list(block.group.outputs)
+            explained, mean[outputs], variance[outputs] = block.explain(found, gain)
+            rows[outputs] -= explained
+        mean, covariance = self._basis.total.predict(rows, mean, variance)
+        return OnlinePrediction(mean, covariance, u, f, features, self._version, gains)
+
+    def learn(self, prediction: OnlinePrediction, y: np.ndarray) -> None:
+        """Add the sample that `prediction` was made for, observed as y (k,). O(k m (m + p)).
+
+        Raises:
+            ValueError: the model changed since the prediction.
+        """
+        if prediction.version != self._version:
+            raise ValueError('the prediction was made before the last change of the model')
+        data = np.concatenate([prediction.f, y[:, None]], axis=1)  # (k, p + 1)
+        self._learn(prediction.u, prediction.whitenings, data)
+
+    def learn_all(self, data: Observations) -> None:
+        """Learn samples as `learn` does one by one."""
+        for u, f, y in zip(data.U, data.F, data.y, strict=True):
+            self._learn(u, self._basis.features(u), np.concatenate([f, y[:, None]], axis=1))
+
+    def _learn(self, u: np.ndarray, features: tuple[Whitening, ...], data: np.ndarray) -> None:
+        self._version += 1
+        if self._forgetting.factor != 1.0:
+            self._basis.fade(self._forgetting)
+            self._samples.fade(self._forgetting.factor)
+        self._basis.absorb(u, features, data)
+        self._samples.append(u, data)
+        self._keep_to_budget()
+
+    def _keep_to_budget(self) -> None:
+        while self.size > self._budget:
+            self._samples.drop(0)
+            self._gone += 1
+
+    def change(
+        self,
+        model: Model | None = None,
+        budget: int | None = None,
+        *,
+        remember: bool | None = None,
+        policy: str | None = None,
+        forgetting: float | None = None,
+    ) -> None:
+        """Take other hyper-parameters, budget or memory; `policy` says nothing here.
+
+        While the kept samples are the whole stream, it is learned again under other
+        hyper-parameters; later what it told is taken over (`gp.feature_change`), or
+        without memory the kept samples are learned again. O(k m^3 + n k m^2).
+        """
+        del policy
+        self._remember = self._remember if remember is None else remember
+        if model is not None and model != self._model:
+            if self._gone and not self._remember:
+                self._basis = StreamBasis.of_samples(
+                    model, self._prior, self._features, self._samples
+                )
+                self._gone = 0
+            else:
+                self._basis = self._basis.under(model, self._samples, is_whole=not self._gone)
+            self._model = model
+            self._version += 1
+        if budget:
+            self._budget = budget
+            self._keep_to_budget()
+            self._samples = self._samples.with_room(budget + 1)
+        if forgetting is not None:
+            self._forgetting = Forgetting(forgetting, self._prior)
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Return everything that was learned, as arrays; `restore` takes it back."""
+        arrays = {
+            'U': self._samples.inputs, 'data': self._samples.data,
+            'weights': self._samples.weights,
+            'counts': np.array([self._gone, self._forgetting.turn]),
+        }  # fmt: skip
+        arrays |= {f'basis_{name}': array for name, array in self._basis.state().items()}
+        return {name: array.copy() for name, array in arrays.items()}
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """Continue exactly where `state` was taken."""
+        self._samples = SampleBuffer(state['U'], state['data'], state['weights'], self._budget + 1)
+        self._gone, self._forgetting.turn = (int(count) for count in state['counts'])
+        self._basis = StreamBasis.restored(
+            self._model, self._prior, self._features, part_of(state, 'basis_')
+        )
+        self._version += 1

@@ -1,0 +1,168 @@
+"""The samples that Z is conditioned on, factored: one growing factor per group of outputs.
+
+Components of X with the same covariance up to a scale share one growing factor L, with
+`A = L^-1 F` and `b = L^-1 y` of each beside it. Appending borders the factor; the solve it needs
+is the one the prediction made. Which sample leaves is a policy (`gp.retention`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from sgp_ros.gp.factor import GrowingFactor, Whitening
+from sgp_ros.gp.model import Model
+from sgp_ros.gp.output_groups import OutputGroup, output_groups
+from sgp_ros.gp.retention import RETENTIONS
+from sgp_ros.gp.sample_buffer import SampleBuffer
+from sgp_ros.gp.state_parts import part_of
+
+
+class FactoredBuffer:
+    """Samples and their factors.
+
+    Attributes:
+        model: hyper-parameters, k kernels and k noise variances.
+        samples: held, in the order in which they came.
+        groups: of outputs that share a factor.
+        factors: one per group.
+        room: most samples held at once.
+        policy: which sample leaves, a key of `RETENTIONS`.
+        rotated: samples dropped since the factors were computed.
+
+    Args:
+        model: hyper-parameters.
+        samples: to begin with.
+        room: most samples held at once.
+        policy: which sample leaves.
+        before: the same samples under other hyper-parameters or with other room. Factors of
+            groups that are the same are taken over, and `before` must not learn any more.
+
+    Raises:
+        NumericalError: the samples have no factor in double precision.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        samples: SampleBuffer,
+        room: int,
+        policy: str,
+        before: FactoredBuffer | None = None,
+    ) -> None:
+        self.model = model
+        self.samples = samples.with_room(room)
+        self.groups = output_groups(model)
+        self.room = room
+        kept: dict[OutputGroup, GrowingFactor] = {}
+        if before is not None and before.room == room:
+            kept = dict(zip(before.groups, before.factors, strict=True))
+        self.factors: tuple[GrowingFactor, ...] = tuple(
+            kept.get(group) or self._factored(group) for group in self.groups
+        )
+        self.policy = policy
+        self._retention = RETENTIONS[policy]()
+        self._retention.rebuild(model, self.factors, self.samples.inputs)
+        is_kept = before is not None and not kept.keys().isdisjoint(self.groups)
+        self.rotated: int = before.rotated if before is not None and is_kept else 0
+
+    def _factored(self, group: OutputGroup) -> GrowingFactor:
+        factor = GrowingFactor(group, self.samples.data.shape[2] - 1, self.room)
+        factor.fill(self.samples.inputs, self.samples.data[:, list(group.outputs)])
+        return factor
+
+    @property
+    def size(self) -> int:
+        """Samples held."""
+        return self.samples.size
+
+    @property
+    def rows(self) -> np.ndarray:
+        """What the samples tell of W: rows of unit noise and their values, (n k, p + 1)."""
+        width = self.samples.data.shape[2]
+        weights = self.samples.weights[:, None, None]
+        return np.vstack([(weights * factor.white).reshape(-1, width) for factor in self.factors])
+
+    def whiten(self, u: np.ndarray) -> tuple[Whitening, ...]:
+        """Return an input u (d,) against the samples, one per factor. O(n^2 / 2) each."""
+        return tuple(factor.whiten(u) for factor in self.factors)
+
+    def explain(
+        self, whitenings: tuple[Whitening, ...]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return what the samples tell at an input: of each regressor, of Z, and its variance.
+
+        Returns:
+            Shapes (k, p), (k,) and (k,): Z is the second less the first times W.
+        """
+        explained = np.empty(self.samples.data.shape[1:])
+        variance = np.empty(len(explained))
+        for group, whitening in zip(self.groups, whitenings, strict=True):
+            outputs = list(group.outputs)
+            explained[outputs] = whitening.explained
+            variance[outputs] = np.square(group.scales) * whitening.variance
+        return explained[:, :-1], explained[:, -1], variance
+
+    def require_room(self, whitenings: tuple[Whitening, ...]) -> None:
+        """Refuse an input that repeats the samples.
+
+        Raises:
+            NumericalError: a factor would lose its positive diagonal.
+        """
+        for factor, whitening in zip(self.factors, whitenings, strict=True):
+            factor.pivot(whitening)
+
+    def append(
+        self, u: np.ndarray, whitenings: tuple[Whitening, ...], data: np.ndarray
+    ) -> list[np.ndarray]:
+        """Add a sample at the input u (d,) of `whitenings`. O(n) per factor.
+
+        Args:
+            u: input.
+            whitenings: of it.
+            data: regressors and, last, observations (k, p + 1).
+
+        Returns:
+            `p(y | earlier samples, W)`: rows of unit noise and their values, per factor.
+        """
+        rows = [
+            factor.append(whitening, data[list(group.outputs)])
+            for group, factor, whitening in zip(self.groups, self.factors, whitenings, strict=True)
+        ]
+        self.samples.append(u, data)
+        self._retention.append(self.factors, u)
+        return rows
+
+    def drop(self) -> None:
+        """Remove the sample that the policy chooses. O(n^2) per factor."""
+        m = self._retention.choose(self.factors)
+        self._retention.drop(self.factors, m)
+        for factor in self.factors:
+            factor.drop(m)
+        self.samples.drop(m)
+        self.rotated += 1
+
+    def distance(self, exact: FactoredBuffer) -> float:
+        """Return the largest relative distance of a factor from that of the same samples."""
+        pairs = zip(self.factors, exact.factors, strict=True)
+        return max((one.distance(other) for one, other in pairs), default=0.0)
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Return what `restore` needs, as arrays."""
+        arrays = {
+            'U': self.samples.inputs, 'data': self.samples.data,
+            'weights': self.samples.weights, 'rotated': np.array(self.rotated),
+        }  # fmt: skip
+        for j, factor in enumerate(self.factors):
+            arrays |= {f'factor{j}_{name}': array for name, array in factor.state().items()}
+        retained = self._retention.state()
+        return arrays | {f'retention_{name}': array for name, array in retained.items()}
+
+    def restore(self, state: Mapping[str, np.ndarray], room: int) -> None:
+        """Continue exactly where `state` was taken, with room for so many samples."""
+        self.samples = SampleBuffer(state['U'], state['data'], state['weights'], room)
+        self.rotated = int(state['rotated'])
+        for j, factor in enumerate(self.factors):
+            factor.restore(part_of(state, f'factor{j}_'))
+        self._retention.restore(part_of(state, 'retention_'))

@@ -1,0 +1,195 @@
+"""What is known of W: a triangular system `R w = z` with unit noise, which grows by rows.
+
+The posterior is N(R^-1 z, (R^T R)^-1). A row of zeros in R is a direction nothing has determined
+yet; until there is none, an orthogonal decomposition with scaled columns takes the place of the
+triangular solve.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import linalg
+
+from sgp_ros.gp.posterior import NULL_TOLERANCE, RANK_TOLERANCE, ZERO_COLUMN
+from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.rotations import (
+    absorb_rows,
+    absorbed_rows_numpy,
+    has_safe_diagonal,
+    solve_rows,
+    solve_upper,
+)
+
+DIFFERENCE_TOLERANCE = 1e-10
+"""Share of a precision below which a difference from it is rounding."""
+
+
+class Information:
+    """Square-root information on p coefficients.
+
+    Args:
+        R: (p, p) upper triangular.
+        z: (p,).
+    """
+
+    def __init__(self, R: np.ndarray, z: np.ndarray) -> None:
+        self.R = R
+        self.z = z
+        self._solved: _Solved | None = None
+
+    @classmethod
+    def nothing(cls, p: int) -> Information:
+        """Return no information on p coefficients."""
+        return cls(np.zeros((p, p)), np.zeros(p))
+
+    @classmethod
+    def of_prior(cls, prior: CoefficientPrior) -> Information:
+        """Return the information that a prior holds."""
+        p = prior.size
+        return cls(*absorbed_rows_numpy(np.zeros((p, p)), np.zeros(p), prior.root, prior.target))
+
+    def copy(self) -> Information:
+        """Return an independent copy."""
+        return Information(self.R.copy(), self.z.copy())
+
+    def absorb(self, rows: np.ndarray) -> None:
+        """Add equations of unit noise, their values in the last column of rows (r, p + 1).
+
+        O(r p^2).
+        """
+        absorb_rows(self.R, self.z, rows.copy())
+        self._solved = None
+
+    def add(self, other: Information) -> None:
+        """Add what another state tells, of independent samples. O(p^3)."""
+        self.absorb(np.column_stack([other.R, other.z]))
+
+    def fade(self, factor: float) -> None:
+        """Let all equations count `factor` times as much as before, their noise still one."""
+        self.R *= factor
+        self.z *= factor
+        self._solved = None
+
+    def scaled(self, factor: float) -> Information:
+        """Return this information as if its noise had had `1 / factor` times the deviation."""
+        return Information(factor * self.R, factor * self.z)
+
+    def with_rows(self, rows: np.ndarray, values: np.ndarray) -> Information:
+        """Return this information with equations `rows (r, p) w = values (r,)` added."""
+        return Information(*absorbed_rows_numpy(self.R, self.z, rows, values))
+
+    def less(self, other: Information) -> Information:
+        """Return what this holds beside `other`, of which it must hold all, up to rounding.
+
+        The difference of the precisions `R^T R`, scaled to a diagonal of one, by its
+        eigenvectors. Where it is lost in rounding nothing is returned, never less. O(p^3).
+        """
+        scale = np.sqrt((self.R * self.R).sum(axis=0))
+        scale[scale == 0.0] = 1.0
+        own, others = self.R / scale, other.R / scale
+        values, vectors = np.linalg.eigh(own.T @ own - others.T @ others)
+        is_known = values > DIFFERENCE_TOLERANCE
+        roots, rows = np.sqrt(values[is_known]), vectors[:, is_known].T
+        z = rows @ (own.T @ self.z - others.T @ other.z) / roots
+        return Information.nothing(len(scale)).with_rows(roots[:, None] * rows * scale, z)
+
+    @property
+    def coefficients(self) -> np.ndarray:
+        """Posterior mean of W, (p,); undetermined directions at zero."""
+        return self._solution().w
+
+    @property
+    def is_identifiable(self) -> np.ndarray:
+        """Whether each coefficient is determined, (p,) of bool."""
+        return np.linalg.norm(self._solution().null, axis=1) < NULL_TOLERANCE
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Posterior covariance over the determined directions, (p, p)."""
+        spread = self.spread(np.eye(len(self.z)))
+        return spread @ spread.T
+
+    def spread(self, rows: np.ndarray) -> np.ndarray:
+        """Return S (k, r) such that `rows W` has covariance `S S^T`, for rows (k, p)."""
+        solved = self._solution()
+        if solved.spread is not None:
+            return rows @ solved.spread
+        solution = rows.copy()
+        solve_rows(self.R, solution)
+        return solution
+
+    def is_determined(self, rows: np.ndarray) -> np.ndarray:
+        """Whether `rows W` leaves out every undetermined direction, (k,) for rows (k, p)."""
+        solved = self._solution()
+        if not solved.null.shape[1]:
+            return np.ones(len(rows), dtype=bool)
+        scaled = rows / solved.scale
+        outside = np.linalg.norm(scaled @ solved.null, axis=1)
+        return outside <= NULL_TOLERANCE * np.linalg.norm(scaled, axis=1)
+
+    def predict(
+        self, rows: np.ndarray, mean: np.ndarray, variance: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return mean (k,) and covariance (k, k) of `rows W + Z`. O(k p^2).
+
+        Args:
+            rows: (k, p).
+            mean: of Z, (k,).
+            variance: of Z, (k,), its components independent.
+
+        Returns:
+            Mean and covariance, the latter infinite on the diagonal where an undetermined
+            direction of W enters.
+        """
+        spread = self.spread(rows)  # (k, r)
+        covariance = spread @ spread.T
+        diagonal = covariance.reshape(-1)[:: len(rows) + 1]
+        diagonal += variance
+        diagonal[~self.is_determined(rows)] = np.inf
+        return mean + rows @ self.coefficients, covariance
+
+    def _solution(self) -> _Solved:
+        if self._solved is None:
+            self._solved = _Solved(self.R, self.z)
+        return self._solved
+
+
+class _Solved:
+    """Solution of one state of the system; `spread` is None where R itself is invertible."""
+
+    def __init__(self, R: np.ndarray, z: np.ndarray) -> None:
+        p = len(z)
+        self.null = np.zeros((p, 0))
+        self.spread: np.ndarray | None = None
+        if not p:
+            self.spread, self.w = np.zeros((0, 0)), np.zeros(0)
+            return
+        if has_safe_diagonal(R, ZERO_COLUMN, RANK_TOLERANCE):
+            self.w = z.copy()
+            solve_upper(R, self.w)
+            return
+        self.scale = np.sqrt((R * R).sum(axis=0))
+        is_zero = self.scale <= ZERO_COLUMN * self.scale.max(initial=0.0)
+        self.scale[is_zero] = 1.0
+        self._decompose(np.where(is_zero, 0.0, R / self.scale), z)
+
+    def _decompose(self, A: np.ndarray, z: np.ndarray) -> None:
+        """Solve `A x = z` for A (p, p) with columns of norm one, or zero, with the shortest x.
+
+        Complete orthogonal decomposition `A P = Q [L^T; 0] Z^T`: a QR with column pivoting tells
+        the rank, one of what it leaves the null space (Golub and Van Loan, section 5.4.7).
+        """
+        p = len(z)
+        factored, order, tau, _, _ = linalg.lapack.dgeqp3(A)
+        diagonal = np.abs(factored.diagonal())
+        rank = int((RANK_TOLERANCE * max(diagonal[0], 1e-300) < diagonal).sum())
+        if not rank:
+            self.spread, self.null, self.w = np.zeros((p, 0)), np.eye(p), np.zeros(p)
+            return
+        Z, L = np.linalg.qr(np.triu(factored[:rank]).T, mode='complete')  # (p, p), (p, rank)
+        Z = Z[np.argsort(order)]
+        roots = linalg.solve_triangular(L[:rank], Z[:, :rank].T, check_finite=False)
+        self.spread = roots.T / self.scale[:, None]
+        self.null = Z[:, rank:]
+        turned = linalg.lapack.dormqr('L', 'T', factored, tau, z[:, None], 64 * p)[0][:rank, 0]
+        self.w = self.spread @ turned

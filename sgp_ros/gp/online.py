@@ -1,0 +1,276 @@
+"""Joint inference of W and Z one sample at a time, with a bounded number of samples in Z.
+
+Until the first sample leaves the buffer, everything is exact. From then on the posterior is the
+product `p(W | all samples) p(Z | W, buffer)`: the first from a basis that absorbs each sample once
+(`gp.stream_basis`), the second from the factored buffer (`gp.factored_buffer`). What this
+neglects: Z given W is told by the buffer alone, and for W, Z is what the features of the basis
+can express.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from sgp_ros.errors import NumericalError
+from sgp_ros.gp.basis_ahead import BasisAhead
+from sgp_ros.gp.factor import Whitening
+from sgp_ros.gp.factored_buffer import FactoredBuffer
+from sgp_ros.gp.forgetting import Forgetting
+from sgp_ros.gp.information import Information
+from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.online_prediction import OnlinePrediction
+from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.sample_buffer import SampleBuffer
+from sgp_ros.gp.state_parts import part_of
+from sgp_ros.gp.stream_basis import StreamBasis
+
+
+class OnlineRegression:
+    """The posterior after each sample.
+
+    Args:
+        model: hyper-parameters, k kernels and k noise variances.
+        prior: of W.
+        budget: most samples that Z is conditioned on.
+        features: most features of each component by which W keeps what dropped samples told.
+        remember: whether it does; else it is known from the prior and the buffer.
+        policy: which sample leaves a full buffer, a key of `RETENTIONS`.
+        forgetting: samples after which information on W counts 1/e; 0 never forgets.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        prior: CoefficientPrior,
+        budget: int,
+        *,
+        features: int = 100,
+        remember: bool = True,
+        policy: str = 'oldest',
+        forgetting: float = 0.0,
+    ) -> None:
+        self._prior = Information.of_prior(prior)
+        self._forgetting = Forgetting(forgetting, self._prior)
+        self._features = features
+        self._budget = budget
+        self._remember = remember
+        self._version = 0
+        samples = SampleBuffer.empty(len(model.kernels), prior.size)
+        self._held = FactoredBuffer(model, samples, budget + 1, policy)
+        self._total = self._prior.copy()
+        self._basis: StreamBasis | None = None
+        self._ahead: BasisAhead | None = None
+
+    @property
+    def model(self) -> Model:
+        """Hyper-parameters in force."""
+        return self._held.model
+
+    @property
+    def information(self) -> Information:
+        """What is known of W."""
+        return self._total if self._basis is None else self._basis.total
+
+    @property
+    def size(self) -> int:
+        """Number of samples in the buffer."""
+        return self._held.size
+
+    @property
+    def unresolved(self) -> int:
+        """Samples at which the features had no room for what Z may do there.
+
+        Such samples tell W and Z little: what Z does there may be the same at each return, so
+        they count as if it were.
+        """
+        return 0 if self._basis is None else self._basis.unresolved
+
+    @property
+    def buffer(self) -> Observations:
+        """A copy of the buffered samples, in the order in which they came."""
+        return self._held.samples.observations()
+
+    @property
+    def rotated(self) -> int:
+        """Samples dropped since the factors were last computed from the buffer."""
+        return self._held.rotated
+
+    @property
+    def base(self) -> Information:
+        """What the prior tells of W, and the dropped samples beside the buffer. O(n p^2)."""
+        if self._basis is None:
+            return self._prior.copy()
+        dropped = self._basis.total.less(self._with_buffer())
+        return self._prior.with_rows(dropped.R, dropped.z)
+
+    def predict(self, u: np.ndarray, f: np.ndarray) -> OnlinePrediction:
+        """Predict X at input u (d,) with regressor f (k, p). O(n^2 / 2) per factor."""
+        return self._predict(u, f, self._held.whiten(u))
+
+    def with_regressor(self, prediction: OnlinePrediction, f: np.ndarray) -> OnlinePrediction:
+        """Predict for another regressor f (k, p) at an input that Z sees as the same. O(k p^2)."""
+        return self._predict(prediction.u, f, prediction.whitenings)
+
+    def _predict(
+        self, u: np.ndarray, f: np.ndarray, whitenings: tuple[Whitening, ...]
+    ) -> OnlinePrediction:
+        explained, mean, variance = self._held.explain(whitenings)
+        mean, covariance = self.information.predict(f - explained, mean, variance)
+        return OnlinePrediction(mean, covariance, u, f, whitenings, self._version)
+
+    def learn(self, prediction: OnlinePrediction, y: np.ndarray) -> None:
+        """Add the sample that `prediction` was made for, observed as y (k,).
+
+        One sample leaves when the budget is exceeded. O(n^2) per factor.
+
+        Raises:
+            ValueError: the model changed since the prediction.
+            NumericalError: the sample repeats others to rounding; nothing has changed.
+        """
+        if prediction.version != self._version:
+            raise ValueError('the prediction was made before the last change of the model')
+        self._held.require_room(prediction.whitenings)
+        self._version += 1
+        if self._forgetting.factor != 1.0:
+            self._fade()
+        u, data = prediction.u, np.concatenate([prediction.f, y[:, None]], axis=1)  # (k, p + 1)
+        rows = self._held.append(u, prediction.whitenings, data)
+        if self._basis is not None:
+            self._basis.absorb(u, self._basis.features(u), data)
+        else:
+            for row in rows:
+                self._total.absorb(row)
+        self._keep_to_budget()
+
+    def learn_all(self, data: Observations) -> None:
+        """Learn samples, the first ones, as `learn` does one by one. O(n^3 / 3) per factor.
+
+        Raises:
+            NumericalError: some repeat others to rounding; this model is of no further use.
+        """
+        if self._forgetting.factor != 1.0:
+            for u, f, y in zip(data.U, data.F, data.y, strict=True):
+                self.learn(self.predict(u, f), y)
+            return
+        n = len(data.U)
+        rows = np.concatenate([data.F, data.y[..., None]], axis=2)
+        samples = SampleBuffer(data.U, rows, np.ones(n), n)
+        room = max(self._budget, n) + 1
+        self._take(FactoredBuffer(self.model, samples, room, self._held.policy))
+        self._keep_to_budget()
+
+    def _fade(self) -> None:
+        self._held.samples.fade(self._forgetting.factor)
+        if self._basis is None:
+            self._forgetting.fade(self._total, ())
+        else:
+            self._basis.fade(self._forgetting)
+
+    def _look_ahead(self) -> None:
+        if self._basis is None and self._remember:
+            room = self._budget - self.size
+            # What fades as it ages can be absorbed only at the end.
+            if room < 0 or self._forgetting.factor == 1.0:
+                if self._ahead is None:
+                    basis = StreamBasis(self.model, self._prior, self._features)
+                    self._ahead = BasisAhead(basis)
+                self._ahead.catch_up(self._held.samples, room)
+
+    def _keep_to_budget(self) -> None:
+        self._look_ahead()
+        while self.size > self._budget:
+            if self._ahead is not None:
+                self._basis, self._ahead = self._ahead.basis, None
+            self._held.drop()
+            if self._basis is None:
+                self._total = self._with_buffer()
+
+    def is_sound(self, prediction: OnlinePrediction) -> bool:
+        """Whether every factor gave the observation a positive variance."""
+        try:
+            self._held.require_room(prediction.whitenings)
+        except NumericalError:
+            return False
+        return True
+
+    def refresh(self) -> float:
+        """Factor the buffer anew, O(n^3 / 3) per factor, and say how far the factors had drifted.
+
+        Returns:
+            The largest norm of a difference, over the norm of what it should have been, among
+            the factors and their whitened data; infinite where a factor was lost.
+
+        Raises:
+            NumericalError: the buffer has no factor in double precision; nothing has changed.
+        """
+        before = self._held
+        self._take(FactoredBuffer(self.model, before.samples, self._budget + 1, before.policy))
+        return before.distance(self._held)
+
+    def change(
+        self,
+        model: Model | None = None,
+        budget: int | None = None,
+        *,
+        remember: bool | None = None,
+        policy: str | None = None,
+        forgetting: float | None = None,
+    ) -> None:
+        """Take other hyper-parameters, budget, memory or policy.
+
+        O(n^3) for each factor whose hyper-parameters or room are others than before.
+
+        Raises:
+            NumericalError: the buffer has no factor under the new hyper-parameters; nothing has
+                changed.
+        """
+        model, policy = model or self.model, policy or self._held.policy
+        budget = budget or self._budget
+        remember = self._remember if remember is None else remember
+        samples = self._held.samples
+        room = max(budget, self.size) + 1
+        held = FactoredBuffer(model, samples, room, policy, before=self._held)
+        basis = self._basis if remember else None
+        if basis is not None and model != self.model:
+            basis = basis.under(model, samples, is_whole=False)
+        self._budget, self._remember, self._basis = budget, remember, basis
+        self._take(held)
+        if forgetting is not None:
+            self._forgetting = Forgetting(forgetting, self._prior)
+        self._ahead = None
+        self._keep_to_budget()
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Return everything that was learned, as arrays; `restore` takes it back."""
+        arrays = {
+            'total_R': self._total.R, 'total_z': self._total.z,
+            'turn': np.array(self._forgetting.turn),
+        }  # fmt: skip
+        arrays |= self._held.state()
+        if self._basis is not None:
+            arrays |= {f'basis_{name}': array for name, array in self._basis.state().items()}
+        return {name: array.copy() for name, array in arrays.items()}
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """Continue exactly where `state` was taken."""
+        self._held.restore(state, self._budget + 1)
+        self._total = Information(np.array(state['total_R']), np.array(state['total_z']))
+        self._forgetting.turn = int(state['turn'])
+        basis = part_of(state, 'basis_')
+        self._basis = None
+        if basis:
+            self._basis = StreamBasis.restored(self.model, self._prior, self._features, basis)
+        self._ahead = None
+        self._version += 1
+
+    def _take(self, held: FactoredBuffer) -> None:
+        self._held = held
+        if self._basis is None:
+            self._total = self._with_buffer()
+        self._version += 1
+
+    def _with_buffer(self) -> Information:
+        rows = self._held.rows
+        return self._prior.with_rows(rows[:, :-1], rows[:, -1])

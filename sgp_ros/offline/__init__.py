@@ -1,1 +1,0 @@
-"""Identification of whole recordings: both directions of time are at hand."""

@@ -1,0 +1,1 @@
+"""Laws of physics that a robot may have: one value per law."""

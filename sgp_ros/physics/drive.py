@@ -1,0 +1,116 @@
+"""The efforts that held commands give behind a delay, a characteristic and a first-order lag.
+
+Every effort is averaged with the hat of one step to either side of its grid point, and sharpened,
+as a second difference treats the position (Fornberg 1988). The averages are exact for any times of
+change: with V the twofold integral of the effort, the average is `(V(t + h) - 2 V(t) + V(t - h)) /
+h^2`, and V of a held command is piecewise quadratic. A lag `T y' + y = u` adds exponentials:
+`int y = int u - T (y - y0)`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+_SHARPEN = (1.0, -1 / 12, 1 / 90)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drive:
+    """Commands of a recording and the grids on which their efforts are wanted.
+
+    Attributes:
+        times: (c,) from which each command holds [s], strictly increasing.
+        values: (c, k) [N m or N].
+        grids: first time [s] and number of points of each stretch.
+        step: of the grids [s].
+    """
+
+    times: np.ndarray
+    values: np.ndarray
+    grids: tuple[tuple[float, int], ...]
+    step: float
+
+    def effort(
+        self,
+        joint: int,
+        *,
+        delay: float = 0.0,
+        time_constant: float = 0.0,
+        characteristic: Callable[[np.ndarray], np.ndarray] | None = None,
+    ) -> np.ndarray:
+        """Return the effort of one joint on the grids, (n,) [N m or N].
+
+        Args:
+            joint: index.
+            delay: of the command [s].
+            time_constant: of the lag behind the characteristic [s].
+            characteristic: from commands to what the motor is asked for; None for the same.
+        """
+        u = self.values[:, joint]
+        if characteristic is not None:
+            u = characteristic(u)
+        times = self.times + delay
+        parts = [
+            _averaged(times, u, time_constant, start, self.step, n) for start, n in self.grids
+        ]
+        return np.concatenate(parts)
+
+    def at(
+        self, joint: int, times: np.ndarray, *, delay: float = 0.0, time_constant: float = 0.0,
+        characteristic: Callable[[np.ndarray], np.ndarray] | None = None,
+    ) -> np.ndarray:  # fmt: skip
+        """Return the effort of one joint at given times, (n,), as `effort` but not averaged."""
+        u = self.values[:, joint]
+        if characteristic is not None:
+            u = characteristic(u)
+        knots = self.times + delay
+        i = np.maximum(np.searchsorted(knots, times, side='right') - 1, 0)
+        if time_constant <= 0.0:
+            return u[i]
+        y = _lagged(knots, u, time_constant)
+        return u[i] + (y[i] - u[i]) * np.exp(-np.maximum(times - knots[i], 0.0) / time_constant)
+
+
+def _averaged(
+    knots: np.ndarray, u: np.ndarray, time_constant: float, start: float, step: float, n: int
+) -> np.ndarray:
+    reach = len(_SHARPEN)
+    t = start + step * np.arange(-reach, n + reach)
+    origin = t[0]
+    lengths = np.diff(knots)
+    U = np.concatenate([[0.0], np.cumsum(u[:-1] * lengths)])
+    V = np.concatenate([[0.0], np.cumsum(U[:-1] * lengths + 0.5 * u[:-1] * lengths**2)])
+    i = np.maximum(np.searchsorted(knots, t, side='right') - 1, 0)
+    since = t - knots[i]
+    single = U[i] + u[i] * since
+    double = V[i] + U[i] * since + 0.5 * u[i] * since**2
+    if time_constant > 0.0:
+        y = _lagged(knots, u, time_constant)
+        now = u[i] + (y[i] - u[i]) * np.exp(-np.maximum(since, 0.0) / time_constant)
+        double = double - time_constant * (
+            single - time_constant * (now - y[0]) - y[0] * (t - origin)
+        )
+    mean = (double[2:] - 2.0 * double[1:-1] + double[:-2]) / step**2
+    result = np.zeros(n)
+    term = mean
+    for power, factor in enumerate(_SHARPEN):
+        margin = reach - 1 - power
+        result += factor * term[margin : margin + n]
+        term = np.diff(term, 2)
+    return result
+
+
+@njit(cache=True)
+def _lagged(knots: np.ndarray, u: np.ndarray, time_constant: float) -> np.ndarray:
+    """Return the output of the lag when each command begins, (c,); it starts settled."""
+    y = np.empty(len(u))
+    y[0] = u[0]
+    for i in range(1, len(u)):
+        y[i] = u[i - 1] + (y[i - 1] - u[i - 1]) * np.exp(
+            -(knots[i] - knots[i - 1]) / time_constant
+        )
+    return y

@@ -1,0 +1,164 @@
+"""What an effect can see of a recording: the motion, the commands and the robot they belong to.
+
+All arrays stand on one uniform grid. The direction of motion is averaged over each cell of the
+grid, so that a reversal between two samples counts at its time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sgp_ros.physics.drive import Drive
+from sgp_ros.rigid.rigid_body import inverse_dynamics, mass_matrix, torque_regressor
+from sgp_ros.rigid.tree import Tree
+
+if TYPE_CHECKING:
+    from sgp_ros.robots.stated_effects import StatedEffect
+
+STILL = 1e-9
+"""Range of the position within which a joint does not move [rad or m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ObservedMotion:
+    """n rows of the k joints of a robot on a uniform grid.
+
+    Attributes:
+        tree: nominal robot.
+        time: (n,) since the first state of the recording [s].
+        step: of the grid [s].
+        position, velocity, acceleration: (n, k), lightly smoothed.
+        effort: (n, k) commanded, or measured where there are no commands; 0 for passive joints.
+        drive: what the drives receive; None where only efforts were measured.
+        starts: rows at which the grid begins anew after a pause.
+        stated: effects that the nominal robot has, beside those that are part of the tree.
+    """
+
+    tree: Tree
+    time: np.ndarray
+    step: float
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    effort: np.ndarray
+    drive: Drive | None
+    starts: tuple[int, ...] = (0,)
+    stated: tuple[StatedEffect, ...] = ()
+
+    @cached_property
+    def direction(self) -> np.ndarray:
+        """Mean of sign(v) over each cell of the grid, (n, k)."""
+        v = self.velocity
+        middle = 0.5 * (v[1:] + v[:-1])
+        before = np.concatenate([v[:1], middle])
+        after = np.concatenate([middle, v[-1:]])
+        return 0.5 * (_mean_sign(before, v) + _mean_sign(v, after))
+
+    @cached_property
+    def wrapped(self) -> np.ndarray:
+        """Positions, those of continuous joints wrapped to [-pi, pi), (n, k)."""
+        q = self.position.copy()
+        turns = self.is_continuous
+        q[:, turns] = (q[:, turns] + np.pi) % (2 * np.pi) - np.pi
+        return q
+
+    @cached_property
+    def moves(self) -> np.ndarray:
+        """Whether each joint moves at all, (k,); nothing can be said of one that does not."""
+        return np.asarray(np.ptp(self.position, axis=0) > STILL)
+
+    @property
+    def moving_joints(self) -> tuple[int, ...]:
+        """Indices of the joints that move."""
+        return tuple(int(j) for j in np.flatnonzero(self.moves))
+
+    @property
+    def is_continuous(self) -> np.ndarray:
+        """Whether each joint turns without limits, (k,)."""
+        k = self.tree.size
+        return ~self.tree.is_prismatic[:k] & ~np.isfinite(self.tree.lower[:k])
+
+    @cached_property
+    def mass_diagonal(self) -> np.ndarray:
+        """Diagonal of the nominal mass matrix, (n, k) [kg m^2 or kg]."""
+        M = mass_matrix(self.tree, self.tree.parameters, self.position)
+        return np.einsum('njj->nj', M).copy()
+
+    @cached_property
+    def nominal_effort(self) -> np.ndarray:
+        """Efforts that the nominal robot takes for this motion, (n, k) [N m or N]."""
+        return self.effort_for(self.position, self.velocity, self.acceleration)
+
+    @cached_property
+    def stated_force(self) -> np.ndarray:
+        """Force of the effects that the nominal robot has, (n, k) [N m or N]."""
+        force = np.zeros(self.position.shape)
+        for effect in self.stated:
+            force += effect.force(self)
+        return force
+
+    @property
+    def dry_joints(self) -> frozenset[int]:
+        """Indices of the joints that the nominal robot's dry friction may hold."""
+        return frozenset(x.place.joint for x in self.stated if x.place and x.is_holding)
+
+    @cached_property
+    def gravity_columns(self) -> np.ndarray:
+        """Efforts that hold the robot against a unit of gravity along each root axis (n, k, 3)."""
+        still = np.zeros_like(self.position)
+        fields = (replace(self.tree, gravity=axis) for axis in np.eye(3))
+        return np.stack(
+            [inverse_dynamics(t, t.parameters, self.position, still, still) for t in fields],
+            axis=2,
+        )
+
+    @cached_property
+    def _slopes(self) -> dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        return {}
+
+    def effort_slopes(self, joint: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the slopes of the nominal efforts, (n, k) each.
+
+        They are the derivatives by position, velocity and acceleration of one joint.
+        """
+        if joint not in self._slopes:
+            found = []
+            for which in range(3):
+                ends = []
+                for sign in (1.0, -1.0):
+                    states = [self.position, self.velocity, self.acceleration]
+                    states[which] = states[which].copy()
+                    states[which][:, joint] += sign * 1e-4
+                    ends.append(self.effort_for(*states))
+                found.append((ends[0] - ends[1]) / 2e-4)
+            self._slopes[joint] = found[0], found[1], found[2]
+        return self._slopes[joint]
+
+    @cached_property
+    def last_body_columns(self) -> np.ndarray:
+        """Efforts per inertial parameter of the last link, (n, k, 10)."""
+        Y = torque_regressor(self.tree, self.position, self.velocity, self.acceleration)
+        last = self.tree.size - 1
+        return Y[:, :, 10 * last : 10 * last + 10].copy()
+
+    def sliding(self, direction: float) -> ObservedMotion:
+        """Return the same motion with every joint about to slide in one direction."""
+        changed = replace(self)
+        changed.__dict__['direction'] = np.full(self.velocity.shape, direction)
+        return changed
+
+    def effort_for(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Return the efforts of the nominal robot for a motion, (n, k) [N m or N]."""
+        rigid = inverse_dynamics(self.tree, self.tree.parameters, q, v, a)
+        return rigid + self.tree.damping[: self.tree.size] * v
+
+
+def _mean_sign(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the mean of sign on the straight line from a to b."""
+    rise = b - a
+    flat = np.abs(rise) <= 1e-300
+    return np.where(flat, np.sign(a), (np.abs(b) - np.abs(a)) / np.where(flat, 1.0, rise))

@@ -1,0 +1,111 @@
+"""Torques of a kinematic tree and their regressor for many samples at once, compiled.
+
+Forces are handed from each body to the one it hangs on, down to the root; a joint feels the part
+along the motion it permits. Torques of joints that follow another count for that one, times their
+multiplier (virtual work). Source: Featherstone 2008, Rigid Body Dynamics Algorithms, chapter 5.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sgp_ros.errors import NumericalError
+from sgp_ros.rigid.rigid_geometry import full_motion, geometry
+from sgp_ros.rigid.rigid_loops import fill_regressor, fill_torque
+from sgp_ros.rigid.tree import Tree
+
+
+def torque_regressor(
+    tree: Tree, q: np.ndarray, v: np.ndarray, a: np.ndarray, out: np.ndarray | None = None
+) -> np.ndarray:
+    """Return Y with `tau = Y @ parameters.ravel()`, (n, k, 10 b).
+
+    Columns come in tens, one ten per body in the order of `inertial.PARAMETERS`. O(b depth) per
+    sample.
+
+    Args:
+        tree: of b bodies, k of which move on their own (b = k without mimic joints).
+        q: positions, (n, k) [rad or m].
+        v: velocities, (n, k) [rad/s or m/s].
+        a: accelerations, (n, k) [rad/s^2 or m/s^2].
+        out: where to write the result, (n, k, 10 b), contiguous; fresh memory can cost more
+            than the computation.
+
+    Raises:
+        ValueError: motions or `out` of another shape.
+    """
+    full = full_motion(tree, q, v, a)
+    g = geometry(tree)
+    shape = (len(full[0]), g.size, 10 * len(tree.parents))
+    Y = np.empty(shape) if out is None else out
+    if Y.shape != shape or Y.dtype != np.float64 or not Y.flags.c_contiguous:
+        raise ValueError(f'out {Y.shape} of {Y.dtype} for a contiguous {shape} of float64')
+    fill_regressor(g, tree.gravity.copy(), *full, Y)
+    return Y
+
+
+def inverse_dynamics(
+    tree: Tree, parameters: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray
+) -> np.ndarray:
+    """Return the torques that a motion takes, (n, k) [N m or N]. O(b) per sample.
+
+    Args:
+        tree: of b bodies.
+        parameters: (b, 10) or (10 b,), in the order of `inertial.PARAMETERS`.
+        q: positions, (n, k) [rad or m].
+        v: velocities, (n, k) [rad/s or m/s].
+        a: accelerations, (n, k) [rad/s^2 or m/s^2].
+    """
+    return _inverse(tree, parameters, tree.gravity, q, v, a)
+
+
+def mass_matrix(tree: Tree, parameters: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Return the joint-space inertia, (n, k, k), a column per unit acceleration. O(k b)."""
+    n, k = np.shape(q)
+    units = np.tile(np.eye(k), (n, 1))
+    still = np.zeros((n * k, k))
+    columns = _inverse(tree, parameters, np.zeros(3), np.repeat(q, k, axis=0), still, units)
+    return columns.reshape(n, k, k).transpose(0, 2, 1)
+
+
+def forward_dynamics(
+    tree: Tree, parameters: np.ndarray, q: np.ndarray, v: np.ndarray, tau: np.ndarray
+) -> np.ndarray:
+    """Return the accelerations that torques cause, (n, k) [rad/s^2 or m/s^2]. O(k b + k^3).
+
+    Args:
+        tree: of b bodies.
+        parameters: (b, 10) or (10 b,), in the order of `inertial.PARAMETERS`.
+        q: positions, (n, k) [rad or m].
+        v: velocities, (n, k) [rad/s or m/s].
+        tau: torques, (n, k) [N m or N].
+
+    Raises:
+        NumericalError: a mass matrix that is not positive definite; the parameters are then none
+            that a body can have.
+    """
+    M = mass_matrix(tree, parameters, q)
+    bias = inverse_dynamics(tree, parameters, q, v, np.zeros_like(M[:, 0]))
+    try:
+        np.linalg.cholesky(M)
+    except np.linalg.LinAlgError as error:
+        raise NumericalError(
+            f'tree {tree.name}: a mass matrix that is not positive definite',
+            'inertial parameters that bodies can have',
+        ) from error
+    return np.linalg.solve(M, (np.asarray(tau) - bias)[:, :, None])[:, :, 0]
+
+
+def _inverse(
+    tree: Tree,
+    parameters: np.ndarray,
+    gravity: np.ndarray,
+    q: np.ndarray,
+    v: np.ndarray,
+    a: np.ndarray,
+) -> np.ndarray:
+    full = full_motion(tree, q, v, a)
+    tau = np.zeros((len(full[0]), geometry(tree).size))
+    table = np.array(parameters, dtype=np.float64).reshape(len(tree.parents), 10)
+    fill_torque(geometry(tree), gravity.copy(), *full, table, tau)
+    return tau

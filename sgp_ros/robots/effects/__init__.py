@@ -1,1 +1,0 @@
-"""Physics that a nominal robot may lack, as data: one `Effect` for each kind."""

@@ -1,0 +1,66 @@
+"""Laws of the correlation of a residual in time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import linalg, signal
+
+from sgp_ros.batch.colour import autoregression, coloured_products, inflation
+
+WEIGHTS = np.array([0.6, 0.2])
+
+
+def _correlations(weights, n):
+    """Correlations and innovation of an autoregression, by Yule and Walker's equations."""
+    a, b = weights
+    rho = [1.0, a / (1.0 - b)]
+    for _ in range(n - 2):
+        rho.append(a * rho[-1] + b * rho[-2])
+    return np.array(rho), 1.0 - a * rho[1] - b * rho[2]
+
+
+def test_products_equal_those_with_the_dense_correlations():
+    """Two blocks that know nothing of each other, each with a Toeplitz matrix."""
+    rng = np.random.default_rng(0)
+    H = rng.normal(size=(90, 3))
+    block = np.repeat([0, 1], [30, 60])
+    rho, innovation = _correlations(WEIGHTS, 60)
+    dense = linalg.block_diag(linalg.toeplitz(rho[:30]), linalg.toeplitz(rho))
+    found = coloured_products(H, block, WEIGHTS, innovation)
+    assert found == pytest.approx(H.T @ dense @ H, rel=1e-4, abs=1e-4)
+
+
+def test_a_planted_autoregression_is_found():
+    """Weights within three of their standard errors at this length."""
+    noise = np.random.default_rng(1).normal(size=20_000)
+    residual = signal.lfilter([1.0], [1.0, *-WEIGHTS], noise)
+    weights, innovation = autoregression(residual, np.zeros(20_000, dtype=int))
+    _, expected = _correlations(WEIGHTS, 3)
+    assert weights[:2] == pytest.approx(WEIGHTS, abs=0.03)
+    assert innovation == pytest.approx(expected, rel=0.05)
+    assert inflation(weights, innovation) == pytest.approx(
+        expected / (1.0 - WEIGHTS.sum()) ** 2, rel=0.2
+    )
+
+
+def test_white_noise_is_left_as_it_is():
+    """BIC takes no order for it in nearly every case: products are the plain ones."""
+    orders = []
+    for seed in range(50):
+        residual = np.random.default_rng(seed).normal(size=400)
+        weights, _ = autoregression(residual, np.zeros(400, dtype=int))
+        orders.append(len(weights))
+    assert np.mean(np.array(orders) == 0) > 0.9
+    H = np.random.default_rng(0).normal(size=(40, 2))
+    plain = coloured_products(H, np.zeros(40, dtype=int), np.zeros(0), 1.0)
+    assert plain == pytest.approx(H.T @ H)
+    assert inflation(np.zeros(0), 1.0) == 1.0
+
+
+@pytest.mark.parametrize('residual', [np.zeros(50), np.ones(50), np.tile([1.0, -1.0], 25)])
+def test_degenerate_residuals_give_a_stationary_process(residual):
+    """Nothing, a constant and an alternation have finite inflation."""
+    weights, innovation = autoregression(residual, np.zeros(50, dtype=int))
+    assert innovation > 0.0
+    assert np.isfinite(inflation(weights, innovation))

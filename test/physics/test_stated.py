@@ -1,0 +1,151 @@
+"""Stated values of effects against what a diagnosis reports."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.drive import Drive
+from sgp_ros.physics.effect import Fitted, Place
+from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.physics.stated import (
+    SIDED,
+    coefficient_quantities,
+    coefficient_std,
+    place_of,
+    shape_and_coefficients,
+    stated_quantities,
+    stated_words,
+)
+from sgp_ros.rigid.tree import read_urdf
+from test.robots.test_tree import ARM, FINGER
+
+URDF = (
+    (ARM % FINGER)
+    .replace('link name="tool"', 'link name="tool0"')
+    .replace('link="tool"', 'link="tool0"')
+    .replace(
+        '<link name="left"/>', '<link name="left"><inertial><mass value="0.1"/></inertial></link>'
+    )
+)
+
+
+def _motion():
+    tree = read_urdf(URDF)
+    rng = np.random.default_rng(0)
+    q, v, a, tau = rng.normal(size=(4, 40, tree.size))
+    time = 0.01 * np.arange(40)
+    drive = Drive(time, tau, ((0.0, 40),), 0.01)
+    return ObservedMotion(tree, time, 0.01, q, v, a, tau, drive)
+
+
+MOTION = _motion()
+CASES = [
+    (effect, place)
+    for effect in EFFECTS.values()
+    for place in {(p.kind, p.side): p for p in effect.places(MOTION)}.values()
+]
+
+
+def _id(value):
+    return value.name if hasattr(value, 'name') else f'{value.kind}{value.side or ""}'
+
+
+def _values(effect, kind, seed):
+    rng = np.random.default_rng(seed)
+    values = {q.name: float(rng.uniform(0.1, 0.9)) for q in stated_quantities(effect.name, kind)}
+    if effect.name == 'position_friction':
+        values['hi'] += 1.0
+    return values
+
+
+@pytest.mark.parametrize(('effect', 'place'), CASES, ids=_id)
+def test_what_was_stated_is_reported(effect, place):
+    """Values to shape and coefficients and back by the report of the diagnosis, all effects."""
+    for seed in range(3):
+        values = _values(effect, place.kind, seed)
+        shape, c = shape_and_coefficients(effect.name, place.kind, values)
+        report = effect.report(Fitted(MOTION, place, shape, c))
+        numbers = {k: v for k, v in report.items() if not isinstance(v, str)}
+        hidden = {'motor_inertia'} if effect.name == 'backlash' else set()
+        assert {k: numbers[k] for k in values if k not in hidden} == pytest.approx(
+            {k: x for k, x in values.items() if k not in hidden}, rel=1e-12
+        )
+
+
+@pytest.mark.parametrize(('effect', 'place'), CASES, ids=_id)
+def test_what_was_reported_is_stated_at_the_same_place(effect, place):
+    """Shape, coefficients, joint, kind, source and side; only a backlash hides a part."""
+    rng = np.random.default_rng(1)
+    starts = effect.starts(MOTION, place)
+    shape = starts[0] if len(starts) else np.array([-0.5, 0.5])
+    if effect.small is not None:
+        shape = effect.small.shape(shape, np.array([0.02, -0.01]))
+    c = np.ones(1)
+    if not effect.is_given:
+        columns = effect.columns(MOTION, place, shape)
+        c = rng.uniform(0.2, 1.0, size=columns.shape[-1])
+        assert columns.shape[-1] == len(coefficient_quantities(effect.name, place.kind))
+    report = effect.report(Fitted(MOTION, place, shape, c))
+    numbers = {k: v for k, v in report.items() if not isinstance(v, str)}
+    again, d = shape_and_coefficients(effect.name, place.kind, numbers)
+    hidden = np.isnan(again)
+    assert hidden.any() == (effect.name == 'backlash')
+    np.testing.assert_allclose(again[~hidden], shape[~hidden], rtol=1e-12)
+    np.testing.assert_allclose(d, c, rtol=1e-12)
+    names = {-1: 'base', -2: 'tool', -3: 'all'}
+    joint = names.get(place.joint) or MOTION.tree.joint_names[place.joint]
+    words = stated_words(effect.name, place, MOTION.tree)
+    assert words.items() >= {k: v for k, v in report.items() if isinstance(v, str)}.items()
+    assert place_of(effect.name, joint, words, numbers, MOTION.tree) == place
+
+
+@pytest.mark.parametrize('effect', SIDED)
+@pytest.mark.parametrize('side', [-1, 1])
+def test_an_unstated_side_is_the_nearer_end_of_the_range(effect, side):
+    tree = MOTION.tree
+    j = next(j for j in range(tree.size) if np.isfinite(tree.upper[j]))
+    joint = tree.joint_names[j]
+    edge = 0.5 * (tree.upper[j] + tree.lower[j]) + side * 0.4 * (tree.upper[j] - tree.lower[j])
+    numbers = {'onset': edge, 'position': edge}
+    assert place_of(effect, joint, {}, numbers, tree) == Place(j, side=side)
+
+
+def test_the_spread_of_coefficients_is_that_of_the_values():
+    """First order against samples; a product and a wave."""
+    rng = np.random.default_rng(0)
+    for name, values in (
+        ('spring', {'stiffness': 2.9, 'rest': 0.4}),
+        ('cogging', {'amplitude': 0.5, 'periods': 7.0, 'phase': 0.7}),
+    ):
+        std = dict.fromkeys(values, 0.01)
+        drawn = np.array(
+            [
+                shape_and_coefficients(
+                    name, '', {k: x + 0.01 * rng.normal() for k, x in values.items()}
+                )[1]
+                for _ in range(4000)
+            ]
+        )
+        found = coefficient_std(name, '', values, std)
+        np.testing.assert_allclose(found, drawn.std(axis=0), rtol=0.05)  # 4.5 / sqrt(2 * 4000)
+
+
+def test_a_coefficient_is_unknown_where_a_value_that_matters_is():
+    std = coefficient_std('spring', '', {'stiffness': 2.0, 'rest': 0.5}, {'stiffness': 0.1})
+    assert std[0] == pytest.approx(0.1)
+    assert std[1] == math.inf
+
+
+def test_an_eccentric_encoder_is_as_uncertain_as_its_amplitude():
+    """Its one coefficient scales what the stated numbers say."""
+    numbers = {'amplitude': 0.05, 'periods': 3.0, 'phase': 0.4}
+    shape, c = shape_and_coefficients('encoder_eccentricity', '', numbers)
+    assert c == pytest.approx([1.0])
+    assert shape == pytest.approx([3.0, 0.05 * np.cos(0.4), 0.05 * np.sin(0.4)])
+    std = coefficient_std('encoder_eccentricity', '', numbers, {'amplitude': 0.005})
+    assert std == pytest.approx([0.1])
+    assert np.isinf(coefficient_std('encoder_eccentricity', '', numbers, {})).all()
