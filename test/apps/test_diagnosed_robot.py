@@ -20,7 +20,7 @@ from sgp_ros.rigid.tree import read_urdf
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import nominal_tree
-from test.robots.effects.test_stated import URDF
+from test.physics.test_stated import URDF
 
 PRACTICE = Path(__file__).parents[2].parent / 'shared' / 'practice'
 needs_cases = pytest.mark.skipif(not PRACTICE.exists(), reason='needs the practice cases')

@@ -12,7 +12,7 @@ from sgp_ros.engine.config import EngineConfig, describe_settings
 from sgp_ros.physics.term import Motion
 from sgp_ros.robots.registry import ROBOTS as BUILT_IN
 from sgp_ros.robots.registry import load_robot
-from test.robots.random_urdf import random_urdf
+from test.rigid.random_urdf import random_urdf
 
 CHAIN = """
 <robot name="chain"><link name="base"/>

@@ -21,7 +21,7 @@ from sgp_ros.physics.stated import (
     stated_words,
 )
 from sgp_ros.rigid.tree import read_urdf
-from test.robots.test_tree import ARM, FINGER
+from test.rigid.test_tree import ARM, FINGER
 
 URDF = (
     (ARM % FINGER)

@@ -12,7 +12,7 @@ from sgp_ros.errors import NumericalError
 from sgp_ros.rigid import consistent
 from sgp_ros.rigid.consistent import project, project_information
 from sgp_ros.rigid.pseudo_inertia import inertial_parameters, is_consistent, pseudo_inertia
-from test.gp.bodies import random_body
+from test.rigid.bodies import random_body
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -14,7 +14,7 @@ from sgp_ros.rigid.pseudo_inertia import (
     is_consistent,
     pseudo_inertia,
 )
-from test.gp.bodies import cloud, parameters_of, random_body
+from test.rigid.bodies import cloud, parameters_of, random_body
 
 SEEDS = st.integers(0, 2**32 - 1)
 

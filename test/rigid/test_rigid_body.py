@@ -16,7 +16,7 @@ from sgp_ros.rigid.rigid_body import (
     torque_regressor,
 )
 from sgp_ros.rigid.tree import read_urdf
-from test.robots.random_urdf import random_urdf
+from test.rigid.random_urdf import random_urdf
 
 TOLERANCE = 1e-11
 """Of the largest entry: 1e4 roundings along a tree of eight bodies."""

@@ -9,7 +9,7 @@ import pytest
 from sgp_ros.errors import ConfigError
 from sgp_ros.rigid.rigid_body import inverse_dynamics
 from sgp_ros.rigid.tree import Payload, read_urdf
-from test.robots.random_urdf import random_urdf
+from test.rigid.random_urdf import random_urdf
 
 ARM = """
 <robot name="arm">

@@ -8,7 +8,7 @@ import pytest
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.rigid.urdf_writer import write_urdf
-from test.gp.bodies import random_body
+from test.rigid.bodies import random_body
 
 URDF = """<?xml version="1.0" encoding="utf-8"?>
 <!-- before the robot: a > b -->

@@ -22,7 +22,7 @@ from sgp_ros.rigid.rigid_body import inverse_dynamics
 from sgp_ros.rigid.tree import read_urdf
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.stated_effects import NOT_ONLINE
-from test.robots.effects.test_stated import URDF
+from test.physics.test_stated import URDF
 
 WIDTH = 0.01
 TREE = read_urdf(URDF)

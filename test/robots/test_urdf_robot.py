@@ -20,8 +20,8 @@ from sgp_ros.rigid.rigid_body import inverse_dynamics
 from sgp_ros.rigid.tree import read_urdf
 from sgp_ros.robots.nominal_prior import LEAST_EFFORT, LIMIT_SHARE
 from sgp_ros.robots.registry import load_robot
-from test.robots.random_urdf import random_urdf
-from test.robots.test_tree import ARM, FINGER
+from test.rigid.random_urdf import random_urdf
+from test.rigid.test_tree import ARM, FINGER
 
 SHARED = Path(__file__).parents[2] / '..' / 'shared'
 TIAGO = SHARED / 'data' / 'tiago' / 'tiago_48_schunk.urdf'
