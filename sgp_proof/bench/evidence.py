@@ -15,9 +15,8 @@ from sgp_proof.bench.rivals import Rivals, timed
 from sgp_proof.bench.timing import median_seconds
 from sgp_ros.gp.kernels import SquaredExponential
 from sgp_ros.gp.learning import learn
-from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior
-from sgp_ros.gp.prior import CoefficientPrior
 
 SAMPLES, QUICK_SAMPLES, INPUTS = 1000, 100, 8
 REPEATS = 9

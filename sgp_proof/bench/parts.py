@@ -6,8 +6,8 @@ import numpy as np
 
 from sgp_proof.bench.problem import Problem
 from sgp_proof.bench.timing import median_seconds
+from sgp_ros.gp.factor import length_for
 from sgp_ros.gp.factor_loops import absorb_column, solve_lower
-from sgp_ros.gp.sliding import length_for
 
 
 def part_times(problem: Problem, n: int, repeats: int, step_s: float) -> dict[str, float]:

@@ -11,9 +11,9 @@ from sgp_proof.bench.parts import part_times
 from sgp_proof.bench.problem import Problem, draw_problem
 from sgp_proof.bench.rivals import Rivals, timed
 from sgp_proof.bench.timing import median_seconds, move_seconds
+from sgp_ros.gp.factor import length_for
+from sgp_ros.gp.model import CoefficientPrior
 from sgp_ros.gp.online import OnlineRegression
-from sgp_ros.gp.prior import CoefficientPrior
-from sgp_ros.gp.sliding import length_for
 
 SIZES = (250, 500, 1000, 2000)
 SHAPES = ((1, 8), (1, 21), (7, 21))

@@ -11,8 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from sgp_proof.paper.protocol import Test, World
-from sgp_ros.gp.model import Observations
-from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.model import CoefficientPrior, Observations
 from sgp_ros.physics.term import Coefficient, Joint, Motion
 from sgp_ros.rigid.inertial import inertial_term, revolute_chain
 from sgp_ros.robots.robot import Robot

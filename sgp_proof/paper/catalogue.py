@@ -9,7 +9,7 @@ from functools import partial
 from sgp_proof.paper import arm, reaction_wheel, toy
 from sgp_proof.paper.choices import CHOICES, FILTERS, Choice, run_choice
 from sgp_proof.paper.protocol import METHOD_NAMES, Outcome, World, run_method
-from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.model import CoefficientPrior
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,9 +13,8 @@ from sgp_ros.gp.kernels import AdditiveSquaredExponential, Kernel, SquaredExpone
 from sgp_ros.gp.learning import initial_model, learn, screened
 from sgp_ros.gp.linear_kernel import Linear
 from sgp_ros.gp.methods import FittedMethod
-from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior
-from sgp_ros.gp.prior import CoefficientPrior
 from sgp_ros.gp.selection import select_inputs
 
 

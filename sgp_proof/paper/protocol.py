@@ -10,9 +10,8 @@ import numpy as np
 from sgp_ros.gp.kernels import Kernel
 from sgp_ros.gp.learning import learn
 from sgp_ros.gp.methods import METHODS, FitOptions, FittedMethod
-from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior
-from sgp_ros.gp.prior import CoefficientPrior
 from sgp_ros.gp.scores import coverage95, nlpd, nmse, pit
 from sgp_ros.gp.selection import select_inputs
 

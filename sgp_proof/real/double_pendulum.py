@@ -21,8 +21,7 @@ from sgp_ros.batch.rollout_fit import RolloutFitOptions, fit_rollouts
 from sgp_ros.batch.rollout_scores import score_windows
 from sgp_ros.batch.rollout_windows import joined
 from sgp_ros.gp.methods import FitOptions, fit_gp
-from sgp_ros.gp.model import Observations
-from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.model import CoefficientPrior, Observations
 from sgp_ros.physics.term import Motion
 from sgp_ros.robots.double_pendulum import DOUBLE_PENDULUM
 

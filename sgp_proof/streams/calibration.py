@@ -24,12 +24,11 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
 from sgp_ros.engine.samples import CommandSample, JointSample
-from sgp_ros.gp.basis import BasisRegression
+from sgp_ros.gp.inducing_regression import InducingPointRegression
 from sgp_ros.gp.kernels import SquaredExponential
 from sgp_ros.gp.learning import learn
-from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.online import OnlineRegression
-from sgp_ros.gp.prior import CoefficientPrior
 from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import ROBOTS, load_robot
@@ -67,7 +66,7 @@ def _ways(model):
         )
         for policy in ('oldest', 'least_informative', 'coverage')
     )
-    yield 'basis', BasisRegression(model, PRIOR, BUDGET, FEATURES)
+    yield 'basis', InducingPointRegression(model, PRIOR, BUDGET, FEATURES)
 
 
 def _one_world(online, data, w):

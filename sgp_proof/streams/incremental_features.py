@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from sgp_ros.gp.information import Information
-from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.model import CoefficientPrior
 
 
 class IncrementalFeatures:

@@ -20,12 +20,11 @@ from pathlib import Path
 import numpy as np
 
 from sgp_proof.environment import environment
-from sgp_ros.gp.basis import BasisRegression
+from sgp_ros.gp.inducing_regression import InducingPointRegression
 from sgp_ros.gp.learning import initial_model, learn, screened
-from sgp_ros.gp.model import Observations
+from sgp_ros.gp.model import CoefficientPrior, Observations
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.posterior import Posterior
-from sgp_ros.gp.prior import CoefficientPrior
 from sgp_ros.gp.scores import RunningScore
 
 RESULT = Path(__file__).parent / 'results' / 'long_stream.json'
@@ -83,7 +82,7 @@ def _ways(model):
         )
         for policy in ('oldest', 'least_informative', 'coverage')
     }
-    return ways | {'basis': lambda: BasisRegression(model, PRIOR, BUDGET, FEATURES)}
+    return ways | {'basis': lambda: InducingPointRegression(model, PRIOR, BUDGET, FEATURES)}
 
 
 def _stream(online, world, queries):

@@ -27,7 +27,7 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.prior_knowledge import prior_of_robot
 from sgp_ros.engine.samples import CommandSample, JointSample
-from sgp_ros.gp.basis import BasisRegression
+from sgp_ros.gp.inducing_regression import InducingPointRegression
 from sgp_ros.gp.methods import METHODS, FitOptions
 from sgp_ros.gp.model import Model, Observations
 from sgp_ros.gp.online import OnlineRegression
@@ -162,7 +162,7 @@ def _methods(data, prior, inputs, every, first):
     for policy in ('oldest', 'least_informative', 'coverage'):
         online = OnlineRegression(sgp_model, prior, BUDGET, features=FEATURES, policy=policy)
         methods[f'SGP, exact, {policy}'] = _Joint(online)
-    methods['SGP, basis'] = _Joint(BasisRegression(sgp_model, prior, BUDGET, FEATURES))
+    methods['SGP, basis'] = _Joint(InducingPointRegression(sgp_model, prior, BUDGET, FEATURES))
     return methods, sgp_model
 
 

@@ -16,8 +16,7 @@ from sgp_ros.batch.posterior import BatchPosterior
 from sgp_ros.batch.regression_data import FilteredData
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.gp.methods import METHODS, FitOptions, Inputs
-from sgp_ros.gp.model import Model, Observations
-from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.robots.robot import Robot
 
 FEWEST_ROWS = 10

@@ -24,9 +24,8 @@ from scipy import linalg
 from sgp_ros.batch.colour import autoregression, coloured_products, inflation
 from sgp_ros.batch.pivoted import PivotedBasis, pivoted_basis
 from sgp_ros.gp.kernels import Kernel
-from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior
-from sgp_ros.gp.prior import CoefficientPrior
 
 _TOLERANCE = 1e-3  # of the noise variance
 _CHUNK = 4096

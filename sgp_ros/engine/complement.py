@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sgp_ros.gp.online_prediction import OnlinePrediction
+from sgp_ros.gp.regression import OnlinePrediction
 
 _LEAST_RECIPROCAL_CONDITION = 1e-12
 

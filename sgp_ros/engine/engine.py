@@ -22,8 +22,8 @@ from sgp_ros.engine.samples import (
     SettingValue,
 )
 from sgp_ros.engine.snapshots import fill_from_snapshot, snapshot_config, take_snapshot
-from sgp_ros.gp.drift import DriftTest
 from sgp_ros.gp.model import Model
+from sgp_ros.gp.scores import DriftTest
 from sgp_ros.robots.robot import Robot
 
 

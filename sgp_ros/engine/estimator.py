@@ -19,13 +19,11 @@ from sgp_ros.engine.prior_knowledge import (
 from sgp_ros.engine.results import Channel, Counts, Estimate
 from sgp_ros.engine.windows import Equation
 from sgp_ros.errors import NumericalError
-from sgp_ros.gp.drift import DriftTest
 from sgp_ros.gp.learning import initial_model
 from sgp_ros.gp.model import Model, Observations
 from sgp_ros.gp.online import OnlineRegression
-from sgp_ros.gp.online_prediction import OnlinePrediction
-from sgp_ros.gp.regression import Regression
-from sgp_ros.gp.scores import RunningScore
+from sgp_ros.gp.regression import OnlinePrediction, Regression
+from sgp_ros.gp.scores import DriftTest, RunningScore
 from sgp_ros.robots.robot import Robot
 
 _BASELINE_BUDGET = 1

@@ -11,8 +11,7 @@ import numpy as np
 from sgp_ros.engine.results import Counts
 from sgp_ros.errors import NumericalError
 from sgp_ros.gp.online import OnlineRegression
-from sgp_ros.gp.online_prediction import OnlinePrediction
-from sgp_ros.gp.regression import Regression
+from sgp_ros.gp.regression import OnlinePrediction, Regression
 
 
 def predict_soundly(

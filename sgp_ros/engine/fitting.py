@@ -9,9 +9,8 @@ import numpy as np
 
 from sgp_ros.errors import NumericalError
 from sgp_ros.gp.learning import initial_model, learn, screened
-from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior
-from sgp_ros.gp.prior import CoefficientPrior
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from sgp_ros.engine.config import EngineConfig, JointHyperparameters
-from sgp_ros.gp.basis import BasisRegression
+from sgp_ros.gp.inducing_regression import InducingPointRegression
 from sgp_ros.gp.kernels import Kernel, SquaredExponential
-from sgp_ros.gp.model import Model
+from sgp_ros.gp.model import CoefficientPrior, Model
 from sgp_ros.gp.online import OnlineRegression
-from sgp_ros.gp.prior import CoefficientPrior
 from sgp_ros.gp.regression import Regression
 from sgp_ros.robots.robot import Robot
 
@@ -62,7 +61,7 @@ def empty_regression(model: Model, prior: CoefficientPrior, config: EngineConfig
     budget, remember = sample_budget(config), config.buffer_remember
     forgetting = config.forgetting_samples
     if config.buffer_mode == 'basis':
-        return BasisRegression(
+        return InducingPointRegression(
             model,
             prior,
             budget,

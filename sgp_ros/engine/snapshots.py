@@ -25,11 +25,10 @@ from sgp_ros.engine.samples import (
 )
 from sgp_ros.engine.windows import State
 from sgp_ros.errors import ConfigError
-from sgp_ros.gp.drift import DriftTest
 from sgp_ros.gp.kernels import SquaredExponential
 from sgp_ros.gp.model import Model
 from sgp_ros.gp.regression import Regression
-from sgp_ros.gp.scores import RunningScore
+from sgp_ros.gp.scores import DriftTest, RunningScore
 from sgp_ros.robots.robot import Robot
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from sgp_ros.engine.fitting import FitResult
 from sgp_ros.engine.samples import SettingsChange, SettingValue
 from sgp_ros.errors import NumericalError
-from sgp_ros.gp.output_groups import separable
+from sgp_ros.gp.model import separable
 
 if TYPE_CHECKING:
     from sgp_ros.engine.engine import Engine

@@ -7,11 +7,14 @@ triangular solve.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
+
 import numpy as np
 from scipy import linalg
 
+from sgp_ros.gp.model import CoefficientPrior
 from sgp_ros.gp.posterior import NULL_TOLERANCE, RANK_TOLERANCE, ZERO_COLUMN
-from sgp_ros.gp.prior import CoefficientPrior
 from sgp_ros.gp.rotations import (
     absorb_rows,
     absorbed_rows_numpy,
@@ -193,3 +196,37 @@ class _Solved:
         self.null = Z[:, rank:]
         turned = linalg.lapack.dormqr('L', 'T', factored, tau, z[:, None], 64 * p)[0][:rank, 0]
         self.w = self.spread @ turned
+
+
+class Forgetting:
+    """Fades information, sample by sample.
+
+    Attributes:
+        factor: `sqrt(lambda)`, by which equations of unit noise shrink at each sample.
+        turn: samples so far, which says whose turn among the equations of the prior it is.
+
+    Args:
+        samples: N, after which information counts 1/e; 0 never forgets.
+        prior: of W.
+    """
+
+    def __init__(self, samples: float, prior: Information) -> None:
+        self.factor = math.exp(-0.5 / samples) if samples > 0.0 else 1.0
+        self.turn = 0
+        self._prior = prior
+
+    def fade(self, total: Information, parts: Iterable[Information]) -> None:
+        """Fade `total`, which holds the prior, and parts, which do not. O(p^2)."""
+        if self.factor == 1.0:
+            return
+        for information in (total, *parts):
+            information.fade(self.factor)
+        p = len(self._prior.z)
+        if p:
+            share, i = self.lost(p), self.turn % p
+            total.absorb(share * np.append(self._prior.R[i], self._prior.z[i])[None])
+        self.turn += 1
+
+    def lost(self, samples: int) -> float:
+        """Return the root of the share of information that so many samples fade away."""
+        return math.sqrt(1.0 - self.factor ** (2 * samples))

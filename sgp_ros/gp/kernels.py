@@ -11,8 +11,8 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
+from sgp_ros.gp.linear_algebra import turn_into_exponents
 from sgp_ros.gp.linear_kernel import Linear
-from sgp_ros.gp.matrix_loops import turn_into_exponents
 
 T = TypeVar('T')
 

@@ -14,10 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sgp_ros.gp.learning import initial_model, learn, screened
-from sgp_ros.gp.model import Model, Observations
-from sgp_ros.gp.posterior import Posterior
-from sgp_ros.gp.prediction import Prediction
-from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
+from sgp_ros.gp.posterior import Posterior, Prediction
 
 
 @dataclass(frozen=True, slots=True)

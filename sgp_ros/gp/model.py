@@ -1,10 +1,16 @@
-"""What the inference works on: the observed data, and the hyper-parameters of the model."""
+"""Observed data, hyper-parameters, groups of outputs that share a factor, and the prior of W.
+
+The prior is kept as a square root of its precision: `Lambda = root^T root` is the inverse of
+sigma_w. Knowing nothing (sigma_w infinite) is then simply a root without rows, and no digit is
+lost on the way there.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import linalg
 
 from sgp_ros.gp.kernels import Kernel
 
@@ -69,3 +75,134 @@ class Model:
             kernels.append(kernel.with_log_parameters(theta[start:stop]))
             start = stop
         return Model(tuple(kernels), tuple(float(x) for x in np.exp(theta[start:])))
+
+
+_SAME = 1e-12
+"""Relative difference of signal-to-noise ratios up to which they are one ratio: rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class OutputGroup:
+    """Outputs whose covariance is `scale^2 (K + noise I)` with one K.
+
+    Attributes:
+        kernel: of the first output; None where Z is zero.
+        noise: of the first output.
+        outputs: their indices.
+        scales: one per output, 1 for the first.
+    """
+
+    kernel: Kernel | None
+    noise: float
+    outputs: tuple[int, ...]
+    scales: tuple[float, ...]
+
+
+def output_groups(model: Model) -> tuple[OutputGroup, ...]:
+    """Return the groups of a model in the order of their first outputs."""
+    found: list[OutputGroup] = []
+    for j, (kernel, noise) in enumerate(zip(model.kernels, model.noise, strict=True)):
+        for i, group in enumerate(found):
+            if _is_multiple(kernel, noise, group):
+                scales = (*group.scales, float(np.sqrt(noise / group.noise)))
+                found[i] = OutputGroup(group.kernel, group.noise, (*group.outputs, j), scales)
+                break
+        else:
+            found.append(OutputGroup(kernel, noise, (j,), (1.0,)))
+    return tuple(found)
+
+
+def separable(one: Model, other: Model) -> tuple[tuple[int, ...], ...]:
+    """Return the finest sets of outputs that share no factor with others under either model."""
+    sets = [{j} for j in range(len(one.noise))]
+    for group in (*output_groups(one), *output_groups(other)):
+        joined = [s for s in sets if s.intersection(group.outputs)]
+        sets = [s for s in sets if s not in joined] + [set().union(*joined)]
+    return tuple(tuple(sorted(s)) for s in sorted(sets, key=min))
+
+
+def group_of(model: Model, outputs: tuple[int, ...]) -> OutputGroup:
+    """Return some outputs of one group as a group of their own."""
+    first = outputs[0]
+    noise = model.noise[first]
+    scales = tuple(float(np.sqrt(model.noise[j] / noise)) for j in outputs)
+    return OutputGroup(model.kernels[first], noise, outputs, scales)
+
+
+def _is_multiple(kernel: Kernel | None, noise: float, group: OutputGroup) -> bool:
+    other = group.kernel
+    if kernel is None or other is None:
+        return kernel is other
+    if (type(kernel), kernel.inputs, kernel.lengthscales) != (
+        type(other), other.inputs, other.lengthscales
+    ):  # fmt: skip
+        return False
+    heights = kernel.log_parameters[: -len(kernel.inputs)]
+    others = other.log_parameters[: -len(kernel.inputs)]
+    ratio = np.log(noise / group.noise)
+    if not len(heights):
+        return bool(ratio == 0.0)
+    return bool(np.all(np.abs(heights - others - ratio) <= _SAME))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoefficientPrior:
+    """W ~ N(mu, sigma_w) (Wu and Movellan, equation 1), possibly flat in some directions.
+
+    Attributes:
+        root: (r, p), full row rank; `root^T root` is the precision.
+        target: (r,), `root mu`.
+        log_det: logarithm of the determinant of the precision over the r informed directions.
+    """
+
+    root: np.ndarray
+    target: np.ndarray
+    log_det: float
+
+    @property
+    def size(self) -> int:
+        """Number of coefficients p."""
+        return int(self.root.shape[1])
+
+    @classmethod
+    def flat(cls, p: int) -> CoefficientPrior:
+        """Return the prior that knows nothing of p coefficients."""
+        return cls(np.zeros((0, p)), np.zeros(0), 0.0)
+
+    @classmethod
+    def from_std(cls, mean: np.ndarray, std: np.ndarray) -> CoefficientPrior:
+        """Return independent priors.
+
+        Args:
+            mean: (p,) [unit of each coefficient].
+            std: (p,), positive; infinite where nothing is known.
+
+        Raises:
+            ValueError: a standard deviation that is not positive.
+        """
+        if not np.all(std > 0.0):
+            raise ValueError(f'prior standard deviations must be positive: {std}')
+        known = np.isfinite(std)
+        scale = 1.0 / std[known]
+        root = np.zeros((int(known.sum()), len(std)))
+        root[np.arange(len(scale)), np.flatnonzero(known)] = scale
+        return cls(root, scale * mean[known], float(2.0 * np.log(scale).sum()))
+
+    @classmethod
+    def from_covariance(cls, mean: np.ndarray, covariance: np.ndarray) -> CoefficientPrior:
+        """Return the prior with mean (p,) and positive definite covariance (p, p).
+
+        Raises:
+            ValueError: the covariance is not positive definite.
+        """
+        try:
+            lower = linalg.cholesky(covariance, lower=True)
+        except linalg.LinAlgError as error:
+            raise ValueError('the prior covariance is not positive definite') from error
+        root = linalg.solve_triangular(lower, np.eye(len(mean)), lower=True)
+        return cls(root, root @ mean, float(-2.0 * np.log(np.diag(lower)).sum()))
+
+    def scaled(self, factor: float) -> CoefficientPrior:
+        """Return this prior with every standard deviation times `factor`, about the same mean."""
+        log_det = self.log_det - 2.0 * len(self.target) * float(np.log(factor))
+        return CoefficientPrior(self.root / factor, self.target / factor, log_det)

@@ -2,7 +2,7 @@
 
 Until the first sample leaves the buffer, everything is exact. From then on the posterior is the
 product `p(W | all samples) p(Z | W, buffer)`: the first from a basis that absorbs each sample once
-(`gp.stream_basis`), the second from the factored buffer (`gp.factored_buffer`). What this
+(`gp.inducing_information`), the second from the factored buffer (`gp.buffer`). What this
 neglects: Z given W is told by the buffer alone, and for W, Z is what the features of the basis
 can express.
 """
@@ -14,17 +14,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from sgp_ros.errors import NumericalError
-from sgp_ros.gp.basis_ahead import BasisAhead
-from sgp_ros.gp.factor import Whitening
-from sgp_ros.gp.factored_buffer import FactoredBuffer
-from sgp_ros.gp.forgetting import Forgetting
-from sgp_ros.gp.information import Information
-from sgp_ros.gp.model import Model, Observations
-from sgp_ros.gp.online_prediction import OnlinePrediction
-from sgp_ros.gp.prior import CoefficientPrior
-from sgp_ros.gp.sample_buffer import SampleBuffer
-from sgp_ros.gp.state_parts import part_of
-from sgp_ros.gp.stream_basis import StreamBasis
+from sgp_ros.gp.buffer import FactoredBuffer, SampleBuffer
+from sgp_ros.gp.factor import Whitening, part_of
+from sgp_ros.gp.inducing_information import GradualFill, InducingInformation
+from sgp_ros.gp.information import Forgetting, Information
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
+from sgp_ros.gp.regression import OnlinePrediction
 
 
 class OnlineRegression:
@@ -60,8 +55,8 @@ class OnlineRegression:
         samples = SampleBuffer.empty(len(model.kernels), prior.size)
         self._held = FactoredBuffer(model, samples, budget + 1, policy)
         self._total = self._prior.copy()
-        self._basis: StreamBasis | None = None
-        self._ahead: BasisAhead | None = None
+        self._basis: InducingInformation | None = None
+        self._ahead: GradualFill | None = None
 
     @property
     def model(self) -> Model:
@@ -174,15 +169,15 @@ class OnlineRegression:
             # What fades as it ages can be absorbed only at the end.
             if room < 0 or self._forgetting.factor == 1.0:
                 if self._ahead is None:
-                    basis = StreamBasis(self.model, self._prior, self._features)
-                    self._ahead = BasisAhead(basis)
+                    basis = InducingInformation(self.model, self._prior, self._features)
+                    self._ahead = GradualFill(basis)
                 self._ahead.catch_up(self._held.samples, room)
 
     def _keep_to_budget(self) -> None:
         self._look_ahead()
         while self.size > self._budget:
             if self._ahead is not None:
-                self._basis, self._ahead = self._ahead.basis, None
+                self._basis, self._ahead = self._ahead.information, None
             self._held.drop()
             if self._basis is None:
                 self._total = self._with_buffer()
@@ -261,7 +256,9 @@ class OnlineRegression:
         basis = part_of(state, 'basis_')
         self._basis = None
         if basis:
-            self._basis = StreamBasis.restored(self.model, self._prior, self._features, basis)
+            self._basis = InducingInformation.restored(
+                self.model, self._prior, self._features, basis
+            )
         self._ahead = None
         self._version += 1
 

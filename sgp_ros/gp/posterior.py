@@ -16,10 +16,41 @@ from scipy import linalg
 
 from sgp_ros.gp.blocks import Block, build_blocks
 from sgp_ros.gp.kernels import Kernel
-from sgp_ros.gp.matrix_loops import subtract_symmetric
-from sgp_ros.gp.model import Model, Observations
-from sgp_ros.gp.prediction import Prediction
-from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.linear_algebra import subtract_symmetric
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prediction:
+    """Predicted X(q) at q queries.
+
+    Attributes:
+        mean: (q, k).
+        covariance: (q, k, k); the diagonal is infinite where an undetermined direction of W
+            enters.
+    """
+
+    mean: np.ndarray
+    covariance: np.ndarray
+
+    @property
+    def variance(self) -> np.ndarray:
+        """Variances of the components, (q, k)."""
+        return np.einsum('qkk->qk', self.covariance)
+
+    def observed(self, noise: np.ndarray, G: np.ndarray | None = None) -> Prediction:
+        """Return the prediction of Y = g X + V.
+
+        Args:
+            noise: (m,) variances of V.
+            G: (q, m, k) observation matrices; None for the identity.
+        """
+        if G is None:
+            return Prediction(self.mean, self.covariance + np.diag(noise))
+        mean = np.einsum('qmk,qk->qm', G, self.mean)
+        covariance = np.einsum('qmk,qkl,qnl->qmn', G, self.covariance, G) + np.diag(noise)
+        return Prediction(mean, covariance)
+
 
 RANK_TOLERANCE = 1e-11
 """Least singular value of balanced columns, over the largest, that counts as information on W.

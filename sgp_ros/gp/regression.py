@@ -1,15 +1,40 @@
-"""What a stream asks of a regression, whichever way it keeps what it learned."""
+"""One-step predictions, and the methods of every regression that learns a stream."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
+from sgp_ros.gp.factor import Whitening
 from sgp_ros.gp.information import Information
 from sgp_ros.gp.model import Model, Observations
-from sgp_ros.gp.online_prediction import OnlinePrediction
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OnlinePrediction:
+    """Prediction of X at one input, with what learning it reuses.
+
+    Attributes:
+        mean: (k,).
+        covariance: (k, k) of X, without noise; infinite on the diagonal where an undetermined
+            direction of W enters.
+        u, f: the input (d,) and regressor (k, p) it was made for.
+        whitenings: the input against the samples, one per factor; in a basis against the inducing
+            inputs, one per component.
+        version: state of the model it was made with.
+        gains: of a basis, by which data enter the features, (m,) per component; else none.
+    """
+
+    mean: np.ndarray
+    covariance: np.ndarray
+    u: np.ndarray
+    f: np.ndarray
+    whitenings: tuple[Whitening, ...]
+    version: int
+    gains: tuple[np.ndarray, ...] = ()
 
 
 class Regression(Protocol):

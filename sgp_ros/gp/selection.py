@@ -18,8 +18,7 @@ import numpy as np
 from sgp_ros.gp.kernels import Kernel
 from sgp_ros.gp.learning import initial_model, learn, screened
 from sgp_ros.gp.linear_kernel import Linear
-from sgp_ros.gp.model import Model, Observations
-from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 
 MARGIN = 3.0
 """Evidence that an input must be worth [nat]: a Bayes factor of twenty."""

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from sgp_ros.batch import posterior as posterior_module
 from sgp_ros.batch.posterior import BatchPosterior
 from sgp_ros.gp.kernels import SquaredExponential
-from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior
-from sgp_ros.gp.prior import CoefficientPrior
 
 MODEL = Model((SquaredExponential(1.5, (0.8, 1.2), (0, 1)), None), (0.05, 0.2))
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
 
-from sgp_ros.gp.factor import GrowingFactor
+from sgp_ros.gp.factor import ROOM, GrowingFactor
 from sgp_ros.gp.factor_loops import (
     absorb_column,
     absorbed_column_numpy,
@@ -19,8 +19,7 @@ from sgp_ros.gp.factor_loops import (
     solve_lower,
 )
 from sgp_ros.gp.kernels import SquaredExponential
-from sgp_ros.gp.output_groups import OutputGroup, output_groups
-from sgp_ros.gp.sliding import ROOM
+from sgp_ros.gp.model import OutputGroup, output_groups
 from test.gp.worlds import random_problem
 
 GROUP = OutputGroup(SquaredExponential(1.0, (1.0,), (0,)), 0.1, (0, 1), (1.0, 2.0))

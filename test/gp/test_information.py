@@ -7,7 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sgp_ros.gp.inducing_regression import InducingPointRegression
 from sgp_ros.gp.information import Information
+from sgp_ros.gp.kernels import SquaredExponential
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
+from sgp_ros.gp.online import OnlineRegression
+from sgp_ros.gp.posterior import Posterior
+from test.gp.worlds import random_problem
 
 
 @given(st.integers(0, 10_000), st.integers(0, 6), st.integers(1, 6))
@@ -60,3 +66,112 @@ def test_without_full_rank_the_shortest_solution_counts(seed):
     assert found.is_determined(within).all()
     assert not found.is_determined(outside).any()
     assert not found.is_identifiable[2]
+
+
+FLAT = CoefficientPrior.flat(3)
+
+
+def _exact(model, prior, **options):
+    return OnlineRegression(model, prior, 5, **options)
+
+
+def _basis(model, prior, **options):
+    return InducingPointRegression(model, prior, 10, 30, **options)
+
+
+WAYS = [_exact, _basis]
+
+
+def _learn(online, data):
+    for u, f, y in zip(data.U, data.F, data.y, strict=True):
+        online.learn(online.predict(u, f), y)
+    return online
+
+
+@pytest.mark.parametrize('way', WAYS)
+def test_without_process_it_is_weighted_least_squares(way):
+    """Recursive least squares with a forgetting factor: sample i counts `exp(-age / N)`."""
+    model, data = random_problem(5, n=40, noise_like='parametric')
+    online = _learn(way(model, FLAT, forgetting=7.0), data)
+    root = np.exp(-0.5 * np.arange(39, -1, -1) / 7.0)
+    weighted = Observations(data.U, root[:, None, None] * data.F, root[:, None] * data.y)
+    batch = Posterior(model, weighted, FLAT)
+    np.testing.assert_allclose(online.information.coefficients, batch.coefficients, rtol=1e-9)
+    np.testing.assert_allclose(online.information.covariance, batch.covariance, rtol=1e-8)
+
+
+def test_without_memory_only_the_buffer_counts_faded():
+    """Weights go with their samples, also after the buffer has slid through its memory."""
+    model, data = random_problem(5, n=150, noise_like='parametric')
+    prior = CoefficientPrior.from_std(np.ones(3), np.full(3, 2.0))
+    online = OnlineRegression(model, prior, 5, remember=False, forgetting=7.0)
+    _learn(online, data)
+    root = np.exp(-0.5 * np.arange(4, -1, -1) / 7.0)
+    tail = Observations(
+        data.U[-5:], root[:, None, None] * data.F[-5:], root[:, None] * data.y[-5:]
+    )
+    batch = Posterior(model, tail, prior)
+    np.testing.assert_allclose(online.information.coefficients, batch.coefficients, rtol=1e-9)
+    np.testing.assert_allclose(online.information.covariance, batch.covariance, rtol=1e-8)
+
+
+@pytest.mark.parametrize('way', WAYS)
+def test_a_change_of_noise_keeps_the_weights(way):
+    """What is rebuilt under other hyper-parameters is as faded as it was."""
+    model, data = random_problem(6, n=40, noise_like='parametric')
+    online = _learn(way(model, FLAT, forgetting=7.0), data)
+    before = online.information
+    online.change(model=Model(model.kernels, tuple(4.0 * x for x in model.noise)))
+    np.testing.assert_allclose(online.information.coefficients, before.coefficients, rtol=1e-9)
+    np.testing.assert_allclose(online.information.covariance, 4.0 * before.covariance, rtol=1e-8)
+
+
+@pytest.mark.parametrize('way', WAYS)
+def test_the_prior_is_not_forgotten(way):
+    """A direction without excitation keeps its prior, to the share that fades in p samples."""
+    model, _ = random_problem(7, n=2)
+    prior = CoefficientPrior.from_std(np.array([1.0, 2.0, 3.0]), np.array([0.5, 1.0, 2.0]))
+    online = way(model, prior, forgetting=20.0)
+    rng = np.random.default_rng(0)
+    for _ in range(400):
+        f = np.zeros((2, 3))
+        f[:, 0] = rng.normal(size=2)
+        online.learn(online.predict(rng.normal(size=3), f), rng.normal(size=2))
+    std = np.sqrt(np.diag(online.information.covariance))
+    np.testing.assert_allclose(std[1:], [1.0, 2.0], rtol=0.1)
+    np.testing.assert_allclose(online.information.coefficients[1:], [2.0, 3.0], rtol=0.1)
+
+
+@pytest.mark.parametrize('way', WAYS)
+def test_a_changed_robot_is_followed(way):
+    """After a jump of W and five time constants the old value is out of the estimate."""
+    kernel = SquaredExponential(0.1, (1.0,), (0,))
+    model = Model((kernel,), (0.01,))
+    rng = np.random.default_rng(3)
+    n = 400
+    U, F = rng.uniform(-2.0, 2.0, size=(n, 1)), rng.normal(size=(n, 1, 3))
+    w = np.where(np.arange(n)[:, None] < n // 2, [1.0, 2.0, 3.0], [1.5, 1.0, 3.5])
+    y = np.einsum('nkp,np->nk', F, w) + 0.1 * rng.normal(size=(n, 1))
+    data = Observations(U, F, y)
+    errors = [
+        np.linalg.norm(
+            _learn(way(model, FLAT, forgetting=forgetting), data).information.coefficients - w[-1]
+        )
+        for forgetting in (40.0, 0.0)
+    ]
+    assert errors[0] < 0.1 < errors[1]
+
+
+@pytest.mark.parametrize('way', WAYS)
+def test_stop_save_restore_continue_equals_never_stopped(way):
+    """Weights and the turn of the prior are part of the state, to the bit."""
+    model, data = random_problem(8, n=40)
+    prior = CoefficientPrior.from_std(np.zeros(3), np.ones(3))
+    one, other = (way(model, prior, forgetting=9.0) for _ in range(2))
+    for i in range(40):
+        if i == 19:
+            other.restore(one.state())
+        for online in (one, other) if i >= 19 else (one,):
+            online.learn(online.predict(data.U[i], data.F[i]), data.y[i])
+    for name, array in other.state().items():
+        np.testing.assert_array_equal(array, one.state()[name])

@@ -9,9 +9,8 @@ from sgp_ros.errors import NumericalError
 from sgp_ros.gp.kernels import SquaredExponential
 from sgp_ros.gp.learning import initial_model, learn
 from sgp_ros.gp.methods import METHODS, FitOptions
-from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior
-from sgp_ros.gp.prior import CoefficientPrior
 from sgp_ros.gp.scores import RunningScore, coverage95, nlpd, nmse, pit
 from test.gp.worlds import random_problem
 
@@ -163,7 +162,7 @@ def test_a_fit_without_any_factor_raises(monkeypatch):
     """Where no start has a positive definite covariance, the error says what to look at."""
     data = Observations(np.zeros((6, 1)), np.zeros((6, 1, 0)), np.zeros((6, 1)))
     start = Model((SquaredExponential(1.0, (1.0,), (0,)),), (1e-300,))
-    monkeypatch.setattr('sgp_ros.gp.search_box._NOISE_FLOOR', 1e-300)
+    monkeypatch.setattr('sgp_ros.gp.learning._NOISE_FLOOR', 1e-300)
     with pytest.raises(NumericalError, match='no positive definite'):
         learn(data, CoefficientPrior.flat(0), start)
 

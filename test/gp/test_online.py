@@ -10,15 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sgp_ros.errors import NumericalError
+from sgp_ros.gp.buffer import SampleBuffer
+from sgp_ros.gp.inducing_information import InducingInformation
 from sgp_ros.gp.information import Information
 from sgp_ros.gp.kernels import SquaredExponential
-from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.posterior import Posterior
-from sgp_ros.gp.prior import CoefficientPrior
 from sgp_ros.gp.rotations import absorb_rows, absorbed_rows_numpy
-from sgp_ros.gp.sample_buffer import SampleBuffer
-from sgp_ros.gp.stream_basis import StreamBasis
 from test.gp.worlds import random_problem, returning
 
 PRIORS = [CoefficientPrior.flat(3), CoefficientPrior.from_std(np.ones(3), np.full(3, 2.0))]
@@ -142,7 +141,7 @@ def test_sharing_a_factor_changes_no_prediction():
     kernels = (first, model.kernels[1], double)
     shared = _stream(Model(kernels, (0.2, 0.3, 0.8)), data, PRIORS[1], 8)
     parted = _stream(Model(kernels, (0.2, 0.3, 0.8 * (1.0 + 1e-10))), data, PRIORS[1], 8)
-    for part in ('factor', 'basis_block'):
+    for part in ('factor', 'basis_set'):
         held = [
             sum(name.startswith(part) and name.endswith('_L') for name in x.state())
             for x in (shared, parted)
@@ -272,7 +271,7 @@ def test_the_basis_is_filled_while_the_buffer_fills():
     assert online._ahead is None
     rows = np.concatenate([data.F, data.y[..., None]], axis=2)
     samples = SampleBuffer(data.U, rows, np.ones(61), 61)
-    fresh = StreamBasis.of_samples(online.model, Information.of_prior(prior), 100, samples)
+    fresh = InducingInformation.of_samples(online.model, Information.of_prior(prior), 100, samples)
     np.testing.assert_array_equal(online.information.R, fresh.total.R)
 
 

@@ -11,9 +11,8 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 from sgp_ros.errors import NumericalError
 from sgp_ros.gp.information import Information
 from sgp_ros.gp.kernels import SquaredExponential
-from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior
-from sgp_ros.gp.prior import CoefficientPrior
 from test.gp.textbook import dense
 from test.gp.worlds import random_problem
 

@@ -8,10 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sgp_ros.errors import NumericalError
-from sgp_ros.gp.inverse_column import inverse_column, inverse_column_numpy
-from sgp_ros.gp.model import Model
+from sgp_ros.gp.factor_loops import inverse_column, inverse_column_numpy
+from sgp_ros.gp.model import CoefficientPrior, Model
 from sgp_ros.gp.online import OnlineRegression
-from sgp_ros.gp.prior import CoefficientPrior
 from sgp_ros.gp.retention import RETENTIONS
 from test.gp.worlds import random_problem
 

@@ -7,8 +7,7 @@ import pytest
 
 from sgp_ros.gp.kernels import SquaredExponential
 from sgp_ros.gp.linear_kernel import Linear
-from sgp_ros.gp.model import Observations
-from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.model import CoefficientPrior, Observations
 from sgp_ros.gp.selection import select_inputs
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sgp_ros.gp.kernels import SquaredExponential
-from sgp_ros.gp.model import Model, Observations
-from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 
 
 def random_problem(seed, n=12, k=2, p=3, d=3, gain=None, noise_like=None):

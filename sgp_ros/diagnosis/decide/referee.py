@@ -16,7 +16,7 @@ from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.locate.remainder import foretold, observations, process_inputs, spread
 from sgp_ros.diagnosis.parts import PARTS, parts_of
 from sgp_ros.gp.learning import initial_model, learn, screened
-from sgp_ros.gp.prior import CoefficientPrior
+from sgp_ros.gp.model import CoefficientPrior
 
 LEAST_ROWS = 5 * PARTS
 """Rows below which the referee has no opinion."""

@@ -12,10 +12,9 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.parts import PARTS, parts_of
+from sgp_ros.gp.model import CoefficientPrior, Observations
 from sgp_ros.gp.model import Model as Hyperparameters
-from sgp_ros.gp.model import Observations
 from sgp_ros.gp.posterior import Posterior
-from sgp_ros.gp.prior import CoefficientPrior
 from sgp_ros.gp.selection import select_inputs
 from sgp_ros.physics.observed_motion import ObservedMotion
 

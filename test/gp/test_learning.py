@@ -7,12 +7,10 @@ import pytest
 from scipy import optimize
 
 from sgp_ros.gp.kernels import AdditiveSquaredExponential, SquaredExponential
-from sgp_ros.gp.learning import initial_model, learn
+from sgp_ros.gp.learning import initial_model, learn, opened_box, search_box
 from sgp_ros.gp.linear_kernel import Linear
-from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior
-from sgp_ros.gp.prior import CoefficientPrior
-from sgp_ros.gp.search_box import opened_box, search_box
 
 FLAT = CoefficientPrior.flat(0)
 

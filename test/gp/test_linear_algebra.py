@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sgp_ros.gp.matrix_loops import (
+from sgp_ros.gp.linear_algebra import (
     exponents_numpy,
     subtract_symmetric,
     subtracted_numpy,

@@ -1,4 +1,4 @@
-"""The samples that Z is conditioned on, factored: one growing factor per group of outputs.
+"""Buffered samples, and the factors of their covariance: one growing factor per group of outputs.
 
 Components of X with the same covariance up to a scale share one growing factor L, with
 `A = L^-1 F` and `b = L^-1 y` of each beside it. Appending borders the factor; the solve it needs
@@ -11,12 +11,89 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sgp_ros.gp.factor import GrowingFactor, Whitening
-from sgp_ros.gp.model import Model
-from sgp_ros.gp.output_groups import OutputGroup, output_groups
+from sgp_ros.gp.factor import GrowingFactor, SlidingRows, Whitening, part_of
+from sgp_ros.gp.model import Model, Observations, OutputGroup, output_groups
 from sgp_ros.gp.retention import RETENTIONS
-from sgp_ros.gp.sample_buffer import SampleBuffer
-from sgp_ros.gp.state_parts import part_of
+
+_FULL = np.ones(())
+
+
+class SampleBuffer:
+    """Copies of samples, with room for as many as are held at once.
+
+    Args:
+        U: (n, d) inputs.
+        data: (n, k, p + 1) regressors and, last, observations.
+        weights: (n,) by which their equations of unit noise count for W.
+        capacity: most samples held at once.
+    """
+
+    def __init__(
+        self, U: np.ndarray, data: np.ndarray, weights: np.ndarray, capacity: int
+    ) -> None:
+        self._capacity = capacity
+        self._U = _sliding(U, capacity)
+        self._data = _sliding(data, capacity)
+        self._weights = _sliding(weights, capacity)
+
+    @classmethod
+    def empty(cls, k: int, p: int) -> SampleBuffer:
+        """Return a buffer without samples or room, for k outputs and p coefficients."""
+        return cls(np.zeros((0, 0)), np.zeros((0, k, p + 1)), np.zeros(0), 0)
+
+    def with_room(self, capacity: int) -> SampleBuffer:
+        """Return a copy with this capacity."""
+        return SampleBuffer(self.inputs, self.data, self.weights, capacity)
+
+    @property
+    def size(self) -> int:
+        """Samples held."""
+        return self._data.size
+
+    @property
+    def inputs(self) -> np.ndarray:
+        """Inputs, a view (size, d)."""
+        return self._U.rows
+
+    @property
+    def data(self) -> np.ndarray:
+        """Regressors and, last, observations, a view (size, k, p + 1)."""
+        return self._data.rows
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Weights of the equations, a view (size,)."""
+        return self._weights.rows
+
+    def observations(self) -> Observations:
+        """Return a copy of the samples."""
+        return Observations(
+            self.inputs.copy(), self.data[:, :, :-1].copy(), self.data[:, :, -1].copy()
+        )
+
+    def append(self, u: np.ndarray, data: np.ndarray) -> None:
+        """Add a sample of weight 1, input u (d,), data (k, p + 1); the first one tells d."""
+        if not self.size:
+            self._U = _sliding(np.zeros((0, len(u))), self._capacity)
+        self._U.append(u)
+        self._data.append(data)
+        self._weights.append(_FULL)
+
+    def drop(self, m: int) -> None:
+        """Remove sample m."""
+        self._U.drop(m)
+        self._data.drop(m)
+        self._weights.drop(m)
+
+    def fade(self, factor: float) -> None:
+        """Let all samples count `factor` times as much as before."""
+        self._weights.rows[:] *= factor
+
+
+def _sliding(rows: np.ndarray, capacity: int) -> SlidingRows:
+    held = SlidingRows(capacity, rows.shape[1:])
+    held.replace(rows)
+    return held
 
 
 class FactoredBuffer:

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sgp_ros.gp.sample_buffer import SampleBuffer
+from sgp_ros.gp.buffer import SampleBuffer
 
 
 @given(st.lists(st.integers(0, 5), max_size=40))

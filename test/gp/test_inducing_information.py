@@ -1,19 +1,75 @@
-"""Laws of taking what a stream told to other hyper-parameters."""
+"""Laws of the information of a whole stream on W, its inducing points at a limit or changed."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from sgp_ros.gp.basis import BasisRegression
-from sgp_ros.gp.feature_block import JITTER
-from sgp_ros.gp.feature_change import interpolation_error
+from sgp_ros.gp.inducing_information import InducingInformation, interpolation_error
+from sgp_ros.gp.inducing_points import JITTER
+from sgp_ros.gp.inducing_regression import InducingPointRegression
+from sgp_ros.gp.information import Forgetting, Information
 from sgp_ros.gp.kernels import SquaredExponential
-from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.posterior import Posterior
-from sgp_ros.gp.prior import CoefficientPrior
-from test.gp.worlds import random_problem, returning
+from test.gp.worlds import plane, random_problem, returning
+
+
+def _learned(model, prior, data, features):
+    basis = InducingInformation(model, Information.of_prior(prior), features)
+    for u, f, y in zip(data.U, data.F, data.y, strict=True):
+        basis.absorb(u, basis.features(u), np.column_stack([f, y]))
+    return basis
+
+
+def test_without_room_the_intervals_of_w_still_hold():
+    """A tenth of the features that Z would need make W less certain, not too certain.
+
+    The mean of 40 draws of chi2_3 / 3 has standard deviation 0.129; four of these bound it from
+    above. Remainders that counted as news at each sample would give a mean square above ten.
+    """
+    squares = []
+    for seed in range(40):
+        model, prior, w, data = plane(seed, 400, 0.01)
+        basis = _learned(model, prior, data, 20)
+        assert basis.unresolved > 300
+        error = basis.total.R @ (basis.total.coefficients - w)
+        squares.append(error @ error / 3)
+    assert np.mean(squares) < 1.0 + 4 * 0.129
+
+
+@pytest.mark.parametrize('noise', [1e-2, 1e-4, 1e-6, 1e-8])
+def test_little_noise_costs_no_digit_that_w_needs(noise):
+    """Down to a hundred-millionth of the variance of Z, W is that of a batch fit.
+
+    Errors of a hundredth of the noise are all that the basis may make; features so close that
+    their covariance has no inverse in double precision would be lost far above that.
+    """
+    model, prior, _, data = returning(2)
+    model = type(model)(model.kernels, (noise,))
+    kernel = model.kernels[0]
+    grid = np.linspace(-2.0, 2.0, 9)[:, None]
+    z = kernel.matrix(data.U, grid) @ np.random.default_rng(0).normal(size=9)
+    rough = np.sqrt(noise) * np.random.default_rng(1).normal(size=len(z))
+    data.y[:, 0] = data.F[:, 0] @ [1.0, 2.0, 3.0] + z + rough
+    found = _learned(model, prior, data, 100).total
+    batch = Posterior(model, data, prior)
+    deviations = np.sqrt(np.diag(batch.covariance))
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), deviations, rtol=0.02)
+    assert np.all(np.abs(found.coefficients - batch.coefficients) < 0.2 * deviations)
+
+
+def test_what_fades_no_longer_stands_for_the_same_remainder():
+    """Samples without room are numbered by as much as they still count."""
+    model, prior, _, data = plane(0, 300, 0.01)
+    basis = _learned(model, prior, data, 5)
+    points = basis.sets[0]
+    before = points.tally.copy()
+    forgetting = Forgetting(2.0, Information.of_prior(prior))
+    basis.fade(forgetting)
+    np.testing.assert_allclose(points.tally, np.exp(-0.5) * before)
+
 
 PRIOR = CoefficientPrior.from_std(np.ones(3), np.full(3, 2.0))
 
@@ -29,7 +85,7 @@ def _exact(model, prior):
 
 
 def _basis(model, prior):
-    return BasisRegression(model, prior, 20, 60)
+    return InducingPointRegression(model, prior, 20, 60)
 
 
 WAYS = [_exact, _basis]
@@ -153,16 +209,16 @@ def test_w_stays_calibrated_through_a_wrong_start(way):
 def test_the_interpolation_error_is_the_variance_of_a_difference(length):
     """Of Z less its interpolation, by the joint covariance of both under the other kernel."""
     model, prior, _, data = returning(0)
-    block = _learn(_basis(model, prior), data)._basis.blocks[0]
-    own, other = block.group.kernel, SquaredExponential(1.3, (length,), (0,))
-    B, squares = np.array(block.inputs), []
+    points = _learn(_basis(model, prior), data)._basis.sets[0]
+    own, other = points.group.kernel, SquaredExponential(1.3, (length,), (0,))
+    B, squares = np.array(points.inputs), []
     for u in data.U:
         K = own.matrix(B) + JITTER * own.variance * np.eye(len(B))
         a = np.linalg.solve(K, own.matrix(B, u[None])[:, 0])
         difference = np.append(-a, 1.0)
         squares.append(difference @ other.matrix(np.vstack([B, u])) @ difference)
     expected = np.mean(squares)
-    assert interpolation_error(block, other, data.U) == pytest.approx(expected, abs=1e-7)
+    assert interpolation_error(points, other, data.U) == pytest.approx(expected, abs=1e-7)
     assert (expected > model.noise[0]) == (length == 0.2)
 
 
@@ -189,7 +245,7 @@ def _tail(data):
 
 @pytest.mark.parametrize('way', WAYS)
 def test_outputs_that_come_to_share_a_kernel_are_restored_apart(way):
-    """What was told of each stays in a block of its own, also in a state that is restored."""
+    """What was told of each stays in a points of its own, also in a state that is restored."""
     model = _model((1.0, 2.0), (0.8, 0.7), (0.1, 0.3))
     shared = _model((1.0, 3.0), (0.6, 0.6), (0.1, 0.3))
     data = _spread_out()
@@ -198,6 +254,6 @@ def test_outputs_that_come_to_share_a_kernel_are_restored_apart(way):
     other.restore(one.state())
     for online in (one, other):
         _learn(online, data)
-    assert len(one._basis.blocks) == 2
+    assert len(one._basis.sets) == 2
     for name, array in other.state().items():
         np.testing.assert_array_equal(array, one.state()[name])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sgp_ros.gp.drift import SAMPLES_PER_ALARM, SLACK, THRESHOLD, DriftTest, run_length
+from sgp_ros.gp.scores import SAMPLES_PER_ALARM, SLACK, THRESHOLD, DriftTest, run_length
 
 
 def _alarms(errors):

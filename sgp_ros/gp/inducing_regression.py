@@ -1,8 +1,8 @@
-"""Joint inference of W and Z over a stream of any length, at constant cost and memory.
+"""Inducing-point GP: joint inference of W and Z over a stream, at constant cost and memory.
 
-W and Z are predicted from what the whole stream told of them (`gp.stream_basis`). No sample has
-to be kept for that. The last ones are kept all the same: hyper-parameters are fitted to them, and
-what other hyper-parameters need beyond what the stream told is learned from them.
+W and Z are predicted from the information of the whole stream (`gp.inducing_information`). No
+sample has to be kept for that. The last ones are kept all the same: hyper-parameters are fitted to
+them, and what other hyper-parameters need beyond that information is learned from them.
 """
 
 from __future__ import annotations
@@ -11,18 +11,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sgp_ros.gp.factor import Whitening
-from sgp_ros.gp.forgetting import Forgetting
-from sgp_ros.gp.information import Information
-from sgp_ros.gp.model import Model, Observations
-from sgp_ros.gp.online_prediction import OnlinePrediction
-from sgp_ros.gp.prior import CoefficientPrior
-from sgp_ros.gp.sample_buffer import SampleBuffer
-from sgp_ros.gp.state_parts import part_of
-from sgp_ros.gp.stream_basis import StreamBasis
+from sgp_ros.gp.buffer import SampleBuffer
+from sgp_ros.gp.factor import Whitening, part_of
+from sgp_ros.gp.inducing_information import InducingInformation
+from sgp_ros.gp.information import Forgetting, Information
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
+from sgp_ros.gp.regression import OnlinePrediction
 
 
-class BasisRegression:
+class InducingPointRegression:
     """The posterior after each sample, in a basis of bounded size.
 
     Args:
@@ -53,7 +50,7 @@ class BasisRegression:
         self._version = 0
         self._gone = 0
         self._samples = SampleBuffer.empty(len(model.kernels), prior.size).with_room(budget + 1)
-        self._basis = StreamBasis(model, self._prior, features)
+        self._basis = InducingInformation(model, self._prior, features)
 
     @property
     def model(self) -> Model:
@@ -73,7 +70,7 @@ class BasisRegression:
     @property
     def features(self) -> tuple[int, ...]:
         """Features in use by each component."""
-        sizes = {j: block.size for block in self._basis.blocks for j in block.group.outputs}
+        sizes = {j: points.size for points in self._basis.sets for j in points.group.outputs}
         return tuple(sizes[j] for j in sorted(sizes))
 
     @property
@@ -95,15 +92,17 @@ class BasisRegression:
         """What the prior tells of W, and those that are gone beside the kept samples. O(n m^2)."""
         if not (self._remember and self._gone):
             return self._prior.copy()
-        kept = StreamBasis.of_samples(self._model, self._prior, self._features, self._samples)
+        kept = InducingInformation.of_samples(
+            self._model, self._prior, self._features, self._samples
+        )
         gone = self._basis.total.less(kept.total)
         return self._prior.with_rows(gone.R, gone.z)
 
     def predict(self, u: np.ndarray, f: np.ndarray) -> OnlinePrediction:
         """Predict X at input u (d,) with regressor f (k, p). O(k m^2)."""
         features = self._basis.features(u)
-        pairs = zip(self._basis.blocks, features, strict=True)
-        return self._predict(u, f, features, tuple(block.gain(found) for block, found in pairs))
+        pairs = zip(self._basis.sets, features, strict=True)
+        return self._predict(u, f, features, tuple(points.gain(found) for points, found in pairs))
 
     def with_regressor(self, prediction: OnlinePrediction, f: np.ndarray) -> OnlinePrediction:
         """Predict for another regressor f (k, p) at an input that Z sees as the same. O(k m p)."""
@@ -117,9 +116,9 @@ class BasisRegression:
         gains: tuple[np.ndarray, ...],
     ) -> OnlinePrediction:
         rows, mean, variance = f.copy(), np.zeros(len(f)), np.zeros(len(f))
-        for block, found, gain in zip(self._basis.blocks, features, gains, strict=True):
-            outputs = list(block.group.outputs)
-            explained, mean[outputs], variance[outputs] = block.explain(found, gain)
+        for points, found, gain in zip(self._basis.sets, features, gains, strict=True):
+            outputs = list(points.group.outputs)
+            explained, mean[outputs], variance[outputs] = points.explain(found, gain)
             rows[outputs] -= explained
         mean, covariance = self._basis.total.predict(rows, mean, variance)
         return OnlinePrediction(mean, covariance, u, f, features, self._version, gains)
@@ -166,14 +165,14 @@ class BasisRegression:
         """Take other hyper-parameters, budget or memory; `policy` says nothing here.
 
         While the kept samples are the whole stream, it is learned again under other
-        hyper-parameters; later what it told is taken over (`gp.feature_change`), or
+        hyper-parameters; later what it told is taken over (`gp.inducing_information`), or
         without memory the kept samples are learned again. O(k m^3 + n k m^2).
         """
         del policy
         self._remember = self._remember if remember is None else remember
         if model is not None and model != self._model:
             if self._gone and not self._remember:
-                self._basis = StreamBasis.of_samples(
+                self._basis = InducingInformation.of_samples(
                     model, self._prior, self._features, self._samples
                 )
                 self._gone = 0
@@ -202,7 +201,7 @@ class BasisRegression:
         """Continue exactly where `state` was taken."""
         self._samples = SampleBuffer(state['U'], state['data'], state['weights'], self._budget + 1)
         self._gone, self._forgetting.turn = (int(count) for count in state['counts'])
-        self._basis = StreamBasis.restored(
+        self._basis = InducingInformation.restored(
             self._model, self._prior, self._features, part_of(state, 'basis_')
         )
         self._version += 1

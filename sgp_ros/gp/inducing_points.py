@@ -1,17 +1,17 @@
-"""What a stream tells of the Z of outputs that share a kernel, in features of bounded number.
+"""Inducing-point features of the Z of outputs that share a kernel, as square-root information.
 
 The features at u are `phi(u) = L^-1 k(B, u)` with inducing inputs B and `L L^T = K(B, B)`, their
 weights standard normal: Z as the values at B predict it. What they cannot predict, the remainder
-`kappa(u, u) - phi phi^T`, counts as noise of its own at each sample (Snelson and Ghahramani 2006).
-An input joins B when its remainder is no longer small beside the noise; features that exist do not
-change by that, so nothing absorbed before has to be seen again. Where B has no room for it, the
-remainder may be the same at each return, and n samples with the same error of variance r
+`kappa(u, u) - phi phi^T`, counts as noise of its own at each sample (FITC: Snelson and Ghahramani
+2006). An input joins B when its remainder is no longer small beside the noise; features that exist
+do not change by that, so nothing absorbed before has to be seen again. Where B has no room for it,
+the remainder may be the same at each return, and n samples with the same error of variance r
 tell no more than one: the n-th counts with the variance n r.
 
 Two systems are kept: one that holds the prior of the weights, which W and predictions need, and
-one of the data alone, which other hyper-parameters need (`gp.feature_change`). The second could
-be had from the first by taking the prior off, but where data tell little beside the prior that
-difference is rounding; rotations into a second triangle lose no digit.
+one of the data alone, which other hyper-parameters need (`gp.inducing_information`). The second
+could be had from the first by taking the prior off, but where data tell little beside the prior
+that difference is rounding; rotations into a second triangle lose no digit.
 """
 
 from __future__ import annotations
@@ -23,13 +23,15 @@ from dataclasses import replace
 import numpy as np
 from scipy import linalg
 
-from sgp_ros.gp.factor import GrowingFactor, Whitening
-from sgp_ros.gp.forgetting import Forgetting
-from sgp_ros.gp.information import Information
-from sgp_ros.gp.output_groups import OutputGroup
-from sgp_ros.gp.rotations import absorb_each
-from sgp_ros.gp.state_parts import part_of
-from sgp_ros.gp.trapezoid import absorb_equation, absorbed_equations_numpy, solve_transposed
+from sgp_ros.gp.factor import GrowingFactor, Whitening, part_of
+from sgp_ros.gp.information import Forgetting, Information
+from sgp_ros.gp.model import OutputGroup
+from sgp_ros.gp.rotations import (
+    absorb_each,
+    absorb_equation,
+    absorbed_equations_numpy,
+    solve_transposed,
+)
 
 REMAINDER = 0.01
 """Share of the noise variance above which the remainder makes an input join. The features then
@@ -42,7 +44,7 @@ LEAST = 1e-9
 """Share of the variance of Z below which a remainder is rounding: no input joins for it."""
 
 
-class FeatureBlock:
+class InducingPoints:
     """Square-root information on the weights of one group of outputs, coupled to W.
 
     Attributes:
@@ -65,7 +67,7 @@ class FeatureBlock:
         self.tally = np.zeros(3)
         k = len(group.outputs)
         self._shape = (k, p + 1)
-        self._told_R, self._told_z = np.zeros((k, p, p)), np.zeros((k, p))
+        self._residual_R, self._residual_z = np.zeros((k, p, p)), np.zeros((k, p))
         self._scales = np.array(group.scales)[:, None]  # (k, 1)
         self._capacity = dense = capacity if group.kernel is not None else 0
         variance = 0.0 if group.kernel is None else group.kernel.variance
@@ -97,9 +99,9 @@ class FeatureBlock:
         return self._data_R[:m, :m], self._data_S[:m]
 
     @property
-    def told(self) -> tuple[Information, ...]:
-        """What the data tell of W whatever the weights are, one per output, not copied."""
-        return tuple(map(Information, self._told_R, self._told_z))
+    def residuals(self) -> tuple[Information, ...]:
+        """Equations left on W once the weights are eliminated, one per output, not copied."""
+        return tuple(map(Information, self._residual_R, self._residual_z))
 
     def features(self, u: np.ndarray) -> Whitening:
         """Return phi(u), (size,), as `v`, for an input u (d,). O(size^2 / 2)."""
@@ -176,7 +178,7 @@ class FeatureBlock:
         alone = rest.copy()
         absorb_equation(self._R, self._S, scale * found.v, rest)
         absorb_equation(self._data_R, self._data_S, scale * found.v, alone)
-        absorb_each(self._told_R, self._told_z, alone.reshape(self._shape))
+        absorb_each(self._residual_R, self._residual_z, alone.reshape(self._shape))
         return rest.reshape(self._shape)
 
     def learn_anew(self, U: np.ndarray, data: np.ndarray, weights: np.ndarray) -> None:
@@ -188,25 +190,26 @@ class FeatureBlock:
     def take(self, R: np.ndarray, S: np.ndarray) -> None:
         """Hold data of unit noise, weights `R` (r, size) and the rest `S` (r, k (p + 1)), instead.
 
-        What they tell of W whatever the weights are enters `told`. O(m^3).
+        The equations that are left on W once the weights are eliminated enter `residuals`. O(m^3).
         """
         m = self.size
         R, S, alone = absorbed_equations_numpy(R, S, np.zeros((m, m)), np.zeros((m, S.shape[1])))
         self._data_R[:m, :m], self._data_S[:m] = R, S
         R, S, _ = absorbed_equations_numpy(np.eye(m), np.zeros_like(S), R, S)
         self._R[:m, :m], self._S[:m] = R, S
-        for j, told in enumerate(self.told):
-            told.absorb(alone.reshape(-1, *self._shape)[:, j])
+        for j, residual in enumerate(self.residuals):
+            residual.absorb(alone.reshape(-1, *self._shape)[:, j])
 
-    def on_coefficients(self) -> tuple[Information, ...]:
-        """Return what the data of each output tell of W under the prior of the weights. O(m^3)."""
+    def marginals(self) -> tuple[Information, ...]:
+        """Return the data's information on W per output, the weights integrated out. O(m^3)."""
         m = self.size
         _, _, rest = absorbed_equations_numpy(
             np.eye(m), np.zeros((m, self._S.shape[1])), *self.data
         )
         rows = rest.reshape(-1, *self._shape)
         return tuple(
-            told.with_rows(rows[:, j, :-1], rows[:, j, -1]) for j, told in enumerate(self.told)
+            residual.with_rows(rows[:, j, :-1], rows[:, j, -1])
+            for j, residual in enumerate(self.residuals)
         )
 
     def fade(self, forgetting: Forgetting) -> np.ndarray:
@@ -236,7 +239,7 @@ class FeatureBlock:
             'tally': self.tally,
             'R': self._R[:m, :m], 'C': self._S[:m],
             'data_R': self._data_R[:m, :m], 'data_C': self._data_S[:m],
-            'told_R': self._told_R, 'told_z': self._told_z,
+            'residual_R': self._residual_R, 'residual_z': self._residual_z,
         }  # fmt: skip
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
@@ -247,7 +250,7 @@ class FeatureBlock:
         m = self.size
         self._R[:m, :m], self._S[:m] = state['R'], state['C']
         self._data_R[:m, :m], self._data_S[:m] = state['data_R'], state['data_C']
-        self._told_R[:], self._told_z[:] = state['told_R'], state['told_z']
+        self._residual_R[:], self._residual_z[:] = state['residual_R'], state['residual_z']
 
 
 def remainder_of(features: Whitening) -> float:
