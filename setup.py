@@ -7,6 +7,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = 'sgp_ros'
+PROOF = 'sgp_proof'
 VERSION = '0.1.0'
 # `colcon build --symlink-install` runs a link to this file in a folder that lacks the rest.
 SOURCES = Path(__file__).resolve().parent
@@ -32,7 +33,7 @@ setup(
     maintainer='The sgp_ros maintainers',
     maintainer_email='maintainers@sgp-ros.example',
     python_requires='>=3.10',
-    packages=find_packages(include=[NAME, f'{NAME}.*', 'sgp_proof', 'sgp_proof.*']),
+    packages=find_packages(include=[NAME, f'{NAME}.*', PROOF, f'{PROOF}.*']),
     package_data={NAME: ['py.typed', 'report/templates/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
@@ -79,7 +80,10 @@ setup(
             'sgp = sgp_ros.cli:main',
             'sgp_node = sgp_ros.ros.sgp_node:main',
             'reaction_wheel = sgp_ros.ros.reaction_wheel:main',
-        ]
+        ],
+        # The experiments are beside the package, not a part of it: it installs without them.
+        'sgp_ros.commands': [f'{PROOF} = {PROOF}.commands:add_commands']
+        * (SOURCES / PROOF).is_dir(),
     },
     zip_safe=False,
 )

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sgp_ros.cli import main
+from sgp_ros.cli import Progress, main
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.writer import RecordingWriter
-from sgp_ros.report.progress import Progress
 
 ROOT = Path(__file__).parents[1]
 
@@ -236,11 +237,70 @@ def test_results_replace_older_ones_and_leave_no_parts(wheel, tmp_path):
 
 def test_help_shows_an_example(capsys):
     """Every command has one."""
-    for command in ('demo', 'simulate', 'replay', 'import', 'reproduce'):
+    for command in ('demo', 'simulate', 'replay', 'identify', 'diagnose', 'import', 'reproduce'):
         with pytest.raises(SystemExit) as caught:
             main([command, '--help'])
         assert caught.value.code == 0
         assert f'example: sgp {command}' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'said'),
+    [
+        ('identify x --robot y --cutoff -1', "--cutoff: '-1', expected a number above 0"),
+        ('identify x --robot y --cutoff nan', "--cutoff: 'nan'"),
+        ('identify x --robot y --share 1', "--share: '1', expected a number above 0 and below 1"),
+        ('identify x --robot y --stretch 0', "--stretch: '0'"),
+        ('simulate x --duration inf', "--duration: 'inf'"),
+        ('simulate x --rate 0', "--rate: '0'"),
+        ('simulate x --rate fast', "--rate: 'fast', expected a number above 0"),
+        ('simulate x --seed -1', "--seed: '-1', expected an integer from 0"),
+        ('simulate x --seed 1.5', "--seed: '1.5'"),
+        ('demo --duration nan', "--duration: 'nan'"),
+        ('reproduce --seeds 0', '0 seeds; expected at least one'),
+    ],
+)
+def test_a_number_that_makes_no_sense_is_refused_as_it_was_given(arguments, said, capsys):
+    """What was found is what the user wrote, and what was expected stands beside it."""
+    assert said in _refused(arguments.split(), capsys)
+
+
+def test_help_comes_without_what_computes():
+    """A user who asks what there is does not wait for NumPy."""
+    code = (
+        'import sys; from sgp_ros.cli import main\n'
+        "try: main(['--help'])\n"
+        "except SystemExit: assert not {'numpy', 'yaml', 'rosbags'} & set(sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', code], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert 'simulate' in done.stdout
+
+
+def test_another_package_adds_a_command_by_an_entry_point(tmp_path, monkeypatch, capsys):
+    """An installed package with the group is all that it takes; a broken one costs a remark."""
+    (tmp_path / 'waiting.py').write_text(
+        'def add_commands(add):\n'
+        "    parser = add('wait', 'waiting:wait', 'Wait.', 'sgp wait 3')\n"
+        "    parser.add_argument('seconds', type=float)\n"
+        'def wait(seconds, out, progress):\n'
+        "    return {'waited': seconds}\n"
+    )
+    folder = tmp_path / 'waiting-1.dist-info'
+    folder.mkdir()
+    (folder / 'METADATA').write_text('Metadata-Version: 2.1\nName: waiting\nVersion: 1\n')
+    (folder / 'entry_points.txt').write_text(
+        '[sgp_ros.commands]\nwaiting = waiting:add_commands\nbroken = nowhere:add_commands\n'
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    assert main(['wait', '3', '--json']) == 0
+    captured = capsys.readouterr()
+    assert json.loads(captured.out) == {'waited': 3.0}
+    assert captured.err.splitlines() == [
+        "sgp: no commands of nowhere:add_commands: No module named 'nowhere'"
+    ]
 
 
 def test_progress_is_silent_where_nobody_watches(capsys):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -36,6 +37,45 @@ def test_entry_points_exist():
     assert {name for name, _, _ in scripts} == {'sgp', 'sgp_node', 'reaction_wheel'}
     for _, module, function in scripts:
         assert callable(getattr(import_module(module), function))
+
+
+def _told_to_setuptools(folder, monkeypatch):
+    """Return what setup.py in `folder` tells setuptools."""
+    told = {}
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr('setuptools.setup', told.update)
+    runpy.run_path(str(folder / 'setup.py'))
+    return told
+
+
+def test_experiments_bring_their_commands_and_are_not_needed(tmp_path, monkeypatch):
+    """With the folder `sgp_proof` there are entry points for its commands, without it none."""
+    told = _told_to_setuptools(ROOT, monkeypatch)
+    (entry,) = told['entry_points']['sgp_ros.commands']
+    module, function = entry.split(' = ')[1].split(':')
+    assert callable(getattr(import_module(module), function))
+    for name in ('setup.py', 'README.md', 'package.xml'):
+        shutil.copy(ROOT / name, tmp_path)
+    shutil.copytree(ROOT / 'sgp_ros', tmp_path / 'sgp_ros')
+    alone = _told_to_setuptools(tmp_path, monkeypatch)
+    assert not alone['entry_points']['sgp_ros.commands']
+    assert {name.split('.')[0] for name in alone['packages']} == {'sgp_ros'}
+
+
+def test_every_requirement_stands_in_the_manifest(monkeypatch):
+    """A user of rosdep gets what a user of pip gets."""
+    keys = {
+        'numpy': 'python3-numpy', 'scipy': 'python3-scipy', 'numba': 'python3-numba',
+        'pyyaml': 'python3-yaml', 'jinja2': 'python3-jinja2', 'matplotlib': 'python3-matplotlib',
+        'pin': 'pinocchio',
+    }  # fmt: skip
+    manifest = ET.parse(ROOT / 'package.xml').getroot()
+    present = {entry.text for entry in manifest.findall('exec_depend')}
+    required = {
+        re.split('[<>=]', text)[0]
+        for text in _told_to_setuptools(ROOT, monkeypatch)['install_requires']
+    }
+    assert {keys.get(name, f'python3-{name}-pip') for name in required} <= present
 
 
 def test_shipped_files_are_found_from_the_source_tree():

@@ -60,44 +60,47 @@ class DiagnoseOptions:
 
 
 def run_diagnose(
-    bag: str,
-    robot_name: str,
-    out: Path,
-    options: DiagnoseOptions,
-    *,
-    progress: Callable[[float], None],
+    bag: str, robot: str, out: Path, *, progress: Callable[[float], None], **options: Any
 ) -> dict[str, Any]:
     """Diagnose a recording and write diagnosis.json, predictions and the report.
+
+    Args:
+        bag: the recording.
+        robot: a URDF, or a robot YAML with one, or a built-in name.
+        out: folder of the results.
+        progress: called with the share that is done.
+        options: fields of `DiagnoseOptions`.
 
     Raises:
         ConfigError: a robot without nominal bodies or inertias, or a file that is none.
         RecordingError: nothing in the recording can be used, or nothing moves.
         NumericalError: the motion leaves the equations without a solution.
     """
-    nominal = nominal_model(load_robot(robot_name))
-    robot, tree = nominal.robot, nominal.tree
+    chosen = DiagnoseOptions(**options)
+    nominal = nominal_model(load_robot(robot))
+    model, tree = nominal.robot, nominal.tree
     if not has_inertia(tree):
         raise ConfigError(
-            f'the mass matrix of the nominal robot {robot.name} is singular',
+            f'the mass matrix of the nominal robot {model.name} is singular',
             'a mass and inertias for every moving link of the URDF',
             'identify it first and give the robot_identified.urdf of sgp identify',
         )
     remarks = list(nominal.remarks)
-    events = _events(bag, robot, options, remarks)
+    events = _events(bag, model, chosen, remarks)
     still = still_joints(events, tree.moving_names)
     if len(still) == tree.size:
         raise RecordingError(
-            f'no joint of {robot.name} moves in {Path(bag).name}',
+            f'no joint of {model.name} moves in {Path(bag).name}',
             f'at least {LEAST_POSITIONS} positions of one of {", ".join(still)}',
             'take a recording in which the robot moves',
         )
     if still:
         remarks.append(f'Nothing can be said of joints that do not move: {", ".join(still)}.')
-    tests = _held_out(robot, options, remarks)
-    simulation = _simulation(nominal, options, remarks)
+    tests = _held_out(model, chosen, remarks)
+    simulation = _simulation(nominal, chosen, remarks)
     try:
         found = diagnose(
-            events, robot, tree, tests, stated=nominal.stated, holds_out=not options.tests,
+            events, model, tree, tests, stated=nominal.stated, holds_out=not chosen.tests,
             progress=progress,
         )  # fmt: skip
     except np.linalg.LinAlgError as error:

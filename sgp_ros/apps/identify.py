@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -43,50 +43,65 @@ class IdentifyOptions:
         tests: recordings that are only scored on; without any, a part of the recording.
         joint_states: topic of the states; None for the one there is.
         command: topic of the commands; None for the one there is.
-        effort_source: `state`, `command` or `auto`.
-        identification: what is fitted and held out.
+        effort: where efforts come from, `state`, `command` or `auto`.
+        inputs: what Z sees, such as `own:velocity`; None lets the data choose.
+        holdout: the part held out without tests, `tail` or `alternate`.
+        share: how much of it.
+        stretch: length of alternate stretches [s].
+        cutoff: of the low-pass [Hz]; None chooses from the data.
     """
 
     tests: Sequence[str] = ()
     joint_states: str | None = None
     command: str | None = None
-    effort_source: str = 'auto'
-    identification: IdentificationOptions = field(default_factory=IdentificationOptions)
+    effort: str = 'auto'
+    inputs: Sequence[str] | None = None
+    holdout: str = 'tail'
+    share: float = 0.4
+    stretch: float = 6.0
+    cutoff: float | None = None
+
+    @property
+    def identification(self) -> IdentificationOptions:
+        """What is fitted and held out."""
+        return IdentificationOptions(
+            residual_inputs=None if self.inputs is None else tuple(self.inputs),
+            holdout=self.holdout,
+            share=self.share,
+            stretch_s=self.stretch,
+            cutoff=self.cutoff,
+        )
 
 
 def run_identify(
-    bag: str,
-    robot_name: str,
-    out: Path,
-    options: IdentifyOptions,
-    *,
-    progress: Callable[[float], None],
+    bag: str, robot: str, out: Path, *, progress: Callable[[float], None], **options: Any
 ) -> dict[str, Any]:
     """Identify a robot and write findings, report, robot YAML and URDF.
 
     Args:
         bag: the recording that is learned from.
-        robot_name: built-in name, robot YAML or URDF.
+        robot: built-in name, robot YAML or URDF.
         out: folder of the results.
-        options: see `IdentifyOptions`.
         progress: called with the share that is done.
+        options: fields of `IdentifyOptions`.
 
     Raises:
         ConfigError: a wrong robot, method or hold-out.
         RecordingError: nothing in the recording can be used.
     """
+    chosen = IdentifyOptions(**options)
     require_folder(out)
-    robot = load_robot(robot_name)
+    model = load_robot(robot)
     remarks: list[str] = []
-    signals = read_signals(bag, robot, options, remarks)
+    signals = read_signals(bag, model, chosen, remarks)
     tests = {
-        name: read_signals(path, robot, options, remarks)
-        for name, path in names_of_tests(options.tests).items()
+        name: read_signals(path, model, chosen, remarks)
+        for name, path in names_of_tests(chosen.tests).items()
     }
     progress(0.1)
     found = identify(
-        signals, robot, tests, options.identification,
-        nominal=nominal_coefficients(robot), progress=lambda share: progress(0.1 + 0.7 * share),
+        signals, model, tests, chosen.identification,
+        nominal=nominal_coefficients(model), progress=lambda share: progress(0.1 + 0.7 * share),
     )  # fmt: skip
     rollouts = roll_out_held(found, signals, tests)
     progress(0.95)
@@ -99,7 +114,7 @@ def run_identify(
     known = found.physics.coefficients
     std = np.where(known.is_identifiable, known.std, np.inf)
     values, has_bodies = best_coefficients(found), found.consistent is not None
-    write_identified(out, robot, values, std, has_bodies=has_bodies)
+    write_identified(out, model, values, std, has_bodies=has_bodies)
     write_identification(out, found, findings, remarks)
     progress(1.0)
     print_findings(findings)
@@ -136,9 +151,7 @@ def read_signals(bag: str, robot: Robot, options: IdentifyOptions, remarks: list
     recording = open_recording(bag)
     events = recording.events(options.joint_states, options.command)
     try:
-        signals = collect_signals(
-            events, robot, max_gap=MAX_GAP_S, effort_source=options.effort_source
-        )
+        signals = collect_signals(events, robot, max_gap=MAX_GAP_S, effort_source=options.effort)
     except RecordingError as error:
         raise RecordingError(f'{bag}: {error.found}', error.expected, error.remedy) from error
     remarks += recording.remarks

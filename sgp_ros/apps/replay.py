@@ -40,6 +40,7 @@ class ReplayOptions:
     Attributes:
         joint_states: topic of the states; None chooses it.
         command: topic of the commands; None chooses it, `none` takes no commands.
+        params: ROS 2 parameter file; None takes the shipped one of the robot, if there is one.
         model: saved model to continue from; None starts anew.
         is_learning: whether to learn, or only to predict and score.
         truth: `truth.json` of a simulation to compare the parameters with.
@@ -47,38 +48,32 @@ class ReplayOptions:
 
     joint_states: str | None = None
     command: str | None = None
+    params: str | None = None
     model: str | None = None
     is_learning: bool = True
     truth: str | None = None
 
 
 def run_replay(
-    bag: str,
-    robot_name: str,
-    params: str | None,
-    out: Path,
-    options: ReplayOptions,
-    *,
-    progress: Callable[[float], None],
+    bag: str, robot: str, out: Path, *, progress: Callable[[float], None], **options: Any
 ) -> dict[str, Any]:
     """Replay a recording and write predictions, metrics, report, model and identified robot.
 
     Args:
         bag: the recording.
-        robot_name: built-in name, robot YAML or URDF.
-        params: ROS 2 parameter file; None takes the shipped one of the robot, if there is one.
+        robot: built-in name, robot YAML or URDF.
         out: folder of the results.
-        options: see `ReplayOptions`.
         progress: called with the share that is done.
+        options: fields of `ReplayOptions`.
 
     Raises:
         ConfigError: a wrong robot, parameter file, model or truth.
         RecordingError: nothing in the recording can be used.
     """
-    robot = load_robot(robot_name)
-    truth = load_truth(options.truth) if options.truth else None
+    chosen = ReplayOptions(**options)
+    truth = load_truth(chosen.truth) if chosen.truth else None
     recording = open_recording(bag)
-    engine = _make_engine(robot, params, options)
+    engine = _make_engine(load_robot(robot), chosen)
     remarks = list(recording.remarks)
     history, timing = History(), Timing()
     out.mkdir(parents=True, exist_ok=True)
@@ -92,8 +87,8 @@ def run_replay(
                 if found is not None:
                     write_outputs(writer, PredictionTopics(), found)
 
-        run_events(engine, recording, options, keep, timing, progress)
-        _check_use(engine, recording, options)
+        run_events(engine, recording, chosen, keep, timing, progress)
+        _check_use(engine, recording, chosen)
     remarks += [f'{count} messages could not be read: {reason}'
                 for reason, count in recording.unreadable.items()]  # fmt: skip
     remark = write_identified_robot(out, engine)
@@ -237,11 +232,11 @@ def _parameter_line(parameter: Mapping[str, Any], truth: Mapping[str, float] | N
     return text
 
 
-def _make_engine(robot: Robot, params: str | None, options: ReplayOptions) -> Engine:
+def _make_engine(robot: Robot, options: ReplayOptions) -> Engine:
     # settings are shipped for built-in robots; a URDF may have the same name by chance
-    is_built_in = params is None and not robot.source
+    is_built_in = options.params is None and not robot.source
     shipped = find_shipped(f'{robot.name}.yaml') if is_built_in else None
-    source = params or shipped
+    source = options.params or shipped
     settings = load_parameters(source) if source else {}
     config = EngineConfig.from_mapping(settings, robot)
     engine = Engine(robot, config)

@@ -23,8 +23,8 @@ def run_simulation(
     out: Path,
     progress: Callable[[float], None],
     *,
-    duration_s: float,
-    rate_hz: float | None = None,
+    duration: float,
+    rate: float | None = None,
     seed: int = 0,
     controller: str | None = None,
     effects: Sequence[str] = (),
@@ -37,8 +37,8 @@ def run_simulation(
         robot: name of a simulated robot, a URDF file, or a robot YAML.
         out: folder of the results.
         progress: called with the share that is done.
-        duration_s: length [s].
-        rate_hz: of sampling and control [Hz]; None for the usual one.
+        duration: length [s].
+        rate: of sampling and control [Hz]; None for the usual one.
         seed: of all random numbers.
         controller: name; None for the usual one.
         effects: texts such as `coulomb_friction:joint=pole,level=0.01`.
@@ -54,14 +54,14 @@ def run_simulation(
     simulation = make_simulation(
         simulator,
         seed=seed,
-        rate_hz=rate_hz,
+        rate_hz=rate,
         controller=controller,
         effects=[*found.effects, *effects],
         sensors=chosen,
         physical=parse_physical(physical),
         start_ns=START_NS,
     )
-    recording = simulate(simulation, duration_s, progress)
+    recording = simulate(simulation, duration, progress)
     recording.truth['transport'] = asdict(transport)
     out.mkdir(parents=True, exist_ok=True)
     path = out / f'{name}.mcap'
