@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from sgp_proof.bench.evidence import bench_evidence
-from sgp_proof.bench.machine import machine
-from sgp_proof.bench.rivals import installed
+from sgp_proof.bench.rivals import RIVALS
 from sgp_proof.bench.step import bench_step
+from sgp_proof.result_files import machine
 from sgp_ros.errors import ConfigError
 from sgp_ros.report.files import write_text
 
@@ -45,8 +45,7 @@ def run_bench(
         raise ConfigError(
             f'the benchmark {unknown[0]!r}', f'one of {", ".join(BENCHES)}', 'correct the name'
         )
-    rivals = installed()
-    for name, rival in rivals.items():
+    for name, rival in RIVALS.items():
         if rival is None:
             sys.stderr.write(
                 f'sgp bench: {name} is not installed, its columns stay empty; '
@@ -58,7 +57,7 @@ def run_bench(
         def share(part: float, done: int = i) -> None:
             progress((done + part) / len(chosen))
 
-        result[name] = BENCHES[name](rivals, share, is_quick=is_quick)
+        result[name] = BENCHES[name](RIVALS, share, is_quick=is_quick)
     write_text(out / 'bench.json', json.dumps(result, indent=1, allow_nan=False) + '\n')
     text = bench_tables(result)
     write_text(out / 'bench.md', text)

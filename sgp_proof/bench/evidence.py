@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
-from sgp_proof.bench.problem import Problem, draw_problem
+from sgp_proof.bench.problem import Problem, draw_problem, median_seconds
 from sgp_proof.bench.rivals import Rivals, timed
-from sgp_proof.bench.timing import median_seconds
 from sgp_ros.gp.kernels import SquaredExponential
 from sgp_ros.gp.learning import learn
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations

@@ -1,7 +1,9 @@
-"""The synthetic stream that all rivals are timed on."""
+"""The synthetic stream that all rivals are timed on, and how they are timed."""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,3 +54,28 @@ def draw_problem(samples: int, outputs: int, inputs: int, seed: int) -> Problem:
     smooth = np.sin(U @ rng.normal(size=(inputs, outputs)) / np.sqrt(inputs))
     y = F @ rng.normal(size=p) + smooth + 0.1 * rng.normal(size=(samples, outputs))
     return Problem(U, F, y, 1.0, (float(np.sqrt(inputs)),) * inputs, 0.01)
+
+
+def median_seconds(work: Callable[[], object], repeats: int, loops: int = 1) -> float:
+    """Return the median over `repeats` of the mean of `loops` calls [s]; one call warms up."""
+    work()
+    times = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        for _ in range(loops):
+            work()
+        times.append((time.perf_counter() - began) / loops)
+    return float(np.median(times))
+
+
+def move_seconds(read: int, updated: int, repeats: int) -> float:
+    """Return the time to read some doubles once and to read and write others once [s].
+
+    Measured by an inner product and by a product in place over arrays of just these sizes, which
+    lie in the cache if what they stand for does.
+    """
+    first, second = np.ones(read), np.ones(updated)
+    loops = max(1, 1_000_000 // (read + updated))
+    reading = median_seconds(lambda: np.dot(first, first), repeats, loops)
+    updating = median_seconds(lambda: np.multiply(second, 1.0, out=second), repeats, loops)
+    return reading + updating

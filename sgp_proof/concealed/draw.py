@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sgp_proof.concealed import answers, scores, sizes
+from sgp_proof.concealed import answers, balance, sizes
 from sgp_proof.concealed import world as worlds
 from sgp_proof.concealed.concealed_effect import UnsuitableError
 from sgp_proof.concealed.kinds import draw_effect
@@ -89,7 +89,7 @@ def _attempt(seed, rng, tier, wanted, out):
 
 def observed(rng, world, tier, *, needs_velocity=False):
     """Return the world with noise of its velocities, its usual motion, and that noise."""
-    motion = worlds.pilot_motion(world.run('near', 12.0, 1), world)
+    motion = balance.pilot_motion(world.run('near', 12.0, 1), world)
     relative = 0.002 if tier == 'A' else float(rng.choice([0.01, 0.03]))
     noise = tuple(float(relative * v) for v in motion.velocity)
     has_velocity = world.sensors.measures_velocity or needs_velocity
@@ -142,7 +142,7 @@ def _check(real, world, concealed):
         if share < sizes.SMALLEST_SHARE:
             raise UnsuitableError(f'{effect.name} makes {share:.2e}')
     if not concealed and world.errors:
-        error = max(x['nominal'] for x in scores.nominal_share(real, world).values())
+        error = max(x['nominal'] for x in balance.nominal_share(real, world).values())
         if error < sizes.SMALLEST_SHARE:
             raise UnsuitableError(f'wrong parameters make {error:.2e}')
 
@@ -177,7 +177,7 @@ def write_case(seed, tier, wanted, out, rng, world, concealed, recordings, motio
         verdict, right = answers.without_effect(world.errors, world.bodies)
     q, sensors, share = real.shown_position, world.sensors, sizes.shares(real, world)
     nmse = {
-        name: scores.recording_scores(recording, world, name != 'real')
+        name: balance.recording_scores(recording, world, name != 'real')
         for name, recording in (('real', real), *held_out.items())
     }
     answer = {

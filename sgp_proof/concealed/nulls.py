@@ -13,22 +13,20 @@ nothing is adequate. Every model that competes is fitted; its statistics go to
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 import tempfile
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from sgp_proof.concealed import draw, scores, sizes
+from sgp_proof.concealed import balance, draw, sizes
 from sgp_proof.concealed import world as worlds
 from sgp_proof.concealed.concealed_effect import UnsuitableError
 from sgp_proof.concealed.kinds import draw_effect
 from sgp_proof.concealed.robots import urdf
-from sgp_proof.environment import environment
+from sgp_proof.result_files import RESULTS, seed_range, write_result
 from sgp_ros.apps.simulated_files import write_simulated
 from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
@@ -41,7 +39,6 @@ from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import nominal_tree
 from sgp_ros.simulation.registry import EFFECTS
 
-RESULTS = Path(__file__).parents[1] / 'results'
 NOTHING, PARAMETERS, SLIGHT = 'nothing', 'wrong parameters', 'slight unlisted effect'
 LISTED, UNLISTED = 'one effect of the list', 'unlisted effect'
 KINDS = (NOTHING, PARAMETERS, SLIGHT, LISTED, UNLISTED)
@@ -57,11 +54,11 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
     parser.add_argument('--tier', choices=('A', 'B'), default='B')
     parser.add_argument('--seeds', default='1000:1100', help='FIRST:LAST+1')
+    parser.add_argument('--out', type=Path, default=RESULTS, help='folder of the result')
     arguments = parser.parse_args()
-    first, last = map(int, arguments.seeds.split(':'))
-    path = RESULTS / f'nulls_{arguments.tier.lower()}.json'
+    path = arguments.out / f'nulls_{arguments.tier.lower()}.json'
     rows = []
-    for seed in range(first, last):
+    for seed in seed_range(arguments.seeds):
         begin = time.perf_counter()
         row = drawn(seed, arguments.tier)
         if row is None:
@@ -69,9 +66,8 @@ def main():
         rows.append(row)
         print(seed, row['kind'], row['robot'], row['verdict'],
               f'{time.perf_counter() - begin:.0f} s', flush=True)  # fmt: skip
-        report = {'schema': 1, 'tier': arguments.tier, 'seeds': arguments.seeds,
-                  'environment': environment(), 'worlds': rows}  # fmt: skip
-        path.write_text(json.dumps(report, allow_nan=False) + '\n', encoding='utf-8')
+        report = {'tier': arguments.tier, 'seeds': arguments.seeds, 'worlds': rows}
+        write_result(path, report, indent=None)
 
 
 def drawn(seed, tier):
@@ -88,10 +84,7 @@ def drawn(seed, tier):
 def _attempt(seed, rng, tier, kind):
     is_wrong = kind == PARAMETERS or (kind in _CONCEALED and rng.random() < 0.5)
     world = worlds.draw_world(seed, rng, tier, 0.3 if is_wrong else 0.0)
-    motion = worlds.pilot_motion(world.run('near', 12.0, 1), world)
-    relative = 0.002 if tier == 'A' else float(rng.choice([0.01, 0.03]))
-    noise = tuple(float(relative * v) for v in motion.velocity)
-    world = replace(world, sensors=replace(world.sensors, velocity_noise=noise))
+    world, motion, _ = draw.observed(rng, world, tier)
     concealed = []
     if kind in _CONCEALED:
         name = str(rng.choice(NAMES)) if kind == LISTED else 'unknown'
@@ -102,7 +95,7 @@ def _attempt(seed, rng, tier, kind):
     share = max(sizes.own_share(recording, world, e) for e in concealed) if concealed else 0.0
     if concealed and (share < sizes.SMALLEST_SHARE) != (kind == SLIGHT):
         raise UnsuitableError(f'{concealed[0].name} makes {share:.2e}')
-    error = max(x['nominal'] for x in scores.nominal_share(recording, world).values())
+    error = max(x['nominal'] for x in balance.nominal_share(recording, world).values())
     if kind == PARAMETERS and error < sizes.SMALLEST_SHARE:
         raise UnsuitableError(f'wrong parameters make {error:.2e}')
     what = concealed[0].name if concealed else ''

@@ -15,8 +15,6 @@ and the arm has no constant dry friction, of which a URDF says nothing.
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import tempfile
 from collections import Counter
@@ -27,11 +25,11 @@ import numpy as np
 from sgp_proof.concealed import draw, sizes
 from sgp_proof.concealed import world as worlds
 from sgp_proof.concealed.concealed_effect import Concealed, UnsuitableError
-from sgp_proof.concealed.rates import summary
 from sgp_proof.concealed.robots import DOWN, UP, Body, Y, Z
-from sgp_proof.concealed.run import RESULTS, scored_case
-from sgp_proof.environment import environment
+from sgp_proof.concealed.run import scored_case
+from sgp_proof.concealed.scoring import summary
 from sgp_proof.paper import toy
+from sgp_proof.result_files import make_parser, seed_range, write_result
 from sgp_ros.simulation.figure_eight import ARM
 from sgp_ros.simulation.reaction_wheel import ReactionWheel
 from sgp_ros.simulation.toy_pendulum import ToyPendulum
@@ -44,30 +42,28 @@ BALL = 0.04
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
+    parser = make_parser(__doc__, 'concealed_paper')
     parser.add_argument('--seeds', default='0:10', help='FIRST:LAST+1')
     parser.add_argument('--worlds', type=Path, help='where the worlds are kept')
     arguments = parser.parse_args()
-    first, last = map(int, arguments.seeds.split(':'))
     rows = {name: [] for name in CONCEALMENTS}
     with tempfile.TemporaryDirectory() as folder:
         out = arguments.worlds or Path(folder) / 'worlds'
         for part in ('cases', 'answers'):
             (out / part).mkdir(parents=True, exist_ok=True)
-        for seed in range(first, last):
+        for seed in seed_range(arguments.seeds):
             for name in CONCEALMENTS:
                 drawn = draw_paper_case(seed, name, out)
                 if drawn is not None:
                     row = scored_case(out, drawn[0], Path(folder) / 'out' / drawn[0])
                     rows[name].append(with_shares(row, size_of(seed), drawn[1]))
     report = {
-        'schema': 1, 'seeds': arguments.seeds, 'environment': environment(),
+        'seeds': arguments.seeds,
         'concealments': {
             name: {'summary': summary(found), 'cases': found} for name, found in rows.items()
         },
     }  # fmt: skip
-    path = RESULTS / 'concealed_paper.json'
-    path.write_text(json.dumps(report, indent=1, allow_nan=False) + '\n', encoding='utf-8')
+    write_result(arguments.out, report)
 
 
 def size_of(seed):

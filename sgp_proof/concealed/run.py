@@ -26,11 +26,10 @@ from pathlib import Path
 import numpy as np
 
 from sgp_proof.concealed import scoring
-from sgp_proof.concealed.improvement import improvements
-from sgp_proof.concealed.rates import HELD_OUT, summary
-from sgp_proof.environment import environment
+from sgp_proof.concealed.oracle import improvements
+from sgp_proof.concealed.scoring import HELD_OUT, summary
+from sgp_proof.result_files import RESULTS, seed_range, write_result
 
-RESULTS = Path(__file__).parents[1] / 'results'
 OUTCOME = 'outcome.json'
 """How a diagnosis ended and how long it took, beside what it wrote."""
 
@@ -42,6 +41,7 @@ def main():
     parser.add_argument('--only', help='conceal this in every world, as `draw` has it')
     parser.add_argument('--worlds', type=Path, help='worlds drawn before; else they are drawn')
     parser.add_argument('--outputs', type=Path, help='where diagnoses are kept; else nowhere')
+    parser.add_argument('--out', type=Path, default=RESULTS, help='folder of the result')
     parser.add_argument('--processes', type=int, default=2)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
@@ -53,18 +53,16 @@ def main():
                 only = ('--only', arguments.only) if arguments.only else ()
                 _run('sgp_proof.concealed.draw', '--seeds', seeds, '--tier', arguments.tier,
                      '--out', str(worlds), *only)  # fmt: skip
-            first, last = map(int, seeds.split(':'))
-            cases += [f'case_{seed:03d}' for seed in range(first, last)]
+            cases += [f'case_{seed:03d}' for seed in seed_range(seeds)]
         cases = [case for case in cases if (worlds / 'answers' / f'{case}.json').exists()]
         with ThreadPoolExecutor(arguments.processes) as pool:
             scored = list(pool.map(lambda case: scored_case(worlds, case, outputs / case), cases))
     report = {
-        'schema': 1, 'tier': arguments.tier, 'seeds': arguments.seeds, 'only': arguments.only,
-        'environment': environment(), 'summary': summary(scored), 'cases': scored,
+        'tier': arguments.tier, 'seeds': arguments.seeds, 'only': arguments.only,
+        'summary': summary(scored), 'cases': scored,
     }  # fmt: skip
     kind = f'_{arguments.only}' if arguments.only else ''
-    path = RESULTS / f'concealed_{arguments.tier.lower()}{kind}.json'
-    path.write_text(json.dumps(report, indent=1, allow_nan=False) + '\n', encoding='utf-8')
+    write_result(arguments.out / f'concealed_{arguments.tier.lower()}{kind}.json', report)
     print(json.dumps(report['summary'], indent=1))
 
 

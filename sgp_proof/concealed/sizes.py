@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from sgp_proof.concealed import world as worlds
+from sgp_proof.concealed.balance import Balance
 from sgp_proof.concealed.concealed_effect import UnsuitableError
 
 SMALLEST_SHARE = 0.0042
@@ -19,7 +19,7 @@ def shares(recording, world):
 
     Of the mean squared command; on a joint without a motor, of the mean square of `M_jj a`.
     """
-    balance = worlds.Balance.of(recording, world.true.mechanism)
+    balance = Balance.of(recording, world.true.mechanism)
     scale = np.where(
         [body.is_driven for body in world.bodies],
         np.mean(balance.given**2, axis=0),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sgp_proof.concealed import robots
-from sgp_proof.concealed.concealed_effect import Motion, UnsuitableError
+from sgp_proof.concealed.concealed_effect import UnsuitableError
 from sgp_ros.errors import NumericalError
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.controllers import ControllerChoice
@@ -172,54 +172,6 @@ def make_world(seed, rng, tier, family, bodies, true_bodies, errors):
     nominal = tree_simulator(robots.urdf(family, bodies))
     true = tree_simulator(robots.urdf(family, true_bodies))
     return replace(world, bodies=bodies, nominal=nominal, true=true)
-
-
-def pilot_motion(recording, world):
-    """Return the rms values of a recording that effects are sized by."""
-    balance = Balance.of(recording, world.true.mechanism)
-    is_driven = [body.is_driven for body in world.bodies]
-    effort = np.where(is_driven, balance.given.std(axis=0), balance.diagonal.std(axis=0))
-    q = recording.shown_position
-    return Motion(
-        effort + 1e-9, recording.shown_velocity.std(axis=0) + 1e-9,
-        recording.true_acceleration.std(axis=0) + 1e-9, q.std(axis=0) + 1e-9,
-        q.min(axis=0), q.max(axis=0), q,
-    )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Balance:
-    """Both sides of the equation of a robot without effects along the motion of the encoders.
-
-    Attributes:
-        given: (n, k) the command in force at each sample [N m or N].
-        needed: (n, k) `M a - h` [N m or N].
-        diagonal: (n, k) `M_jj a_j`, the measure of force on a joint without a motor [N m or N].
-        predicted: (n, k) accelerations under the command [rad/s^2 or m/s^2].
-    """
-
-    given: np.ndarray
-    needed: np.ndarray
-    diagonal: np.ndarray
-    predicted: np.ndarray
-
-    @classmethod
-    def of(cls, recording, mechanism):
-        """Evaluate a mechanism at each sample."""
-        positions, velocities = recording.shown_position, recording.shown_velocity
-        pairs = [mechanism.dynamics(q, v) for q, v in zip(positions, velocities, strict=True)]
-        inverse_mass, force = (np.array(x) for x in zip(*pairs, strict=True))
-        mass, a = np.linalg.inv(inverse_mass), recording.true_acceleration
-        stamps = recording.command_stamps_ns
-        index = np.searchsorted(stamps, recording.stamps_ns, side='right') - 1
-        given = recording.command[np.maximum(index, 0)] * (index >= 0)[:, np.newaxis]
-        given = np.array([mechanism.drive(u, v) for u, v in zip(given, velocities, strict=True)])
-        return cls(
-            given,
-            np.einsum('nij,nj->ni', mass, a) - force,
-            np.einsum('njj,nj->nj', mass, a),
-            np.einsum('nij,nj->ni', inverse_mass, given + force),
-        )
 
 
 def _sensors(rng, bodies, is_hard, rate_hz):

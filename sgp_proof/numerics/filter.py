@@ -5,32 +5,28 @@ filter. Compared on the same recordings: backward differences paired by index (t
 differences), central differences with the command averaged over two steps, and the weak form of
 `sgp_ros.engine.weak_form`.
 
-    python sgp_proof/numerics/filter.py --seeds 10
+    python -m sgp_proof.numerics.filter --seeds 10
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
-from pathlib import Path
 
 for _name in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS'):
     os.environ.setdefault(_name, '1')
 
 import numpy as np
 
-from sgp_proof.environment import environment
+from sgp_proof.result_files import make_parser, write_result
+from sgp_proof.streams.accuracy import events_of
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
-from sgp_ros.engine.samples import CommandSample, JointSample
 from sgp_ros.physics.term import Motion
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.recording import simulate
 
-RESULT = Path(__file__).parent / 'results' / 'filter.json'
 DURATION_S = 20.0
 SCORED = ('w1', 'w3', 'w5', 'w8', 'w9', 'w10')
 
@@ -64,11 +60,7 @@ def weak_form(recording, robot, window):
         'buffer.budget': 2000, 'reorder_window': 0.0,
     }  # fmt: skip
     engine = Engine(robot, EngineConfig.from_mapping(settings, robot))
-    events = []
-    for i, stamp in enumerate(recording.stamps_ns):
-        events.append(CommandSample(int(stamp), recording.command[i]))
-        events.append(JointSample(int(stamp), recording.joint_names, recording.position[i]))
-    replay(engine, events, lambda _step: None)
+    replay(engine, events_of(recording), lambda _step: None)
     return {p.name: p.value for p in engine.parameters()}
 
 
@@ -83,9 +75,8 @@ METHODS = {
 
 def main() -> None:
     """Print and write the median relative error of each coefficient per method."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = make_parser(__doc__, 'filter')
     parser.add_argument('--seeds', type=int, default=10)
-    parser.add_argument('--out', type=Path, default=RESULT)
     arguments = parser.parse_args()
     robot = load_robot('reaction_wheel')
     errors = {name: [] for name in METHODS}
@@ -96,8 +87,6 @@ def main() -> None:
             found = method(recording, robot)
             errors[name].append([abs(found[c] / truth[c] - 1.0) for c in SCORED])
     result = {
-        'schema': 1,
-        'environment': environment(),
         'seeds': arguments.seeds,
         'duration_s': DURATION_S,
         'rate_hz': 100.0,
@@ -106,7 +95,7 @@ def main() -> None:
             name: [float(x) for x in np.median(rows, axis=0)] for name, rows in errors.items()
         },
     }
-    arguments.out.write_text(json.dumps(result, indent=1) + '\n', encoding='utf-8')
+    write_result(arguments.out, result)
     print('median relative error [%] over', arguments.seeds, 'seeds')
     print(f'{"":40s}' + ''.join(f'{c:>9s}' for c in SCORED))
     for name, row in result['median_relative_error'].items():

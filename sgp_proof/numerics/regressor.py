@@ -6,17 +6,12 @@ into fresh memory. Pinocchio is called from a Python loop, its result dropped. T
 time to write as many bytes as the regressor has, at the write bandwidth measured by filling the
 same memory with a constant. One thread; medians over repeats.
 
-    python sgp_proof/numerics/regressor.py --repeats 15
+    python -m sgp_proof.numerics.regressor --repeats 15
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
-from importlib.metadata import version
-from pathlib import Path
-from time import perf_counter
 
 for _name in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
     os.environ.setdefault(_name, '1')
@@ -24,11 +19,11 @@ for _name in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
 import numpy as np
 import pinocchio
 
-from sgp_proof.environment import environment
+from sgp_proof.bench.problem import median_seconds
+from sgp_proof.result_files import make_parser, write_result
 from sgp_ros.rigid.inertial import revolute_chain
 from sgp_ros.rigid.rigid_body import forward_dynamics, inverse_dynamics, torque_regressor
 
-RESULT = Path(__file__).parent / 'results' / 'regressor.json'
 SEED = 0
 JOINTS = 7
 BATCHES = (1, 100, 4000)
@@ -46,17 +41,6 @@ def chain(rng):
         joint = pinocchio.JointModelRevoluteUnaligned(axes[i])
         parent = model.addJoint(parent, joint, pinocchio.SE3(np.eye(3), offsets[i]), f'j{i}')
     return revolute_chain([f'j{i}' for i in range(JOINTS)], axes, offsets), model
-
-
-def seconds(work, repeats):
-    """Return the median time of `work()` over repeats, after two runs that do not count."""
-    times = []
-    for i in range(repeats + 2):
-        began = perf_counter()
-        work()
-        if i >= 2:
-            times.append(perf_counter() - began)
-    return float(np.median(times))
 
 
 def pinocchio_loop(model, q, v, a):
@@ -81,8 +65,7 @@ def batch_row(tree, size, rng, repeats):
     }
     row = {'samples': size}
     for name, work in works.items():
-        cost = seconds(lambda work=work: [work() for _ in range(loops)], repeats)
-        row[name] = 1e6 * cost / (loops * size)
+        row[name] = 1e6 * median_seconds(work, repeats, loops) / size
     row['samples_per_s'] = 1e6 / row['regressor_us']
     row['times_floor'] = row['regressor_us'] / row['floor_us']
     return row
@@ -90,21 +73,18 @@ def batch_row(tree, size, rng, repeats):
 
 def main() -> None:
     """Print and write the cost per sample."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = make_parser(__doc__, 'regressor')
     parser.add_argument('--repeats', type=int, default=15)
-    parser.add_argument('--out', type=Path, default=RESULT)
     arguments = parser.parse_args()
     rng = np.random.default_rng(SEED)
     tree, model = chain(rng)
     q, v, a = rng.normal(size=(3, LOOPED, JOINTS))
-    theirs = 1e6 * seconds(lambda: pinocchio_loop(model, q, v, a), arguments.repeats) / LOOPED
+    looped = median_seconds(lambda: pinocchio_loop(model, q, v, a), arguments.repeats)
+    theirs = 1e6 * looped / LOOPED
     expected = pinocchio.computeJointTorqueRegressor(model, model.createData(), q[0], v[0], a[0])
     error = np.abs(torque_regressor(tree, q[:1], v[:1], a[:1])[0] - expected).max()
-    machine = environment() | {'pinocchio': pinocchio.__version__, 'pin': version('pin')}
     rows = [batch_row(tree, size, rng, arguments.repeats) for size in BATCHES]
     result = {
-        'schema': 1,
-        'environment': machine,
         'seed': SEED,
         'repeats': arguments.repeats,
         'joints': JOINTS,
@@ -113,8 +93,7 @@ def main() -> None:
         'pinocchio_loop_us': theirs,
         'batches': rows,
     }
-    arguments.out.write_text(json.dumps(result, indent=1) + '\n', encoding='utf-8')
-    print(f'seed {SEED}, {arguments.repeats} repeats;', ', '.join(map(': '.join, machine.items())))
+    write_result(arguments.out, result, 'pin')
     print(f'Pinocchio in a Python loop: {theirs:.2f} us a sample')
     for row in rows:
         print(', '.join(f'{name} {value:.4g}' for name, value in row.items()))

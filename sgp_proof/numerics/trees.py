@@ -1,6 +1,6 @@
 """Random trees of joints: are intervals calibrated, are unidentifiable directions all flagged?
 
-python -m sgp_proof.numerics.trees [TREES]
+python -m sgp_proof.numerics.trees [--trees 210]
 """
 
 from __future__ import annotations
@@ -9,24 +9,19 @@ import os
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
-import json
-import sys
 from dataclasses import dataclass
-from importlib.metadata import version
-from pathlib import Path
 
 import numpy as np
 import pinocchio
 from scipy import linalg
 
-from sgp_proof.environment import environment
+from sgp_proof.result_files import make_parser, write_result
 from sgp_ros.errors import NumericalError
 from sgp_ros.rigid.base_parameters import RegressorFactor, base_parameters
 from sgp_ros.rigid.consistent import project_information
 from sgp_ros.rigid.pseudo_inertia import is_consistent
 from sgp_ros.simulation.random_tree import random_tree
 
-RESULT = Path(__file__).parent / 'results' / 'trees.json'
 SAMPLES, SECONDS, HARMONICS = 300, 20.0, 6
 STILL, TINY, TINY_SIZE = 0.15, 0.1, 1e-3
 NOISE_SHARE, NOISE_FLOOR = 0.02, 1e-3
@@ -267,21 +262,24 @@ def summary(outcomes):
 
 def main() -> None:
     """Study trees of two to eight joints in turn, and write the result."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 210
+    parser = make_parser(__doc__, 'trees')
+    parser.add_argument('--trees', type=int, default=210)
+    arguments = parser.parse_args()
     outcomes = []
-    for seed in range(count):
+    for seed in range(arguments.trees):
         outcomes.append(study(seed, 2 + seed % 7))
         x = outcomes[-1]
         if x.missed or x.false or x.rank != x.exact_rank or x.distance_after is None:
             print('tree', seed, x)
     result = {
-        'schema': 1,
-        'environment': environment() | {'pin': version('pin'), 'clarabel': version('clarabel')},
-        'seeds': [0, count - 1],
+        'seeds': [0, arguments.trees - 1],
         'all': summary(outcomes),
-        'by_joints': {k: summary([x for x in outcomes if x.joints == k]) for k in range(2, 9)},
+        'by_joints': {
+            k: summary([x for x in outcomes if x.joints == k])
+            for k in sorted({x.joints for x in outcomes})
+        },
     }
-    RESULT.write_text(json.dumps(result, indent=1) + '\n', encoding='utf-8')
+    write_result(arguments.out, result, 'pin', 'clarabel')
     for name, value in result['all'].items():
         print(f'{name:40s}{value}')
 

@@ -11,12 +11,10 @@ import json
 import tempfile
 from pathlib import Path
 
-from sgp_proof.environment import environment
+from sgp_proof.real.recordings import imported
+from sgp_proof.result_files import make_parser, write_result
 from sgp_ros.cli import main as sgp
 
-ROOT = Path(__file__).parents[2]
-DATA = ROOT.parent / 'shared' / 'data' / 'emps'
-RESULT = Path(__file__).parent / 'results' / 'emps.json'
 PUBLISHED = {'M': 95.1089, 'Fv': 203.5034, 'Fc': 20.3935, 'offset': -3.1648}
 
 
@@ -33,11 +31,11 @@ def _metrics(folder):
 
 def main() -> None:
     """Import, replay, compare, and write the result."""
+    arguments = make_parser(__doc__, 'emps').parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for record in ('emps_id', 'emps_val_pulses'):
-            mapping = ROOT / 'config' / 'import' / 'emps.yaml'
-            _run('import', DATA / f'{record}.csv', '--map', mapping, '--out', folder)
+            imported(f'emps/{record}.csv', 'emps', folder)
         learned, held_out = folder / 'learned', folder / 'held_out'
         robot = ('--robot', 'linear_axis')
         _run('replay', folder / 'emps_id.mcap', *robot, '--out', learned)
@@ -55,15 +53,13 @@ def main() -> None:
             'published_inside_95': abs(p['value'] - published) <= 1.96 * p['std'],
         }  # fmt: skip
     result = {
-        'schema': 1,
-        'environment': environment(),
         'parameters': parameters,
         'identification_record': _errors(one),
         'validation_record_frozen': _errors(other),
         'samples': {'identification': one['samples'], 'validation': other['samples']},
         'timing': one['timing'],
     }
-    RESULT.write_text(json.dumps(result, indent=1) + '\n', encoding='utf-8')
+    write_result(arguments.out, result)
     for name, p in parameters.items():
         print(
             f'{name:8s}{p["value"]:10.4f} +- {1.96 * p["std"]:.4f} {p["unit"]:8s}'

@@ -12,13 +12,11 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from pathlib import Path
 
-from sgp_proof.environment import environment
-from sgp_proof.real.live_recordings import CASES, cut_bag, imported
-from sgp_proof.real.simple_pendulum import SECONDS
+from sgp_proof.real.recordings import DOUBLE, SIMPLE, UNDISTURBED_S, cut_bag, imported
+from sgp_proof.result_files import make_parser, write_result
 from sgp_ros.apps.identify import IdentifyOptions, read_signals
 from sgp_ros.batch.identification import IdentificationOptions, identify
 from sgp_ros.engine.config import EngineConfig
@@ -33,8 +31,6 @@ from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.simple_pendulum import SIMPLE_PENDULUM
 from sgp_ros.robots.terms import constant, direction, sine, single_column, velocity
 
-RESULT = Path(__file__).parent / 'results' / 'pendulum_regression.json'
-DOUBLE = 'dfki_double_pendulum/design_{}__sys_id__trajectory_{}.npz'
 DOUBLES = {
     f'{design[:3]} run {run}': DOUBLE.format(design, run)
     for design in ('A.0__20220815', 'C.0__20220914')
@@ -113,6 +109,7 @@ def _methods(robot, bags):
 
 def main() -> None:
     """Measure all and write the result."""
+    arguments = make_parser(__doc__, 'pendulum_regression').parse_args()
     windows, methods = {}, {}
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
@@ -120,9 +117,8 @@ def main() -> None:
             bag = imported(file, 'dfki_double_pendulum', place)
             windows[name] = {'inverse': _windows(DOUBLE_PENDULUM, bag)}
         bags = {}
-        for name, seconds in SECONDS.items():
-            mapping = CASES['simple_pendulum'].mapping
-            bag = imported(f'dfki_simple_pendulum/{name}.csv', mapping, place)
+        for name, seconds in UNDISTURBED_S.items():
+            bag = imported(SIMPLE.format(name), 'dfki_simple_pendulum', place)
             bags[name] = cut_bag(bag, seconds)
             windows[name] = {
                 'inverse': _windows(SIMPLE_PENDULUM, bags[name]),
@@ -131,8 +127,7 @@ def main() -> None:
             }
         for robot in (SIMPLE_PENDULUM, FORWARD):
             methods[robot.target] = _methods(robot, bags)
-    result = {'schema': 1, 'environment': environment(), 'windows': windows, 'methods': methods}
-    RESULT.write_text(json.dumps(result, indent=1, allow_nan=False) + '\n', encoding='utf-8')
+    write_result(arguments.out, {'windows': windows, 'methods': methods})
 
 
 if __name__ == '__main__':

@@ -1,110 +1,177 @@
-"""Real recordings through `sgp identify`: EMPS, double pendulum, Panda, TIAGo's arm.
+"""Recordings of real machines: the files of their authors, robots, maps and what is withheld.
 
-    python -m sgp_proof.real.recordings [NAME ...]
+python -m sgp_proof.real.recordings cut OUT TABLE --from S --to S
+python -m sgp_proof.real.recordings join OUT NPZ [NPZ ...]
+python -m sgp_proof.real.recordings friction OUT URDF
 
-Every number is one of `identification.json`; what it says of the filter, of held-out time and of
-the parameters is kept in `results/<name>.json`.
+The last ones write a part of a table, several tables as one, and a URDF without friction.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import tempfile
-import time
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from sgp_proof.environment import environment
+import numpy as np
+
+from sgp_proof.result_files import ROOT
 from sgp_ros.cli import main as sgp
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.recordings.writer import RecordingWriter
+from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.robot import Robot
 
-ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / 'shared' / 'data'
-RESULTS = Path(__file__).parent / 'results'
+"""The files of the authors, which are not part of this repository."""
 ROBOTS = ROOT / 'config' / 'robots'
+PAUSE_S = 1.0
 DOUBLE = 'dfki_double_pendulum/design_{}__sys_id__trajectory_{}.npz'
-IMPORTED = {
-    'emps': ('emps', ('emps/emps_id.csv', 'emps/emps_val_pulses.csv')),
-    'panda': ('panda', ('panda/panda_exciting.npz',)),
-    'double_pendulum_a0': (
-        'dfki_double_pendulum', [DOUBLE.format('A.0__20220815', i) for i in ('00', '01')],
+SIMPLE = 'dfki_simple_pendulum/{}.csv'
+UNDISTURBED_S = {'energy_shaping': 3.9, 'sac': 3.9, 'energy_shaping_1kg': 7.0}
+"""Seconds before hands or a balancing controller act on the simple pendulum."""
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A recording with its robot and settings.
+
+    Attributes:
+        file: below `DATA`: a bag, or a table with a map.
+        robot: built-in name, or YAML below the repository.
+        config: stem of the parameter file.
+        mapping: stem of the map for import; empty for a bag.
+        speed: in multiples of the recorded rate, where the recording is played.
+        seconds: from the beginning that count; None for all.
+    """
+
+    file: str
+    robot: str
+    config: str
+    mapping: str = ''
+    speed: float = 1.0
+    seconds: float | None = None
+
+    @property
+    def robot_argument(self) -> str:
+        """The robot as `--robot` takes it."""
+        return str(ROOT / self.robot) if self.robot.endswith('.yaml') else self.robot
+
+    @property
+    def params(self) -> Path:
+        """The parameter file."""
+        return ROOT / 'config' / f'{self.config}.yaml'
+
+    def load_robot(self) -> Robot:
+        """Return the robot."""
+        return load_robot(self.robot_argument)
+
+    def bag(self, folder: Path) -> Path:
+        """Return the recording as a bag, imported into a folder where it is a table."""
+        if not self.mapping:
+            return DATA / self.file
+        bag = imported(self.file, self.mapping, folder)
+        return bag if self.seconds is None else cut_bag(bag, self.seconds)
+
+
+MACHINES = {
+    'emps': Machine('emps/emps_id.csv', 'linear_axis', 'linear_axis', 'emps'),
+    'panda': Machine('panda/panda_exciting.npz', 'config/robots/panda.yaml', 'panda', 'panda'),
+    # Its first half only gathers; four times as fast, all of it fits into the stretch.
+    'tiago': Machine(
+        'tiago/mcap_tiago_dynamic', 'config/robots/tiago_arm.yaml', 'tiago_arm', speed=4.0
     ),
-    'double_pendulum_c0': (
-        'dfki_double_pendulum', [DOUBLE.format('C.0__20220914', i) for i in ('00', '01')],
+    'double_pendulum_a0': Machine(
+        DOUBLE.format('A.0__20220815', '00'), 'double_pendulum', 'double_pendulum',
+        'dfki_double_pendulum',
+    ),
+    'double_pendulum_c0': Machine(
+        DOUBLE.format('C.0__20220914', '00'), 'double_pendulum', 'double_pendulum',
+        'dfki_double_pendulum',
+    ),
+    'simple_pendulum': Machine(
+        SIMPLE.format('energy_shaping'), 'simple_pendulum', 'simple_pendulum',
+        'dfki_simple_pendulum', seconds=UNDISTURBED_S['energy_shaping'],
+    ),
+    'simple_pendulum_1kg': Machine(
+        SIMPLE.format('energy_shaping_1kg'), 'simple_pendulum', 'simple_pendulum',
+        'dfki_simple_pendulum', seconds=UNDISTURBED_S['energy_shaping_1kg'],
     ),
 }  # fmt: skip
-"""Name to map and files under the shared data."""
-COMMANDS = {
-    'double_pendulum_a0': (
-        'design_A.0__20220815__sys_id__trajectory_00.mcap', '--robot', 'double_pendulum',
-        '--test', 'design_A.0__20220815__sys_id__trajectory_01.mcap',
-    ),
-    'double_pendulum_c0': (
-        'design_C.0__20220914__sys_id__trajectory_00.mcap', '--robot', 'double_pendulum',
-        '--test', 'design_C.0__20220914__sys_id__trajectory_01.mcap',
-    ),
-    'emps': ('emps_id.mcap', '--robot', 'linear_axis', '--test', 'emps_val_pulses.mcap'),
-    'panda': ('panda_exciting.mcap', '--robot', 'panda.yaml', '--share', '0.4'),
-    'tiago': (
-        'mcap_tiago_dynamic', '--robot', 'tiago_arm.yaml', '--holdout', 'alternate',
-        '--share', '0.5', '--stretch', '6',
-    ),
-    'tiago_5hz': (
-        'mcap_tiago_dynamic', '--robot', 'tiago_arm.yaml', '--holdout', 'alternate',
-        '--share', '0.5', '--stretch', '6', '--cutoff', '5',
-    ),
-    'panda_5hz': (
-        'panda_exciting.mcap', '--robot', 'panda.yaml', '--share', '0.4', '--cutoff', '5',
-    ),
-    'panda_every_velocity': (
-        'panda_exciting.mcap', '--robot', 'panda.yaml', '--share', '0.4',
-        '--inputs', 'every:velocity',
-    ),
-}  # fmt: skip
-"""Arguments of `sgp identify` per recording, files by their names alone."""
 
 
-def _found(argument: str, folder: Path) -> str:
-    """Return the path of a file that a command names."""
-    for path in (folder / argument, ROBOTS / argument, DATA / 'tiago' / argument):
-        if path.exists():
-            return str(path)
-    return argument
+def imported(file: str, mapping: str, folder: Path) -> Path:
+    """Return a table below `DATA` as a bag."""
+    path = ROOT / 'config' / 'import' / f'{mapping}.yaml'
+    if sgp(['import', str(DATA / file), '--map', str(path), '--out', str(folder)]):
+        raise SystemExit(f'{file} cannot be imported')
+    return folder / f'{Path(file).stem}.mcap'
 
 
-def run(name: str, folder: Path) -> dict:
-    """Import and identify one recording."""
-    machine = name.removesuffix('_5hz').removesuffix('_every_velocity')
-    name_of_map, files = IMPORTED.get(machine, ('', ()))
-    for file in files:
-        mapping = ROOT / 'config' / 'import' / f'{name_of_map}.yaml'
-        if sgp(['import', str(DATA / file), '--map', str(mapping), '--out', str(folder)]):
-            raise SystemExit(f'{file} cannot be imported')
-    began = time.perf_counter()
-    out = folder / name
-    arguments = [_found(argument, folder) for argument in COMMANDS[name]]
-    if sgp(['identify', *arguments, '--out', str(out)]):
-        raise SystemExit(f'{name} cannot be identified')
-    findings = json.loads((out / 'identification.json').read_text(encoding='utf-8'))
-    del findings['base_parameters'], findings['versions']
-    return {
-        'schema': 1,
-        'command': 'sgp identify ' + ' '.join(COMMANDS[name]),
-        'environment': environment(),
-        'seed': 0,
-        'seconds': round(time.perf_counter() - began, 1),
-        'findings': findings,
-    }
+def cut_bag(bag: Path, seconds: float) -> Path:
+    """Return a bag of the first seconds of another one."""
+    events = list(open_recording(bag).events())
+    target = bag.with_name(f'{bag.stem}_{seconds:g}s.mcap')
+    with RecordingWriter(target) as writer:
+        for event in events:
+            if event.stamp_ns - events[0].stamp_ns <= 1e9 * seconds:
+                writer.write_event(event)
+    return target
 
 
-def main() -> None:
-    """Run the named recordings, or all."""
+def cut(source: Path, target: Path, start: float, stop: float) -> None:
+    """Write the rows of a table (CSV or NPZ) whose time is in [start, stop) [s].
+
+    Time is the first column of a CSV and the array `t` of an NPZ.
+    """
+    if source.suffix == '.csv':
+        with source.open(encoding='utf-8', newline='') as file:
+            header, *rows = csv.reader(file)
+        with target.open('w', encoding='utf-8', newline='') as file:
+            kept = (row for row in rows if start <= float(row[0]) < stop)
+            csv.writer(file).writerows([header, *kept])
+        return
+    with np.load(source, allow_pickle=False) as table:
+        arrays = dict(table)
+    inside = (arrays['t'] >= start) & (arrays['t'] < stop)
+    np.savez(target, **{k: x[inside] if len(x) == len(inside) else x for k, x in arrays.items()})
+
+
+def join(sources: list[Path], target: Path) -> None:
+    """Write several NPZ recordings as one, a second of pause between them."""
+    tables = [dict(np.load(source, allow_pickle=False)) for source in sources]
+    begin = 0.0
+    for table in tables:
+        table['t'] = table['t'] - table['t'][0] + begin
+        begin = table['t'][-1] + PAUSE_S
+    np.savez(target, **{k: np.concatenate([table[k] for table in tables]) for k in tables[0]})
+
+
+def without_friction(urdf: str) -> str:
+    """Return a URDF without the `<dynamics>` of its joints, that is damping and friction."""
+    return re.sub(r'\s*<dynamics\b[^>]*/>', '', urdf)
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Run one of the three commands; `argv` are its words, those of the process without."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('names', nargs='*', choices=[*COMMANDS, []], default=[])
-    for name in parser.parse_args().names or COMMANDS:
-        with tempfile.TemporaryDirectory() as folder:
-            result = run(name, Path(folder))
-        text = json.dumps(result, indent=1, allow_nan=False) + '\n'
-        (RESULTS / f'{name}_identified.json').write_text(text, encoding='utf-8')
+    parser.add_argument('command', choices=('cut', 'join', 'friction'))
+    parser.add_argument('target', type=Path)
+    parser.add_argument('sources', type=Path, nargs='+')
+    parser.add_argument('--from', dest='start', type=float, default=0.0)
+    parser.add_argument('--to', dest='stop', type=float, default=np.inf)
+    arguments = parser.parse_args(argv)
+    first = arguments.sources[0]
+    if arguments.command == 'cut':
+        cut(first, arguments.target, arguments.start, arguments.stop)
+    elif arguments.command == 'join':
+        join(arguments.sources, arguments.target)
+    else:
+        text = without_friction(first.read_text(encoding='utf-8'))
+        arguments.target.write_text(text, encoding='utf-8')
 
 
 if __name__ == '__main__':

@@ -15,7 +15,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,9 +22,8 @@ from pathlib import Path
 import numpy as np
 from scipy import spatial
 
-from sgp_proof.environment import environment
-from sgp_proof.real.live_recordings import imported
-from sgp_proof.real.recordings import DATA, ROBOTS
+from sgp_proof.real.recordings import DATA, ROBOTS, imported
+from sgp_proof.result_files import make_parser, write_result
 from sgp_ros.apps.identify import IdentifyOptions, read_signals
 from sgp_ros.batch.blocks import holdout
 from sgp_ros.batch.fit import OfflineOptions, fit_offline
@@ -33,7 +31,6 @@ from sgp_ros.batch.plan import FilterPlan
 from sgp_ros.batch.regression_data import filtered_data
 from sgp_ros.robots.registry import load_robot
 
-RESULT = Path(__file__).parent / 'results' / 'residuals.json'
 SPACINGS = {'white': 0.55, 'dense': 0.25}
 """Distance of the rows in periods of the cut-off: white noise is white again, or half of that."""
 INPUTS = {
@@ -52,7 +49,7 @@ _PASS_RATE = 5
 
 @dataclass(frozen=True)
 class Arm:
-    """A recording as `sgp_proof.real.recordings` scores it, and the filter chosen there."""
+    """A recording as `sgp_proof.real.identified` scores it, and the filter chosen there."""
 
     robot: str
     cutoffs: tuple[float, ...]
@@ -210,6 +207,7 @@ def _calibration(robot, spec, one, other):
 
 def main() -> None:
     """Measure all and write the result."""
+    arguments = make_parser(__doc__, 'residuals').parse_args()
     arms = {}
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
@@ -228,8 +226,7 @@ def main() -> None:
             }
             if name == 'panda':
                 arms[name]['passes'] = _passes(arm, signals, robot)
-    result = {'schema': 1, 'environment': environment(), 'arms': arms, 'emps_sessions': sessions}
-    RESULT.write_text(json.dumps(result, indent=1, allow_nan=False) + '\n', encoding='utf-8')
+    write_result(arguments.out, {'arms': arms, 'emps_sessions': sessions})
 
 
 if __name__ == '__main__':

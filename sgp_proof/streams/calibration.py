@@ -10,20 +10,19 @@ the real ones, through the engine of `sgp replay` in both modes.
 
 from __future__ import annotations
 
-import argparse
 import json
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
-from sgp_proof.environment import environment
-from sgp_proof.real.live_recordings import CASES, DATA, ROOT, imported
+from sgp_proof.real.recordings import MACHINES
+from sgp_proof.result_files import make_parser, read_result, write_result
+from sgp_proof.streams.accuracy import events_of
 from sgp_ros.apps.parameter_file import load_parameters
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
-from sgp_ros.engine.samples import CommandSample, JointSample
 from sgp_ros.gp.inducing_regression import InducingPointRegression
 from sgp_ros.gp.kernels import SquaredExponential
 from sgp_ros.gp.learning import learn
@@ -31,13 +30,12 @@ from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.recordings.reader import open_recording
-from sgp_ros.robots.registry import ROBOTS, load_robot
+from sgp_ros.robots.registry import ROBOTS
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.recording import simulate
 
-RESULT = Path(__file__).parent / 'results' / 'calibration.json'
-WORLDS, LENGTH, FIRST, BUDGET, FEATURES = 200, 400, 100, 60, 60
-WHEELS, WHEEL_S = 200, 20.0
+LENGTH, FIRST, BUDGET, FEATURES = 400, 100, 60, 60
+WHEEL_S = 20.0
 TRUE = Model((SquaredExponential(1.0, (0.5, 1.5), (0, 1)),), (0.05,))
 PRIOR = CoefficientPrior.from_std(np.zeros(3), np.full(3, 2.0))
 SETTLED = 100
@@ -89,9 +87,9 @@ def _one_world(online, data, w):
     )  # fmt: skip
 
 
-def _worlds():
+def _worlds(seeds):
     found = {}
-    for seed in range(WORLDS):
+    for seed in seeds:
         data, w = _world(seed)
         head = Observations(data.U[:FIRST], data.F[:FIRST], data.y[:FIRST])
         learned = learn(head, PRIOR, TRUE).model
@@ -126,17 +124,14 @@ def _engine_run(robot, settings, events):
     return _summary(estimates, engine), engine
 
 
-def _wheels():
+def _wheels(seeds):
     robot = ROBOTS['reaction_wheel']
     found = {'exact': [], 'basis': []}
-    for seed in range(WHEELS):
+    for seed in seeds:
         run = simulate(
             make_simulation('reaction_wheel', seed=seed, controller='sinusoids', rate_hz=100.0,
                             start_ns=1), WHEEL_S)  # fmt: skip
-        events = []
-        for stamp, position, command in zip(run.stamps_ns, run.position, run.command, strict=True):
-            events.append(CommandSample(int(stamp), command))
-            events.append(JointSample(int(stamp), run.joint_names, position))
+        events = events_of(run)
         for mode, rows in found.items():
             rows.append(_engine_run(robot, {'buffer.mode': mode}, events)[0])
     return {
@@ -150,19 +145,14 @@ def _wheels():
     }  # fmt: skip
 
 
-def _recordings():
+def _recordings(_seeds):
     found = {}
-    for name, case in CASES.items():
+    for name, case in MACHINES.items():
         if case.seconds is not None:
             continue  # too short to settle
         with tempfile.TemporaryDirectory() as folder:
-            bag = DATA / case.file
-            if case.mapping:
-                bag = imported(case.file, case.mapping, Path(folder))
-            events = list(open_recording(bag).events())
-        is_file = case.robot.endswith('.yaml')
-        robot = load_robot(str(ROOT / case.robot) if is_file else case.robot)
-        settings = load_parameters(ROOT / 'config' / f'{case.config}.yaml')
+            events = list(open_recording(case.bag(Path(folder))).events())
+        robot, settings = case.load_robot(), load_parameters(case.params)
         settings = {k: v for k, v in settings.items() if k not in ('robot', 'command.type')}
         found[name] = {'joints': list(robot.joint_names)}
         for mode in ('exact', 'basis'):
@@ -177,17 +167,16 @@ PARTS = {'worlds': _worlds, 'wheels': _wheels, 'recordings': _recordings}
 
 def main():
     """Run the named parts, or all, and write the result."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('names', nargs='*', choices=[*PARTS, []], default=[])
-    names = parser.parse_args().names or list(PARTS)
-    found = json.loads(RESULT.read_text(encoding='utf-8')) if RESULT.is_file() else {}
-    for name in names:
-        found[name] = PARTS[name]()
+    parser = make_parser(__doc__, 'calibration', PARTS)
+    parser.add_argument('--seeds', type=int, default=200, help='of worlds and wheels')
+    arguments = parser.parse_args()
+    found = read_result(arguments.out)
+    for name in arguments.names:
+        found[name] = PARTS[name](range(arguments.seeds))
         print(name, json.dumps(found[name], indent=1), flush=True)
-    result = {'schema': 1, 'environment': environment(), 'length': LENGTH, 'budget': BUDGET,
-              'features': FEATURES, 'wheel_s': WHEEL_S}  # fmt: skip
+    result = {'length': LENGTH, 'budget': BUDGET, 'features': FEATURES, 'wheel_s': WHEEL_S}
     result |= {name: found[name] for name in PARTS if name in found}
-    RESULT.write_text(json.dumps(result, indent=1, allow_nan=False) + '\n', encoding='utf-8')
+    write_result(arguments.out, result)
 
 
 if __name__ == '__main__':

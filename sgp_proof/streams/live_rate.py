@@ -13,7 +13,6 @@ repeated.
 
 from __future__ import annotations
 
-import argparse
 import gc
 import json
 import os
@@ -28,12 +27,10 @@ from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
-from sgp_proof.environment import environment
+from sgp_proof.result_files import ROOT, make_parser, write_result
 from sgp_ros.apps.live_processes import LiveProcesses, graph_environment
 from sgp_ros.apps.parameter_file import load_parameters
 
-ROOT = Path(__file__).parents[2]
-RESULT = Path(__file__).parent / 'results' / 'live_rate.json'
 RATE_HZ, WARM_UP_S, BUDGET = 1000.0, 25.0, 500
 REORDER_S, WINDOW_S = 0.02, 0.1
 _START_LIMIT_S = 30.0
@@ -216,9 +213,10 @@ def _summary(listener, published, processor, took_s):
 
 def main():
     """Run the node in each way and write the result."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = make_parser(__doc__, 'live_rate')
     parser.add_argument('--seconds', type=float, default=60.0)
-    seconds = parser.parse_args().seconds
+    arguments = parser.parse_args()
+    seconds = arguments.seconds
     found, void, order = {name: [] for name in RUNS}, [], list(ORDER)
     while order:
         name = order.pop(0)
@@ -236,11 +234,11 @@ def main():
         else:
             raise SystemExit(f'{len(void)} runs were void: this computer has other work to do')
     result = {
-        'schema': 2, 'environment': environment(), 'rate_hz': RATE_HZ, 'seconds': seconds,
+        'rate_hz': RATE_HZ, 'seconds': seconds,
         'budget': BUDGET, 'reorder_s': REORDER_S, 'window_s': WINDOW_S, 'runs': found,
         'void': void, 'pause_s': PAUSE_S,
     }  # fmt: skip
-    RESULT.write_text(json.dumps(result, indent=1, allow_nan=False) + '\n', encoding='utf-8')
+    write_result(arguments.out, result, schema=2)
 
 
 if __name__ == '__main__':

@@ -12,14 +12,13 @@ once, for all. Times are those of the processor, not of the wall.
 from __future__ import annotations
 
 import gc
-import json
 import resource
 import time
 from pathlib import Path
 
 import numpy as np
 
-from sgp_proof.environment import environment
+from sgp_proof.result_files import make_parser, write_result
 from sgp_ros.gp.inducing_regression import InducingPointRegression
 from sgp_ros.gp.learning import initial_model, learn, screened
 from sgp_ros.gp.model import CoefficientPrior, Observations
@@ -27,8 +26,7 @@ from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.posterior import Posterior
 from sgp_ros.gp.scores import RunningScore
 
-RESULT = Path(__file__).parent / 'results' / 'long_stream.json'
-SAMPLES, BLOCK, FIRST, BUDGET, FEATURES, QUERIES = 200_000, 20_000, 400, 300, 150, 1000
+BLOCK, FIRST, BUDGET, FEATURES, QUERIES = 20_000, 400, 300, 150, 1000
 RATE_HZ = 100.0
 NOISE = 0.1
 PRIOR = CoefficientPrior.from_std(np.zeros(4), np.full(4, 10.0))
@@ -85,11 +83,11 @@ def _ways(model):
     return ways | {'basis': lambda: InducingPointRegression(model, PRIOR, BUDGET, FEATURES)}
 
 
-def _stream(online, world, queries):
+def _stream(online, world, queries, samples):
     found = {name: [] for name in ('us_p50', 'us_p99', 'resident_mb', 'nmse', 'w_msq')}
     score = RunningScore()
     noise = online.model.noise[0]
-    for first in range(0, SAMPLES, BLOCK):
+    for first in range(0, samples, BLOCK):
         U, F, y, _ = world.samples(first, BLOCK)
         durations = np.empty(BLOCK)
         for i in range(BLOCK):
@@ -116,12 +114,12 @@ def _error(online, queries):
     return float(np.mean((means - truth) ** 2) / truth.var())
 
 
-def _subset(model, world, queries, size):
+def _subset(model, world, queries, size, samples):
     """Return the error of batch fits on random subsets of the same stream."""
     errors = []
-    U, F, y, _ = world.samples(0, SAMPLES)
+    U, F, y, _ = world.samples(0, samples)
     for seed in range(5):
-        chosen = np.random.default_rng(seed).choice(SAMPLES, size, replace=False)
+        chosen = np.random.default_rng(seed).choice(samples, size, replace=False)
         posterior = Posterior(model, Observations(U[chosen], F[chosen], y[chosen]), PRIOR)
         means = posterior.predict(queries[0], queries[1]).mean[:, 0]
         errors.append(float(np.mean((means - queries[2]) ** 2) / queries[2].var()))
@@ -130,24 +128,27 @@ def _subset(model, world, queries, size):
 
 def main():
     """Run every way on the same stream and write the result."""
-    model = _model(World(0))
-    U, F, _, truth = World(0).samples(SAMPLES + ROOM, QUERIES * 10)
+    parser = make_parser(__doc__, 'long_stream')
+    parser.add_argument('--samples', type=int, default=200_000, help=f'a multiple of {BLOCK}')
+    arguments = parser.parse_args()
+    samples, model = arguments.samples, _model(World(0))
+    U, F, _, truth = World(0).samples(samples + ROOM, QUERIES * 10)
     queries = (U[::10], F[::10], truth[::10])
     result = {
-        'schema': 1, 'environment': environment(), 'samples': SAMPLES, 'block': BLOCK,
+        'samples': samples, 'block': BLOCK,
         'budget': BUDGET, 'features': FEATURES, 'ways': {}, 'noise_variance': model.noise[0],
         'lengthscales': list(model.kernels[0].lengthscales),
-        'random_subset_nmse': _subset(model, World(0), queries, BUDGET),
+        'random_subset_nmse': _subset(model, World(0), queries, BUDGET, samples),
     }  # fmt: skip
     for name, make in _ways(model).items():
         online = make()
-        found = _stream(online, World(0), queries)
+        found = _stream(online, World(0), queries, samples)
         if name == 'basis':
             found |= {'features': list(online.features), 'unresolved': online.unresolved}
         result['ways'][name] = found
         print(name, {key: value[-1] if isinstance(value, list) else value
                      for key, value in found.items()}, flush=True)  # fmt: skip
-    RESULT.write_text(json.dumps(result, indent=1, allow_nan=False) + '\n', encoding='utf-8')
+    write_result(arguments.out, result)
 
 
 if __name__ == '__main__':

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
 
-from sgp_proof.bench import gpytorch_rival, sklearn_rival
 from sgp_proof.bench.command import BENCHES, bench_tables, run_bench
 from sgp_proof.bench.evidence import bench_evidence
 from sgp_proof.bench.problem import draw_problem
+from sgp_proof.bench.rivals import RIVALS
 from sgp_proof.bench.step import memory_of, step_row
 from sgp_ros.cli import main
 from sgp_ros.errors import ConfigError
@@ -59,22 +58,10 @@ def test_unknown_benchmarks_are_refused(tmp_path):
         run_bench(['stepp'], tmp_path, lambda share: None)
 
 
-@pytest.mark.parametrize(
-    'rival',
-    [
-        pytest.param(
-            sklearn_rival,
-            marks=pytest.mark.skipif(not find_spec('sklearn'), reason='no scikit-learn'),
-        ),
-        pytest.param(
-            gpytorch_rival,
-            marks=pytest.mark.skipif(not find_spec('gpytorch'), reason='no GPyTorch'),
-        ),
-    ],
-)
-def test_rivals_compute_the_same(rival):
+@pytest.mark.parametrize('name', [name for name, rival in RIVALS.items() if rival is not None])
+def test_rivals_compute_the_same(name):
     """The evidence agrees to eight digits, so the same work is timed."""
-    (row,) = bench_evidence({'rival': rival}, lambda share: None, is_quick=True)
+    (row,) = bench_evidence({'rival': RIVALS[name]}, lambda share: None, is_quick=True)
     assert row['rival_difference'] < 1e-8 * abs(row['log_evidence']) + 1e-6
     assert row['fit_log_evidence'] >= row['rival_fit_log_evidence'] - 0.1
 

@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from sgp_proof.concealed import draw, improvement, paper, rates, robots, run, scoring, sizes
+from sgp_proof.concealed import draw, paper, robots, run, scoring, sizes
 from sgp_proof.concealed.concealed_effect import SCORED
-from sgp_proof.concealed.oracle import Oracle, suspects, unlisted
+from sgp_proof.concealed.oracle import Oracle, error, nominal_error, share, suspects, unlisted
 from sgp_proof.concealed.unknown import UNKNOWN
 from sgp_ros.physics.observed_motion import ObservedMotion
 from sgp_ros.rigid.rigid_body import mass_matrix
@@ -170,10 +170,10 @@ def test_the_true_structure_finds_the_true_numbers_and_predicts_what_was_held_ou
     scores = scoring.parameter_scores(answer, {'findings': oracle.findings()})
     assert len(scores) == sum(len(effect['scored']) for effect in answer['effects'])
     assert all(score['error'] < 0.01 for score in scores)
-    for stem in rates.HELD_OUT:
+    for stem in scoring.HELD_OUT:
         found = oracle.predict(case / f'{stem}.mcap')
-        left = improvement.error(truth, stem, found.time, found.acceleration)
-        assert left < 0.02 * improvement.nominal_error(answer, stem) + 1e-3
+        left = error(truth, stem, found.time, found.acceleration)
+        assert left < 0.02 * nominal_error(answer, stem) + 1e-3
 
 
 def test_where_the_fit_of_the_true_structure_starts_does_not_show(drawn):
@@ -226,12 +226,12 @@ def test_of_an_unlisted_effect_the_size_alone_is_open(kind):
 
 def test_the_share_runs_from_the_nominal_error_to_that_of_the_best_possible():
     """Clipped on both sides; where there is hardly anything to gain there is no share."""
-    assert improvement.share(0.5, 0.5, 0.1) == 0.0
-    assert improvement.share(0.5, 0.2, 0.1) == pytest.approx(0.75)
-    assert improvement.share(0.5, 0.05, 0.1) == 1.0
-    assert improvement.share(0.5, 9.0, 0.1) == -1.0
-    assert improvement.share(0.5, 0.4, 0.4995) is None
-    assert improvement.share(0.5, 0.4, 0.7) is None
+    assert share(0.5, 0.5, 0.1) == 0.0
+    assert share(0.5, 0.2, 0.1) == pytest.approx(0.75)
+    assert share(0.5, 0.05, 0.1) == 1.0
+    assert share(0.5, 9.0, 0.1) == -1.0
+    assert share(0.5, 0.4, 0.4995) is None
+    assert share(0.5, 0.4, 0.7) is None
 
 
 def test_a_diagnosis_better_than_the_fitted_true_structure_is_counted():
@@ -242,17 +242,17 @@ def test_a_diagnosis_better_than_the_fitted_true_structure_is_counted():
         return {
             'case': case, 'truth': [['backlash', 'j']], 'verdict': 'missing_physics',
             'said': 'missing_physics', 'found': [], 'right': True, 'seconds': 1.0,
-            'errors': dict.fromkeys(rates.HELD_OUT, e),
+            'errors': dict.fromkeys(scoring.HELD_OUT, e),
             'improvement': dict.fromkeys(
-                rates.HELD_OUT, improvement.share(0.5, diagnosed, oracle)
+                scoring.HELD_OUT, share(0.5, diagnosed, oracle)
             ),
             'improvement_of_truth': dict.fromkeys(
-                rates.HELD_OUT, improvement.share(0.5, diagnosed, 0.0)
+                scoring.HELD_OUT, share(0.5, diagnosed, 0.0)
             ),
         }  # fmt: skip
 
     rows = [row('one', 0.0, 0.1), row('two', 0.3, 0.1), row('three', 0.4, 0.6)]
-    found = rates.summary(rows)['improvement']['real_far']
+    found = scoring.summary(rows)['improvement']['real_far']
     assert (found['above'], found['largest']) == (1, pytest.approx(1.25))
     assert found['not_scored'] == {'three': 'backlash'}
     assert found['below_nine_tenths'] == {'two': 'backlash'}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sgp_proof.paper import reaction_wheel, toy
-from sgp_proof.paper.choices import CHOICES, run_choice
+from sgp_proof.paper.catalogue import CHOICES, run_choice
 from sgp_proof.paper.protocol import METHOD_NAMES, SGP_ALL, run_method
 from sgp_ros.cli import main
 from sgp_ros.gp.linear_kernel import Linear

@@ -1,6 +1,6 @@
 """One-step predictions along streams, beside what people use for it.
 
-    python -m sgp_proof.streams.stream_accuracy [NAME ...]
+    python -m sgp_proof.streams.accuracy [NAME ...]
 
 Every method sees the same equations of motion in the same order, predicts each before it learns
 it, and is scored after the first ones, from which it learns its hyper-parameters, once. The batch
@@ -9,40 +9,46 @@ SGP is fitted anew to all that came before, ten times a stream: what a stream co
 
 from __future__ import annotations
 
-import argparse
 import itertools
-import json
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
 
-from sgp_proof.environment import environment
 from sgp_proof.paper import arm
-from sgp_proof.streams.incremental_features import IncrementalFeatures
+from sgp_proof.real.recordings import MACHINES
+from sgp_proof.result_files import make_parser, read_result, write_result
 from sgp_ros.apps.parameter_file import load_parameters
-from sgp_ros.cli import main as sgp
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.prior_knowledge import prior_of_robot
 from sgp_ros.engine.samples import CommandSample, JointSample
 from sgp_ros.gp.inducing_regression import InducingPointRegression
+from sgp_ros.gp.information import Information
 from sgp_ros.gp.methods import METHODS, FitOptions
-from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.posterior import Posterior
 from sgp_ros.gp.scores import coverage95, nlpd, nmse
 from sgp_ros.recordings.reader import open_recording
-from sgp_ros.robots.registry import ROBOTS, load_robot
+from sgp_ros.robots.registry import ROBOTS
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.recording import simulate
 
-ROOT = Path(__file__).parents[2]
-DATA = ROOT.parent / 'shared' / 'data'
-RESULT = Path(__file__).parent / 'results' / 'stream_accuracy.json'
 BUDGET, FEATURES, RIVAL_FEATURES, REFITS = 300, 150, 200, 10
 _GATHER = {'learning.initial': 100_000, 'refit.enabled': False}
+
+
+def events_of(recording):
+    """Return a simulated recording as events: each command, and the positions at that time."""
+    events = []
+    for stamp, position, command in zip(
+        recording.stamps_ns, recording.position, recording.command, strict=True
+    ):
+        events.append(CommandSample(int(stamp), command))
+        events.append(JointSample(int(stamp), recording.joint_names, position))
+    return events
 
 
 def _gathered(robot, settings, events):
@@ -63,14 +69,8 @@ def _reaction_wheel():
         ),
         100.0,
     )
-    events = []
-    for stamp, position, command in zip(
-        recording.stamps_ns, recording.position, recording.command, strict=True
-    ):
-        events.append(CommandSample(int(stamp), command))
-        events.append(JointSample(int(stamp), recording.joint_names, position))
     robot = ROBOTS['reaction_wheel_6']
-    return robot, _gathered(robot, {}, events), 200
+    return robot, _gathered(robot, {}, events_of(recording)), 200
 
 
 def _arm():
@@ -81,26 +81,58 @@ def _arm():
     return arm.make_robot(), data, 200
 
 
-def _recorded(name, events):
-    settings = load_parameters(ROOT / 'config' / f'{name}.yaml')
-    robot = load_robot(str(ROOT / 'config' / 'robots' / f'{name}.yaml'))
-    return robot, _gathered(robot, settings, events), settings['learning.initial']
-
-
-def _tiago():
-    return _recorded('tiago_arm', open_recording(DATA / 'tiago/mcap_tiago_dynamic').events())
-
-
-def _panda():
+def _recorded(name):
+    machine = MACHINES[name]
+    robot, settings = machine.load_robot(), load_parameters(machine.params)
     with tempfile.TemporaryDirectory() as folder:
-        mapping = ROOT / 'config' / 'import' / 'panda.yaml'
-        table = DATA / 'panda/panda_exciting.npz'
-        if sgp(['import', str(table), '--map', str(mapping), '--out', folder]):
-            raise SystemExit(f'{table} cannot be imported')
-        return _recorded('panda', open_recording(Path(folder) / 'panda_exciting.mcap').events())
+        events = open_recording(machine.bag(Path(folder))).events()
+        return robot, _gathered(robot, settings, events), settings['learning.initial']
 
 
-STREAMS = {'reaction_wheel': _reaction_wheel, 'arm': _arm, 'tiago': _tiago, 'panda': _panda}
+STREAMS = {
+    'reaction_wheel': _reaction_wheel,
+    'arm': _arm,
+    'tiago': lambda: _recorded('tiago'),
+    'panda': lambda: _recorded('panda'),
+}
+
+
+class IncrementalFeatures:
+    """A rival without physics: incremental sparse spectrum Gaussian process regression.
+
+    Gijsberts and Metta, Neural Networks 41, 2013: a process in random Fourier features (Rahimi and
+    Recht 2007) whose weights are learned by recursive least squares. No Python library has it.
+
+    Args:
+        kernel: squared exponential.
+        noise: variance.
+        features: an even number.
+        seed: of the frequencies.
+    """
+
+    def __init__(self, kernel, noise, features, seed):
+        rng = np.random.default_rng(seed)
+        self._kernel = kernel
+        self._noise = noise
+        self._frequencies = rng.normal(size=(len(kernel.inputs), features // 2))
+        prior = CoefficientPrior.from_std(np.zeros(features), np.ones(features))
+        self._information = Information.of_prior(prior)
+
+    def _features(self, u):
+        angle = self._kernel.scale(u[None])[0] @ self._frequencies
+        scale = np.sqrt(self._kernel.variance / len(angle))
+        return scale * np.concatenate([np.cos(angle), np.sin(angle)])
+
+    def predict(self, u):
+        """Return mean and variance of the observation at an input u (d,)."""
+        phi = self._features(u)
+        spread = self._information.spread(phi[None])[0]
+        return float(phi @ self._information.coefficients), float(spread @ spread) + self._noise
+
+    def learn(self, u, y):
+        """Learn observation y at input u (d,)."""
+        root = np.sqrt(self._noise)
+        self._information.absorb(np.append(self._features(u), y)[None] / root)
 
 
 class _Joint:
@@ -216,20 +248,15 @@ def _run(name):
 
 def main():
     """Run the named streams, or all, and write the result."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('names', nargs='*', choices=[*STREAMS, []], default=[])
-    names = parser.parse_args().names or list(STREAMS)
-    found = {}
-    if RESULT.is_file():
-        found = json.loads(RESULT.read_text(encoding='utf-8'))['streams']
-    for name in names:
+    arguments = make_parser(__doc__, 'stream_accuracy', STREAMS).parse_args()
+    found = read_result(arguments.out).get('streams', {})
+    for name in arguments.names:
         found[name] = _run(name)
         result = {
-            'schema': 1, 'environment': environment(), 'budget': BUDGET, 'features': FEATURES,
-            'rival_features': RIVAL_FEATURES,
+            'budget': BUDGET, 'features': FEATURES, 'rival_features': RIVAL_FEATURES,
             'streams': {name: found[name] for name in STREAMS if name in found},
         }  # fmt: skip
-        RESULT.write_text(json.dumps(result, indent=1, allow_nan=False) + '\n', encoding='utf-8')
+        write_result(arguments.out, result)
 
 
 if __name__ == '__main__':

@@ -1,6 +1,6 @@
 """Real recordings through `sgp replay` and through the node over DDS, number by number.
 
-    python -m sgp_proof.real.live_recordings [NAME ...]
+    python -m sgp_proof.real.live [NAME ...]
 
 The recorded states are published with their own stamps, at the recorded rate or a stated multiple
 of it, to a real node in another process. What the node predicted is held against a replay of what
@@ -11,19 +11,19 @@ ready. The simple pendulum's recordings are cut before hands push it.
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import json
 import os
 import tempfile
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import rclpy
 from sensor_msgs.msg import JointState
 
-from sgp_proof.environment import environment
+from sgp_proof.real.recordings import MACHINES
+from sgp_proof.result_files import ROOT, make_parser, read_result, write_result
 from sgp_ros.apps.demo import compare
 from sgp_ros.apps.live_processes import LiveProcesses, graph_environment
 from sgp_ros.apps.parameter_file import load_parameters
@@ -33,106 +33,23 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.samples import JointSample
 from sgp_ros.recordings.reader import open_recording
-from sgp_ros.recordings.writer import RecordingWriter
 from sgp_ros.report.metrics import Timing, collect_metrics
-from sgp_ros.robots.registry import load_robot
 from sgp_ros.ros.publications import joint_state
 
-ROOT = Path(__file__).parents[2]
-DATA = ROOT.parent / 'shared' / 'data'
-RESULT = Path(__file__).parent / 'results' / 'live_recordings.json'
 NODE = 'sgp_ros.ros.sgp_node'
 WALL_S = 20.0
 """Longest stretch that is played [s of the clock on the wall]."""
 _START_LIMIT_S, _QUIET_S = 30.0, 2.5
 _SECOND_NS = 1_000_000_000
-DOUBLE = 'dfki_double_pendulum/design_{}__sys_id__trajectory_00.npz'
-SIMPLE = 'dfki_simple_pendulum/{}.csv'
-
-
-@dataclass(frozen=True)
-class Case:
-    """A recording, its robot and its settings.
-
-    `speed` is in multiples of the recorded rate, `seconds` cuts the recording.
-    """
-
-    file: str
-    robot: str
-    config: str
-    mapping: str = ''
-    speed: float = 1.0
-    seconds: float | None = None
-
-
-CASES = {
-    'emps': Case('emps/emps_id.csv', 'linear_axis', 'linear_axis', 'emps'),
-    'panda': Case('panda/panda_exciting.npz', 'config/robots/panda.yaml', 'panda', 'panda'),
-    # Its first half only gathers; four times as fast, all of it fits into the stretch.
-    'tiago': Case(
-        'tiago/mcap_tiago_dynamic', 'config/robots/tiago_arm.yaml', 'tiago_arm', speed=4.0
-    ),
-    'double_pendulum_a0': Case(
-        DOUBLE.format('A.0__20220815'), 'double_pendulum', 'double_pendulum',
-        'dfki_double_pendulum',
-    ),
-    'double_pendulum_c0': Case(
-        DOUBLE.format('C.0__20220914'), 'double_pendulum', 'double_pendulum',
-        'dfki_double_pendulum',
-    ),
-    'simple_pendulum': Case(
-        SIMPLE.format('energy_shaping'), 'simple_pendulum', 'simple_pendulum',
-        'dfki_simple_pendulum', seconds=3.9,
-    ),
-    'simple_pendulum_1kg': Case(
-        SIMPLE.format('energy_shaping_1kg'), 'simple_pendulum', 'simple_pendulum',
-        'dfki_simple_pendulum', seconds=7.0,
-    ),
-}  # fmt: skip
-
-
-def _bag(case, folder):
-    """Return the recording as a bag, imported where it is a table."""
-    if not case.mapping:
-        return DATA / case.file
-    bag = imported(case.file, case.mapping, folder)
-    return bag if case.seconds is None else cut_bag(bag, case.seconds)
-
-
-def imported(file, name_of_map, folder):
-    """Return a table of the shared data as a bag."""
-    mapping = ROOT / 'config' / 'import' / f'{name_of_map}.yaml'
-    if sgp(['import', str(DATA / file), '--map', str(mapping), '--out', str(folder)]):
-        raise SystemExit(f'{file} cannot be imported')
-    return folder / f'{Path(file).stem}.mcap'
-
-
-def cut_bag(bag, seconds):
-    """Return a bag of the first seconds of another one."""
-    events = list(open_recording(bag).events())
-    cut = bag.with_name(f'{bag.stem}_{seconds:g}s.mcap')
-    with RecordingWriter(cut) as writer:
-        for event in events:
-            if event.stamp_ns - events[0].stamp_ns <= 1e9 * seconds:
-                writer.write_event(event)
-    return cut
 
 
 def _replayed(case, bag, folder):
     """Run `sgp replay` as a user would; return its metrics."""
     out = folder / 'replay'
-    arguments = ['--robot', _robot(case), '--params', str(_config(case)), '--out', str(out)]
+    arguments = ['--robot', case.robot_argument, '--params', str(case.params), '--out', str(out)]
     if sgp(['replay', str(bag), *arguments]):
         raise SystemExit(f'{bag} cannot be replayed')
     return json.loads((out / 'metrics.json').read_text(encoding='utf-8'))
-
-
-def _robot(case):
-    return str(ROOT / case.robot) if case.robot.endswith('.yaml') else case.robot
-
-
-def _config(case):
-    return ROOT / 'config' / f'{case.config}.yaml'
 
 
 def _play(case, bag, record, graph):
@@ -142,9 +59,9 @@ def _play(case, bag, record, graph):
     rclpy.init(context=context, domain_id=int(graph['ROS_DOMAIN_ID']))
     player = rclpy.create_node('player', context=context)
     try:
-        settings = load_parameters(_config(case))
+        settings = load_parameters(case.params)
         node = processes.start(NODE, {
-            **settings, 'robot': _robot(case), 'command.type': 'none',
+            **settings, 'robot': case.robot_argument, 'command.type': 'none',
             'record.path': str(record), 'qos.depth': 5000,
         })  # fmt: skip
         publisher = player.create_publisher(JointState, 'joint_states', 5000)
@@ -180,8 +97,8 @@ def _publish(publisher, events, speed):
 
 def _record_replayed(case, record):
     """Replay what the node recorded; return the comparison and the metrics."""
-    robot = load_robot(_robot(case))
-    engine = Engine(robot, EngineConfig.from_mapping(load_parameters(_config(case)), robot))
+    robot = case.load_robot()
+    engine = Engine(robot, EngineConfig.from_mapping(load_parameters(case.params), robot))
     estimates, timing = [], Timing()
     options = ReplayOptions('/joint_states', 'none')
     run_events(
@@ -195,7 +112,7 @@ def _record_replayed(case, record):
 def _run(name, case, graph):
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
-        bag = _bag(case, place)
+        bag = case.bag(place)
         replay = _replayed(case, bag, place)
         record = place / 'live.mcap'
         published = _play(case, bag, record, graph)
@@ -216,22 +133,18 @@ def _run(name, case, graph):
 
 def main() -> None:
     """Run the named recordings, or all, and write the result."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('names', nargs='*', choices=[*CASES, []], default=[])
-    names = parser.parse_args().names or list(CASES)
-    found = {}
-    if RESULT.is_file():
-        found = json.loads(RESULT.read_text(encoding='utf-8'))['recordings']
+    arguments = make_parser(__doc__, 'live_recordings', MACHINES).parse_args()
+    found = read_result(arguments.out).get('recordings', {})
     with tempfile.TemporaryDirectory() as logs, graph_environment(Path(logs)) as graph:
         graph['PYTHONPATH'] = str(ROOT)
         os.environ.update(graph)
-        for name in names:
-            found[name] = _run(name, CASES[name], graph)
+        for name in arguments.names:
+            found[name] = _run(name, MACHINES[name], graph)
     result = {
-        'schema': 1, 'environment': environment(), 'wall_s': WALL_S,
-        'recordings': {name: found[name] for name in CASES if name in found},
+        'wall_s': WALL_S,
+        'recordings': {name: found[name] for name in MACHINES if name in found},
     }  # fmt: skip
-    RESULT.write_text(json.dumps(result, indent=1, allow_nan=False) + '\n', encoding='utf-8')
+    write_result(arguments.out, result)
 
 
 if __name__ == '__main__':

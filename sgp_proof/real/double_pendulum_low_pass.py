@@ -1,6 +1,6 @@
 """What would let `sgp diagnose` name the friction of the double pendulum.
 
-    python -m sgp_proof.real.double_pendulum_diagnosis
+    python -m sgp_proof.real.double_pendulum_low_pass
 
 Other low-passes than the recording chose, more runs, other runs, and a model that lacks Coulomb
 friction alone. The low-pass is no option of the command, so it is set in its place here.
@@ -9,7 +9,6 @@ friction alone. The low-pass is no option of the command, so it is set in its pl
 from __future__ import annotations
 
 import contextlib
-import json
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -17,13 +16,13 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import savgol_filter
 
-from sgp_proof.environment import environment
-from sgp_proof.real.real_diagnosis import DATA, execute, inside, read
+from sgp_proof.real.diagnosis import execute, inside, read
+from sgp_proof.real.recordings import DATA, DOUBLE
+from sgp_proof.result_files import make_parser, write_result
 from sgp_ros.diagnosis import pipeline
 from sgp_ros.report.metrics import versions
 
-TARGET = Path(__file__).parent / 'results' / 'double_pendulum_diagnosis.json'
-RUN = 'data/dfki_double_pendulum/design_A.0__20220815__sys_id__trajectory_{}.npz'
+DAY = 'A.0__20220815'
 MAP = 'config/import/dfki_double_pendulum.yaml'
 LEARNED, HELD = ('00', '02', '04', '11', '13'), ('01', '03', '05', '12')
 ROBOT, WITH_ROTORS = 'double_pendulum_a0.urdf', 'double_pendulum_a0_rotors.yaml'
@@ -62,8 +61,10 @@ def diagnosed(runs, robot, cutoff):
         folder = Path(name)
         with inside(folder), low_pass(cutoff):
             for part, chosen in (('learn', runs), ('test', HELD[:1])):
-                sources = ' '.join(RUN.format(run) for run in chosen)
-                execute(f'python -m sgp_proof.real.withheld join out/{part}.npz {sources}', folder)
+                sources = ' '.join(f'data/{DOUBLE.format(DAY, run)}' for run in chosen)
+                execute(
+                    f'python -m sgp_proof.real.recordings join out/{part}.npz {sources}', folder
+                )
                 execute(f'sgp import out/{part}.npz --map {MAP} --out out', folder)
             printed = execute(
                 f'sgp diagnose out/learn.mcap --robot config/robots/{robot} '
@@ -83,7 +84,7 @@ def noise():
     """
     rough = {'q': [], 'dq': []}
     for run in EVERY:
-        table = np.load(DATA.parent / RUN.format(run))
+        table = np.load(DATA / DOUBLE.format(DAY, run))
         for name, values in rough.items():
             smooth = savgol_filter(table[name], _WINDOW, _ORDER, axis=0)
             values.extend((table[name] - smooth).std(axis=0))
@@ -92,19 +93,20 @@ def noise():
 
 def main():
     """Carry out all variants and write what they say."""
+    parser = make_parser(__doc__, 'double_pendulum_diagnosis')
+    parser.add_argument('--variants', type=int, default=len(VARIANTS), help='how many of them')
+    arguments = parser.parse_args()
     result = {
-        'schema': 1,
-        'command': 'python -m sgp_proof.real.double_pendulum_diagnosis',
-        'environment': environment(),
+        'command': 'python -m sgp_proof.real.double_pendulum_low_pass',
         'versions': versions(),
         'noise': noise(),
         'variants': [],
     }
-    for variant in VARIANTS:
+    for variant in VARIANTS[: arguments.variants]:
         found = diagnosed(*variant)
         result['variants'].append(found)
         print(*variant[1:], found['sentence'])
-    TARGET.write_text(json.dumps(result, indent=1, allow_nan=False) + '\n', encoding='utf-8')
+    write_result(arguments.out, result)
 
 
 if __name__ == '__main__':

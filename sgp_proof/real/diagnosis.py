@@ -1,6 +1,6 @@
 """What `sgp diagnose` finds on real machines whose friction, or load, is withheld from the model.
 
-    python -m sgp_proof.real.real_diagnosis [NAME ...]
+    python -m sgp_proof.real.diagnosis [NAME ...]
 
 Each machine is a list of commands as a user would give them, run in one folder in which `data` and
 `config` stand for the recordings and the configuration of this repository.
@@ -8,7 +8,6 @@ Each machine is a list of commands as a user would give them, run in one folder 
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import json
@@ -19,36 +18,20 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from sgp_proof.environment import environment
-from sgp_proof.real.withheld import main as withheld
+from sgp_proof.real.recordings import DATA, DOUBLE, SIMPLE, UNDISTURBED_S
+from sgp_proof.real.recordings import main as withheld
+from sgp_proof.result_files import ROOT, make_parser, read_result, write_result
 from sgp_ros.cli import main as sgp
 from sgp_ros.report.metrics import versions
 
-ROOT = Path(__file__).parents[2]
-DATA = ROOT.parent / 'shared' / 'data'
-TARGET = Path(__file__).parent / 'results' / 'real_diagnosis.json'
 IMAGES = ROOT / 'docs' / 'images' / 'real_machines'
 SHOWN_RIVALS = 4
-EMPS = (
-    'sgp diagnose out/emps_id.mcap --robot config/robots/emps.urdf'
-    ' --test out/emps_val_pulses.mcap --out out/diagnosis'
-)
-LOADED = (
-    'sgp diagnose out/energy_shaping_1kg.mcap --robot config/robots/simple_pendulum.urdf'
-    ' --out out/diagnosis'
-)
-UNLOADED = (
-    'sgp diagnose out/energy_shaping.mcap --robot config/robots/simple_pendulum.urdf'
-    ' --test out/sac.mcap --out out/diagnosis'
-)
-DOUBLE = (
-    'sgp diagnose out/learn.mcap --robot config/robots/double_pendulum_a0.urdf'
-    ' --test out/test.mcap --out out/diagnosis'
-)
-_RUNS = 'data/dfki_double_pendulum/design_A.0__20220815__sys_id__trajectory_{}.npz'
 _DOUBLE = {
-    'learn': ' '.join(_RUNS.format(i) for i in ('00', '02', '04', '11', '13')),
-    'test': ' '.join(_RUNS.format(i) for i in ('01', '03', '05', '12')),
+    part: ' '.join('data/' + DOUBLE.format('A.0__20220815', i) for i in runs)
+    for part, runs in (
+        ('learn', ('00', '02', '04', '11', '13')),
+        ('test', ('01', '03', '05', '12')),
+    )
 }
 
 
@@ -56,10 +39,12 @@ def _imported(name: str, *files: str) -> tuple[str, ...]:
     return tuple(f'sgp import {f} --map config/import/{name}.yaml --out out' for f in files)
 
 
-def _pendulum(name: str, stop: float) -> tuple[str, ...]:
-    source = f'data/dfki_simple_pendulum/{name}.csv'
-    cut = f'python -m sgp_proof.real.withheld cut out/{name}.csv {source} --to {stop:g}'
-    return (cut, *_imported('dfki_simple_pendulum', f'out/{name}.csv'))
+def _pendulum(name: str) -> tuple[str, ...]:
+    cut = f'python -m sgp_proof.real.recordings cut out/{name}.csv data/{SIMPLE.format(name)}'
+    return (
+        f'{cut} --to {UNDISTURBED_S[name]:g}',
+        *_imported('dfki_simple_pendulum', f'out/{name}.csv'),
+    )
 
 
 def _arm(name: str, recording: str, robot: str, split: float) -> tuple[str, ...]:
@@ -67,11 +52,11 @@ def _arm(name: str, recording: str, robot: str, split: float) -> tuple[str, ...]
     source, identified = f'data/{name}/{recording}.npz', 'out/identified/robot_identified.urdf'
     diagnose = f'sgp diagnose out/learn.mcap --robot out/{robot}.yaml --test out/test.mcap'
     return (
-        f'python -m sgp_proof.real.withheld cut out/learn.npz {source} --to {split:g}',
-        f'python -m sgp_proof.real.withheld cut out/test.npz {source} --from {split:g}',
+        f'python -m sgp_proof.real.recordings cut out/learn.npz {source} --to {split:g}',
+        f'python -m sgp_proof.real.recordings cut out/test.npz {source} --from {split:g}',
         *_imported(name, 'out/learn.npz', 'out/test.npz'),
         f'sgp identify out/learn.mcap --robot config/robots/{robot}.yaml --out out/identified',
-        f'python -m sgp_proof.real.withheld friction out/{robot}.urdf {identified}',
+        f'python -m sgp_proof.real.recordings friction out/{robot}.urdf {identified}',
         f'cp config/robots/{robot}.yaml out',
         f'{diagnose} --out out/diagnosis',
     )
@@ -80,22 +65,34 @@ def _arm(name: str, recording: str, robot: str, split: float) -> tuple[str, ...]
 MACHINES = {
     'emps': (
         *_imported('emps', 'data/emps/emps_id.csv', 'data/emps/emps_val_pulses.csv'),
-        EMPS,
+        (
+            'sgp diagnose out/emps_id.mcap --robot config/robots/emps.urdf'
+            ' --test out/emps_val_pulses.mcap --out out/diagnosis'
+        ),
     ),
     'simple_pendulum_1kg': (
-        *_pendulum('energy_shaping_1kg', 7.0),
-        LOADED,
+        *_pendulum('energy_shaping_1kg'),
+        (
+            'sgp diagnose out/energy_shaping_1kg.mcap --robot config/robots/simple_pendulum.urdf'
+            ' --out out/diagnosis'
+        ),
     ),
     'simple_pendulum': (
-        *_pendulum('energy_shaping', 3.9),
-        *_pendulum('sac', 3.9),
-        UNLOADED,
+        *_pendulum('energy_shaping'),
+        *_pendulum('sac'),
+        (
+            'sgp diagnose out/energy_shaping.mcap --robot config/robots/simple_pendulum.urdf'
+            ' --test out/sac.mcap --out out/diagnosis'
+        ),
     ),
     'double_pendulum': (
-        f'python -m sgp_proof.real.withheld join out/learn.npz {_DOUBLE["learn"]}',
-        f'python -m sgp_proof.real.withheld join out/test.npz {_DOUBLE["test"]}',
+        f'python -m sgp_proof.real.recordings join out/learn.npz {_DOUBLE["learn"]}',
+        f'python -m sgp_proof.real.recordings join out/test.npz {_DOUBLE["test"]}',
         *_imported('dfki_double_pendulum', 'out/learn.npz', 'out/test.npz'),
-        DOUBLE,
+        (
+            'sgp diagnose out/learn.mcap --robot config/robots/double_pendulum_a0.urdf'
+            ' --test out/test.mcap --out out/diagnosis'
+        ),
     ),
     'panda': _arm('panda', 'panda_exciting', 'panda', 12.6),
     'tiago': _arm('tiago', 'tiago_dynamic', 'tiago_arm', 48.0),
@@ -198,23 +195,18 @@ def read(out: Path, printed: str) -> dict:
 
 def main() -> None:
     """Run the named machines, or all, beside results that are there."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('names', nargs='*', choices=[*MACHINES, []], default=[])
-    for name in parser.parse_args().names or MACHINES:
+    arguments = make_parser(__doc__, 'real_diagnosis', MACHINES).parse_args()
+    machines = read_result(arguments.out).get('machines', {})
+    for name in arguments.names:
         with tempfile.TemporaryDirectory() as folder:
-            machine = run(name, Path(folder))
-        before = json.loads(TARGET.read_text(encoding='utf-8')) if TARGET.exists() else {}
-        machines = {**before.get('machines', {}), name: machine}
+            machines[name] = run(name, Path(folder))
         result = {
-            'schema': 1,
-            'command': 'python -m sgp_proof.real.real_diagnosis',
-            'environment': environment(),
+            'command': 'python -m sgp_proof.real.diagnosis',
             'versions': versions(),
             'machines': {key: machines[key] for key in MACHINES if key in machines},
         }
-        text = json.dumps(result, indent=1, allow_nan=False)
-        TARGET.write_text(text + '\n', encoding='utf-8')
-        print(name, machine['sentence'])
+        write_result(arguments.out, result)
+        print(name, machines[name]['sentence'])
 
 
 if __name__ == '__main__':
