@@ -10,6 +10,8 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / 'sgp_ros'
 MODULES = sorted(PACKAGE.rglob('*.py'))
+PROOF = PACKAGE.parent / 'sgp_proof'
+PROOF_MODULES = sorted(PROOF.rglob('*.py'))
 
 NUMERIC = {'numpy', 'scipy'}
 MESSAGES = {
@@ -47,6 +49,19 @@ LAYERS = {
     'cli': {'apps', 'errors'},
 }  # fmt: skip
 """Layer to what it may import beside the standard library, itself and the package's version."""
+
+PROOF_ROOMS = {
+    'result_files': set(),
+    'commands': set(),
+    'unchanged': {'result_files'},
+    'bench': {'result_files'},
+    'paper': set(),
+    'real': {'result_files'},
+    'streams': {'result_files', 'paper', 'real'},
+    'numerics': {'result_files', 'bench', 'streams'},
+    'concealed': {'result_files', 'paper'},
+}
+"""Room of the proof to the other ones that it may import, beside every layer of the product."""
 
 PURE = ('gp', 'physics', 'rigid', 'engine', 'robots', 'simulation', 'batch')
 SILENT = ('errors', *PURE, 'recordings', 'diagnosis')
@@ -99,7 +114,21 @@ def test_imports_follow_the_table(path):
         assert known, f'{layer} imports {name} in line {node.lineno}'
 
 
-@pytest.mark.parametrize('path', MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
+@pytest.mark.parametrize('path', PROOF_MODULES, ids=lambda p: str(p.relative_to(PROOF)))
+def test_rooms_of_the_proof_follow_their_table(path):
+    """The product never imports the proof, by the table of layers; its rooms do so in order."""
+    room = path.relative_to(PROOF).with_suffix('').parts[0]
+    if room == '__init__':
+        return
+    for name, node in _imports(_tree(path)):
+        parts = name.split('.')
+        if parts[0] == PROOF.name:
+            assert parts[1] in {room, *PROOF_ROOMS[room]}, f'{name} in line {node.lineno}'
+
+
+@pytest.mark.parametrize(
+    'path', [*MODULES, *PROOF_MODULES], ids=lambda p: str(p.relative_to(PACKAGE.parent))
+)
 def test_no_module_unpickles_or_evaluates(path):
     """Model and robot files are data."""
     tree = _tree(path)
@@ -148,6 +177,12 @@ def test_the_fold_is_pure(path):
             ), node.lineno
 
 
+@pytest.mark.parametrize('path', PROOF_MODULES, ids=lambda p: str(p.relative_to(PROOF)))
+def test_modules_of_the_proof_stay_short(path):
+    """A script may list what it does in one function, but a module has one subject."""
+    assert path.read_text(encoding='utf-8').count('\n') <= LONGEST_MODULE
+
+
 @pytest.mark.parametrize('path', MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
 def test_modules_and_functions_stay_short(path):
     """Past this length a reader loses the thread; `__init__` files hold a docstring alone."""
@@ -160,7 +195,9 @@ def test_modules_and_functions_stay_short(path):
             assert body <= LONGEST_FUNCTION, node.name
 
 
-@pytest.mark.parametrize('path', MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
+@pytest.mark.parametrize(
+    'path', [*MODULES, *PROOF_MODULES], ids=lambda p: str(p.relative_to(PACKAGE.parent))
+)
 def test_every_module_says_what_it_is_for(path):
     """The docstring's first line is one sentence."""
     docstring = ast.get_docstring(_tree(path))

@@ -76,7 +76,7 @@ def scored_case(worlds, case, out):
         diagnose_case(worlds / 'cases' / case, out)
     outcome = json.loads((out / OUTCOME).read_text(encoding='utf-8'))
     answer = json.loads((worlds / 'answers' / f'{case}.json').read_text(encoding='utf-8'))
-    truth = np.load(worlds / 'answers' / f'{case}_truth.npz')
+    truth = np.load(worlds / 'answers' / f'{case}_truth.npz', allow_pickle=False)
     row = {
         'case': case, 'key': answer['key'], 'verdict': answer['verdict'],
         'truth': [[e['effect'], e['joint']] for e in answer['effects']],

@@ -84,7 +84,7 @@ def noise():
     """
     rough = {'q': [], 'dq': []}
     for run in EVERY:
-        table = np.load(DATA / DOUBLE.format(DAY, run))
+        table = np.load(DATA / DOUBLE.format(DAY, run), allow_pickle=False)
         for name, values in rough.items():
             smooth = savgol_filter(table[name], _WINDOW, _ORDER, axis=0)
             values.extend((table[name] - smooth).std(axis=0))
