@@ -27,7 +27,7 @@ LAYERS = {
     'simulation': NUMERIC | {'mujoco', 'errors'},
     'engine': {'numpy', 'gp', 'physics', 'rigid', 'robots', 'errors'},
     'batch': NUMERIC | {
-        'numba', 'gp', 'physics', 'rigid', 'robots', 'engine.samples', 'errors',
+        'numba', 'gp', 'physics', 'rigid', 'robots', 'engine', 'errors',
     },
     'recordings': {
         'numpy', 'scipy', 'yaml', 'rosbags', 'mcap', 'zstandard', 'engine.samples',

@@ -12,7 +12,7 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.intake import Intake
 from sgp_ros.engine.results import Counts
 from sgp_ros.engine.samples import CommandSample, JointSample
-from sgp_ros.engine.windows import Equation
+from sgp_ros.engine.windows import Equation, WindowFilter
 from sgp_ros.gp.model import Observations
 from sgp_ros.physics.term import Motion
 from sgp_ros.robots.registry import ROBOTS
@@ -144,12 +144,13 @@ def _coefficients(truth: dict[str, object], model: Robot) -> np.ndarray:
 def _equations(
     recording: SimulatedRecording, position: np.ndarray, model: Robot, config: EngineConfig
 ) -> list[Equation]:
-    intake = Intake(model, config, Counts())
+    intake, windows = Intake(model, config, Counts()), WindowFilter(model, config)
     equations = []
     for i, stamp in enumerate(recording.stamps_ns):
         intake.take_command(CommandSample(int(stamp), recording.command[i]))
         sample = JointSample(int(stamp), recording.joint_names, position[i])
-        equations += intake.take_state(sample)
+        state = intake.take_state(sample)
+        equations += windows.push(state, intake.commands) if state is not None else []
     return equations
 
 

@@ -19,6 +19,8 @@ from sgp_ros.batch.rollout_scores import RolloutScore, score_windows
 from sgp_ros.batch.rollout_windows import cut_windows, joined
 from sgp_ros.batch.signals import Signals, collect_signals
 from sgp_ros.batch.zero_phase import ZeroPhase
+from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.report.files import write_text
@@ -29,7 +31,6 @@ from sgp_ros.robots.robot import Robot
 
 Stretch = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
-MAX_GAP_S = 0.25
 HORIZONS: tuple[float | None, ...] = (0.0, 0.3, None)
 """One step, 0.3 s, the longest held-out stretch."""
 _STRIDE_S = 0.25
@@ -43,7 +44,7 @@ class IdentifyOptions:
         tests: recordings that are only scored on; without any, a part of the recording.
         joint_states: topic of the states; None for the one there is.
         command: topic of the commands; None for the one there is.
-        effort: where efforts come from, `state`, `command` or `auto`.
+        effort: where efforts come from, a key of `EFFORT_SOURCES`.
         inputs: what Z sees, such as `own:velocity`; None lets the data choose.
         holdout: the part held out without tests, `tail` or `alternate`.
         share: how much of it.
@@ -108,6 +109,8 @@ def run_identify(
     counts = {'states on the grid': len(signals.time)}
     for what, refused in (('states', signals.refused), ('commands', signals.commands_refused)):
         counts |= {f'{what} refused: {reason}': n for reason, n in refused.items() if n}
+    if signals.left_out:
+        counts['states of stretches too short to be filtered'] = signals.left_out
     findings = collect_findings(found, Path(bag).name, rollouts, counts)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / 'identification.json', json.dumps(findings, indent=1, allow_nan=False) + '\n')
@@ -151,7 +154,9 @@ def read_signals(bag: str, robot: Robot, options: IdentifyOptions, remarks: list
     recording = open_recording(bag)
     events = recording.events(options.joint_states, options.command)
     try:
-        signals = collect_signals(events, robot, max_gap=MAX_GAP_S, effort_source=options.effort)
+        signals = collect_signals(
+            events, robot, EngineConfig(effort_source=EFFORT_SOURCES[options.effort])
+        )
     except RecordingError as error:
         raise RecordingError(f'{bag}: {error.found}', error.expected, error.remedy) from error
     remarks += recording.remarks

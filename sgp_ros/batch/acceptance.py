@@ -1,24 +1,78 @@
-"""Decides of every state and command of a recording whether it is used, and why not.
+"""The accepted states and held commands of a whole recording.
 
-The reasons are those of the online engine. A whole recording can be sorted, so no sample is late.
+The intake of the engine decides what is accepted. A whole recording can be sorted, so no sample is
+late.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from sgp_ros.batch.held_commands import HeldCommands
+from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.intake import Intake, State
+from sgp_ros.engine.ordering import in_order
+from sgp_ros.engine.results import Counts
 from sgp_ros.engine.samples import CommandSample, Event, JointSample
-from sgp_ros.errors import ConfigError, RecordingError
+from sgp_ros.errors import RecordingError
 from sgp_ros.robots.robot import Robot
 
-EFFORT_SOURCES = ('auto', 'state', 'command')
-_REASONS = ('late', 'duplicate', 'nonfinite', 'unpaired', 'unknown_joint', 'gap')
-_COMMAND_REASONS = ('wrong_length', 'unknown_joint', 'nonfinite')
+USUAL = EngineConfig()
+"""Settings of the intake where none are given: those of the engine."""
 _COMMON_SHARE = 0.5
+_LONGEST_LAG_S, _LAGS = 0.2, 41
+_LEAST_EXPLAINED = 0.5
+_GAINS = (0.25, 1.5)
+"""Of a measured effort on an effort commanded: dead zone and saturation lower it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldCommands:
+    """c commands to the robot's k joints, each of which holds until the next one.
+
+    Attributes:
+        stamps_ns: (c,) int64, from which each holds, strictly increasing [ns].
+        effort: (c, k) [unit of the commands].
+    """
+
+    stamps_ns: np.ndarray
+    effort: np.ndarray
+
+    def at(self, stamps_ns: np.ndarray) -> np.ndarray:
+        """Return the commands in force, (n, k); before the first one that one."""
+        index = np.searchsorted(self.stamps_ns, stamps_ns, side='right') - 1
+        return np.asarray(self.effort[np.maximum(index, 0)])
+
+    def averages(self, start_ns: int, step: float, n: int) -> tuple[np.ndarray, np.ndarray]:
+        """Average the commands over a grid of n points, exactly for any times of change.
+
+        Args:
+            start_ns: stamp of the first point [ns].
+            step: between two points [s].
+            n: number of points.
+
+        Returns:
+            centred (n, k), averaged about each point with the hat that reaches one step to either
+            side, and following (n, k), the mean from each point to the next. Before the first
+            command the first one holds.
+        """
+        changes = (self.stamps_ns - start_ns) * 1e-9 / step  # in steps after the first point
+        edges = np.arange(-1.0, n + 1.0)
+        inside = changes[(changes > edges[0]) & (changes < edges[-1])]
+        bounds = np.union1d(edges, inside)
+        left, right = bounds[:-1], bounds[1:]
+        cell = np.searchsorted(edges, left, side='right') - 1  # cell i ends at point i
+        index = np.searchsorted(changes, left, side='right') - 1
+        value = self.effort[np.maximum(index, 0)]  # (pieces, k)
+        a, b = left - edges[cell], right - edges[cell]
+        rising = 0.5 * (b * b - a * a)
+        width = b - a
+        mean = _sums(cell, width[:, None] * value, n + 1)
+        before = _sums(cell, rising[:, None] * value, n + 1)
+        after = mean - before
+        return before[:n] + after[1:], mean[1:]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,178 +82,145 @@ class Accepted:
     Attributes:
         stamps_ns: (m,) int64, strictly increasing [ns].
         position: (m, k) [rad or m].
-        velocity: (m, k) [rad/s or m/s]; None where most states have none.
-        effort: (m, k) measured; None where the commands count.
+        velocity: (m, k) [rad/s or m/s], NaN where a state has none; None where most have none.
+        effort: (m, k) measured, NaN where the commands count.
+        is_measured: (m,) whether the measured effort counts.
         commands: None without.
-        refused, commands_refused: by reason.
+        counts: what was read, used and refused.
     """
 
     stamps_ns: np.ndarray
     position: np.ndarray
     velocity: np.ndarray | None
-    effort: np.ndarray | None
+    effort: np.ndarray
+    is_measured: np.ndarray
     commands: HeldCommands | None
-    refused: dict[str, int]
-    commands_refused: dict[str, int]
+    counts: Counts
+
+    def stretches(self, max_gap: float) -> list[np.ndarray]:
+        """Return the rows of stretches without a pause above `max_gap` [s], of one source each."""
+        ends = np.diff(self.stamps_ns) > max_gap * 1e9
+        ends |= np.diff(self.is_measured)
+        return np.split(np.arange(len(self.stamps_ns)), np.flatnonzero(ends) + 1)
 
 
-def accept(
-    events: Iterable[Event],
-    robot: Robot,
-    effort_source: str,
-    command_timeout: float,
-    command_joints: Sequence[str] | None,
-) -> Accepted:
-    """Sort, check and pair the events of a recording; arguments as for `collect_signals`."""
-    if effort_source not in EFFORT_SOURCES:
-        raise ConfigError(f'effort source {effort_source!r}', f'one of {list(EFFORT_SOURCES)}')
-    states, commands = _Table(robot), _CommandTable(robot, command_joints)
+def accept(events: Iterable[Event], robot: Robot, config: EngineConfig = USUAL) -> Accepted:
+    """Return what the intake of the engine accepts of a recording.
+
+    Args:
+        events: in any order.
+        robot: whose joints are taken, in its order.
+        config: settings of the intake.
+
+    Raises:
+        RecordingError: no state is accepted.
+    """
+    counts = Counts()
+    intake = Intake(robot, config, counts)
+    states: list[State] = []
+    strangers: set[tuple[str, ...]] = set()
+    admitted = []
     for event in events:
-        if isinstance(event, JointSample):
-            states.add(event)
-        elif isinstance(event, CommandSample):
-            commands.add(event)
-    if not states.stamps_ns:
-        raise RecordingError(
-            f'no usable state of robot {robot.name}: {states.why_refused()}',
-            f'states of the joints {list(robot.joint_names)}',
-            'name the joints in a robot file, or take the robot of this recording',
-        )
-    return _paired(states, commands.held(), commands.refused, effort_source, command_timeout)
+        if intake.admit(event):
+            admitted.append(event)
+        elif isinstance(event, JointSample):
+            strangers.add(event.names)
+    for event in in_order(admitted):
+        if isinstance(event, CommandSample):
+            intake.take_command(event)
+        elif isinstance(event, JointSample):
+            state = intake.take_state(event)
+            states += [] if state is None else [state]
+    if not states:
+        raise _none_accepted(robot, config, counts, strangers)
+    return _table(states, intake, counts)
 
 
-class _Table:
-    """Rows of states in the robot's order, NaN for what a state lacks."""
+def are_efforts(accepted: Accepted, robot: Robot) -> bool:
+    """Return whether the measured efforts follow the commands as a drive lets them follow.
 
-    def __init__(self, robot: Robot) -> None:
-        self.robot = robot
-        self.refused = dict.fromkeys(_REASONS, 0)
-        self.stamps_ns: list[int] = []
-        self.rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-        self._orders: dict[tuple[str, ...], list[int] | None] = {}
-        self._missing = np.full(len(robot.joints), np.nan)
-        self._gains = np.array([joint.effort_gain for joint in robot.joints])
+    On most of the actuated joints a straight line on the command, delayed by at most 0.2 s, must
+    explain half of the variance of the measured effort, with a slope of about one, and more than
+    it explains of the variance of the position, which is what a commanded position would do.
+    Delay, lag, dead zone and saturation of a drive leave that much.
 
-    def add(self, sample: JointSample) -> None:
-        order = self._order(sample.names)
-        if order is None:
-            self.refused['unknown_joint'] += 1
-            return
-        position = sample.position[order]
-        velocity = self._missing if sample.velocity is None else sample.velocity[order]
-        effort = self._missing if sample.effort is None else sample.effort[order] * self._gains
-        bad = np.isinf(velocity).any() or np.isinf(effort[self.actuated]).any()
-        if bad or not np.isfinite(position).all():
-            self.refused['nonfinite'] += 1
-            return
-        self.stamps_ns.append(sample.stamp_ns)
-        self.rows.append((position, velocity, effort))
-
-    def why_refused(self) -> str:
-        reasons = [f'{count} {reason}' for reason, count in self.refused.items() if count]
-        strangers = [list(names) for names, order in self._orders.items() if order is None]
-        return ', '.join(reasons or ['there is none']) + (
-            f', the joints are {strangers[0]}' if strangers else ''
-        )
-
-    @property
-    def actuated(self) -> list[int]:
-        return [j for j, joint in enumerate(self.robot.joints) if joint.is_actuated]
-
-    def _order(self, names: tuple[str, ...]) -> list[int] | None:
-        if names not in self._orders:
-            known = all(name in names for name in self.robot.joint_names)
-            order = [names.index(name) for name in self.robot.joint_names] if known else None
-            self._orders[names] = order
-        return self._orders[names]
+    Args:
+        accepted: with commands, and measured efforts in some states.
+        robot: whose joints they are.
+    """
+    rows = np.flatnonzero(accepted.is_measured)
+    assert accepted.commands is not None
+    stamps, effort, position = (
+        x[rows] for x in (accepted.stamps_ns, accepted.effort, accepted.position)
+    )
+    delays = np.round(np.linspace(0.0, _LONGEST_LAG_S * 1e9, _LAGS)).astype(np.int64)
+    commands = np.array([accepted.commands.at(stamps - delay) for delay in delays])
+    follows = []
+    for j, joint in enumerate(robot.joints):
+        u = commands[:, :, j]
+        if joint.is_actuated and (np.ptp(u) > 0.0 or np.ptp(effort[:, j]) > 0.0):
+            explained, slope = _best_line(u, effort[:, j])
+            rival, _ = _best_line(u, position[:, j])
+            is_unit = _GAINS[0] <= slope <= _GAINS[1]
+            follows.append(is_unit and explained > max(_LEAST_EXPLAINED, rival))
+    return bool(follows) and float(np.mean(follows)) > _COMMON_SHARE
 
 
-class _CommandTable:
-    """Commands in the robot's order; joints that a command leaves out keep theirs."""
+def _best_line(u: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """Return the share of the variance of y (n,) that a line on a row of u (m, n) explains.
 
-    def __init__(self, robot: Robot, joints: Sequence[str] | None) -> None:
-        self._robot = robot
-        usual = [joint.name for joint in robot.joints if joint.is_actuated]
-        self._joints = tuple(usual if joints is None else joints)
-        self.refused = dict.fromkeys(_COMMAND_REASONS, 0)
-        self._commands: list[CommandSample] = []
-
-    def add(self, command: CommandSample) -> None:
-        reason = self._problem(command)
-        if reason:
-            self.refused[reason] += 1
-        else:
-            self._commands.append(command)
-
-    def held(self) -> HeldCommands | None:
-        effort = np.zeros(len(self._robot.joints))
-        latest: dict[int, np.ndarray] = {}
-        for command in sorted(self._commands, key=lambda c: c.stamp_ns):
-            effort = effort.copy()
-            for name, value in zip(command.names or self._joints, command.effort, strict=True):
-                if name in self._robot.joint_names:
-                    joint = self._robot.joint_names.index(name)
-                    effort[joint] = value * self._robot.joints[joint].effort_gain
-            latest[command.stamp_ns] = effort
-        if not latest:
-            return None
-        return HeldCommands(np.array(list(latest), dtype=np.int64), np.array([*latest.values()]))
-
-    def _problem(self, command: CommandSample) -> str | None:
-        names = command.names or self._joints
-        if len(command.effort) != len(names):
-            return 'wrong_length'
-        if not set(names) & set(self._robot.joint_names):
-            return 'unknown_joint'
-        return None if np.isfinite(command.effort).all() else 'nonfinite'
+    The best row is taken, and its slope returned.
+    """
+    du, dy = u - u.mean(axis=1, keepdims=True), y - y.mean()
+    powers, power = (du * du).sum(axis=1), float(dy @ dy)
+    products = du @ dy
+    valid = powers > 0.0
+    if power == 0.0 or not valid.any():
+        return 0.0, 0.0
+    slopes = products[valid] / powers[valid]
+    shares = slopes * products[valid] / power
+    best = int(shares.argmax())
+    return float(shares[best]), float(slopes[best])
 
 
-def _paired(
-    states: _Table,
-    commands: HeldCommands | None,
-    commands_refused: dict[str, int],
-    source: str,
-    timeout: float,
-) -> Accepted:
-    stamps = np.array(states.stamps_ns, dtype=np.int64)
-    order = np.argsort(stamps, kind='stable')
-    first = np.concatenate([[True], np.diff(stamps[order]) > 0])
-    states.refused['duplicate'] += int((~first).sum())
-    rows = order[first]
-    stamps = stamps[rows]
-    position, velocity, effort = (np.array(x)[rows] for x in zip(*states.rows, strict=True))
-    has_velocity = np.isfinite(velocity).all(axis=1)
-    keep = np.ones(len(stamps), dtype=bool)
-    uses_velocity = bool(has_velocity.mean() > _COMMON_SHARE)
-    if uses_velocity:
-        keep &= has_velocity
-        states.refused['nonfinite'] += int((~keep).sum())
-    has_effort = np.isfinite(effort[:, states.actuated]).all(axis=1)
-    measured = source == 'state' or (source == 'auto' and has_effort.mean() > _COMMON_SHARE)
-    if states.actuated:
-        pairs = has_effort if measured else _in_force(commands, stamps, timeout)
-        states.refused['unpaired'] += int((keep & ~pairs).sum())
-        keep &= pairs
-    if not keep.any():
-        raise RecordingError(
-            f'no state with an effort among {len(keep)}, effort source {source!r}',
-            'an effort in the states, or commands before them',
-            'give the topic of the commands with --command, or another --effort',
-        )
-    passive = [j for j in range(position.shape[1]) if j not in states.actuated]
-    effort[:, passive] = 0.0
+def _table(states: list[State], intake: Intake, counts: Counts) -> Accepted:
+    missing = np.full(states[0].position.shape, np.nan)
+    velocity = np.array([missing if s.velocity is None else s.velocity for s in states])
+    has_velocity = np.mean([s.velocity is not None for s in states]) > _COMMON_SHARE
+    held = intake.commands
     return Accepted(
-        stamps[keep],
-        position[keep],
-        velocity[keep] if uses_velocity else None,
-        effort[keep] if measured or not states.actuated else None,
-        commands,
-        states.refused,
-        commands_refused,
+        np.array([s.stamp_ns for s in states], dtype=np.int64),
+        np.array([s.position for s in states]),
+        velocity if has_velocity else None,
+        np.array([missing if s.effort is None else s.effort for s in states]),
+        np.array([s.effort is not None for s in states]),
+        HeldCommands(np.array(held.stamps_ns, dtype=np.int64), np.array(held.efforts))
+        if held.stamps_ns
+        else None,
+        counts,
     )
 
 
-def _in_force(commands: HeldCommands | None, stamps: np.ndarray, timeout: float) -> np.ndarray:
-    if commands is None:
-        return np.zeros(len(stamps), dtype=bool)
-    return commands.age(stamps) <= timeout
+def _none_accepted(
+    robot: Robot, config: EngineConfig, counts: Counts, strangers: set[tuple[str, ...]]
+) -> RecordingError:
+    if counts.refused['unpaired']:
+        return RecordingError(
+            f'no state with an effort among {counts.read}, effort source {config.effort_source!r}',
+            'an effort in the states, or commands before them',
+            'give the topic of the commands with --command, or another --effort',
+        )
+    reasons = [f'{count} {reason}' for reason, count in counts.refused.items() if count]
+    seen = next((list(n) for n in sorted(strangers) if not {*robot.joint_names} <= {*n}), None)
+    return RecordingError(
+        f'no usable state of robot {robot.name}: {", ".join(reasons or ["there is none"])}'
+        + (f', the joints are {seen}' if seen else ''),
+        f'states of the joints {list(robot.joint_names)}',
+        'name the joints in a robot file, or take the robot of this recording',
+    )
+
+
+def _sums(cell: np.ndarray, x: np.ndarray, cells: int) -> np.ndarray:
+    """Add the rows of x (m, k) that fall into the same cell, (cells, k)."""
+    columns = [np.bincount(cell, weights=column, minlength=cells) for column in x.T]
+    return np.column_stack(columns)

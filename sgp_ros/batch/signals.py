@@ -11,14 +11,15 @@ other.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import interpolate
 
-from sgp_ros.batch.acceptance import Accepted, accept
+from sgp_ros.batch.acceptance import USUAL, Accepted, accept
 from sgp_ros.batch.stencils import sharpened
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import RecordingError
 from sgp_ros.robots.effect_terms import EffortMap
@@ -43,6 +44,7 @@ class Signals:
         commands_refused: commands by reason.
         rate: of the grid [Hz].
         start_ns: stamp of the first accepted state [ns].
+        left_out: accepted states of stretches too short to be filtered.
     """
 
     time: np.ndarray
@@ -55,41 +57,29 @@ class Signals:
     commands_refused: dict[str, int]
     rate: float
     start_ns: int
+    left_out: int = 0
 
 
 def collect_signals(
-    events: Iterable[Event],
-    robot: Robot,
-    *,
-    max_gap: float,
-    effort_source: str = 'auto',
-    command_timeout: float = 1.0,
-    command_joints: Sequence[str] | None = None,
+    events: Iterable[Event], robot: Robot, config: EngineConfig = USUAL
 ) -> Signals:
     """Bring the states and commands of a recording to a uniform grid at their median rate.
 
     Args:
         events: in any order.
         robot: whose joints are taken, in its order.
-        max_gap: a longer pause between states ends a segment [s].
-        effort_source: `state` for the measured effort, `command` for the held command, `auto` for
-            the measured one where more than half of the states carry it.
-        command_timeout: a command older than this pairs with no state [s].
-        command_joints: joints of a command without names; None for the actuated joints.
+        config: settings of the intake; `max_gap` ends a segment too.
 
     Raises:
-        ConfigError: an effort source that does not exist.
         RecordingError: nothing usable is left.
     """
-    accepted = accept(events, robot, effort_source, command_timeout, command_joints)
-    gaps = np.flatnonzero(np.diff(accepted.stamps_ns) > max_gap * 1e9) + 1
-    stretches = np.split(np.arange(len(accepted.stamps_ns)), gaps)
+    accepted = accept(events, robot, config)
+    stretches = accepted.stretches(config.max_gap)
     used = [rows for rows in stretches if len(rows) >= SHORTEST_SEGMENT]
-    accepted.refused['gap'] += sum(len(rows) for rows in stretches) - sum(map(len, used))
     if not used:
         raise RecordingError(
             f'{len(accepted.stamps_ns)} states, nowhere {SHORTEST_SEGMENT} of them without a pause'
-            f' above {max_gap:g} s',
+            f' above {config.max_gap:g} s',
             'a recording without such pauses',
             'record longer, and more states per second',
         )
@@ -97,8 +87,10 @@ def collect_signals(
     step = 1e-9 * float(np.median(steps))
     parts = [_Part.of(accepted, rows, step) for rows in used]
     if robot.effort_map is not None:
-        parts = [part.acting(robot.effort_map, is_measured=accepted.effort is not None)
-                 for part in parts]  # fmt: skip
+        parts = [
+            part.acting(robot.effort_map, is_measured=bool(accepted.is_measured[rows[0]]))
+            for part, rows in zip(parts, used, strict=True)
+        ]
     ends = np.cumsum([len(part.time) for part in parts])
     starts = [0, *ends[:-1]]
     return Signals(
@@ -108,10 +100,11 @@ def collect_signals(
         np.concatenate([part.effort for part in parts]),
         _joined([part.command for part in parts]),
         tuple(slice(int(a), int(b)) for a, b in zip(starts, ends, strict=True)),
-        accepted.refused,
-        accepted.commands_refused,
+        accepted.counts.refused,
+        accepted.counts.commands_refused,
         1.0 / step,
         int(accepted.stamps_ns[0]),
+        sum(map(len, stretches)) - sum(map(len, used)),
     )
 
 
@@ -131,18 +124,18 @@ class _Part:
         known = (stamps - stamps[0]) * 1e-9
         n = int(known[-1] / step + 1e-6) + 1
         grid = np.minimum(np.arange(n) * step, known[-1])
-        position = interpolate.CubicSpline(known, accepted.position[rows])(grid)
+        path = interpolate.CubicSpline(known, accepted.position[rows])
         velocity, effort, command = None, None, None
         if accepted.velocity is not None:
-            velocity = _linear(grid, known, accepted.velocity[rows])
-        if accepted.effort is not None:
+            velocity = _velocity(grid, known, accepted.velocity[rows], path)
+        if accepted.is_measured[rows[0]]:
             effort = _linear(grid, known, accepted.effort[rows])
         if accepted.commands is not None:
             centred, command = accepted.commands.averages(int(stamps[0]), step, n)
             effort = sharpened(centred) if effort is None else effort
         assert effort is not None
         start = (int(stamps[0]) - int(accepted.stamps_ns[0])) * 1e-9
-        return cls(start + np.arange(n) * step, position, velocity, effort, command)
+        return cls(start + np.arange(n) * step, path(grid), velocity, effort, command)
 
     def acting(self, effort_map: EffortMap, *, is_measured: bool) -> _Part:
         """Return the segment with the efforts that act in place of the recorded ones."""
@@ -155,6 +148,16 @@ class _Part:
         return replace(
             self, effort=effort_map(self.effort, v, is_measured=is_measured), command=command
         )
+
+
+def _velocity(
+    grid: np.ndarray, known: np.ndarray, measured: np.ndarray, path: interpolate.CubicSpline
+) -> np.ndarray:
+    """Return the velocity on a grid; states without one are passed over."""
+    has = np.isfinite(measured).all(axis=1)
+    if not has.any():
+        return np.asarray(path(grid, 1))
+    return _linear(grid, known[has], measured[has])
 
 
 def _linear(grid: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:

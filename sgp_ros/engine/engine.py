@@ -1,4 +1,4 @@
-"""The fold: events in, estimates out, one at a time and in the order of their stamps."""
+"""The fold over a stream: events in, estimates out, one at a time in the order of stamps."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.estimator import Estimator
 from sgp_ros.engine.fitting import FitRequest
-from sgp_ros.engine.intake import Intake
+from sgp_ros.engine.intake import Intake, State
 from sgp_ros.engine.ordering import ReorderBuffer
 from sgp_ros.engine.readout import read_parameters, read_scores
 from sgp_ros.engine.results import Counts, Estimate, ParameterEstimate, Score, Step
@@ -22,6 +22,7 @@ from sgp_ros.engine.samples import (
     SettingValue,
 )
 from sgp_ros.engine.snapshots import fill_from_snapshot, snapshot_config, take_snapshot
+from sgp_ros.engine.windows import WindowFilter
 from sgp_ros.gp.model import Model
 from sgp_ros.gp.scores import DriftTest
 from sgp_ros.robots.robot import Robot
@@ -35,7 +36,7 @@ class Engine:
         config: settings in force.
         counts: what became of every sample.
         delay_s: half the length of the last filter window [s].
-        order, intake, estimator: the three stages of the fold.
+        order, intake, windows, estimator: the stages of the fold.
         fits, next_fit: fits handed out so far, and the learned count at which the next is due.
     """
 
@@ -46,6 +47,7 @@ class Engine:
         self.delay_s = 0.5 * config.filter_window
         self.order = ReorderBuffer(round(config.reorder_window * 1e9))
         self.intake = Intake(robot, config, self.counts)
+        self.windows = WindowFilter(robot, config)
         self.estimator = Estimator(robot, config, self.counts)
         self._is_fit_due = False
         self.fits = 0
@@ -74,11 +76,10 @@ class Engine:
             The events that took effect, in order (a record of these reproduces the run), and the
             estimates they made possible.
         """
-        self._count_arrival(event)
-        if self.intake.refuse_early(event):
+        if not self.intake.admit(event):
             return Step()
         if self.order.is_late(event):
-            self._count_late(event)
+            self.intake.refuse_late(event)
             return Step()
         return self._take(self.order.push(event))
 
@@ -213,6 +214,7 @@ class Engine:
         self.counts = Counts()
         self.order = ReorderBuffer(self.order.window_ns)
         self.intake = Intake(self.robot, self.config, self.counts)
+        self.windows = WindowFilter(self.robot, self.config)
         self.estimator.begin_stream(self.counts)
         self._is_fit_due = False
         self.next_fit = self.config.refit_period
@@ -226,12 +228,11 @@ class Engine:
         estimates: list[Estimate] = []
         for event in events:
             if isinstance(event, JointSample):
-                if event.stamp_ns == self.intake.last_state_ns:
-                    self.counts.refused['duplicate'] += 1
+                is_duplicate = event.stamp_ns == self.intake.last_state_ns
+                state = self.intake.take_state(event)
+                if is_duplicate:
                     continue
-                for equation in self.intake.take_state(event):
-                    self.delay_s = 0.5 * equation.span_s
-                    estimates.append(self.estimator.take(equation))
+                estimates += self._estimates(state)
                 self._schedule_fit()
             elif isinstance(event, CommandSample):
                 self.intake.take_command(event)
@@ -242,9 +243,22 @@ class Engine:
             released.append(event)
         return Step(tuple(released), tuple(estimates))
 
+    def _estimates(self, state: State | None) -> list[Estimate]:
+        """Return the estimates that the next state completes; without it no window goes on."""
+        if state is None:
+            self.windows.restart()
+            self.intake.commands.forget_before(self._now_ns)
+            return []
+        estimates = []
+        for equation in self.windows.push(state, self.intake.commands):
+            self.delay_s = 0.5 * equation.span_s
+            estimates.append(self.estimator.take(equation))
+        return estimates
+
     def _forget(self) -> None:
         self.estimator = Estimator(self.robot, self.config, self.counts)
         self.intake = Intake(self.robot, self.config, self.counts)
+        self.windows = WindowFilter(self.robot, self.config)
         self._is_fit_due = False
         self.next_fit = self.counts.learned
 
@@ -259,20 +273,7 @@ class Engine:
         self.estimator.configure(config)
         filters = ('filter_window', 'filter_degree', 'filter_hop', 'filter_velocity')
         if any(getattr(config, name) != getattr(self.config, name) for name in filters):
-            self.intake.configure(config)
-        else:
-            self.intake.configure_limits(config)
+            self.windows = WindowFilter(self.robot, config)
+        self.intake.configure(config)
         self.order.window_ns = round(config.reorder_window * 1e9)
         self.config = config
-
-    def _count_arrival(self, event: Event) -> None:
-        if isinstance(event, JointSample):
-            self.counts.read += 1
-        elif isinstance(event, CommandSample):
-            self.counts.commands_read += 1
-
-    def _count_late(self, event: Event) -> None:
-        if isinstance(event, JointSample):
-            self.counts.refused['late'] += 1
-        elif isinstance(event, CommandSample):
-            self.counts.commands_refused['late'] += 1

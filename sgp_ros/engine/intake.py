@@ -1,70 +1,167 @@
-"""Decides of every state and command whether it is used, and for which reason it is not."""
+"""The one intake of states and commands, which live, replay, identify and diagnose share.
+
+It decides of every event whether it is used, and for which reason it is not. What follows from the
+accepted states is not decided here: online they fill windows, offline whole stretches.
+"""
 
 from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
-from sgp_ros.engine.pairing import CommandHistory
 from sgp_ros.engine.results import Counts
 from sgp_ros.engine.samples import CommandSample, Event, JointSample
-from sgp_ros.engine.windows import Equation, State, WindowFilter
 from sgp_ros.robots.robot import Robot
 
 
-class Intake:
-    """Checks ordered samples, pairs states with commands and filters them.
+@dataclass(frozen=True, slots=True, eq=False)
+class State:
+    """One accepted state of the robot's k joints, in the robot's order.
 
     Attributes:
-        commands: the commands of the recent past.
-        windows: the states of the recent past.
-        last_state_ns: stamp of the last state that was released [ns], None before the first.
+        stamp_ns: header stamp [ns].
+        position: (k,).
+        velocity: (k,) measured, or None.
+        effort: (k,) measured, or None where the command counts.
+    """
+
+    stamp_ns: int
+    position: np.ndarray
+    velocity: np.ndarray | None
+    effort: np.ndarray | None
+
+
+class CommandHistory:
+    """Zero-order hold over commands: each holds until the next one.
+
+    Attributes:
+        stamps_ns: times at which commands began [ns], increasing.
+        efforts: one (k,) per command.
+    """
+
+    def __init__(self) -> None:
+        self.stamps_ns: list[int] = []
+        self.efforts: list[np.ndarray] = []
+
+    def add(self, stamp_ns: int, effort: np.ndarray) -> None:
+        """Let `effort` (k,) hold from `stamp_ns` on, which is not before the last one."""
+        if self.stamps_ns and self.stamps_ns[-1] == stamp_ns:
+            self.efforts[-1] = effort
+            return
+        self.stamps_ns.append(stamp_ns)
+        self.efforts.append(effort)
+
+    def age_ns(self, stamp_ns: int) -> int | None:
+        """Return how old the command in force at `stamp_ns` is [ns]; None without one."""
+        index = bisect_right(self.stamps_ns, stamp_ns)
+        return None if index == 0 else stamp_ns - self.stamps_ns[index - 1]
+
+    def average(
+        self,
+        first_ns: int,
+        last_ns: int,
+        cumulative: Callable[[np.ndarray], np.ndarray],
+        acting: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
+    ) -> np.ndarray:
+        """Integrate the held commands against a kernel, exactly.
+
+        Args:
+            first_ns: start of the kernel's support, where a command is in force [ns].
+            last_ns: its end [ns].
+            cumulative: integral of the kernel from `first_ns` to times given in seconds after it.
+            acting: from held commands (pieces, k) and the middles of their times (pieces,) [s
+                after `first_ns`] to what acts; None for the commands themselves.
+
+        Returns:
+            (k,) [unit of the commands].
+        """
+        start = bisect_right(self.stamps_ns, first_ns) - 1
+        stop = bisect_right(self.stamps_ns, last_ns)
+        changes = [first_ns, *self.stamps_ns[start + 1 : stop], last_ns]
+        seconds = np.array([stamp - first_ns for stamp in changes]) * 1e-9
+        shares = np.diff(cumulative(seconds))  # (pieces,)
+        held = np.array(self.efforts[start:stop])  # (pieces, k)
+        if acting is not None:
+            held = acting(held, 0.5 * (seconds[1:] + seconds[:-1]))
+        return shares @ held
+
+    def forget_before(self, stamp_ns: int) -> None:
+        """Drop commands that ended before `stamp_ns`."""
+        keep = max(bisect_right(self.stamps_ns, stamp_ns) - 1, 0)
+        del self.stamps_ns[:keep]
+        del self.efforts[:keep]
+
+
+class Intake:
+    """Checks events, pairs states with efforts, counts what it refuses.
+
+    `admit` takes events as they arrive, `take_command` and `take_state` take the admitted ones in
+    the order of their stamps. With `effort.source: auto` commands count until the first state
+    that carries a measured effort; from there on a state without one is refused as unpaired.
+
+    Args:
+        robot: whose joints are taken, in its order.
+        config: settings of the intake.
+        counts: where reads and refusals are counted.
+
+    Attributes:
+        commands: those taken.
+        last_state_ns: stamp of the last state that was not a duplicate [ns]; None before.
+        is_measured: whether a state with a measured effort has been accepted.
     """
 
     def __init__(self, robot: Robot, config: EngineConfig, counts: Counts) -> None:
         self._robot = robot
         self._counts = counts
-        self._is_driven = any(joint.is_actuated for joint in robot.joints)
         self._actuated = np.array([joint.is_actuated for joint in robot.joints])
         self._gains = np.array([joint.effort_gain for joint in robot.joints])
         self._last_order: tuple[tuple[str, ...], np.ndarray | None] = ((), None)
         self.commands = CommandHistory()
         self.last_state_ns: int | None = None
+        self.is_measured = False
         self.configure(config)
 
     def configure(self, config: EngineConfig) -> None:
-        """Take new settings; a changed filter starts a new window."""
-        self.configure_limits(config)
-        self.windows = WindowFilter(self._robot, config)
-
-    def configure_limits(self, config: EngineConfig) -> None:
-        """Take new settings that leave the filter as it is."""
+        """Take new settings, in force from the next event on."""
         self._config = config
         order = config.command_joints
         self._command_joints = tuple(
             joint.name for joint in self._robot.joints if joint.is_actuated
         ) if order == ('',) else order  # fmt: skip
 
-    def refuse_early(self, event: Event) -> bool:
-        """Refuse what no order can mend: unknown joints, bad numbers, wrong lengths.
+    def admit(self, event: Event) -> bool:
+        """Count an event that arrives; refuse what no order can mend.
 
         Returns:
-            Whether the event was refused and counted.
+            Whether joints, numbers and lengths are as they should be.
         """
         if isinstance(event, JointSample):
+            self._counts.read += 1
             reason = self._state_problem(event)
-            if reason:
-                self._counts.refused[reason] += 1
-            return reason is not None
-        if isinstance(event, CommandSample):
+            refused = self._counts.refused
+        elif isinstance(event, CommandSample):
+            self._counts.commands_read += 1
             reason = self._command_problem(event)
-            if reason:
-                self._counts.commands_refused[reason] += 1
-            return reason is not None
-        return False
+            refused = self._counts.commands_refused
+        else:
+            return True
+        if reason:
+            refused[reason] += 1
+        return reason is None
+
+    def refuse_late(self, event: Event) -> None:
+        """Count an event that came after a later one had been taken."""
+        if isinstance(event, JointSample):
+            self._counts.refused['late'] += 1
+        elif isinstance(event, CommandSample):
+            self._counts.commands_refused['late'] += 1
 
     def take_command(self, command: CommandSample) -> None:
-        """Let a released command hold from its stamp on; joints it leaves out keep theirs."""
+        """Let a command hold from its stamp on; joints it leaves out keep theirs."""
         names = command.names or self._command_joints
         held = self.commands.efforts
         effort = held[-1].copy() if held else np.zeros(len(self._robot.joints))
@@ -74,42 +171,42 @@ class Intake:
                 effort[joint] = value * self._gains[joint]
         self.commands.add(command.stamp_ns, effort)
 
-    def take_state(self, sample: JointSample) -> list[Equation]:
-        """Return the equations that a released state completes."""
-        last, self.last_state_ns = self.last_state_ns, sample.stamp_ns
+    def take_state(self, sample: JointSample) -> State | None:
+        """Return a state in the robot's order; None where it is refused, for one reason."""
+        last = self.last_state_ns
+        if sample.stamp_ns == last:
+            self._counts.refused['duplicate'] += 1
+            return None
+        self.last_state_ns = sample.stamp_ns
         if last is not None and sample.stamp_ns - last > self._config.max_gap * 1e9:
             self._counts.refused['gap'] += 1
-            self.windows.restart()
-            return []
-        state = self._state(sample)
-        if state is None:
-            self._counts.refused['unpaired'] += 1
-            self.windows.restart()
-            return []
-        return self.windows.push(state, self.commands)
-
-    def _state(self, sample: JointSample) -> State | None:
-        """Return the state in the robot's order; None where no effort belongs to it."""
+            return None
         order = self._order(sample.names)
+        is_paired, effort = self._effort(sample, order)
+        if not is_paired:
+            self._counts.refused['unpaired'] += 1
+            return None
         velocity = _chosen(sample.velocity, order)
         if velocity is not None and not np.isfinite(velocity).all():
             velocity = None
-        effort = _chosen(sample.effort, order)
-        if effort is not None and not np.isfinite(effort[self._actuated]).all():
-            effort = None
-        if self._config.effort_source == 'command':
-            effort = None
-        if effort is not None:
-            effort = np.where(self._actuated, effort * self._gains, 0.0)
-        elif self._is_driven and not self._has_command(sample.stamp_ns):
-            return None
+        self._counts.used += 1
         return State(sample.stamp_ns, sample.position[order], velocity, effort)
 
-    def _has_command(self, stamp_ns: int) -> bool:
-        if self._config.effort_source == 'state':
-            return False
-        age = self.commands.age_ns(stamp_ns)
-        return age is not None and age <= self._config.command_timeout * 1e9
+    def _effort(
+        self, sample: JointSample, order: np.ndarray | None
+    ) -> tuple[bool, np.ndarray | None]:
+        """Return whether an effort belongs to a state, and the measured one where it counts."""
+        if not self._actuated.any():
+            return True, np.zeros(len(self._actuated))
+        source = self._config.effort_source
+        effort = None if source == 'command' else _chosen(sample.effort, order)
+        if effort is not None and np.isfinite(effort[self._actuated]).all():
+            self.is_measured = True
+            return True, np.where(self._actuated, effort * self._gains, 0.0)
+        if source == 'state' or (source == 'auto' and self.is_measured):
+            return False, None
+        age = self.commands.age_ns(sample.stamp_ns)
+        return age is not None and age <= self._config.command_timeout * 1e9, None
 
     def _state_problem(self, sample: JointSample) -> str | None:
         order = self._order(sample.names)

@@ -1,8 +1,9 @@
-"""Puts events in the order of their stamps, within a window of time."""
+"""The order of events: by stamp, within a window of time or over a whole recording."""
 
 from __future__ import annotations
 
 import heapq
+from collections.abc import Iterable
 
 from sgp_ros.engine.samples import CommandSample, Event, JointSample
 
@@ -87,6 +88,11 @@ class ReorderBuffer:
             self.released_ns, self.released_rank, _, event = heapq.heappop(self._heap)
             released.append(event)
         return released
+
+
+def in_order(events: Iterable[Event]) -> list[Event]:
+    """Return a whole recording in the order in which a `ReorderBuffer` would release it."""
+    return sorted(events, key=lambda event: (event.stamp_ns, _rank(event)))
 
 
 def _rank(event: Event) -> int:

@@ -98,7 +98,8 @@ class Counts:
     """How many states and commands came, and what became of them.
 
     Attributes:
-        read, refused: states that came, and those refused by reason.
+        read, used, refused: states that came, those accepted, and those refused by reason; what
+            waits for its order is neither yet.
         commands_read, commands_refused: the same for commands.
         estimated: windows that gave an equation.
         learned: equations that the model learned.
@@ -112,6 +113,7 @@ class Counts:
     """
 
     read: int = 0
+    used: int = 0
     refused: dict[str, int] = field(default_factory=lambda: dict.fromkeys(REFUSALS, 0))
     commands_read: int = 0
     commands_refused: dict[str, int] = field(
@@ -128,11 +130,6 @@ class Counts:
     factor_checks: int = 0
     factor_drift: float = 0.0
     factor_rebuilt: int = 0
-
-    @property
-    def used(self) -> int:
-        """States that took part in a window or wait for one."""
-        return self.read - sum(self.refused.values())
 
     @property
     def refits_refused(self) -> int:

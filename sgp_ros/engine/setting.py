@@ -18,6 +18,12 @@ KINDS = {
     'str_array': 'a list of strings',
 }
 
+EFFORT_SOURCES = {
+    'auto': 'auto', 'measured': 'state', 'commanded': 'command', 'state': 'state',
+    'command': 'command',
+}  # fmt: skip
+"""What `--effort` of the commands may be, to the value of the setting `effort.source`."""
+
 
 @dataclass(frozen=True, slots=True)
 class Setting:

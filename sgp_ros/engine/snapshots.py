@@ -15,6 +15,7 @@ import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.estimator import Estimator
+from sgp_ros.engine.intake import State
 from sgp_ros.engine.samples import (
     CommandSample,
     Event,
@@ -23,7 +24,6 @@ from sgp_ros.engine.samples import (
     SettingsChange,
     frozen_array,
 )
-from sgp_ros.engine.windows import State
 from sgp_ros.errors import ConfigError
 from sgp_ros.gp.kernels import SquaredExponential
 from sgp_ros.gp.model import Model
@@ -34,7 +34,7 @@ from sgp_ros.robots.robot import Robot
 if TYPE_CHECKING:
     from sgp_ros.engine.engine import Engine
 
-VERSION = 4
+VERSION = 5
 
 
 def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
@@ -60,9 +60,10 @@ def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
                 intake.commands.stamps_ns, intake.commands.efforts, strict=True
             )
         ],
-        'states': [_encode_state(state) for state in intake.windows.states],
-        'next_ns': intake.windows.next_ns,
+        'states': [_encode_state(state) for state in engine.windows.states],
+        'next_ns': engine.windows.next_ns,
         'last_state_ns': intake.last_state_ns,
+        'is_measured': intake.is_measured,
         'scores': {c: [asdict(s) for s in scores] for c, scores in estimator.scores.items()},
         'drift': [asdict(test) for test in estimator.drift],
         'baseline_scores': [asdict(score) for score in estimator.baseline_scores],
@@ -109,9 +110,10 @@ def fill_from_snapshot(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> No
     intake = engine.intake
     for stamp, effort in text['commands']:
         intake.commands.add(stamp, np.array(effort))
-    intake.windows.states = [_decode_state(state) for state in text['states']]
-    intake.windows.next_ns = text['next_ns']
+    engine.windows.states = [_decode_state(state) for state in text['states']]
+    engine.windows.next_ns = text['next_ns']
     intake.last_state_ns = text['last_state_ns']
+    intake.is_measured = text['is_measured']
     released = text['released']
     engine.order.resume(
         None if released is None else (released[0], released[1]),

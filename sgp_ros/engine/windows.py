@@ -1,4 +1,4 @@
-"""Turns paired states into filtered equations of motion, one window at a time."""
+"""Filtered equations of motion from the accepted states of a stream, one window at a time."""
 
 from __future__ import annotations
 
@@ -8,27 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
-from sgp_ros.engine.pairing import CommandHistory
+from sgp_ros.engine.intake import CommandHistory, State
 from sgp_ros.engine.weak_form import WeakForm, polynomial_smoother
 from sgp_ros.physics.term import Motion
 from sgp_ros.robots.robot import Robot
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class State:
-    """One accepted state of the robot's k joints, in the robot's order.
-
-    Attributes:
-        stamp_ns: header stamp [ns].
-        position: (k,).
-        velocity: (k,) measured, or None.
-        effort: (k,) measured, or None where the command counts.
-    """
-
-    stamp_ns: int
-    position: np.ndarray
-    velocity: np.ndarray | None
-    effort: np.ndarray | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +67,12 @@ class WindowFilter:
         self.next_ns = None
 
     def push(self, state: State, commands: CommandHistory) -> list[Equation]:
-        """Take the next state and return the equations that became complete."""
+        """Take the next state and return the equations that became complete.
+
+        A window holds efforts of one source: another one begins anew.
+        """
+        if self.states and (self.states[-1].effort is None) != (state.effort is None):
+            self.restart()
         self.states.append(state)
         if self.next_ns is None:
             self.next_ns = state.stamp_ns + self._half_ns

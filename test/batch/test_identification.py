@@ -9,6 +9,7 @@ import pytest
 
 from sgp_ros.batch.identification import HELD_OUT, IdentificationOptions, identify
 from sgp_ros.batch.signals import collect_signals
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.rigid.inertial import PARAMETERS
 from sgp_ros.rigid.pseudo_inertia import is_consistent
@@ -42,7 +43,7 @@ def arm(arm_robot, nominal):
 
 
 def _arm_signals(robot, **choices):
-    return collect_signals(arm_samples(rate=50.0, **choices), robot, max_gap=0.25)
+    return collect_signals(arm_samples(rate=50.0, **choices), robot, EngineConfig(max_gap=0.25))
 
 
 def _coefficients(robot, *names):
@@ -166,7 +167,9 @@ def test_a_motion_of_one_joint_is_told_from_one_that_shows_all(arm_robot):
         )
         for s in samples
     ]
-    found = identify(collect_signals(still, arm_robot, max_gap=0.25), arm_robot, {}, PHYSICS)
+    found = identify(
+        collect_signals(still, arm_robot, EngineConfig(max_gap=0.25)), arm_robot, {}, PHYSICS
+    )
     assert found.excitation.missing > 0
     assert found.suggestions
     assert found.excitation.unexcited

@@ -12,6 +12,7 @@ from sgp_ros.batch.physics import autocorrelation, least_squares, solved, triang
 from sgp_ros.batch.plan import WHITE, choose_plan
 from sgp_ros.batch.regression_data import filtered_data
 from sgp_ros.batch.signals import collect_signals
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.errors import RecordingError
 from sgp_ros.robots.linear_axis import LINEAR_AXIS
 from sgp_ros.robots.reaction_wheel import REACTION_WHEEL
@@ -92,7 +93,7 @@ def test_the_better_source_of_velocity_is_chosen(noise, source):
 def test_joints_of_different_size_count_alike():
     """Every joint is judged in its own unit: the slow pole beside the fast wheel."""
     events = list(simulated_events('reaction_wheel', 20.0))
-    signals = collect_signals(events, REACTION_WHEEL, max_gap=0.1)
+    signals = collect_signals(events, REACTION_WHEEL, EngineConfig(max_gap=0.1))
     choice = choose_plan(signals, REACTION_WHEEL)
     data = filtered_data(signals, REACTION_WHEEL, choice.plan)
     w, _ = least_squares(data.F, data.y)

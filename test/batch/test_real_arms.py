@@ -20,6 +20,7 @@ from sgp_ros.batch.fit import fit_offline
 from sgp_ros.batch.plan import FilterPlan
 from sgp_ros.batch.regression_data import filtered_data
 from sgp_ros.batch.signals import collect_signals
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.table_map import read_map
 from sgp_ros.recordings.tables import read_table
@@ -57,7 +58,7 @@ def tiago():
 
 
 def _filtered(events, robot, plan):
-    return filtered_data(collect_signals(events, robot, max_gap=0.1), robot, plan)
+    return filtered_data(collect_signals(events, robot, EngineConfig(max_gap=0.1)), robot, plan)
 
 
 def _squares(fit, data):

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sgp_ros.batch.held_commands import HeldCommands
+from sgp_ros.batch.acceptance import HeldCommands
 from sgp_ros.batch.signals import collect_signals
 from sgp_ros.batch.stencils import second_derivative
 from sgp_ros.batch.zero_phase import ZeroPhase
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.robots.linear_axis import LINEAR_AXIS
@@ -52,7 +53,9 @@ def test_effort_and_acceleration_of_a_mass_agree_at_every_sample():
     times = np.arange(400) * 0.01
     switches = np.concatenate([[0.0], np.sort(rng.uniform(0.02, 3.9, 150))])
     forces = rng.normal(size=151)
-    signals = collect_signals(cart_events(times, switches, forces), CART, max_gap=0.1)
+    signals = collect_signals(
+        cart_events(times, switches, forces), CART, EngineConfig(max_gap=0.1)
+    )
     force = 2.0 * second_derivative(signals.position, signals.rate)
     inner = slice(8, -8)
     assert signals.effort[inner] == pytest.approx(force[inner], abs=1e-6)
@@ -62,8 +65,8 @@ def test_effort_and_acceleration_of_a_mass_agree_at_every_sample():
 def test_arrival_order_is_irrelevant():
     """A whole recording can be sorted: nothing is late."""
     events = cart_events(np.arange(100) * 0.01, [0.0, 0.5], [1.0, -1.0])
-    first = collect_signals(events, CART, max_gap=0.1)
-    second = collect_signals(events[::-1], CART, max_gap=0.1)
+    first = collect_signals(events, CART, EngineConfig(max_gap=0.1))
+    second = collect_signals(events[::-1], CART, EngineConfig(max_gap=0.1))
     assert np.array_equal(first.position, second.position)
     assert np.array_equal(first.effort, second.effort)
     assert first.refused == second.refused == dict.fromkeys(first.refused, 0)
@@ -74,7 +77,7 @@ def test_uneven_stamps_and_missing_samples_leave_the_motion_as_it_is():
     rng = np.random.default_rng(0)
     times = np.arange(1000) * 0.01 + rng.uniform(-0.002, 0.002, 1000)
     times = times[rng.random(1000) > 0.1]
-    signals = collect_signals(_axis_states(times), LINEAR_AXIS, max_gap=0.2)
+    signals = collect_signals(_axis_states(times), LINEAR_AXIS, EngineConfig(max_gap=0.2))
     assert signals.rate == pytest.approx(100.0, rel=0.05)
     assert np.diff(signals.time) == pytest.approx(1.0 / signals.rate, rel=1e-6)
     at = times[0] + signals.time[5:-5]
@@ -85,10 +88,11 @@ def test_uneven_stamps_and_missing_samples_leave_the_motion_as_it_is():
 def test_a_pause_ends_a_segment():
     """Nothing is made up inside a gap, and each segment keeps its own grid."""
     times = np.concatenate([np.arange(100) * 0.01, 5.0 + np.arange(60) * 0.01, [9.0, 9.01]])
-    signals = collect_signals(_axis_states(times), LINEAR_AXIS, max_gap=0.1)
-    assert signals.segments == (slice(0, 100), slice(100, 160))
-    assert signals.time[100] == pytest.approx(5.0)
+    signals = collect_signals(_axis_states(times), LINEAR_AXIS, EngineConfig(max_gap=0.1))
+    assert signals.segments == (slice(0, 100), slice(100, 159))
+    assert signals.time[100] == pytest.approx(5.01)
     assert signals.refused['gap'] == 2
+    assert signals.left_out == 1
 
 
 def test_each_refused_state_is_counted_for_one_reason():
@@ -101,7 +105,7 @@ def test_each_refused_state_is_counted_for_one_reason():
         _state(0.603, [0.0], effort=[0.0], names=('other',)),
         _state(0.604, [0.0]),
     ]
-    signals = collect_signals([*good, *bad], LINEAR_AXIS, max_gap=0.1)
+    signals = collect_signals([*good, *bad], LINEAR_AXIS, EngineConfig(max_gap=0.1))
     assert signals.refused == {
         'late': 0, 'duplicate': 1, 'nonfinite': 2, 'unpaired': 1, 'unknown_joint': 1, 'gap': 0,
     }  # fmt: skip
@@ -115,7 +119,7 @@ def test_joints_come_in_the_order_of_the_robot():
                names=('wheel', 'pole'))
         for i in range(30)
     ]  # fmt: skip
-    signals = collect_signals(states, REACTION_WHEEL, max_gap=0.1)
+    signals = collect_signals(states, REACTION_WHEEL, EngineConfig(max_gap=0.1))
     assert signals.position[3] == pytest.approx([2.0, 1.0])
     assert signals.velocity[3] == pytest.approx([4.0, 3.0])
     assert signals.effort[3] == pytest.approx([0.0, 5.0])
@@ -131,14 +135,16 @@ def test_a_gain_turns_recorded_efforts_into_those_of_the_physics(is_measured):
         events = [
             replace(e, effort=frozen_array([1.0])) for e in events if isinstance(e, JointSample)
         ]
-    plain, scaled = (collect_signals(events, robot, max_gap=0.1) for robot in (CART, driven))
+    plain, scaled = (
+        collect_signals(events, robot, EngineConfig(max_gap=0.1)) for robot in (CART, driven)
+    )
     np.testing.assert_allclose(scaled.effort, -4.0 * plain.effort, atol=1e-12)
 
 
 def test_a_stale_command_pairs_with_no_state():
     """What the drive did after the commands stopped is not known."""
     events = cart_events(np.arange(300) * 0.01, [0.0, 0.5], [1.0, -1.0])
-    signals = collect_signals(events, CART, max_gap=0.1)
+    signals = collect_signals(events, CART, EngineConfig(max_gap=0.1))
     assert signals.refused['unpaired'] == 149
     assert signals.time[-1] == pytest.approx(1.5)
 
@@ -151,8 +157,10 @@ def test_refused_commands_are_counted_by_reason():
         CommandSample(START_NS, frozen_array([1.0]), ('other',)),
         CommandSample(START_NS, frozen_array([np.nan])),
     ]
-    signals = collect_signals([*events, *bad], CART, max_gap=0.1)
-    assert signals.commands_refused == {'wrong_length': 1, 'unknown_joint': 1, 'nonfinite': 1}
+    signals = collect_signals([*events, *bad], CART, EngineConfig(max_gap=0.1))
+    assert signals.commands_refused == {
+        'late': 0, 'wrong_length': 1, 'unknown_joint': 1, 'nonfinite': 1,
+    }  # fmt: skip
     assert signals.effort[3:-3] == pytest.approx(1.0)
 
 
@@ -160,13 +168,17 @@ def test_a_recording_without_effort_is_refused_with_the_remedy():
     """An actuated joint needs one."""
     states = [_state(0.01 * i, [0.0]) for i in range(30)]
     with pytest.raises(RecordingError, match='topic of the commands'):
-        collect_signals(states, LINEAR_AXIS, max_gap=0.1)
+        collect_signals(states, LINEAR_AXIS, EngineConfig(max_gap=0.1))
     with pytest.raises(RecordingError, match='no usable state'):
-        collect_signals([], LINEAR_AXIS, max_gap=0.1)
+        collect_signals([], LINEAR_AXIS, EngineConfig(max_gap=0.1))
     with pytest.raises(RecordingError, match='record longer'):
-        collect_signals(_axis_states([0.0, 0.01]), LINEAR_AXIS, max_gap=0.1)
+        collect_signals(_axis_states([0.0, 0.01]), LINEAR_AXIS, EngineConfig(max_gap=0.1))
     with pytest.raises(ConfigError, match='effort source'):
-        collect_signals(states, LINEAR_AXIS, max_gap=0.1, effort_source='motor')
+        collect_signals(
+            states,
+            LINEAR_AXIS,
+            EngineConfig.from_mapping({'max_gap': 0.1, 'effort.source': 'motor'}, LINEAR_AXIS),
+        )
 
 
 def test_joining_uneven_samples_costs_no_acceleration():
@@ -176,7 +188,7 @@ def test_joining_uneven_samples_costs_no_acceleration():
     times = times[rng.random(3000) > 0.05]
     omega = 2.0 * np.pi * 3.0
     states = [_state(t, [np.sin(omega * t)], effort=[0.0]) for t in times]
-    signals = collect_signals(states, LINEAR_AXIS, max_gap=0.2)
+    signals = collect_signals(states, LINEAR_AXIS, EngineConfig(max_gap=0.2))
     zero_phase = ZeroPhase(signals.rate, 10.0)
     _, _, found = zero_phase.states(signals.position)
     at = (signals.start_ns - START_NS) * 1e-9 + signals.time[:, None]

@@ -8,6 +8,7 @@ import numpy as np
 from scipy import signal
 
 from sgp_ros.batch.signals import Signals, collect_signals
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.physics.term import Coefficient, Joint
 from sgp_ros.recordings.table_map import read_map
@@ -51,14 +52,14 @@ def axis_signals(duration=30.0, **choices):
     """Return the signals of a simulated linear axis, without unmodelled force by default."""
     settings = {'rate_hz': 200.0, **choices}
     events = simulated_events('linear_axis', duration, **settings)
-    return collect_signals(events, LINEAR_AXIS, max_gap=0.1)
+    return collect_signals(events, LINEAR_AXIS, EngineConfig(max_gap=0.1))
 
 
 def emps_signals(name='emps_id'):
     """Return the signals of a record of the EMPS axis."""
     mapping = read_map(ROOT / 'config' / 'import' / 'emps.yaml')
     events = read_table(EMPS / f'{name}.csv', mapping).events()
-    return collect_signals(events, LINEAR_AXIS, max_gap=0.1)
+    return collect_signals(events, LINEAR_AXIS, EngineConfig(max_gap=0.1))
 
 
 def cart_events(times, switches, forces, mass=2.0):

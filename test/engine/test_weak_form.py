@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate
 
-from sgp_ros.engine.pairing import CommandHistory
+from sgp_ros.engine.intake import CommandHistory
 from sgp_ros.engine.weak_form import WeakForm, polynomial_smoother
 
 

@@ -15,9 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import interpolate
 
-from sgp_ros.batch.acceptance import accept
+from sgp_ros.batch.acceptance import USUAL, Accepted, HeldCommands, accept, are_efforts
 from sgp_ros.batch.zero_phase import ZeroPhase
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event, JointSample
 from sgp_ros.errors import RecordingError
 from sgp_ros.physics.drive import Drive
@@ -26,10 +27,14 @@ from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.stated_effects import StatedEffect
 
-LONGEST_PAUSE_S = 0.5
 SHORTEST_ROWS = 64
 NOISE_SHARE = 3e-6
 """Share of the mean square of the effort that noise may take below the cut-off."""
+_COMMON_SHARE = 0.5
+_NO_EFFORTS = (
+    'The commands are no efforts: the measured effort does not follow them. It is taken as the '
+    'effort that acts: nothing can be said of delay, dead zone, saturation and lag of the drive.'
+)
 LOWEST_CUTOFF_HZ, HIGHEST_CUTOFF_HZ = 3.0, 25.0
 
 
@@ -49,6 +54,7 @@ class RawTrajectory:
         noise_density: (k,) of the positions, one-sided [rad^2/Hz or m^2/Hz].
         start_ns: stamp of the first state of the recording.
         stated: effects that the nominal robot has, beside those of its tree.
+        remarks: what is odd about the efforts.
     """
 
     time: np.ndarray
@@ -62,65 +68,113 @@ class RawTrajectory:
     noise_density: np.ndarray
     start_ns: int
     stated: tuple[StatedEffect, ...] = ()
+    remarks: tuple[str, ...] = ()
 
 
 def collect(
-    events: Iterable[Event], robot: Robot, stated: tuple[StatedEffect, ...] = ()
+    events: Iterable[Event],
+    robot: Robot,
+    stated: tuple[StatedEffect, ...] = (),
+    config: EngineConfig = USUAL,
 ) -> RawTrajectory:
     """Bring a recording to its uniform grid.
+
+    Where states carry a measured effort and there are commands too, the commands act if the
+    measured effort follows them: then the laws of the drive can be told from them. Commands of
+    another kind never take the place of measured efforts.
 
     Args:
         events: of the recording.
         robot: names, actuated joints and gains.
         stated: effects that the nominal robot has, beside those of its tree.
+        config: settings of the intake.
 
     Raises:
         RecordingError: too little is left.
     """
     known_events = list(events)
-    accepted = accept(known_events, robot, 'auto', 1.0, None)
-    stamps = accepted.stamps_ns
+    accepted = accept(known_events, robot, config)
     start_ns = min(e.stamp_ns for e in known_events if isinstance(e, JointSample))
-    seconds = (stamps - start_ns) * 1e-9
-    breaks = np.flatnonzero(np.diff(seconds) > LONGEST_PAUSE_S) + 1
+    seconds = (accepted.stamps_ns - start_ns) * 1e-9
+    measured = bool(accepted.is_measured.mean() > _COMMON_SHARE)
     stretches = [
-        rows for rows in np.split(np.arange(len(stamps)), breaks) if len(rows) >= SHORTEST_ROWS
+        rows
+        for rows in accepted.stretches(config.max_gap)
+        if len(rows) >= SHORTEST_ROWS and accepted.is_measured[rows[0]] == measured
     ]
     if not stretches:
         raise RecordingError(
-            f'{len(stamps)} states, no {SHORTEST_ROWS} without a pause of {LONGEST_PAUSE_S:g} s',
+            f'{len(seconds)} states, no {SHORTEST_ROWS} without a pause of {config.max_gap:g} s',
             'at least some seconds of motion', 'take a longer recording',
         )  # fmt: skip
     step = float(np.median(np.concatenate([np.diff(seconds[rows]) for rows in stretches])))
-    times, positions, grids, segments = [], [], [], []
-    velocities: list[np.ndarray] = []
-    efforts: list[np.ndarray] = []
-    row = 0
-    for rows in stretches:
+    parts = [_Stretch.of(accepted, rows, seconds, step) for rows in stretches]
+    ends = np.cumsum([len(part.time) for part in parts])
+    segments = tuple(
+        slice(int(end) - len(part.time), int(end)) for end, part in zip(ends, parts, strict=True)
+    )
+    drive, remarks = _drive(accepted, robot, config, measured=measured)
+    position = np.concatenate([part.position for part in parts])
+    return RawTrajectory(
+        np.concatenate([part.time for part in parts]), step, position,
+        _joined([part.velocity for part in parts]), _joined([part.effort for part in parts]),
+        None if drive is None else Drive(
+            (drive.stamps_ns - start_ns) * 1e-9, drive.effort,
+            tuple((float(part.time[0]), len(part.time)) for part in parts), step,
+        ),
+        segments, dict(accepted.counts.refused), noise_density(position, segments, step),
+        start_ns, stated, remarks,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """The arrays of `RawTrajectory` for one stretch."""
+
+    time: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray | None
+    effort: np.ndarray | None
+
+    @classmethod
+    def of(
+        cls, accepted: Accepted, rows: np.ndarray, seconds: np.ndarray, step: float
+    ) -> _Stretch:
         known = seconds[rows]
         n = int((known[-1] - known[0]) / step + 1e-6) + 1
         t = known[0] + step * np.arange(n)
         inner = np.minimum(t, known[-1])
-        times.append(t)
-        positions.append(interpolate.CubicSpline(known, accepted.position[rows])(inner))
-        for source, target in ((accepted.velocity, velocities), (accepted.effort, efforts)):
-            if source is not None:
-                target.append(interpolate.interp1d(known, source[rows], axis=0)(inner))
-        grids.append((float(known[0]), n))
-        segments.append(slice(row, row + n))
-        row += n
+        path = interpolate.CubicSpline(known, accepted.position[rows])
+        velocity, effort = None, None
+        if accepted.velocity is not None:
+            velocity = path(inner, 1)
+            has = np.isfinite(accepted.velocity[rows]).all(axis=1)
+            if has.any():
+                velocity = _lines(inner, known[has], accepted.velocity[rows][has])
+        if accepted.is_measured[rows[0]]:
+            effort = _lines(inner, known, accepted.effort[rows])
+        return cls(t, path(inner), velocity, effort)
+
+
+def _lines(t: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return np.column_stack([np.interp(t, known, column) for column in values.T])
+
+
+def _joined(parts: Sequence[np.ndarray | None]) -> np.ndarray | None:
+    arrays = [part for part in parts if part is not None]
+    return np.concatenate(arrays) if arrays else None
+
+
+def _drive(
+    accepted: Accepted, robot: Robot, config: EngineConfig, *, measured: bool
+) -> tuple[HeldCommands | None, tuple[str, ...]]:
+    """Return the commands that act, None where the measured effort does; and what to remark."""
     commands = accepted.commands
-    drive = None
-    if commands is not None and len(commands.stamps_ns) > 1:
-        drive = Drive((commands.stamps_ns - start_ns) * 1e-9, commands.effort, tuple(grids), step)
-    position = np.concatenate(positions)
-    return RawTrajectory(
-        np.concatenate(times), step, position,
-        np.concatenate(velocities) if velocities else None,
-        np.concatenate(efforts) if efforts else None,
-        drive, tuple(segments), dict(accepted.refused), noise_density(position, segments, step),
-        start_ns, stated,
-    )  # fmt: skip
+    if commands is None or len(commands.stamps_ns) <= 1 or config.effort_source == 'state':
+        return None, ()
+    if not measured or are_efforts(accepted, robot):
+        return commands, ()
+    return None, (_NO_EFFORTS,)
 
 
 def noise_density(position: np.ndarray, segments: Sequence[slice], step: float) -> np.ndarray:

@@ -15,6 +15,7 @@ from sgp_ros.diagnosis.compare.trajectory import (
     collect,
     observe,
 )
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import JointSample, frozen_array
 from sgp_ros.errors import RecordingError
 from test.diagnosis.worlds import (
@@ -71,7 +72,7 @@ def test_a_pause_splits_the_recording_and_short_pieces_are_left_out(robots, perf
     assert len(raw.segments) == 2
     ends = [(raw.time[s.start], raw.time[s.stop - 1]) for s in raw.segments]
     assert ends[0][1] == pytest.approx(3.0)
-    assert ends[1][0] == pytest.approx(5.5)
+    assert ends[1][0] == pytest.approx(5.5 + PERIOD)  # the state after the pause is refused
     motion = observe(raw, robots[1][1], choose_bandwidth(raw, robots[1][1]))
     assert motion.starts == tuple(s.start for s in raw.segments)
 
@@ -153,3 +154,43 @@ def test_a_robot_without_inertia_or_motion_still_gets_a_filter(robots, perfect):
     zeros = World(*(np.zeros_like(x) for x in vars(perfect[1]).values()))
     still = collect(events_of(replace(zeros, time=perfect[1].time)), robot)
     assert choose_bandwidth(still, tree).cutoff > 0.0
+
+
+def test_a_measured_effort_behind_a_drive_leaves_the_commands_in_their_place(robots, perfect):
+    """Delay, dead zone and saturation are told from commands, which the effort follows."""
+    world = perfect[1]
+    late = np.roll(world.command, 6, axis=0)
+    size = np.abs(late).max()
+    seen = np.clip(late - np.clip(late, -0.1 * size, 0.1 * size), -0.5 * size, 0.5 * size)
+    raw = collect(events_of(world, effort=seen), robots[1][0])
+    assert raw.drive is not None
+    assert raw.remarks == ()
+
+
+@pytest.mark.parametrize('kind', ['position', 'noise', 'constant', 'scaled'])
+def test_commands_of_another_kind_never_replace_a_measured_effort(robots, perfect, kind):
+    """A topic of positions beside the states of a real machine."""
+    world = perfect[1]
+    rng = np.random.default_rng(0)
+    given = {
+        'position': np.roll(world.position, -2, axis=0),
+        'noise': rng.normal(size=world.command.shape),
+        'constant': np.zeros(world.command.shape),
+        'scaled': 100.0 * world.command,
+    }[kind]
+    events = events_of(replace(world, command=given), effort=world.command)
+    raw = collect(events, robots[1][0])
+    assert raw.drive is None
+    assert 'no efforts' in raw.remarks[0]
+    motion = observe(raw, robots[1][1], choose_bandwidth(raw, robots[1][1]))
+    np.testing.assert_array_equal(motion.effort, raw.effort)
+
+
+@pytest.mark.parametrize('source', ['state', 'command'])
+def test_the_source_of_efforts_can_be_stated(robots, perfect, source):
+    """Whatever the efforts look like."""
+    events = events_of(perfect[1], effort=perfect[1].command)
+    raw = collect(events, robots[1][0], config=EngineConfig(effort_source=source))
+    assert (raw.drive is None) == (source == 'state')
+    assert (raw.effort is None) == (source == 'command')
+    assert raw.remarks == ()
