@@ -191,6 +191,10 @@ def _add_recording(parser: argparse.ArgumentParser, metavar: str = 'BAG') -> Non
     )
     parser.add_argument('--joint-states', metavar='TOPIC', help='topic of the states')
     parser.add_argument('--command', metavar='TOPIC', help='topic of the commands')
+    parser.add_argument(
+        '--effort', choices=('auto', 'measured', 'commanded', 'state', 'command'), default='auto',
+        help='the effort that acts; auto: the measured one where there is one (default: auto)',
+    )  # fmt: skip
 
 
 def _add_demo(add: AddCommand) -> None:
@@ -265,8 +269,6 @@ def _add_identify(add: AddCommand) -> None:
                         help='of the low-pass (default: chosen from the data)')  # fmt: skip
     parser.add_argument('--inputs', nargs='+', metavar='NAME',
                         help='what Z sees, such as own:velocity or every:velocity')  # fmt: skip
-    parser.add_argument('--effort', choices=('auto', 'state', 'command'), default='auto',
-                        help='where efforts come from (default: %(default)s)')  # fmt: skip
 
 
 def _add_diagnose(add: AddCommand) -> None:

@@ -15,7 +15,9 @@ from sgp_ros.diagnosis.compare.simulation_check import disagreement, nominal_sha
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.result import Diagnosis, Proof
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event, JointSample
+from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import ConfigError, NumericalError, RecordingError
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.report.diagnosis import write_diagnosis
@@ -51,12 +53,14 @@ class DiagnoseOptions:
         tests: held-out recordings; a part of the training recording without any.
         joint_states: topic of the states; None for the one there is.
         command: topic of the commands; None for the one there is.
+        effort: the effort that acts, a key of `EFFORT_SOURCES`; the simulation is read as `auto`.
     """
 
     sim: str | None = None
     tests: Sequence[str] = ()
     joint_states: str | None = None
     command: str | None = None
+    effort: str = 'auto'
 
 
 def run_diagnose(
@@ -101,7 +105,7 @@ def run_diagnose(
     try:
         found = diagnose(
             events, model, tree, tests, stated=nominal.stated, holds_out=not chosen.tests,
-            progress=progress,
+            config=EngineConfig(effort_source=EFFORT_SOURCES[chosen.effort]), progress=progress,
         )  # fmt: skip
     except np.linalg.LinAlgError as error:
         raise NumericalError(

@@ -21,6 +21,7 @@ from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import is_record, replay
 from sgp_ros.engine.results import Step
 from sgp_ros.engine.samples import CommandSample, Event, JointSample
+from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import ConfigError, NumericalError, RecordingError
 from sgp_ros.recordings.predictions import PredictionTopics, outputs, write_outputs
 from sgp_ros.recordings.reader import Recording, open_recording
@@ -40,6 +41,7 @@ class ReplayOptions:
     Attributes:
         joint_states: topic of the states; None chooses it.
         command: topic of the commands; None chooses it, `none` takes no commands.
+        effort: the effort that acts, a key of `EFFORT_SOURCES`; `auto` leaves the settings.
         params: ROS 2 parameter file; None takes the shipped one of the robot, if there is one.
         model: saved model to continue from; None starts anew.
         is_learning: whether to learn, or only to predict and score.
@@ -48,6 +50,7 @@ class ReplayOptions:
 
     joint_states: str | None = None
     command: str | None = None
+    effort: str = 'auto'
     params: str | None = None
     model: str | None = None
     is_learning: bool = True
@@ -243,6 +246,8 @@ def _make_engine(robot: Robot, options: ReplayOptions) -> Engine:
     if options.model:
         engine.restore(load_model(options.model))
         engine.begin_stream()
+    if options.effort != 'auto':
+        engine.change({'effort.source': EFFORT_SOURCES[options.effort]})
     if not options.is_learning:
         engine.change({'learning.enabled': False})
     return engine

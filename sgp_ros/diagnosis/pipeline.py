@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
+from sgp_ros.batch.acceptance import USUAL
 from sgp_ros.diagnosis.compare.equations import Equations, make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.compare.velocity_sensor import sensor_lags
@@ -23,6 +24,7 @@ from sgp_ros.diagnosis.prove.final_model import FinalModel
 from sgp_ros.diagnosis.prove.held_out import keep_back
 from sgp_ros.diagnosis.prove.proof import prove
 from sgp_ros.diagnosis.result import Band, Dependence, Diagnosis, Traces
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.robot import Robot
@@ -37,6 +39,7 @@ def diagnose(
     *,
     stated: tuple[StatedEffect, ...] = (),
     holds_out: bool = False,
+    config: EngineConfig = USUAL,
     progress: Callable[[float], None] = lambda _share: None,
 ) -> Diagnosis:
     """Say what a recording has that the nominal robot lacks.
@@ -49,21 +52,21 @@ def diagnose(
         stated: effects that the nominal robot has, beside those of its tree.
         holds_out: whether blocks of the training recording are kept for the proof, as
             `held_out`; everything is then learned from the rest.
+        config: settings of the intake.
         progress: called with the share that is done.
 
     Raises:
         RecordingError: too little motion, or none of the joints.
     """
-    raw = collect(events, robot, stated)
-    held = {stem: collect(recording, robot, stated) for stem, recording in tests.items()}
+    raw = collect(events, robot, stated, config)
+    held = {stem: collect(test, robot, stated, config) for stem, test in tests.items()}
     raw, kept, remarks = keep_back(raw) if holds_out else (raw, {}, ())
     equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
-    competition = compete(equations, lambda share: progress(0.05 + 0.75 * share))
+    competition = compete(equations, lambda share: progress(0.05 + 0.85 * share))
     decision = decide(equations, competition)
     lags = [lag for lag in sensor_lags(raw, equations) if lag.is_physics]
     remainders = _remainders(equations, decision)
     final = FinalModel(decision.model, competition.nominal, equations, remainders)
-    progress(0.9)
     contrasts = Contrasts(equations, decision.model)
     recordings = {'train': raw, **kept, **held}
     proofs = {stem: prove(final, part, tree) for stem, part in recordings.items()}
@@ -89,7 +92,7 @@ def diagnose(
         rate_hz=1.0 / (raw.step * equations.filter.decimation),
         rows=len(equations.d),
         refused={reason: count for reason, count in raw.refused.items() if count},
-        remarks=remarks,
+        remarks=(*raw.remarks, *remarks),
         bodies=diagnosed_bodies(equations, decision.model),
         equivalents=equivalents(equations, competition, decision, contrasts),
     )

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.trajectory import SHORTEST_ROWS
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import CommandSample, Event, JointSample
 from sgp_ros.errors import ConfigError
 from sgp_ros.recordings.writer import Status
@@ -73,11 +73,11 @@ class Diagnosing:
             for past in self._past
         )
 
-    def start(self, command_joints: tuple[str, ...]) -> tuple[bool, str]:
+    def start(self, config: EngineConfig) -> tuple[bool, str]:
         """Start a diagnosis of the recent past.
 
         Args:
-            command_joints: order of a command without names; `('',)` for the actuated joints.
+            config: settings of the intake.
 
         Returns:
             Whether it was started, and one sentence.
@@ -91,8 +91,7 @@ class Diagnosing:
             return False, ' '.join(str(error).split())
         if states < SHORTEST_ROWS:
             return False, f'too few states: {states}, at least {SHORTEST_ROWS} are needed'
-        events = tuple(_named(event, command_joints) for event in self.events)
-        self._process = DiagnosisProcess(DiagnosisRequest(self._path, events))
+        self._process = DiagnosisProcess(DiagnosisRequest(self._path, self.events, config))
         return True, f'started on {states} states'
 
     def poll(self) -> DiagnosisDone | DiagnosisFailed | None:
@@ -129,13 +128,6 @@ class Diagnosing:
         if self._process is not None:
             self._process.close()
         self._process = None
-
-
-def _named(event: Event, joints: tuple[str, ...]) -> Event:
-    """Return a command without names with those that the settings give it."""
-    if not isinstance(event, CommandSample) or event.names is not None or joints == ('',):
-        return event
-    return replace(event, names=joints) if len(joints) == len(event.effort) else event
 
 
 def _status(name: str, robot: str, finding: Mapping[str, Any]) -> Status:

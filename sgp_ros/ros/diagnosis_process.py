@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import SgpError
 
@@ -31,10 +32,12 @@ class DiagnosisRequest:
     Attributes:
         robot: robot YAML or URDF.
         events: states and commands.
+        config: settings of the intake.
     """
 
     robot: str
     events: tuple[Event, ...]
+    config: EngineConfig
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +124,10 @@ def _outcome(request: DiagnosisRequest) -> DiagnosisDone | DiagnosisFailed:
 
     try:
         nominal = nominal_model(load_robot(request.robot))
-        found = diagnose(request.events, nominal.robot, nominal.tree, {}, stated=nominal.stated)
+        found = diagnose(
+            request.events, nominal.robot, nominal.tree, {}, stated=nominal.stated,
+            config=request.config,
+        )  # fmt: skip
         return DiagnosisDone(diagnosis_mapping(found))
     except SgpError as error:
         return DiagnosisFailed(' '.join(str(error).split()))

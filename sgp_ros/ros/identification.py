@@ -273,9 +273,7 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
         return response
 
     def _diagnose(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success, response.message = self._diagnosing.start(
-            self._session.engine.config.command_joints
-        )
+        response.success, response.message = self._diagnosing.start(self._session.engine.config)
         return response
 
     def _learn(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import gc
 
-import numpy as np
-
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import CommandSample, JointSample, Reset, frozen_array
 from sgp_ros.robots.registry import load_robot
-from sgp_ros.ros.diagnosing import MOST_EVENTS, Diagnosing, _named
+from sgp_ros.ros.diagnosing import MOST_EVENTS, Diagnosing
 
 
 def _diagnosing(window_s: float, robot: str = 'reaction_wheel') -> Diagnosing:
@@ -68,15 +67,6 @@ def test_the_garbage_collector_does_not_search_what_is_remembered() -> None:
 
 
 def test_a_robot_without_nominal_bodies_is_refused_with_the_reason() -> None:
-    started, message = _diagnosing(1.0, 'simple_pendulum').start(('',))
+    started, message = _diagnosing(1.0, 'simple_pendulum').start(EngineConfig())
     assert not started
     assert 'simple_pendulum has no nominal values of J' in message
-
-
-def test_commands_without_names_get_those_of_the_settings() -> None:
-    """The order of an array is a setting of the engine; a diagnosis must read it alike."""
-    bare = CommandSample(0, frozen_array([1.0, 2.0]))
-    assert _named(bare, ('b', 'a')).names == ('b', 'a')
-    assert _named(bare, ('',)) is bare
-    named = CommandSample(0, np.zeros(1), ('a',))
-    assert _named(named, ('b',)) is named
