@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from pathlib import Path
 
 from sgp_ros.engine.config import describe_settings
+from sgp_ros.gp.kernels import KERNELS
 from sgp_ros.robots.registry import ROBOTS
 
 TARGET = Path(__file__).parent / 'settings.md'
@@ -16,8 +18,20 @@ Generated from the code by `python docs/generate_settings.py`. Every line is a R
 at the start; any other takes effect before the next sample. A set that is invalid is refused and
 changes nothing.
 
+The hyper-parameters shown are those of the default kernel; `model.kernel` chooses another one (see
+below), whose hyper-parameters then take their place.
+
 | setting | default | range | unit | what it does |
 |---|---|---|---|---|
+"""
+KERNEL_HEAD = """
+## Kernels
+
+The choices of `model.kernel`. To add one, write one class (`sgp_ros/gp/kernel.py` shows one of ten
+lines) and add it to `KERNELS`: it can then be chosen, learnt, saved and restored.
+
+| kernel | what it is | hyper-parameters of a joint |
+|---|---|---|
 """
 
 
@@ -44,7 +58,15 @@ def text():
         name = setting.name.replace('hyper.axis.', 'hyper.<joint>.')
         unit = setting.unit.replace('(N)^2', 'target squared')
         lines.append(_line(setting, name).replace(setting.unit or '\0', unit or '\0'))
-    return HEAD + '\n'.join(lines) + '\n'
+    kernels = [
+        f'| `{name}` | {_summary(kernel)} | {", ".join(f"`{p.name}`" for p in kernel.parameters)} |'
+        for name, kernel in KERNELS.items()
+    ]
+    return HEAD + '\n'.join(lines) + '\n' + KERNEL_HEAD + '\n'.join(kernels) + '\n'
+
+
+def _summary(kernel):
+    return (inspect.getdoc(kernel) or '').splitlines()[0]
 
 
 if __name__ == '__main__':

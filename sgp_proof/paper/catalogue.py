@@ -11,9 +11,9 @@ import numpy as np
 from sgp_proof.paper import arm, reaction_wheel, toy
 from sgp_proof.paper.protocol import METHOD_NAMES, Outcome, World, run_method, score, thinned
 from sgp_proof.paper.reaction_wheel import ENCODER_SETTINGS
-from sgp_ros.gp.kernels import AdditiveSquaredExponential, Kernel, SquaredExponential
+from sgp_ros.gp.kernel import Kernel
+from sgp_ros.gp.kernels import AdditiveSquaredExponential, Linear, SquaredExponential
 from sgp_ros.gp.learning import initial_model, learn, screened
-from sgp_ros.gp.linear_kernel import Linear
 from sgp_ros.gp.methods import FittedMethod
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior

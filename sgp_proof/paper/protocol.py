@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sgp_ros.gp.kernels import Kernel
+from sgp_ros.gp.kernel import Kernel
 from sgp_ros.gp.learning import learn
 from sgp_ros.gp.methods import METHODS, FitOptions, FittedMethod
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations

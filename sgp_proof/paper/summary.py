@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from sgp_proof.paper.protocol import Outcome
-from sgp_ros.gp.kernels import Kernel
-from sgp_ros.gp.linear_kernel import Linear
+from sgp_ros.gp.kernel import Kernel
+from sgp_ros.gp.kernels import Linear
 
 SCORES = ('nmse', 'nmse_measured', 'nlpd', 'coverage95')
 EQUAL = 1.15

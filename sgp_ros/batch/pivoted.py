@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from sgp_ros.gp.kernels import Kernel
+from sgp_ros.gp.kernel import Kernel
 
 _ROUNDING = 1e-10
 

@@ -23,7 +23,7 @@ from scipy import linalg
 
 from sgp_ros.batch.colour import autoregression, coloured_products, inflation
 from sgp_ros.batch.pivoted import PivotedBasis, pivoted_basis
-from sgp_ros.gp.kernels import Kernel
+from sgp_ros.gp.kernel import Kernel
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior
 

@@ -2,8 +2,7 @@
 
 A setting has a dotted name, as in a ROS 2 parameter file (`filter.window`). The node declares its
 parameters from `describe_settings`, the commands read the same names from the same file, and both
-end in one frozen `EngineConfig`. Hyper-parameters are settings too: `hyper.<joint>.noise_variance`
-and its two neighbours, where 0 means "estimate it from the data".
+end in one frozen `EngineConfig`. Hyper-parameters are settings too (`engine/hyperparameters.py`).
 """
 
 from __future__ import annotations
@@ -12,13 +11,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from sgp_ros.engine.hyperparameters import JointHyperparameters, describe, kernel_named
 from sgp_ros.engine.samples import SettingValue
 from sgp_ros.engine.setting import Setting
 from sgp_ros.errors import ConfigError
+from sgp_ros.gp.kernels import KERNELS, SquaredExponential
 from sgp_ros.robots.robot import Robot
-
-_LARGEST = 1e12
-"""Largest length scale [unit of the input]; of a variance, its square."""
 
 
 def _setting(
@@ -30,28 +28,6 @@ def _setting(
 ) -> Any:
     meta = {'setting': Setting(name, kind, default, description, **limits)}
     return field(default=default, metadata=meta)
-
-
-@dataclass(frozen=True, slots=True)
-class JointHyperparameters:
-    """Hyper-parameters of the model of one joint; 0 means "from the data".
-
-    Attributes:
-        joint: the joint's name.
-        signal_variance: prior variance of Z [target unit squared].
-        lengthscales: one per input of Z [unit of the input]; `(0.0,)` for all automatic.
-        noise_variance: variance of V [target unit squared].
-    """
-
-    joint: str
-    signal_variance: float = 0.0
-    lengthscales: tuple[float, ...] = (0.0,)
-    noise_variance: float = 0.0
-
-    @property
-    def is_automatic(self) -> bool:
-        """Whether any of them is still to be estimated."""
-        return min(self.signal_variance, self.noise_variance, *self.lengthscales) <= 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +76,10 @@ class EngineConfig:
     model_method: str = _setting(
         'model.method', 'str', 'SGP', 'SGP: physics and process; PR: physics; GP: process.',
         choices=('SGP', 'PR', 'GP'), read_only=True,
+    )  # fmt: skip
+    model_kernel: str = _setting(
+        'model.kernel', 'str', SquaredExponential.name, 'Covariance function of Z.',
+        choices=KERNELS, read_only=True,
     )  # fmt: skip
     model_residual_inputs: tuple[str, ...] = _setting(
         'model.residual_inputs', 'str_array', ('default',),
@@ -181,7 +161,8 @@ class EngineConfig:
         Raises:
             ConfigError: unknown names, wrong types and values out of range, all in one error.
         """
-        known = {setting.name: setting for setting in describe_settings(robot)}
+        kernel = kernel_named(values.get('model.kernel'))
+        known = {setting.name: setting for setting in describe_settings(robot, kernel.name)}
         problems, converted = [], {}
         for name, value in values.items():
             problem = known[name].problem(value) if name in known else f'{name}: unknown setting'
@@ -189,7 +170,10 @@ class EngineConfig:
                 problems.append(problem)
             else:
                 converted[name] = known[name].convert(value)
-        hyper = tuple(_joint_hyperparameters(joint, converted) for joint in robot.joint_names)
+        hyper = tuple(
+            JointHyperparameters.of_mapping(joint, kernel, converted)
+            for joint in robot.joint_names
+        )
         problems += _structural_problems(robot, converted, hyper)
         if problems:
             raise ConfigError(
@@ -210,10 +194,7 @@ class EngineConfig:
         """Return every setting by its dotted name; `from_mapping` takes it back."""
         values = {s.name: getattr(self, name) for name, s in _static_settings().items()}
         for joint in self.hyper:
-            prefix = f'hyper.{joint.joint}.'
-            values[prefix + 'signal_variance'] = joint.signal_variance
-            values[prefix + 'lengthscales'] = joint.lengthscales
-            values[prefix + 'noise_variance'] = joint.noise_variance
+            values |= joint.to_mapping()
         return values
 
     def changed(self, changes: Mapping[str, object], robot: Robot) -> EngineConfig:
@@ -222,7 +203,7 @@ class EngineConfig:
         Raises:
             ConfigError: as `from_mapping`, or a change of a read-only setting.
         """
-        known = {setting.name: setting for setting in describe_settings(robot)}
+        known = {s.name: s for s in describe_settings(robot, self.model_kernel)}
         present = self.to_mapping()
         fixed = [
             name
@@ -239,16 +220,6 @@ class EngineConfig:
 
 def _static_settings() -> dict[str, Setting]:
     return {f.name: f.metadata['setting'] for f in fields(EngineConfig) if 'setting' in f.metadata}
-
-
-def _joint_hyperparameters(joint: str, values: Mapping[str, Any]) -> JointHyperparameters:
-    prefix = f'hyper.{joint}.'
-    return JointHyperparameters(
-        joint,
-        values.get(prefix + 'signal_variance', 0.0),
-        values.get(prefix + 'lengthscales', (0.0,)),
-        values.get(prefix + 'noise_variance', 0.0),
-    )
 
 
 def _structural_problems(
@@ -268,30 +239,13 @@ def _structural_problems(
     except ConfigError as error:
         return [*problems, str(error)]
     for joint, seen in zip(hyper, columns, strict=True):
-        given = joint.lengthscales
-        if given != (0.0,) and (len(given) != len(seen) or min(given) <= 0.0):
-            problems.append(
-                f'hyper.{joint.joint}.lengthscales = {list(given)}: expected {len(seen)} '
-                'positive numbers, or [0.0] to estimate them'
-            )
+        problems += joint.problems(len(seen))
     return problems
 
 
-def describe_settings(robot: Robot) -> tuple[Setting, ...]:
-    """Describe every setting that exists for `robot`, in a fixed order."""
-    dynamic = []
+def describe_settings(robot: Robot, kernel: str = SquaredExponential.name) -> tuple[Setting, ...]:
+    """Describe every setting that exists for `robot` with this kernel, in a fixed order."""
+    dynamic: list[Setting] = []
     for joint in robot.joint_names:
-        prefix = f'hyper.{joint}.'
-        unit = robot.target_unit(joint)
-        dynamic += [
-            Setting(prefix + 'signal_variance', 'float', 0.0,
-                    'Prior variance of Z; 0 estimates it.', unit=f'({unit})^2', low=0.0,
-                    high=_LARGEST**2),
-            Setting(prefix + 'lengthscales', 'float_array', (0.0,),
-                    'Length scale of Z per input; [0.0] estimates them.', low=0.0,
-                    high=_LARGEST),
-            Setting(prefix + 'noise_variance', 'float', 0.0,
-                    'Variance of the noise; 0 estimates it.', unit=f'({unit})^2', low=0.0,
-                    high=_LARGEST**2),
-        ]  # fmt: skip
+        dynamic += describe(joint, robot.target_unit(joint), kernel_named(kernel))
     return tuple(_static_settings().values()) + tuple(dynamic)

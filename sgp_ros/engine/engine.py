@@ -9,6 +9,7 @@ import numpy as np
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.estimator import Estimator
 from sgp_ros.engine.fitting import FitRequest
+from sgp_ros.engine.hyperparameters import settings_of
 from sgp_ros.engine.intake import Intake, State
 from sgp_ros.engine.ordering import ReorderBuffer
 from sgp_ros.engine.readout import read_parameters, read_scores
@@ -23,7 +24,6 @@ from sgp_ros.engine.samples import (
 )
 from sgp_ros.engine.snapshots import fill_from_snapshot, snapshot_config, take_snapshot
 from sgp_ros.engine.windows import WindowFilter
-from sgp_ros.gp.model import Model
 from sgp_ros.gp.scores import DriftTest
 from sgp_ros.robots.robot import Robot
 
@@ -143,20 +143,9 @@ class Engine:
     def hyper_settings(self) -> dict[str, SettingValue]:
         """Return the hyper-parameters in force as settings, also those still automatic."""
         regression = self.estimator.regression
-        return {} if regression is None else self.settings_of(regression.model)
-
-    def settings_of(self, model: Model) -> dict[str, SettingValue]:
-        """Return hyper-parameters as settings."""
-        settings: dict[str, SettingValue] = {}
-        for joint, kernel, noise in zip(
-            self.robot.joint_names, model.kernels, model.noise, strict=True
-        ):
-            prefix = f'hyper.{joint}.'
-            settings[prefix + 'noise_variance'] = noise
-            if kernel is not None:
-                settings[prefix + 'signal_variance'] = kernel.variance
-                settings[prefix + 'lengthscales'] = kernel.lengthscales
-        return settings
+        if regression is None:
+            return {}
+        return settings_of(self.robot.joint_names, regression.model)
 
     def parameters(self) -> tuple[ParameterEstimate, ...]:
         """Return the posterior of every coefficient, from the source that the settings name."""

@@ -9,6 +9,7 @@ import numpy as np
 from sgp_ros.engine.complement import solve_complement
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.factor_safety import check_factor, predict_soundly
+from sgp_ros.engine.hyperparameters import kernel_named
 from sgp_ros.engine.prior_knowledge import (
     complement_columns,
     empty_regression,
@@ -263,7 +264,8 @@ class Estimator:
         """Make the first model from what was gathered, then learn that."""
         columns = [np.array(column) for column in zip(*arrays, strict=True)]
         data = Observations(*columns) if arrays else None
-        start = None if data is None else initial_model(data, self.inputs)
+        kernel = kernel_named(self._config.model_kernel)
+        start = None if data is None else initial_model(data, self.inputs, kernel=kernel)
         model = model_of_settings(self._config, self.inputs, start)
         self.regression = self.make_regression(model)
         if self._config.model_method == 'SGP':

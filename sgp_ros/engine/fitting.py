@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sgp_ros.errors import NumericalError
+from sgp_ros.gp.kernels import SquaredExponential
 from sgp_ros.gp.learning import initial_model, learn, screened
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior
@@ -72,8 +73,10 @@ def fit(request: FitRequest) -> FitResult:
         before = -math.inf
     candidates = [(request.model, 0)]
     if request.restarts:
-        inputs = tuple(None if k is None else k.inputs for k in request.model.kernels)
-        fresh = screened(request.data, prior, initial_model(request.data, inputs))
+        kernels = request.model.kernels
+        inputs = tuple(None if k is None else k.inputs for k in kernels)
+        kind = next((type(k) for k in kernels if k is not None), SquaredExponential)
+        fresh = screened(request.data, prior, initial_model(request.data, inputs, kernel=kind))
         candidates.append((fresh, request.restarts - 1))
     best, lowest, evaluations = None, -math.inf, 0
     rng = np.random.default_rng((request.seed, request.number))

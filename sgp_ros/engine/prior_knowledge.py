@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sgp_ros.engine.config import EngineConfig, JointHyperparameters
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.gp.inducing_regression import InducingPointRegression
-from sgp_ros.gp.kernels import Kernel, SquaredExponential
+from sgp_ros.gp.kernel import Kernel
 from sgp_ros.gp.model import CoefficientPrior, Model
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.regression import Regression
@@ -17,24 +17,14 @@ def model_of_settings(
     config: EngineConfig, inputs: tuple[tuple[int, ...] | None, ...], present: Model | None
 ) -> Model:
     """Return the hyper-parameters of the settings, with `present` where they are automatic."""
-    kernels: list[SquaredExponential | None] = []
+    kernels: list[Kernel | None] = []
     noise = []
     for j, (joint, columns) in enumerate(zip(config.hyper, inputs, strict=True)):
         known = None if present is None else present.kernels[j]
-        kernels.append(None if columns is None else _kernel(joint, columns, known))
+        kernels.append(None if columns is None else joint.kernel_on(columns, known))
         fallback = 1.0 if present is None else present.noise[j]
         noise.append(joint.noise_variance or fallback)
     return Model(tuple(kernels), tuple(noise))
-
-
-def _kernel(
-    joint: JointHyperparameters, columns: tuple[int, ...], known: Kernel | None
-) -> SquaredExponential:
-    variance = joint.signal_variance or (known.variance if known else 1.0)
-    lengths = joint.lengthscales
-    if lengths == (0.0,):
-        lengths = known.lengthscales if known else (1.0,) * len(columns)
-    return SquaredExponential(variance, lengths, columns)
 
 
 def prior_of_robot(robot: Robot, config: EngineConfig) -> CoefficientPrior:

@@ -15,6 +15,7 @@ import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.estimator import Estimator
+from sgp_ros.engine.hyperparameters import kernel_named
 from sgp_ros.engine.intake import State
 from sgp_ros.engine.samples import (
     CommandSample,
@@ -25,7 +26,7 @@ from sgp_ros.engine.samples import (
     frozen_array,
 )
 from sgp_ros.errors import ConfigError
-from sgp_ros.gp.kernels import SquaredExponential
+from sgp_ros.gp.kernel import Kernel
 from sgp_ros.gp.model import Model
 from sgp_ros.gp.regression import Regression
 from sgp_ros.gp.scores import DriftTest, RunningScore
@@ -78,7 +79,7 @@ def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
             arrays[f'{name}.{key}'] = array
         for j, kernel in enumerate(regression.model.kernels):
             if kernel is not None:
-                arrays[f'{name}_kernel{j}'] = np.array([kernel.variance, *kernel.lengthscales])
+                arrays[f'{name}_kernel{j}'] = kernel.values
     return arrays
 
 
@@ -142,14 +143,14 @@ def _regressions(estimator: Estimator) -> dict[str, Regression]:
 
 
 def _read_regression(name: str, snapshot: Mapping[str, np.ndarray], engine: Engine) -> Regression:
-    kernels: list[SquaredExponential | None] = []
+    kernels: list[Kernel | None] = []
+    kernel = kernel_named(engine.config.model_kernel)
     for j, columns in enumerate(engine.estimator.inputs):
         key = f'{name}_kernel{j}'
         if key not in snapshot or columns is None:
             kernels.append(None)
             continue
-        variance, *lengthscales = (float(x) for x in snapshot[key])
-        kernels.append(SquaredExponential(variance, tuple(lengthscales), columns))
+        kernels.append(kernel.of_values(snapshot[key], columns))
     noise = tuple(float(x) for x in snapshot[f'{name}_noise'])
     make = engine.estimator.make_regression if name == 'model' else engine.estimator.make_baseline
     regression = make(Model(tuple(kernels), noise))

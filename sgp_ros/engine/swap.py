@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sgp_ros.engine.fitting import FitResult
+from sgp_ros.engine.hyperparameters import prefix_of, settings_of
 from sgp_ros.engine.samples import SettingsChange, SettingValue
 from sgp_ros.errors import NumericalError
 from sgp_ros.gp.model import separable
@@ -43,9 +44,9 @@ class Swap:
         assert fit.model is not None
         regression = engine.estimator.regression
         assert regression is not None
-        settings = engine.settings_of(fit.model)
+        settings = settings_of(engine.robot.joint_names, fit.model)
         for outputs in separable(regression.model, fit.model):
-            names = tuple(f'hyper.{engine.robot.joint_names[j]}.' for j in outputs)
+            names = tuple(prefix_of(engine.robot.joint_names[j]) for j in outputs)
             self._parts.append({n: v for n, v in settings.items() if n.startswith(names)})
 
     @property

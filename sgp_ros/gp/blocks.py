@@ -12,7 +12,7 @@ import numpy as np
 from scipy import linalg
 
 from sgp_ros.errors import NumericalError
-from sgp_ros.gp.kernels import Kernel
+from sgp_ros.gp.kernel import Kernel
 from sgp_ros.gp.model import Model, Observations
 
 

@@ -27,7 +27,7 @@ from sgp_ros.gp.buffer import SampleBuffer
 from sgp_ros.gp.factor import Whitening, part_of
 from sgp_ros.gp.inducing_points import InducingPoints
 from sgp_ros.gp.information import Forgetting, Information
-from sgp_ros.gp.kernels import Kernel
+from sgp_ros.gp.kernel import Kernel
 from sgp_ros.gp.model import Model, OutputGroup, group_of, output_groups
 
 WORST = 2.0

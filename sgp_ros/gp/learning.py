@@ -16,7 +16,8 @@ import numpy as np
 from scipy import optimize
 
 from sgp_ros.errors import NumericalError
-from sgp_ros.gp.kernels import Kernel, SquaredExponential
+from sgp_ros.gp.kernel import Kernel
+from sgp_ros.gp.kernels import SquaredExponential
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior
 
@@ -29,8 +30,8 @@ _TOUCHING = 1e-6
 def search_box(data: Observations, start: Model) -> np.ndarray:
     """Return the least and largest logarithm of each hyper-parameter of `start`, (h, 2).
 
-    Length scales within 1e4 of the spread of their input, variances of Z from 1e-8 to 1e4 times
-    the variance of the target, noise from 1e-8 to 1e2 times that.
+    Those of a kernel as far from their typical values as the kernel says, noise from 1e-8 to 1e2
+    times the variance of the target.
     """
     power = variance_or_one(data.y)
     spread = np.sqrt(variance_or_one(data.U))
@@ -40,9 +41,11 @@ def search_box(data: Observations, start: Model) -> np.ndarray:
             continue
         variance = power[component] if data.G is None else power.mean()
         scales = kernel.scales(float(variance), spread[list(kernel.inputs)])
-        heights = len(scales) - len(kernel.inputs)
-        rows += [(x / _RANGE**2, x * _RANGE) for x in scales[:heights]]
-        rows += [(x / _RANGE, x * _RANGE) for x in scales[heights:]]
+        below, above = (
+            kernel.spread_over((getattr(p, side) for p in kernel.parameters), len(kernel.inputs))
+            for side in ('below', 'above')
+        )
+        rows += zip(scales / below, scales * above, strict=True)
     rows += [(_NOISE_FLOOR * x, _NOISE_TOP * x) for x in power]
     return np.log(np.array(rows))
 
@@ -67,8 +70,8 @@ def opened_box(
         if kernel is None:
             continue
         seen = slice(component, component + 1) if data.G is None else slice(None)
-        heights = slice(row, row + len(kernel.log_parameters) - len(kernel.inputs))
-        row += len(kernel.log_parameters)
+        heights = row + np.flatnonzero(kernel.is_variance)
+        row += len(kernel.values)
         if not np.any(best[heights] > box[heights, 1] - _TOUCHING):
             continue
         least_noise = best[noise:][seen].min()
@@ -118,6 +121,7 @@ def initial_model(
     data: Observations,
     inputs: tuple[tuple[int, ...] | None, ...],
     rule: str = 'standardised',
+    kernel: type[Kernel] = SquaredExponential,
 ) -> Model:
     """Return the values from which learning starts.
 
@@ -128,6 +132,7 @@ def initial_model(
         data: observations, at least two.
         inputs: per component of X the columns of U its Z sees; None for no Z.
         rule: one of `RULES`.
+        kernel: of each Z.
     """
     if rule not in RULES:
         raise ValueError(f'rule {rule!r} is none of {RULES}')
@@ -141,8 +146,8 @@ def initial_model(
             kernels.append(None)
             continue
         variance = power[component] if data.G is None else power.mean()
-        lengths = tuple(float(spread[column]) for column in columns)
-        kernels.append(SquaredExponential(float(variance), lengths, columns))
+        scales = kernel.scales(float(variance), spread[list(columns)])
+        kernels.append(kernel.of_values(scales, columns))
     return Model(tuple(kernels), tuple(float(x) / 100.0 for x in power))
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from sgp_ros.gp.kernels import Kernel
+from sgp_ros.gp.kernel import Kernel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,7 +71,7 @@ class Model:
             if kernel is None:
                 kernels.append(None)
                 continue
-            stop = start + len(kernel.log_parameters)
+            stop = start + len(kernel.values)
             kernels.append(kernel.with_log_parameters(theta[start:stop]))
             start = stop
         return Model(tuple(kernels), tuple(float(x) for x in np.exp(theta[start:])))
@@ -133,16 +133,16 @@ def _is_multiple(kernel: Kernel | None, noise: float, group: OutputGroup) -> boo
     other = group.kernel
     if kernel is None or other is None:
         return kernel is other
-    if (type(kernel), kernel.inputs, kernel.lengthscales) != (
-        type(other), other.inputs, other.lengthscales
-    ):  # fmt: skip
+    if (type(kernel), kernel.inputs) != (type(other), other.inputs):
         return False
-    heights = kernel.log_parameters[: -len(kernel.inputs)]
-    others = other.log_parameters[: -len(kernel.inputs)]
+    is_height, values, others = kernel.is_variance, kernel.values, other.values
+    if not np.array_equal(values[~is_height], others[~is_height]):
+        return False
     ratio = np.log(noise / group.noise)
-    if not len(heights):
+    if not is_height.any():
         return bool(ratio == 0.0)
-    return bool(np.all(np.abs(heights - others - ratio) <= _SAME))
+    heights = np.log(values[is_height]) - np.log(others[is_height])
+    return bool(np.all(np.abs(heights - ratio) <= _SAME))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

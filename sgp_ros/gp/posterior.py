@@ -15,7 +15,7 @@ import numpy as np
 from scipy import linalg
 
 from sgp_ros.gp.blocks import Block, build_blocks
-from sgp_ros.gp.kernels import Kernel
+from sgp_ros.gp.kernel import Kernel
 from sgp_ros.gp.linear_algebra import subtract_symmetric
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import linalg
 
 from sgp_ros.gp.factor import GrowingFactor
-from sgp_ros.gp.kernels import Kernel
+from sgp_ros.gp.kernel import Kernel
 from sgp_ros.gp.model import Model
 
 

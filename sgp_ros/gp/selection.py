@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sgp_ros.gp.kernels import Kernel
+from sgp_ros.gp.kernel import Kernel
+from sgp_ros.gp.kernels import Linear
 from sgp_ros.gp.learning import initial_model, learn, screened
-from sgp_ros.gp.linear_kernel import Linear
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 
 MARGIN = 3.0

@@ -24,7 +24,6 @@ from std_msgs.msg import Float64, Float64MultiArray, String
 from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import JointTrajectory
 
-from sgp_ros.engine.config import describe_settings
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import ConfigError, MessageError, NumericalError
 from sgp_ros.recordings.messages import (
@@ -70,7 +69,7 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
     def __init__(self) -> None:
         super().__init__('sgp_node')
         engine, self._settings = build_engine(self)
-        self._engine_settings = {s.name for s in describe_settings(engine.robot)}
+        self._engine_settings = set(engine.config.to_mapping())
         self._is_writing_back = False
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._reported = self._steady.now()

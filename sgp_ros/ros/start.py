@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -31,10 +32,12 @@ def build_engine(node: Node) -> tuple[Engine, dict[str, SettingValue]]:
     first = declare(node, (ROBOT, MODEL_PATH))
     robot = load_robot(str(first['robot']))
     snapshot = load_model(Path(str(first['model.path']))) if first['model.path'] else None
-    settings = describe_settings(robot)
-    if snapshot is not None:
-        settings = _with_defaults(settings, snapshot_config(snapshot, robot))
-    given = declare(node, (*NODE_SETTINGS, *settings))
+    saved = {} if snapshot is None else snapshot_config(snapshot, robot).to_mapping()
+    (kernel,) = (s for s in describe_settings(robot) if s.name == 'model.kernel')
+    given = declare(node, _with_defaults((kernel,), saved))  # it names the hyper-parameters
+    settings = describe_settings(robot, str(given['model.kernel']))
+    rest = [setting for setting in settings if setting.name != kernel.name]
+    given |= declare(node, (*NODE_SETTINGS, *_with_defaults(rest, saved)))
     names = {setting.name for setting in settings}
     config = EngineConfig.from_mapping({n: v for n, v in given.items() if n in names}, robot)
     warm_up(robot)
@@ -42,12 +45,13 @@ def build_engine(node: Node) -> tuple[Engine, dict[str, SettingValue]]:
     if snapshot is not None:
         engine.restore(snapshot)
         present = engine.config.to_mapping()
-        wanted = {n: v for n, v in config.to_mapping().items() if v != present[n]}
+        wanted = {n: v for n, v in config.to_mapping().items() if v != present.get(n)}
         if wanted:
             engine.change(wanted)
     return engine, {**first, **{n: v for n, v in given.items() if n not in names}}
 
 
-def _with_defaults(settings: tuple[Setting, ...], config: EngineConfig) -> tuple[Setting, ...]:
-    values = config.to_mapping()
-    return tuple(replace(setting, default=values[setting.name]) for setting in settings)
+def _with_defaults(
+    settings: Iterable[Setting], values: Mapping[str, SettingValue]
+) -> list[Setting]:
+    return [replace(s, default=values.get(s.name, s.default)) for s in settings]

@@ -358,7 +358,7 @@ def test_a_fit_may_find_what_the_scale_of_the_data_allows():
     """Efforts of a thousand newton metres that are linear in an input ask for 1e14 N^2 m^2."""
     engine, _ = _run(pendulum_events(200), refit__enabled=False)
     model = engine.estimator.regression.model
-    large = tuple(dataclasses.replace(kernel, variance=1e14) for kernel in model.kernels)
+    large = tuple(dataclasses.replace(kernel, signal_variance=1e14) for kernel in model.kernels)
     found = dataclasses.replace(model, kernels=large, noise=(1e4,))
     assert len(Swap(engine, FitResult(0, found, 3.0, 2.0, 5)).finish()) == 1
     assert engine.estimator.regression.model == found

@@ -48,7 +48,9 @@ def _engine(count=150, **settings):
 def _fit(engine, **changes):
     model = engine.estimator.regression.model
     changed = {
-        'kernels': tuple(dataclasses.replace(k, variance=2.0 * k.variance) for k in model.kernels),
+        'kernels': tuple(
+            dataclasses.replace(k, signal_variance=2.0 * k.variance) for k in model.kernels
+        ),
         'noise': (0.3, 0.7),
     }
     return FitResult(0, dataclasses.replace(model, **(changed | changes)), 2.0, 1.0, 5)

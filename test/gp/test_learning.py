@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy import optimize
 
-from sgp_ros.gp.kernels import AdditiveSquaredExponential, SquaredExponential
+from sgp_ros.gp.kernels import AdditiveSquaredExponential, Linear, SquaredExponential
 from sgp_ros.gp.learning import initial_model, learn, opened_box, search_box
-from sgp_ros.gp.linear_kernel import Linear
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior
 

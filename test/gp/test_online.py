@@ -239,7 +239,9 @@ def test_outputs_may_take_their_hyperparameters_one_after_the_other(changed):
     """Factors of the others are taken over; the end is that of one change, before and after the
     buffer is full, and what a basis told is not counted anew."""
     model, data = random_problem(3, n=60, k=2, d=2)
-    other = Model(tuple(replace(k, variance=1.3 * k.variance) for k in model.kernels), (0.3, 0.2))
+    other = Model(
+        tuple(replace(k, signal_variance=1.3 * k.variance) for k in model.kernels), (0.3, 0.2)
+    )
     prior = CoefficientPrior.from_std(np.zeros(3), np.ones(3))
     for budget in (100, 40):
         at_once, by_parts = (_stream(model, data, prior, budget) for _ in range(2))

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sgp_ros.gp.kernels import SquaredExponential
-from sgp_ros.gp.linear_kernel import Linear
+from sgp_ros.gp.kernels import Linear, SquaredExponential
 from sgp_ros.gp.model import CoefficientPrior, Observations
 from sgp_ros.gp.selection import select_inputs
 

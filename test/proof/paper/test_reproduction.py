@@ -11,7 +11,7 @@ from sgp_proof.paper import reaction_wheel, toy
 from sgp_proof.paper.catalogue import CHOICES, run_choice
 from sgp_proof.paper.protocol import METHOD_NAMES, SGP_ALL, run_method
 from sgp_ros.cli import main
-from sgp_ros.gp.linear_kernel import Linear
+from sgp_ros.gp.kernels import Linear
 
 
 @pytest.fixture(scope='module')
