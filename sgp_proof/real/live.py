@@ -26,15 +26,16 @@ from sgp_proof.real.recordings import MACHINES
 from sgp_proof.result_files import ROOT, make_parser, read_result, write_result
 from sgp_ros.apps.demo import compare
 from sgp_ros.apps.live_processes import LiveProcesses, graph_environment
-from sgp_ros.apps.parameter_file import load_parameters
 from sgp_ros.apps.replay import ReplayOptions, run_events
 from sgp_ros.cli import main as sgp
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.samples import JointSample
+from sgp_ros.recordings.messages import joint_state_message
+from sgp_ros.recordings.model_files import load_parameters
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.report.metrics import Timing, collect_metrics
-from sgp_ros.ros.publications import joint_state
+from sgp_ros.ros.messages import new_message
 
 NODE = 'sgp_ros.ros.sgp_node'
 WALL_S = 20.0
@@ -90,7 +91,8 @@ def _publish(publisher, events, speed):
         if due - began > WALL_S:
             break
         time.sleep(max(0.0, due - time.monotonic()))
-        publisher.publish(joint_state(replace(sample, stamp_ns=sample.stamp_ns + shift)))
+        shifted = replace(sample, stamp_ns=sample.stamp_ns + shift)
+        publisher.publish(joint_state_message(new_message, shifted))
         count += 1
     return count
 

@@ -19,7 +19,6 @@ import numpy as np
 from sgp_proof.paper import arm
 from sgp_proof.real.recordings import MACHINES
 from sgp_proof.result_files import make_parser, read_result, write_result
-from sgp_ros.apps.parameter_file import load_parameters
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.prior_knowledge import prior_of_robot
@@ -31,6 +30,7 @@ from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.posterior import Posterior
 from sgp_ros.gp.scores import coverage95, nlpd, nmse
+from sgp_ros.recordings.model_files import load_parameters
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import ROBOTS
 from sgp_ros.simulation.assembly import make_simulation

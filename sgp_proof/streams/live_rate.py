@@ -29,7 +29,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 from sgp_proof.result_files import ROOT, make_parser, write_result
 from sgp_ros.apps.live_processes import LiveProcesses, graph_environment
-from sgp_ros.apps.parameter_file import load_parameters
+from sgp_ros.recordings.model_files import load_parameters
 
 RATE_HZ, WARM_UP_S, BUDGET = 1000.0, 25.0, 500
 REORDER_S, WINDOW_S = 0.02, 0.1

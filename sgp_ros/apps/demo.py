@@ -18,7 +18,8 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.results import Estimate
 from sgp_ros.errors import ConfigError, RecordingError
-from sgp_ros.recordings.predictions import Point, PredictionTopics, outputs
+from sgp_ros.recordings.messages import Point
+from sgp_ros.recordings.predictions import PredictionTopics, outputs
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.report.files import write_text
 from sgp_ros.report.history import History

@@ -15,8 +15,8 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-from sgp_ros.apps.parameter_file import find_shipped
 from sgp_ros.errors import RecordingError
+from sgp_ros.recordings.model_files import find_shipped
 
 _DOMAINS = range(30, 102)
 _STOP_LIMIT_S = 5.0

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from sgp_ros.apps.identified_robot import nominal_coefficients, write_identified
-from sgp_ros.apps.parameter_file import find_shipped, load_parameters
 from sgp_ros.batch.bodies import nearest_bodies
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
@@ -23,6 +22,12 @@ from sgp_ros.engine.results import Step
 from sgp_ros.engine.samples import CommandSample, Event, JointSample
 from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import ConfigError, NumericalError, RecordingError
+from sgp_ros.recordings.model_files import (
+    find_shipped,
+    load_model,
+    load_parameters,
+    save_model,
+)
 from sgp_ros.recordings.predictions import PredictionTopics, outputs, write_outputs
 from sgp_ros.recordings.reader import Recording, open_recording
 from sgp_ros.recordings.writer import RecordingWriter
@@ -151,21 +156,6 @@ def _counted(
         yield event
 
 
-def load_model(path: str) -> Mapping[str, np.ndarray]:
-    """Return the arrays of a saved model; objects are refused.
-
-    Raises:
-        ConfigError: no such file, or none of this kind.
-    """
-    if not Path(path).is_file():
-        raise ConfigError(f'no model file {path}', 'a model.npz of `sgp replay` or ~/save')
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            return dict(file)
-    except (ValueError, OSError, EOFError) as error:
-        raise ConfigError(f'{path} is no saved model ({error})', 'a model.npz') from error
-
-
 def load_truth(path: str) -> dict[str, float]:
     """Return the true coefficients of a `truth.json` by name.
 
@@ -179,14 +169,6 @@ def load_truth(path: str) -> dict[str, float]:
         raise ConfigError(
             f'{path} holds no coefficients ({error})', 'a truth.json of `sgp simulate`'
         ) from error
-
-
-def save_model(path: Path, snapshot: Mapping[str, np.ndarray]) -> None:
-    """Write a snapshot under a temporary name, then rename it."""
-    growing = path.with_name(f'{path.name}.part')
-    with growing.open('wb') as file:
-        np.savez(file, allow_pickle=False, **snapshot)
-    growing.replace(path)
 
 
 def write_identified_robot(out: Path, engine: Engine) -> str:
@@ -244,7 +226,7 @@ def _make_engine(robot: Robot, options: ReplayOptions) -> Engine:
     config = EngineConfig.from_mapping(settings, robot)
     engine = Engine(robot, config)
     if options.model:
-        engine.restore(load_model(options.model))
+        engine.restore(load_model(Path(options.model)))
         engine.begin_stream()
     if options.effort != 'auto':
         engine.change({'effort.source': EFFORT_SOURCES[options.effort]})

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from sgp_ros.engine.samples import CommandSample, JointSample
-from sgp_ros.recordings.messages import FLOAT64_ARRAY, JOINT_STATE
+from sgp_ros.recordings.command_types import FLOAT64_ARRAY
+from sgp_ros.recordings.messages import JOINT_STATE
 from sgp_ros.recordings.writer import RecordingWriter
 from sgp_ros.report.files import write_text
 from sgp_ros.simulation.recording import SimulatedRecording

@@ -1,4 +1,4 @@
-"""Read bags that are not plain MCAP: SQLite3, compressed rosbag2 directories, ROS 1."""
+"""Bags that are not plain MCAP: SQLite3, compressed rosbag2 directories, ROS 1."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ from rosbags.rosbag2 import Reader as Ros2Reader
 from rosbags.rosbag2 import ReaderError as Ros2Error
 
 from sgp_ros.errors import RecordingError
-from sgp_ros.recordings.mcap_source import RawMessage
-from sgp_ros.recordings.topics import Topic
+from sgp_ros.recordings.topics import RawMessage, Topic
 from sgp_ros.recordings.typestore import short_type
 
 

@@ -1,29 +1,69 @@
-"""Turn ROS messages into the stamped samples of the engine.
+"""ROS messages beside the commands: their samples, and how they are built.
 
-A message is read by its fields only, so the same functions serve messages of rclpy (in the node)
-and of rosbags (in a replay): what is live and what is replayed cannot differ here. NaN stays in a
-sample, the engine refuses and counts it.
+A message is read by its fields only, and built by what is given for making messages, so the same
+functions serve messages of rclpy (in the node) and of rosbags (in a file): what is live and what
+is recorded cannot differ here. NaN stays in a sample, the engine refuses and counts it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
+from sgp_ros.engine.samples import JointSample, Reset, SettingsChange, SettingValue, frozen_array
 from sgp_ros.errors import MessageError
 
 Message = Any
 """A ROS message of any library; its fields are those of its definition."""
 
-JOINT_STATE = 'sensor_msgs/JointState'
-FLOAT64 = 'std_msgs/Float64'
-FLOAT64_ARRAY = 'std_msgs/Float64MultiArray'
-TRAJECTORY = 'trajectory_msgs/JointTrajectory'
+Make = Callable[..., Message]
+"""Makes a message from its type `package/Type` and all its fields as keywords: numbers, texts,
+messages, lists of these, (n,) arrays, and bytes of length one for an octet."""
 
+JOINT_STATE = 'sensor_msgs/JointState'
+DIAGNOSTICS = 'diagnostic_msgs/DiagnosticArray'
+TEXT = 'std_msgs/String'
+
+_NONE = np.zeros(0)
 _SECOND_NS = 1_000_000_000
+_CHANGE = '{"change": "settings" or "reset", "stamp_ns": integer, "settings": {...}}'
+
+
+class Status(NamedTuple):
+    """One entry of a DiagnosticArray.
+
+    Attributes:
+        name: of what is described.
+        level: 0 ok, 1 warning, 2 error, 3 stale.
+        message: one sentence.
+        hardware_id: of the device.
+        values: key to value, in order.
+    """
+
+    name: str
+    level: int
+    message: str
+    hardware_id: str
+    values: Mapping[str, str]
+
+
+class Point(NamedTuple):
+    """The one point of a trajectory: (k,) each, or empty where there is nothing to say.
+
+    Attributes:
+        positions: [rad] or [m].
+        velocities: [rad/s] or [m/s].
+        accelerations: [rad/s^2] or [m/s^2].
+        effort: [N m] or [N].
+    """
+
+    positions: np.ndarray = _NONE
+    velocities: np.ndarray = _NONE
+    accelerations: np.ndarray = _NONE
+    effort: np.ndarray = _NONE
 
 
 def joint_sample(message: Message, receipt_ns: int) -> JointSample:
@@ -36,13 +76,13 @@ def joint_sample(message: Message, receipt_ns: int) -> JointSample:
     Raises:
         MessageError: no joint, a repeated joint, or arrays whose lengths differ.
     """
-    names = _joint_names(message.name)
+    names = joint_names(message.name)
     return JointSample(
         stamp_ns(message, receipt_ns),
         names,
-        _matching(message.position, names, 'position'),
-        _matching(message.velocity, names, 'velocity') if len(message.velocity) else None,
-        _matching(message.effort, names, 'effort') if len(message.effort) else None,
+        matching(message.position, names, 'position'),
+        matching(message.velocity, names, 'velocity') if len(message.velocity) else None,
+        matching(message.effort, names, 'effort') if len(message.effort) else None,
     )
 
 
@@ -52,44 +92,12 @@ def stamp_ns(message: Message, receipt_ns: int) -> int:
     return int(stamp.sec) * _SECOND_NS + int(stamp.nanosec) or receipt_ns
 
 
-def _array_command(message: Message, receipt_ns: int) -> CommandSample:
-    if not len(message.data):
-        raise MessageError('command without a number', 'one number per commanded joint')
-    return CommandSample(receipt_ns, frozen_array(message.data))
+def joint_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the joints that a message names.
 
-
-def _number_command(message: Message, receipt_ns: int) -> CommandSample:
-    return CommandSample(receipt_ns, frozen_array((message.data,)))
-
-
-def _joint_state_command(message: Message, receipt_ns: int) -> CommandSample:
-    names = _joint_names(message.name)
-    effort = _matching(message.effort, names, 'effort')
-    return CommandSample(stamp_ns(message, receipt_ns), effort, names)
-
-
-def _trajectory_command(message: Message, receipt_ns: int) -> CommandSample:
-    names = _joint_names(message.joint_names)
-    if not len(message.points):
-        raise MessageError('trajectory without a point', 'effort in its first point')
-    effort = _matching(message.points[0].effort, names, 'effort of the first point')
-    return CommandSample(stamp_ns(message, receipt_ns), effort, names)
-
-
-CONVERTERS: dict[str, Callable[[Message, int], CommandSample]] = {
-    FLOAT64_ARRAY: _array_command,
-    FLOAT64: _number_command,
-    JOINT_STATE: _joint_state_command,
-    TRAJECTORY: _trajectory_command,
-}
-"""Command type to the function from (message, time of receipt [ns]) to its sample.
-
-Types with a header keep its stamp, zero meaning the time of receipt; the others take that time.
-Of a trajectory the first point counts, from the stamp on.
-"""
-
-
-def _joint_names(names: Sequence[str]) -> tuple[str, ...]:
+    Raises:
+        MessageError: none, or one of them twice.
+    """
     result = tuple(names)
     if not result:
         raise MessageError('message without joint names', 'one name per joint')
@@ -98,7 +106,121 @@ def _joint_names(names: Sequence[str]) -> tuple[str, ...]:
     return result
 
 
-def _matching(values: Sequence[float], names: tuple[str, ...], what: str) -> np.ndarray:
+def matching(values: Sequence[float], names: tuple[str, ...], what: str) -> np.ndarray:
+    """Return one number per joint, (m,), read-only.
+
+    Raises:
+        MessageError: more or fewer numbers than names.
+    """
     if len(values) != len(names):
         raise MessageError(f'{what} of length {len(values)}', f'length {len(names)} as the names')
     return frozen_array(values)
+
+
+def header(make: Make, stamp_ns: int) -> Message:
+    """Return a header with this stamp [ns]."""
+    sec, nanosec = divmod(stamp_ns, _SECOND_NS)
+    stamp = make('builtin_interfaces/Time', sec=sec, nanosec=nanosec)
+    return make('std_msgs/Header', stamp=stamp, frame_id='')
+
+
+def joint_state_message(make: Make, sample: JointSample) -> Message:
+    """Return a `sensor_msgs/JointState`; what the sample lacks stays empty."""
+    return make(
+        JOINT_STATE,
+        header=header(make, sample.stamp_ns),
+        name=list(sample.names),
+        position=sample.position,
+        velocity=_NONE if sample.velocity is None else sample.velocity,
+        effort=_NONE if sample.effort is None else sample.effort,
+    )
+
+
+def trajectory_message(make: Make, stamp_ns: int, names: Sequence[str], point: Point) -> Message:
+    """Return a `trajectory_msgs/JointTrajectory` of one point, at its stamp [ns]."""
+    return make(
+        'trajectory_msgs/JointTrajectory',
+        header=header(make, stamp_ns),
+        joint_names=list(names),
+        points=[
+            make(
+                'trajectory_msgs/JointTrajectoryPoint',
+                positions=point.positions,
+                velocities=point.velocities,
+                accelerations=point.accelerations,
+                effort=point.effort,
+                time_from_start=make('builtin_interfaces/Duration', sec=0, nanosec=0),
+            )
+        ],
+    )
+
+
+def diagnostics_message(make: Make, stamp_ns: int, statuses: Iterable[Status]) -> Message:
+    """Return a `diagnostic_msgs/DiagnosticArray` at this stamp [ns]."""
+    return make(
+        DIAGNOSTICS,
+        header=header(make, stamp_ns),
+        status=[
+            make(
+                'diagnostic_msgs/DiagnosticStatus',
+                level=bytes([status.level]),
+                name=status.name,
+                message=status.message,
+                hardware_id=status.hardware_id,
+                values=[
+                    make('diagnostic_msgs/KeyValue', key=key, value=value)
+                    for key, value in status.values.items()
+                ],
+            )
+            for status in statuses
+        ],
+    )
+
+
+def change_to_text(change: SettingsChange | Reset) -> str:
+    """Return a change of settings as one line of JSON that reads back exactly.
+
+    A float has the shortest digits that give the same float, an array is a list. JSON keeps `1`
+    and `1.0` apart, so the types of the settings survive.
+    """
+    if isinstance(change, Reset):
+        return json.dumps({'change': 'reset', 'stamp_ns': change.stamp_ns})
+    return json.dumps(
+        {
+            'change': 'settings',
+            'stamp_ns': change.stamp_ns,
+            'settings': dict(change.settings),
+        }
+    )
+
+
+def change_from_text(text: str) -> SettingsChange | Reset:
+    """Return the change that `change_to_text` wrote.
+
+    Raises:
+        MessageError: the text is something else.
+    """
+    try:
+        content = json.loads(text)
+    except ValueError as error:
+        raise MessageError('change of settings that is no JSON', _CHANGE) from error
+    if not isinstance(content, dict) or type(content.get('stamp_ns')) is not int:
+        raise MessageError('change of settings without a stamp', _CHANGE)
+    if content.get('change') == 'reset':
+        return Reset(content['stamp_ns'])
+    settings = content.get('settings')
+    if content.get('change') != 'settings' or not isinstance(settings, dict):
+        raise MessageError('change of settings of an unknown kind', _CHANGE)
+    values = {name: _setting(name, value) for name, value in settings.items()}
+    return SettingsChange(content['stamp_ns'], values)
+
+
+def _setting(name: str, value: object) -> SettingValue:
+    if isinstance(value, (bool, int, float, str)):
+        return value
+    if isinstance(value, list):
+        if all(isinstance(item, str) for item in value):
+            return tuple(value)
+        if all(isinstance(item, (int, float)) for item in value):
+            return tuple(value)
+    raise MessageError(f'setting {name} of a strange type', 'a number, text or a list of one kind')

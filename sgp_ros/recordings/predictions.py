@@ -11,19 +11,10 @@ import numpy as np
 
 from sgp_ros.engine.results import Estimate
 from sgp_ros.engine.samples import JointSample
+from sgp_ros.recordings.messages import Point
 from sgp_ros.recordings.writer import RecordingWriter
 
 _NONE = np.zeros(0)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Point:
-    """A trajectory of one point: (k,) each, or empty where there is nothing to say."""
-
-    positions: np.ndarray
-    velocities: np.ndarray
-    accelerations: np.ndarray
-    effort: np.ndarray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,17 +67,7 @@ class PredictionTopics:
 
 def write_outputs(writer: RecordingWriter, topics: PredictionTopics, found: Outputs) -> None:
     """Write what is published of one estimate into a recording."""
-    for topic, point in (
-        (topics.prediction, found.prediction),
-        (topics.prediction_variance, found.variance),
-    ):
-        writer.write_trajectory_point(
-            topic,
-            found.stamp_ns,
-            found.names,
-            point.positions,
-            point.velocities,
-            point.accelerations,
-            point.effort,
-        )
+    stamp_ns, names = found.stamp_ns, found.names
+    writer.write_trajectory(topics.prediction, stamp_ns, names, found.prediction)
+    writer.write_trajectory(topics.prediction_variance, stamp_ns, names, found.variance)
     writer.write_joint_state(topics.predicted_joint_states, found.joint_state)

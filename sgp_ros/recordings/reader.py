@@ -1,4 +1,4 @@
-"""Turn a recording into the events of the engine.
+"""Recordings as the events of the engine.
 
 `open_recording` takes an MCAP file, a rosbag2 directory or a ROS 1 bag and tells by the content
 which it is. `Recording.events` yields what a node would have consumed, in the order of log time.
@@ -17,13 +17,12 @@ import yaml
 from sgp_ros.engine.samples import Event, Reset, SettingsChange
 from sgp_ros.errors import MessageError, RecordingError
 from sgp_ros.recordings.bag_source import RosbagsSource, SqliteSource
-from sgp_ros.recordings.changes import change_from_text
-from sgp_ros.recordings.mcap_index import MAGIC
-from sgp_ros.recordings.mcap_source import McapSource, RawMessage
-from sgp_ros.recordings.messages import CONVERTERS, Message, joint_sample
-from sgp_ros.recordings.outgoing import TEXT
+from sgp_ros.recordings.command_types import COMMAND_TYPES
+from sgp_ros.recordings.mcap_source import MAGIC, McapSource
+from sgp_ros.recordings.messages import TEXT, Message, change_from_text, joint_sample
 from sgp_ros.recordings.topics import (
     CHANGES_TOPIC,
+    RawMessage,
     Topic,
     choose_command,
     choose_joint_states,
@@ -87,7 +86,7 @@ class Recording:
         chosen: dict[str, tuple[Topic, Callable[[Message, int], Event]]] = {}
         commands = choose_command(self.topics, states, command)
         if commands:
-            chosen[commands.name] = commands, CONVERTERS[commands.type]
+            chosen[commands.name] = commands, COMMAND_TYPES[commands.type].decode
         for topic in self.topics:
             if topic.name == changes and topic.type == TEXT:
                 chosen[topic.name] = topic, _change

@@ -1,4 +1,4 @@
-"""Load the columns of CSV, NPZ and MAT files by name."""
+"""Columns of CSV, NPZ and MAT files by name."""
 
 from __future__ import annotations
 

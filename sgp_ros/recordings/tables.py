@@ -1,4 +1,4 @@
-"""Turn a table of numbers into the events of the engine, by means of a map.
+"""Tables of numbers as the events of the engine, by means of a map.
 
 A row becomes one state, and one command where the map names commands. Times are written as they
 are, also where they do not grow: the engine refuses and counts such samples. See `table_map` for
@@ -16,10 +16,9 @@ import numpy as np
 
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.errors import ConfigError, RecordingError
-from sgp_ros.recordings.messages import JOINT_STATE
-from sgp_ros.recordings.table_check import check_map
+from sgp_ros.recordings.command_types import COMMAND_TYPES
 from sgp_ros.recordings.table_files import Columns, load_columns
-from sgp_ros.recordings.table_map import Quantity, TableMap, TimeBase, read_map
+from sgp_ros.recordings.table_map import Quantity, TableMap, TimeBase, check_map, read_map
 from sgp_ros.recordings.writer import RecordingWriter
 
 _LATEST_NS = 2**31 * 10**9
@@ -74,7 +73,8 @@ class Table:
 
     def events(self) -> Iterator[JointSample | CommandSample]:
         """Yield the rows in order, the command of a row before its state."""
-        names = self.command_joints if self.command_type == JOINT_STATE else None
+        has_names = COMMAND_TYPES[self.command_type].has_names
+        names = self.command_joints if has_names else None
         for row, stamp_ns in enumerate(self.stamps_ns):
             if self.commands is not None:
                 yield CommandSample(stamp_ns, frozen_array(self.commands[row]), names)

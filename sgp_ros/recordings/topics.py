@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from sgp_ros.errors import RecordingError
-from sgp_ros.recordings.messages import CONVERTERS, FLOAT64, FLOAT64_ARRAY, JOINT_STATE
+from sgp_ros.recordings.command_types import COMMAND_TYPES, NO_COMMAND
+from sgp_ros.recordings.messages import JOINT_STATE
 
 CHANGES_TOPIC = '/sgp/changes'
 """Where a record keeps the changes of settings."""
-
-NO_COMMAND = 'none'
-"""Option value: take no command topic, the effort comes in the joint states."""
 
 _OWN_OUTPUTS = ('predicted_joint_states', 'prediction', 'prediction_variance')
 _COMMAND_NAMES = ('command', 'commands')
@@ -38,6 +37,20 @@ class Topic:
     def last_name(self) -> str:
         """What follows the last slash."""
         return self.name.rsplit('/', 1)[-1]
+
+
+class RawMessage(NamedTuple):
+    """One message as it was recorded.
+
+    Attributes:
+        log_ns: time of logging [ns].
+        topic: name of its topic.
+        data: serialised message.
+    """
+
+    log_ns: int
+    topic: str
+    data: bytes
 
 
 def choose_joint_states(topics: Sequence[Topic], wanted: str | None) -> Topic:
@@ -75,7 +88,7 @@ def choose_command(topics: Sequence[Topic], states: Topic, wanted: str | None) -
         topics: all topics of the recording.
         states: the topic of the joint states.
         wanted: its name, or `none`. None chooses the one called `command` or `commands`, else the
-            only array or number topic.
+            only topic of a type without joint names.
 
     Raises:
         RecordingError: the named one does not exist, or several are equally likely.
@@ -83,16 +96,16 @@ def choose_command(topics: Sequence[Topic], states: Topic, wanted: str | None) -
     if wanted == NO_COMMAND:
         return None
     if wanted is not None:
-        return _named(topics, wanted, tuple(CONVERTERS), '--command')
+        return _named(topics, wanted, tuple(COMMAND_TYPES), '--command')
     candidates = [
         topic
         for topic in topics
-        if topic.type in CONVERTERS and topic != states and topic.last_name not in _OWN_OUTPUTS
+        if topic.type in COMMAND_TYPES and topic != states and topic.last_name not in _OWN_OUTPUTS
     ]
     likely = [topic for topic in candidates if topic.last_name in _COMMAND_NAMES]
     if likely:
         return _only(likely, likely, '/command', '--command')
-    plain = [topic for topic in candidates if topic.type in {FLOAT64_ARRAY, FLOAT64}]
+    plain = [topic for topic in candidates if not COMMAND_TYPES[topic.type].has_names]
     return plain[0] if len(plain) == 1 else None
 
 

@@ -1,4 +1,4 @@
-"""Serialise and deserialise ROS messages of the standard types without ROS.
+"""ROS messages of the standard types, made, written and read without ROS.
 
 Type names are short (`sensor_msgs/JointState`). The definitions are those of ROS 2 Jazzy; a bag of
 another distribution, or of ROS 1, has the same fields in these types.
@@ -20,7 +20,9 @@ from sgp_ros.recordings.messages import Message
 
 def new_message(kind: str, **fields: Any) -> Message:
     """Return a message of type `kind`; every field must be given."""
-    return _typestore(Stores.ROS2_JAZZY).types[full_type(kind)](**fields)
+    # rosbags holds an octet as a number
+    values = {n: v[0] if isinstance(v, bytes) else v for n, v in fields.items()}
+    return _typestore(Stores.ROS2_JAZZY).types[full_type(kind)](**values)
 
 
 def serialize(kind: str, message: Message) -> bytes:

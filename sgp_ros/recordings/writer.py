@@ -1,4 +1,4 @@
-"""Write events and results as an MCAP file that any ROS 2 tool opens.
+"""MCAP files of events and results that any ROS 2 tool opens.
 
 The log time of an event is its stamp, so that a type without a header keeps it, and a recording
 reads back in the order of stamps. A result of a command appears under its name only when it is
@@ -18,29 +18,21 @@ from mcap.writer import Writer
 from typing_extensions import Self
 
 from sgp_ros.engine.samples import CommandSample, Event, JointSample
-from sgp_ros.recordings.changes import change_to_text
+from sgp_ros.recordings.command_types import COMMAND_TYPES, FLOAT64_ARRAY, TRAJECTORY
 from sgp_ros.recordings.messages import (
-    CONVERTERS,
-    FLOAT64_ARRAY,
-    JOINT_STATE,
-    TRAJECTORY,
-    Message,
-)
-from sgp_ros.recordings.outgoing import (
     DIAGNOSTICS,
+    JOINT_STATE,
     TEXT,
+    Message,
+    Point,
     Status,
-    TrajectoryPoint,
-    command_message,
+    change_to_text,
     diagnostics_message,
     joint_state_message,
-    text_message,
     trajectory_message,
 )
 from sgp_ros.recordings.topics import CHANGES_TOPIC
-from sgp_ros.recordings.typestore import definition, full_type, serialize
-
-__all__ = ['RecordingWriter', 'Status']
+from sgp_ros.recordings.typestore import definition, full_type, new_message, serialize
 
 
 class RecordingWriter:
@@ -50,8 +42,7 @@ class RecordingWriter:
         path: of the file; an existing one is replaced.
         joint_states_topic: where `write_event` puts states.
         command_topic: where it puts commands.
-        command_type: type of the commands, a key of `CONVERTERS`. Those with joint names need
-            commands with names, the others need commands without.
+        command_type: type of the commands, a key of `COMMAND_TYPES`.
         changes_topic: where it puts changes of settings and resets.
         is_live: write under the final name from the start, for the record of a running node.
             Else the file gets its name in `close`, and an error leaves nothing behind.
@@ -67,8 +58,8 @@ class RecordingWriter:
         *,
         is_live: bool = False,
     ) -> None:
-        if command_type not in CONVERTERS:
-            msg = f'command type {command_type!r}: expected one of {sorted(CONVERTERS)}'
+        if command_type not in COMMAND_TYPES:
+            msg = f'command type {command_type!r}: expected one of {sorted(COMMAND_TYPES)}'
             raise ValueError(msg)
         self.path = Path(path)
         self._joint_states_topic = joint_states_topic
@@ -94,48 +85,32 @@ class RecordingWriter:
             ValueError: a command that the command type cannot hold.
         """
         if isinstance(event, JointSample):
-            self._write(
-                self._joint_states_topic, JOINT_STATE, event.stamp_ns, joint_state_message(event),
-                log_ns,
-            )  # fmt: skip
+            message = joint_state_message(new_message, event)
+            self._write(self._joint_states_topic, JOINT_STATE, event.stamp_ns, message, log_ns)
         elif isinstance(event, CommandSample):
-            message = command_message(self._command_type, event)
+            message = COMMAND_TYPES[self._command_type].message(new_message, event)
             self._write(self._command_topic, self._command_type, event.stamp_ns, message, log_ns)
         else:
-            message = text_message(change_to_text(event))
+            message = new_message(TEXT, data=change_to_text(event))
             self._write(self._changes_topic, TEXT, event.stamp_ns, message)
 
     def write_joint_state(self, topic: str, sample: JointSample) -> None:
         """Write a JointState; what the sample lacks stays empty."""
-        self._write(topic, JOINT_STATE, sample.stamp_ns, joint_state_message(sample))
+        message = joint_state_message(new_message, sample)
+        self._write(topic, JOINT_STATE, sample.stamp_ns, message)
 
-    def write_trajectory_point(
-        self,
-        topic: str,
-        stamp_ns: int,
-        names: Sequence[str],
-        positions: Iterable[float] = (),
-        velocities: Iterable[float] = (),
-        accelerations: Iterable[float] = (),
-        effort: Iterable[float] = (),
+    def write_trajectory(
+        self, topic: str, stamp_ns: int, names: Sequence[str], point: Point
     ) -> None:
-        """Write a JointTrajectory of one point at its stamp.
-
-        Args:
-            topic: where to.
-            stamp_ns: header stamp and log time [ns].
-            names: joints, m of them.
-            positions: (m,) [rad] or [m], or empty; the others likewise.
-            velocities: (m,) [rad/s] or [m/s].
-            accelerations: (m,) [rad/s^2] or [m/s^2].
-            effort: (m,) [N m] or [N].
-        """
-        point = TrajectoryPoint(positions, velocities, accelerations, effort)
-        self._write(topic, TRAJECTORY, stamp_ns, trajectory_message(stamp_ns, names, point))
+        """Write a JointTrajectory of one point, header stamp and log time `stamp_ns` [ns]."""
+        message = trajectory_message(new_message, stamp_ns, names, point)
+        self._write(topic, TRAJECTORY, stamp_ns, message)
 
     def write_diagnostics(self, topic: str, stamp_ns: int, entries: Iterable[Status]) -> None:
         """Write a DiagnosticArray with one status per entry, at `stamp_ns` [ns]."""
-        self._write(topic, DIAGNOSTICS, stamp_ns, diagnostics_message(stamp_ns, entries))
+        self._write(
+            topic, DIAGNOSTICS, stamp_ns, diagnostics_message(new_message, stamp_ns, entries)
+        )
 
     def flush(self) -> None:
         """Make everything written so far readable even if the process dies now."""
@@ -191,15 +166,15 @@ def _prepare(command_type: str) -> None:
 
     A node that did so while it runs would stamp the commands that wait meanwhile too late.
     """
-    names = ('joint',) if command_type in {JOINT_STATE, TRAJECTORY} else None
-    command = CommandSample(0, np.zeros(1), names)
+    kind = COMMAND_TYPES[command_type]
+    command = CommandSample(0, np.zeros(1), ('joint',) if kind.has_names else None)
     state = JointSample(0, ('joint',), np.zeros(1))
-    for kind, message in (
-        (JOINT_STATE, joint_state_message(state)),
-        (command_type, command_message(command_type, command)),
-        (TRAJECTORY, trajectory_message(0, ('joint',), TrajectoryPoint())),
-        (TEXT, text_message('')),
-        (DIAGNOSTICS, diagnostics_message(0, ())),
+    for name, message in (
+        (JOINT_STATE, joint_state_message(new_message, state)),
+        (command_type, kind.message(new_message, command)),
+        (TRAJECTORY, trajectory_message(new_message, 0, ('joint',), Point())),
+        (TEXT, new_message(TEXT, data='')),
+        (DIAGNOSTICS, diagnostics_message(new_message, 0, ())),
     ):
-        serialize(kind, message)
-        definition(kind)
+        serialize(name, message)
+        definition(name)

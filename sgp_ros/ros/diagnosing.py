@@ -12,7 +12,7 @@ from sgp_ros.diagnosis.compare.trajectory import SHORTEST_ROWS
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import CommandSample, Event, JointSample
 from sgp_ros.errors import ConfigError
-from sgp_ros.recordings.writer import Status
+from sgp_ros.recordings.messages import Status
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.robot import Robot
 from sgp_ros.ros.diagnosis_process import (

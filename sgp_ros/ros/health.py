@@ -1,4 +1,4 @@
-"""Turns what the engine counts into the statuses of /diagnostics."""
+"""Statuses of /diagnostics from what the engine counts, and of ~/parameters from what it found."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitResult
-from sgp_ros.engine.results import Counts, Estimate
+from sgp_ros.engine.results import Counts, Estimate, ParameterEstimate
 from sgp_ros.errors import MessageError
-from sgp_ros.recordings.writer import Status
+from sgp_ros.recordings.messages import Status
 from sgp_ros.ros.verdict import OK, WARN, Arrivals, judge
 
 _DURATIONS = 2000
@@ -195,3 +195,23 @@ def _flat(counts: Counts, unreadable: int) -> dict[str, int]:
 
 def _under(prefix: str, counts: Mapping[str, int]) -> dict[str, int]:
     return {n.removeprefix(prefix): count for n, count in counts.items() if n.startswith(prefix)}
+
+
+def parameter_statuses(engine: Engine) -> list[Status]:
+    """Return one status per identified coefficient, its numbers plain enough to be plotted."""
+    return [parameter_status(p, engine.robot.name) for p in engine.parameters()]
+
+
+def parameter_status(parameter: ParameterEstimate, robot: str) -> Status:
+    """Return the status of one coefficient of `robot`; no `std` where it is not identifiable."""
+    values = {'value': repr(parameter.value)}
+    if parameter.std is None:
+        message = 'not determined by the motion so far'
+    else:
+        values['std'] = repr(parameter.std)
+        message = f'{parameter.value:.6g} +- {1.96 * parameter.std:.2g} {parameter.unit} (95 %)'
+    values['unit'] = parameter.unit
+    values['identifiable'] = str(int(parameter.is_identifiable))
+    if parameter.joint is not None:
+        values['joint'] = parameter.joint
+    return Status(parameter.name, 0, message, robot, values)

@@ -20,39 +20,28 @@ from rclpy.qos import (
 )
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64, Float64MultiArray, String
+from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import ConfigError, MessageError, NumericalError
+from sgp_ros.recordings.command_types import COMMAND_TYPES, NO_COMMAND
 from sgp_ros.recordings.messages import (
-    CONVERTERS,
-    FLOAT64,
-    FLOAT64_ARRAY,
-    JOINT_STATE,
-    TRAJECTORY,
+    diagnostics_message,
     joint_sample,
+    joint_state_message,
+    trajectory_message,
 )
 from sgp_ros.recordings.predictions import Outputs, PredictionTopics
 from sgp_ros.ros.diagnosing import Diagnosing
 from sgp_ros.ros.diagnosis_process import DiagnosisFailed
-from sgp_ros.ros.node_settings import NO_COMMAND
-from sgp_ros.ros.parameter_status import parameter_statuses
+from sgp_ros.ros.health import parameter_statuses
+from sgp_ros.ros.messages import message_class, new_message
 from sgp_ros.ros.parameters import from_ros, to_ros
-from sgp_ros.ros.publications import diagnostics, joint_state, trajectory
-from sgp_ros.ros.record import Record, Topics
-from sgp_ros.ros.session import Session
+from sgp_ros.ros.session import Record, Session, Topics
 from sgp_ros.ros.start import build_engine
 from sgp_ros.ros.verdict import ERROR, WARN
-
-COMMAND_MESSAGES: dict[str, type] = {
-    FLOAT64_ARRAY: Float64MultiArray,
-    FLOAT64: Float64,
-    JOINT_STATE: JointState,
-    TRAJECTORY: JointTrajectory,
-}
-"""Setting `command.type` to the class of its messages."""
 
 _POLL_S = 0.05
 _FLUSH_S = 1.0
@@ -136,7 +125,7 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
 
         kind = str(self._settings['command.type'])
         if kind != NO_COMMAND:
-            listen(COMMAND_MESSAGES[kind], 'command', CONVERTERS[kind])
+            listen(message_class(kind), 'command', COMMAND_TYPES[kind].decode)
         listen(JointState, 'joint_states', joint_sample)
 
     def _offer_services(self) -> None:
@@ -173,9 +162,11 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
 
     def _publish(self, outputs: Outputs) -> None:
         stamp_ns, names = outputs.stamp_ns, outputs.names
-        self._prediction.publish(trajectory(stamp_ns, names, outputs.prediction))
-        self._variance.publish(trajectory(stamp_ns, names, outputs.variance))
-        self._overlay.publish(joint_state(outputs.joint_state))
+        prediction = trajectory_message(new_message, stamp_ns, names, outputs.prediction)
+        variance = trajectory_message(new_message, stamp_ns, names, outputs.variance)
+        self._prediction.publish(prediction)
+        self._variance.publish(variance)
+        self._overlay.publish(joint_state_message(new_message, outputs.joint_state))
 
     def _poll(self) -> None:
         before = self._session.engine.config
@@ -198,7 +189,7 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
         statuses = parameter_statuses(self._session.engine)
         if statuses:
             now_ns = self.get_clock().now().nanoseconds
-            self._parameters_out.publish(diagnostics(now_ns, statuses))
+            self._parameters_out.publish(diagnostics_message(new_message, now_ns, statuses))
 
     def _report(self) -> None:
         now = self._steady.now()
@@ -218,7 +209,7 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
                 self.get_logger().error(status.message, throttle_duration_sec=_QUIET_S)
         now_ns = self.get_clock().now().nanoseconds
         statuses += self._diagnosing.statuses(self.get_name())
-        self._diagnostics.publish(diagnostics(now_ns, statuses))
+        self._diagnostics.publish(diagnostics_message(new_message, now_ns, statuses))
 
     def _on_set_parameters(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
         settings = {p.name: from_ros(p) for p in parameters if p.name in self._engine_settings}

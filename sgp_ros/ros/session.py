@@ -1,22 +1,86 @@
-"""One run of an engine with its record and its fits: all that the node does beside messages."""
+"""One run of an engine with its record and its fits: all that the node does beside messages.
+
+A record holds what the engine took and gave, in order, so that a replay repeats the run. It opens
+with the settings in force, stamped one nanosecond before the first event.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from sgp_ros.engine.config import describe_settings
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitResult
 from sgp_ros.engine.results import Step
-from sgp_ros.engine.samples import Event, JointSample, SettingValue
+from sgp_ros.engine.samples import Event, JointSample, Reset, SettingsChange, SettingValue
 from sgp_ros.engine.swap import Swap
-from sgp_ros.recordings.predictions import Outputs, outputs
+from sgp_ros.recordings.command_types import FLOAT64_ARRAY, NO_COMMAND
+from sgp_ros.recordings.model_files import save_model
+from sgp_ros.recordings.predictions import Outputs, PredictionTopics, outputs, write_outputs
+from sgp_ros.recordings.writer import RecordingWriter
 from sgp_ros.ros.fit_process import FitProcess, WorkerLost
 from sgp_ros.ros.health import Health
-from sgp_ros.ros.record import Record
-from sgp_ros.ros.storage import save_model
+
+
+@dataclass(frozen=True, slots=True)
+class Topics:
+    """Full names of the topics of a node, as the record shows them."""
+
+    joint_states: str
+    command: str
+    predictions: PredictionTopics
+
+
+class Record:
+    """A growing MCAP file; what was flushed survives a crash.
+
+    Args:
+        path: of the file; missing folders are made.
+        topics: names in the file.
+        command_type: as the setting `command.type`.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+
+    def __init__(self, path: Path, topics: Topics, command_type: str) -> None:
+        self.path = path.absolute()
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        self._topics = topics
+        kind = FLOAT64_ARRAY if command_type == NO_COMMAND else command_type
+        self._writer = RecordingWriter(
+            self.path, topics.joint_states, topics.command, kind, is_live=True
+        )
+        self._is_open = False
+
+    def write_event(self, event: Event, engine: Engine) -> None:
+        """Write an event that took effect; `engine` tells the settings in force.
+
+        Changes before the first sample are part of the settings with which the record opens.
+        """
+        if not self._is_open:
+            if isinstance(event, (SettingsChange, Reset)):
+                return
+            self._is_open = True
+            opening = SettingsChange(event.stamp_ns - 1, _changeable(engine))
+            self._writer.write_event(opening)
+        self._writer.write_event(event)
+
+    def write_outputs(self, outputs: Outputs) -> None:
+        """Write what was published of one estimate."""
+        write_outputs(self._writer, self._topics.predictions, outputs)
+
+    def flush(self) -> None:
+        """Make everything written so far readable even if the process dies now."""
+        self._writer.flush()
+
+    def close(self) -> None:
+        """Complete the file."""
+        self._writer.close()
 
 
 class Session:
@@ -137,3 +201,8 @@ class Session:
             self.health.fit_since_s = None if request is None else time.perf_counter()
             if request is not None:
                 self._fits.submit(request)
+
+
+def _changeable(engine: Engine) -> dict[str, SettingValue]:
+    fixed = {s.name for s in describe_settings(engine.robot) if s.read_only}
+    return {n: v for n, v in engine.config.to_mapping().items() if n not in fixed}

@@ -16,54 +16,56 @@ import numpy as np
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
 
-from sgp_ros.engine.samples import JointSample, SettingValue
+from sgp_ros.engine.samples import CommandSample, JointSample, SettingValue
 from sgp_ros.engine.setting import Setting
 from sgp_ros.errors import MessageError
-from sgp_ros.recordings.messages import CONVERTERS, FLOAT64_ARRAY, JOINT_STATE
+from sgp_ros.recordings.command_types import COMMAND_TYPES, FLOAT64_ARRAY
+from sgp_ros.recordings.messages import joint_state_message
+from sgp_ros.ros.messages import message_class, new_message
 from sgp_ros.ros.parameters import declare
-from sgp_ros.ros.publications import header, joint_state
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.sensors import Sensors
 from sgp_ros.simulation.stepping import SimulatedSample, Simulation
 
 ROBOT = 'reaction_wheel'
 EXTERNAL = 'external'
-SETTINGS = (
-    Setting(
-        'rate', 'float', 100.0, 'Rate of states and control.',
-        unit='Hz', low=1.0, high=2000.0, read_only=True,
-    ),
-    Setting('seed', 'int', 0, 'Seed of the noise and of the motion.', low=0, read_only=True),
-    Setting(
-        'controller', 'str', 'sinusoids',
-        'Who commands; external listens to topic command instead of publishing it.',
-        choices=('sinusoids', 'balance', 'zero', EXTERNAL), read_only=True,
-    ),
-    Setting(
-        'command.type', 'str', FLOAT64_ARRAY,
-        'Message type on topic command; only JointState carries the time from which it holds.',
-        choices=(JOINT_STATE, FLOAT64_ARRAY), read_only=True,
-    ),
-    Setting(
-        'effects', 'str_array', ('',),
-        "Effects added to the truth, such as 'coulomb_friction:joint=pole,level=0.01'.",
-        read_only=True,
-    ),
-    Setting(
-        'encoder_resolution', 'float', 0.0015339807878856412, 'Step of the encoders; 0: none.',
-        unit='rad', low=0.0, high=1.0, read_only=True,
-    ),
-    Setting(
-        'publish_velocity', 'bool', default=False, description='Measure velocity as well.',
-        read_only=True,
-    ),
-)  # fmt: skip
-
 _AHEAD = 0.9
 _LONGEST_PAUSE_NS = 1_000_000_000
-_MESSAGES: dict[str, type] = {JOINT_STATE: JointState, FLOAT64_ARRAY: Float64MultiArray}
+
+
+def simulator_settings() -> tuple[Setting, ...]:
+    """Return the settings of the node."""
+    return (
+        Setting(
+            'rate', 'float', 100.0, 'Rate of states and control.',
+            unit='Hz', low=1.0, high=2000.0, read_only=True,
+        ),
+        Setting('seed', 'int', 0, 'Seed of the noise and of the motion.', low=0, read_only=True),
+        Setting(
+            'controller', 'str', 'sinusoids',
+            'Who commands; external listens to topic command instead of publishing it.',
+            choices=('sinusoids', 'balance', 'zero', EXTERNAL), read_only=True,
+        ),
+        Setting(
+            'command.type', 'str', FLOAT64_ARRAY,
+            'Message type on topic command; a header carries the time from which it holds.',
+            choices=tuple(COMMAND_TYPES), read_only=True,
+        ),
+        Setting(
+            'effects', 'str_array', ('',),
+            "Effects added to the truth, such as 'coulomb_friction:joint=pole,level=0.01'.",
+            read_only=True,
+        ),
+        Setting(
+            'encoder_resolution', 'float', 0.0015339807878856412, 'Step of the encoders; 0: none.',
+            unit='rad', low=0.0, high=1.0, read_only=True,
+        ),
+        Setting(
+            'publish_velocity', 'bool', default=False, description='Measure velocity as well.',
+            read_only=True,
+        ),
+    )  # fmt: skip
 
 
 class SimulatedRobotNode(Node):  # type: ignore[misc]  # rclpy is untyped
@@ -75,8 +77,8 @@ class SimulatedRobotNode(Node):  # type: ignore[misc]  # rclpy is untyped
 
     def __init__(self) -> None:
         super().__init__(ROBOT)
-        settings = declare(self, SETTINGS)
-        self._kind = str(settings['command.type'])
+        settings = declare(self, simulator_settings())
+        self._kind = COMMAND_TYPES[str(settings['command.type'])]
         self._is_external = settings['controller'] == EXTERNAL
         self._period_ns = round(1e9 / float(self.get_parameter('rate').value))
         self._states = self.create_publisher(JointState, 'joint_states', 10)
@@ -84,9 +86,11 @@ class SimulatedRobotNode(Node):  # type: ignore[misc]  # rclpy is untyped
         self._simulation = _simulation(settings, self._simulated_ns)
         if self._is_external:
             quality = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-            self.create_subscription(_MESSAGES[self._kind], 'command', self._obey, quality)
+            self.create_subscription(
+                message_class(self._kind.name), 'command', self._obey, quality
+            )
         else:
-            self._commands = self.create_publisher(_MESSAGES[self._kind], 'command', 10)
+            self._commands = self.create_publisher(message_class(self._kind.name), 'command', 10)
         self.create_timer(1e-9 * self._period_ns, self._step)
 
     @property
@@ -112,10 +116,11 @@ class SimulatedRobotNode(Node):  # type: ignore[misc]  # rclpy is untyped
         if not self._is_external:
             self._commands.publish(self._command(stamp_ns, sample))
         self._states.publish(
-            joint_state(
+            joint_state_message(
+                new_message,
                 JointSample(
                     stamp_ns, self._simulation.joint_names, sample.position, sample.velocity
-                )
+                ),
             )
         )
         if not self._is_external:
@@ -124,17 +129,14 @@ class SimulatedRobotNode(Node):  # type: ignore[misc]  # rclpy is untyped
             self._simulated_ns += ahead_ns
 
     def _command(self, stamp_ns: int, sample: SimulatedSample) -> Any:
-        effort = sample.command.tolist()
-        if self._kind == FLOAT64_ARRAY:
-            return Float64MultiArray(data=effort)
-        names = list(self._simulation.command_joints)
-        return JointState(header=header(stamp_ns), name=names, effort=effort)
+        names = self._simulation.command_joints if self._kind.has_names else None
+        return self._kind.message(new_message, CommandSample(stamp_ns, sample.command, names))
 
     def _obey(self, message: Any) -> None:
         """Hold a command from now on, as the receiver of a real motor would."""
         joints = self._simulation.command_joints
         try:
-            command = CONVERTERS[self._kind](message, self._now_ns)
+            command = self._kind.decode(message, self._now_ns)
         except MessageError as error:
             self.get_logger().warning(str(error), throttle_duration_sec=1.0)
             return

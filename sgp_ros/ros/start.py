@@ -1,4 +1,8 @@
-"""Builds the session of a node from its parameters."""
+"""Engine of a node, built from its parameters and warmed up.
+
+The first call of a compiled loop takes seconds, in which a queue of messages would overflow, so a
+made-up stream comes before the first message.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +10,68 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 from rclpy.node import Node
 
 from sgp_ros.engine.config import EngineConfig, describe_settings
 from sgp_ros.engine.engine import Engine
-from sgp_ros.engine.samples import SettingValue
+from sgp_ros.engine.samples import JointSample, SettingValue, frozen_array
 from sgp_ros.engine.setting import Setting
 from sgp_ros.engine.snapshots import snapshot_config
+from sgp_ros.recordings.command_types import COMMAND_TYPES, FLOAT64_ARRAY, NO_COMMAND
+from sgp_ros.recordings.model_files import load_model
 from sgp_ros.robots.registry import load_robot
-from sgp_ros.ros.node_settings import MODEL_PATH, NODE_SETTINGS, ROBOT
+from sgp_ros.robots.robot import Robot
 from sgp_ros.ros.parameters import declare
-from sgp_ros.ros.storage import load_model
-from sgp_ros.ros.warm_up import warm_up
+
+ROBOT = Setting(
+    'robot', 'str', 'reaction_wheel',
+    'Name of a built-in robot, or path of a robot YAML or URDF.', read_only=True,
+)  # fmt: skip
+MODEL_PATH = Setting(
+    'model.path', 'str', '',
+    'Saved model (.npz) to go on from, with its settings where none are given; empty: none.',
+    read_only=True,
+)  # fmt: skip
+
+_PERIOD_NS = 1_000_000
+_SAMPLES = 40
+
+
+def node_settings() -> tuple[Setting, ...]:
+    """Return the settings of the node that are none of the engine, beside robot and model."""
+    return (
+        Setting(
+            'command.type', 'str', FLOAT64_ARRAY,
+            'Message type on topic command; none: the effort comes in the joint states.',
+            choices=(NO_COMMAND, *COMMAND_TYPES), read_only=True,
+        ),
+        Setting(
+            'qos.depth', 'int', 200, 'Messages kept for the node while it is busy.',
+            low=1, high=100_000, read_only=True,
+        ),
+        Setting(
+            'record.path', 'str', '',
+            'MCAP file for what the node consumes and predicts; empty: no record.', read_only=True,
+        ),
+        Setting(
+            'save.path', 'str', '',
+            'File (.npz) that service save writes; empty: <node name>.npz where the node started.',
+        ),
+        Setting(
+            'diagnostics.period', 'float', 1.0, 'Time between two messages on /diagnostics.',
+            unit='s', low=0.1, high=3600.0, read_only=True,
+        ),
+        Setting(
+            'diagnosis.window', 'float', 60.0,
+            'How much of the past is kept for service diagnose.',
+            unit='s', low=1.0, high=3600.0, read_only=True,
+        ),
+        Setting(
+            'parameters.period', 'float', 1.0, 'Time between two messages on ~/parameters.',
+            unit='s', low=0.02, high=3600.0, read_only=True,
+        ),
+    )  # fmt: skip
 
 
 def build_engine(node: Node) -> tuple[Engine, dict[str, SettingValue]]:
@@ -37,7 +91,7 @@ def build_engine(node: Node) -> tuple[Engine, dict[str, SettingValue]]:
     given = declare(node, _with_defaults((kernel,), saved))  # it names the hyper-parameters
     settings = describe_settings(robot, str(given['model.kernel']))
     rest = [setting for setting in settings if setting.name != kernel.name]
-    given |= declare(node, (*NODE_SETTINGS, *_with_defaults(rest, saved)))
+    given |= declare(node, (*node_settings(), *_with_defaults(rest, saved)))
     names = {setting.name for setting in settings}
     config = EngineConfig.from_mapping({n: v for n, v in given.items() if n in names}, robot)
     warm_up(robot)
@@ -55,3 +109,23 @@ def _with_defaults(
     settings: Iterable[Setting], values: Mapping[str, SettingValue]
 ) -> list[Setting]:
     return [replace(s, default=values.get(s.name, s.default)) for s in settings]
+
+
+def warm_up(robot: Robot) -> None:
+    """Run a short made-up stream through an engine that is then thrown away."""
+    values: dict[str, object] = {
+        'filter.window': 0.008, 'filter.hop': 0.0, 'buffer.budget': 4, 'learning.initial': 4,
+    }  # fmt: skip
+    for joint in robot.joint_names:
+        values[f'hyper.{joint}.signal_variance'] = 1.0
+        values[f'hyper.{joint}.noise_variance'] = 1.0
+    engine = Engine(robot, EngineConfig.from_mapping(values, robot))
+    rng = np.random.default_rng(0)
+    k = len(robot.joints)
+    for i in range(_SAMPLES):
+        position, effort = rng.normal(size=(2, k))
+        sample = JointSample(
+            i * _PERIOD_NS, robot.joint_names, frozen_array(position), effort=frozen_array(effort)
+        )
+        engine.push(sample)
+    engine.flush()

@@ -10,9 +10,9 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from sgp_ros.engine.samples import CommandSample
 from sgp_ros.errors import MessageError
-from sgp_ros.recordings.messages import CONVERTERS, joint_sample
-from sgp_ros.recordings.outgoing import command_message
-from sgp_ros.recordings.typestore import decoder, serialize
+from sgp_ros.recordings.command_types import COMMAND_TYPES
+from sgp_ros.recordings.messages import joint_sample
+from sgp_ros.recordings.typestore import decoder, new_message, serialize
 from test.recordings.worlds import exact
 
 
@@ -88,12 +88,12 @@ def test_samples_do_not_share_memory_with_the_message():
 
 
 def test_every_converter_has_an_example_here():
-    assert set(COMMANDS) == set(CONVERTERS)
+    assert set(COMMANDS) == set(COMMAND_TYPES)
 
 
 @pytest.mark.parametrize('kind', COMMANDS)
 def test_converter_keeps_numbers_names_and_time(kind):
-    sample = CONVERTERS[kind](COMMANDS[kind], 7)
+    sample = COMMAND_TYPES[kind].decode(COMMANDS[kind], 7)
     assert sample.effort.tolist() == [5.0, 6.0][: len(sample.effort)]
     has_header = kind in {'sensor_msgs/JointState', 'trajectory_msgs/JointTrajectory'}
     assert sample.names == (('a', 'b') if has_header else None)
@@ -102,9 +102,11 @@ def test_converter_keeps_numbers_names_and_time(kind):
 
 @pytest.mark.parametrize('kind', COMMANDS)
 def test_rclpy_and_rosbags_messages_give_the_same_sample(kind):
-    live = CONVERTERS[kind](COMMANDS[kind], 7)
-    replayed = decoder(kind, 'cdr')(serialize(kind, command_message(kind, live)))
-    assert exact(CONVERTERS[kind](replayed, 7)) == exact(live)
+    live = COMMAND_TYPES[kind].decode(COMMANDS[kind], 7)
+    replayed = decoder(kind, 'cdr')(
+        serialize(kind, COMMAND_TYPES[kind].message(new_message, live))
+    )
+    assert exact(COMMAND_TYPES[kind].decode(replayed, 7)) == exact(live)
 
 
 @pytest.mark.parametrize(
@@ -119,14 +121,17 @@ def test_rclpy_and_rosbags_messages_give_the_same_sample(kind):
 )
 def test_command_without_one_effort_per_joint_is_refused(kind, message):
     with pytest.raises(MessageError):
-        CONVERTERS[kind](message, 7)
+        COMMAND_TYPES[kind].decode(message, 7)
 
 
 def test_command_that_the_type_cannot_hold_is_a_mistake_of_the_caller():
-    with pytest.raises(ValueError, match='without joint names'):
-        command_message('sensor_msgs/JointState', CommandSample(1, np.ones(1)))
-    with pytest.raises(ValueError, match='with joint names'):
-        command_message('std_msgs/Float64', CommandSample(1, np.ones(1), ('a',)))
+    for kind, command, said in (
+        ('sensor_msgs/JointState', CommandSample(1, np.ones(1)), 'without joint names'),
+        ('std_msgs/Float64', CommandSample(1, np.ones(1), ('a',)), 'with joint names'),
+        ('std_msgs/Float64', CommandSample(1, np.ones(2)), '2 numbers'),
+    ):
+        with pytest.raises(ValueError, match=said):
+            COMMAND_TYPES[kind].message(new_message, command)
 
 
 def test_bytes_that_are_no_message_are_refused():

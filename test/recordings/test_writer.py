@@ -14,9 +14,9 @@ from rosbags.highlevel import AnyReader
 
 from sgp_ros.engine.samples import JointSample
 from sgp_ros.errors import MessageError
-from sgp_ros.recordings.changes import change_from_text, change_to_text
+from sgp_ros.recordings.messages import Point, Status, change_from_text, change_to_text
 from sgp_ros.recordings.reader import open_recording
-from sgp_ros.recordings.writer import RecordingWriter, Status
+from sgp_ros.recordings.writer import RecordingWriter
 from test.recordings import worlds
 
 COMMANDS = {
@@ -67,9 +67,8 @@ def _write_all(path):
             writer.write_event(event)
         sample = JointSample(10**9, ('pole',), worlds.array([1.0]), None, worlds.array([2.0]))
         writer.write_joint_state('/sgp/predicted_joint_states', sample)
-        writer.write_trajectory_point(
-            '/sgp/prediction', 10**9, ('pole',), [1.0], [2.0], worlds.array([3.0]), [4.0]
-        )
+        point = Point(*(worlds.array([x]) for x in (1.0, 2.0, 3.0, 4.0)))
+        writer.write_trajectory('/sgp/prediction', 10**9, ('pole',), point)
         status = Status('fit', 1, 'short of data', 'pole', {'value': '1.5', 'unit': 'kg'})
         writer.write_diagnostics('/diagnostics', 10**9, [status])
 

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
 
 from sgp_ros.engine.samples import CommandSample, Event, JointSample, Reset, SettingsChange
-from sgp_ros.recordings.outgoing import command_message, joint_state_message
+from sgp_ros.recordings.command_types import COMMAND_TYPES
+from sgp_ros.recordings.messages import joint_state_message
 from sgp_ros.recordings.reader import Recording
-from sgp_ros.recordings.typestore import definition, full_type, serialize
+from sgp_ros.recordings.typestore import definition, full_type, new_message, serialize
 from sgp_ros.recordings.writer import RecordingWriter
 
 DATA = Path(__file__).parents[2] / '..' / 'shared' / 'data'
@@ -102,9 +103,10 @@ def message_of(event: JointSample | CommandSample) -> tuple[str, str, bytes]:
     """Return topic, short type and CDR bytes of an event of `swing`."""
     if isinstance(event, JointSample):
         kind = 'sensor_msgs/JointState'
-        return '/joint_states', kind, serialize(kind, joint_state_message(event))
+        return '/joint_states', kind, serialize(kind, joint_state_message(new_message, event))
     kind = 'std_msgs/Float64MultiArray'
-    return '/command', kind, serialize(kind, command_message(kind, event))
+    message = COMMAND_TYPES[kind].message(new_message, event)
+    return '/command', kind, serialize(kind, message)
 
 
 def write_chunks(path: Path, chunks: list[list[Event]], *, unchunked: bool = False) -> Path:

@@ -6,7 +6,8 @@ import numpy as np
 from sensor_msgs.msg import JointState
 
 from sgp_ros.engine.samples import JointSample
-from sgp_ros.ros.publications import header, joint_state
+from sgp_ros.recordings.messages import header, joint_state_message
+from sgp_ros.ros.messages import new_message
 from sgp_ros.simulation.assembly import make_simulation
 from test.ros.graph import Graph
 
@@ -29,12 +30,13 @@ class Stream:
         sample = self._simulation.step()
         self.commands.publish(
             JointState(
-                header=header(sample.stamp_ns), name=['wheel'], effort=sample.command.tolist()
+                header=header(new_message, sample.stamp_ns),
+                name=['wheel'],
+                effort=sample.command.tolist(),
             )
         )
-        return joint_state(
-            JointSample(sample.stamp_ns, self._simulation.joint_names, sample.position)
-        )
+        state = JointSample(sample.stamp_ns, self._simulation.joint_names, sample.position)
+        return joint_state_message(new_message, state)
 
     def publish(self, count: int) -> list[JointState]:
         """Publish that many samples and return the states."""

@@ -15,8 +15,9 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from sgp_ros.engine.samples import CommandSample, JointSample
+from sgp_ros.recordings.messages import header
 from sgp_ros.recordings.reader import open_recording
-from sgp_ros.ros.publications import header
+from sgp_ros.ros.messages import new_message
 from test.ros.graph import Graph, NodeProcess
 
 CASE = Path(__file__).parents[2].parent / 'shared' / 'practice' / 'cases' / 'case_32'
@@ -87,14 +88,14 @@ def _publish_until_read(graph: Graph, publisher: Any, message: JointState, key: 
 
 def _command(event: CommandSample) -> JointState:
     names = event.names or ('shoulder', 'elbow')
-    stamp = header(event.stamp_ns)
+    stamp = header(new_message, event.stamp_ns)
     return JointState(header=stamp, name=list(names), effort=event.effort.tolist())
 
 
 def _state(event: JointSample) -> JointState:
     velocity = [] if event.velocity is None else event.velocity.tolist()
     return JointState(
-        header=header(event.stamp_ns), name=list(event.names),
+        header=header(new_message, event.stamp_ns), name=list(event.names),
         position=event.position.tolist(), velocity=velocity,
     )  # fmt: skip
 
@@ -155,8 +156,9 @@ def test_a_diagnosis_that_fails_says_why(graph: Graph) -> None:
     states = graph.client.create_publisher(JointState, '/joint_states', 1000)
     graph.wait_until(states.get_subscription_count, 'the node')
     for i in range(200):
-        states.publish(JointState(header=header(10**18 + i * 10**7), name=['shoulder', 'elbow'],
-                                  position=[0.01 * i, 0.0]))  # fmt: skip
+        stamp = header(new_message, 10**18 + i * 10**7)
+        names, position = ['shoulder', 'elbow'], [0.01 * i, 0.0]
+        states.publish(JointState(header=stamp, name=names, position=position))
         graph.turn(0.001)
     graph.wait_until(lambda: graph.count('read') > 100, 'states')
     assert graph.call(Trigger, DIAGNOSE).success

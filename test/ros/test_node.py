@@ -294,7 +294,7 @@ def test_a_record_survives_a_killed_node(graph: Graph, tmp_path: Path) -> None:
         ({'filter__window': 1}, 'filter.window'),
         ({'filter__window': -1.0, 'buffer__budget': 1}, '2 wrong parameters'),
         ({'command__type': 'std_msgs/Bool'}, 'command.type'),
-        ({'model__path': '/no/model.npz'}, 'no file /no/model.npz'),
+        ({'model__path': '/no/model.npz'}, 'no model file /no/model.npz'),
     ],
 )
 def test_a_node_that_cannot_start_says_why_in_one_line(

@@ -11,10 +11,10 @@ from rclpy.parameter import Parameter
 from sgp_ros.engine.config import EngineConfig, describe_settings
 from sgp_ros.engine.setting import Setting
 from sgp_ros.robots.registry import ROBOTS, load_robot
-from sgp_ros.ros.node_settings import NODE_SETTINGS, ROBOT
 from sgp_ros.ros.parameters import descriptor, from_ros, to_ros
+from sgp_ros.ros.start import ROBOT, node_settings
 
-SETTINGS = (ROBOT, *NODE_SETTINGS, *describe_settings(ROBOTS['reaction_wheel']))
+SETTINGS = (ROBOT, *node_settings(), *describe_settings(ROBOTS['reaction_wheel']))
 CONFIG = Path(__file__).parents[2] / 'config'
 
 
@@ -51,7 +51,7 @@ def test_a_shipped_file_configures_the_robot_of_its_name(path: Path) -> None:
     given = _flat('', document['/**']['ros__parameters'])
     robot = given.pop('robot')
     assert Path(robot).stem == path.stem
-    known = {setting.name: setting for setting in NODE_SETTINGS}
+    known = {setting.name: setting for setting in node_settings()}
     for name in set(given) & set(known):
         assert known[name].problem(given.pop(name)) is None
     found = load_robot(robot if robot in ROBOTS else str(CONFIG.parent / robot))

@@ -23,13 +23,12 @@ from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitRequest, FitResult, fit
 from sgp_ros.engine.samples import CommandSample, Event, JointSample, SettingsChange
 from sgp_ros.errors import ConfigError
+from sgp_ros.recordings.model_files import load_model, save_model
 from sgp_ros.recordings.predictions import PredictionTopics
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.ros.fit_process import FitProcess, WorkerLost
-from sgp_ros.ros.record import Record, Topics
-from sgp_ros.ros.session import Session
-from sgp_ros.ros.storage import load_model, save_model
+from sgp_ros.ros.session import Record, Session, Topics
 from sgp_ros.simulation.assembly import make_simulation
 
 ROOT = Path(__file__).parents[2]

@@ -6,17 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64, Float64MultiArray
-from trajectory_msgs.msg import JointTrajectory
 
 from sgp_ros.engine.results import Channel, Estimate, ParameterEstimate
-from sgp_ros.recordings.messages import CONVERTERS, joint_sample
+from sgp_ros.recordings.messages import (
+    Status,
+    diagnostics_message,
+    joint_sample,
+    joint_state_message,
+    trajectory_message,
+)
 from sgp_ros.recordings.predictions import outputs
-from sgp_ros.recordings.writer import Status
-from sgp_ros.ros.identification import COMMAND_MESSAGES
-from sgp_ros.ros.parameter_status import parameter_status
-from sgp_ros.ros.publications import diagnostics, joint_state, trajectory
+from sgp_ros.ros.health import parameter_status
+from sgp_ros.ros.messages import new_message
 
 STAMP_NS = 1_700_000_000_123_456_789
 NAN = float('nan')
@@ -37,7 +38,7 @@ def _estimate(acceleration: Sequence[float], effort: Sequence[float]) -> Estimat
 def test_a_prediction_holds_query_and_means_at_the_stamp_of_its_sample() -> None:
     found = outputs(_estimate([3.0, 4.0], [NAN, 5.0]))
     assert found is not None
-    message = trajectory(found.stamp_ns, found.names, found.prediction)
+    message = trajectory_message(new_message, found.stamp_ns, found.names, found.prediction)
     assert (message.header.stamp.sec, message.header.stamp.nanosec) == (1_700_000_000, 123_456_789)
     assert list(message.joint_names) == ['pole', 'wheel']
     (point,) = message.points
@@ -50,7 +51,7 @@ def test_a_prediction_holds_query_and_means_at_the_stamp_of_its_sample() -> None
 def test_a_variance_has_no_query() -> None:
     found = outputs(_estimate([3.0, 4.0], [0.5, 5.0]))
     assert found is not None
-    (point,) = trajectory(found.stamp_ns, found.names, found.variance).points
+    (point,) = trajectory_message(new_message, found.stamp_ns, found.names, found.variance).points
     assert [len(point.positions), len(point.velocities)] == [0, 0]
     assert list(point.accelerations) == [3.0, 4.0]
     assert list(point.effort) == [0.5, 5.0]
@@ -60,7 +61,7 @@ def test_a_channel_that_the_robot_lacks_stays_empty() -> None:
     found = outputs(_estimate([3.0, 4.0], [NAN, NAN]))
     assert found is not None
     assert len(found.prediction.effort) == len(found.variance.effort) == 0
-    assert len(joint_state(found.joint_state).effort) == 0
+    assert len(joint_state_message(new_message, found.joint_state).effort) == 0
 
 
 def test_nothing_is_published_before_there_is_a_model() -> None:
@@ -70,14 +71,16 @@ def test_nothing_is_published_before_there_is_a_model() -> None:
 def test_a_published_state_reads_back_as_the_same_sample() -> None:
     found = outputs(_estimate([3.0, 4.0], [1.5, 5.0]))
     assert found is not None
-    again = joint_sample(joint_state(found.joint_state), 0)
+    again = joint_sample(joint_state_message(new_message, found.joint_state), 0)
     assert (again.stamp_ns, again.names) == (STAMP_NS, ('pole', 'wheel'))
     np.testing.assert_array_equal(again.velocity, found.joint_state.velocity)
     np.testing.assert_array_equal(again.effort, [1.5, 5.0])
 
 
 def test_diagnostics_keep_level_and_values() -> None:
-    (status,) = diagnostics(STAMP_NS, [Status('a', 2, 'b', 'c', {'d': '1'})]).status
+    (status,) = diagnostics_message(
+        new_message, STAMP_NS, [Status('a', 2, 'b', 'c', {'d': '1'})]
+    ).status
     assert (status.level, status.name, status.message) == (b'\x02', 'a', 'b')
     assert [(entry.key, entry.value) for entry in status.values] == [('d', '1')]
 
@@ -89,13 +92,3 @@ def test_a_parameter_is_a_number_that_tools_can_plot(std: float | None) -> None:
     assert float(status.values['value']) == 43.1
     assert ('std' in status.values) is (std is not None)
     assert status.values['unit'] == 'rad/s^2'
-
-
-def test_every_converter_has_its_message_class() -> None:
-    assert {
-        'std_msgs/Float64MultiArray': Float64MultiArray,
-        'std_msgs/Float64': Float64,
-        'sensor_msgs/JointState': JointState,
-        'trajectory_msgs/JointTrajectory': JointTrajectory,
-    } == COMMAND_MESSAGES
-    assert set(COMMAND_MESSAGES) == set(CONVERTERS)

@@ -1,0 +1,149 @@
+"""Message types that commands come in: one entry says how its messages are read and written.
+
+To teach the package another type, add its entry to `COMMAND_TYPES`: recordings with such commands
+are then read and written, and the node subscribes to them, since its setting `command.type` offers
+what the table holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sgp_ros.engine.samples import CommandSample, frozen_array
+from sgp_ros.errors import MessageError
+from sgp_ros.recordings.messages import (
+    JOINT_STATE,
+    Make,
+    Message,
+    Point,
+    header,
+    joint_names,
+    matching,
+    stamp_ns,
+    trajectory_message,
+)
+
+FLOAT64 = 'std_msgs/Float64'
+FLOAT64_ARRAY = 'std_msgs/Float64MultiArray'
+TRAJECTORY = 'trajectory_msgs/JointTrajectory'
+
+NO_COMMAND = 'none'
+"""In the place of a topic or type: no commands, the effort comes in the joint states."""
+
+
+@dataclass(frozen=True, slots=True)
+class CommandType:
+    """A message type that commands come in.
+
+    The definition in a recording and the class in a node follow from its name.
+
+    Attributes:
+        name: `package/Type`.
+        has_names: whether its messages name joints; commands without names go by the order of
+            the robot's command joints.
+        decode: returns the sample of a message, from the message and its time of receipt [ns];
+            raises a `MessageError` for a message without one effort per joint. It keeps the stamp
+            of a header; a type without takes the time of receipt.
+        encode: returns the message of a sample; what makes messages comes first, so that one
+            encoder serves rosbags and rclpy. Raises a `ValueError` for what the type cannot hold.
+
+    >>> from sgp_ros.recordings.typestore import new_message
+    >>> number = CommandType(
+    ...     'std_msgs/Float32',
+    ...     has_names=False,
+    ...     decode=lambda message, received_ns: CommandSample(
+    ...         received_ns, frozen_array((message.data,))
+    ...     ),
+    ...     encode=lambda make, command: make('std_msgs/Float32', data=command.effort[0]),
+    ... )
+    >>> message = number.message(new_message, CommandSample(5, frozen_array([0.25])))
+    >>> number.decode(message, 7).effort
+    array([0.25])
+    """
+
+    name: str
+    has_names: bool
+    decode: Callable[[Message, int], CommandSample]
+    encode: Callable[[Make, CommandSample], Message]
+
+    def message(self, make: Make, command: CommandSample) -> Message:
+        """Return `command` as a message of this type, made by `make`.
+
+        Raises:
+            ValueError: names where the type has none, no names where it needs them, or more
+                numbers than it holds.
+        """
+        if (command.names is None) is self.has_names:
+            how = 'without' if command.names is None else 'with'
+            msg = f'command {how} joint names as {self.name}'
+            raise ValueError(msg)
+        return self.encode(make, command)
+
+
+def _decode_array(message: Message, receipt_ns: int) -> CommandSample:
+    if not len(message.data):
+        raise MessageError('command without a number', 'one number per commanded joint')
+    return CommandSample(receipt_ns, frozen_array(message.data))
+
+
+def _encode_array(make: Make, command: CommandSample) -> Message:
+    layout = make('std_msgs/MultiArrayLayout', dim=[], data_offset=0)
+    return make(FLOAT64_ARRAY, layout=layout, data=command.effort)
+
+
+def _decode_number(message: Message, receipt_ns: int) -> CommandSample:
+    return CommandSample(receipt_ns, frozen_array((message.data,)))
+
+
+def _encode_number(make: Make, command: CommandSample) -> Message:
+    if len(command.effort) != 1:
+        msg = f'command of {len(command.effort)} numbers as {FLOAT64}'
+        raise ValueError(msg)
+    return make(FLOAT64, data=float(command.effort[0]))
+
+
+def _decode_joint_state(message: Message, receipt_ns: int) -> CommandSample:
+    names = joint_names(message.name)
+    effort = matching(message.effort, names, 'effort')
+    return CommandSample(stamp_ns(message, receipt_ns), effort, names)
+
+
+def _encode_joint_state(make: Make, command: CommandSample) -> Message:
+    none = np.zeros(0)
+    return make(
+        JOINT_STATE,
+        header=header(make, command.stamp_ns),
+        name=list(command.names or ()),
+        position=none,
+        velocity=none,
+        effort=command.effort,
+    )
+
+
+def _decode_trajectory(message: Message, receipt_ns: int) -> CommandSample:
+    """Return the first point; it counts from the stamp on."""
+    names = joint_names(message.joint_names)
+    if not len(message.points):
+        raise MessageError('trajectory without a point', 'effort in its first point')
+    effort = matching(message.points[0].effort, names, 'effort of the first point')
+    return CommandSample(stamp_ns(message, receipt_ns), effort, names)
+
+
+def _encode_trajectory(make: Make, command: CommandSample) -> Message:
+    point = Point(effort=command.effort)
+    return trajectory_message(make, command.stamp_ns, command.names or (), point)
+
+
+COMMAND_TYPES = {
+    kind.name: kind
+    for kind in (
+        CommandType(FLOAT64_ARRAY, False, _decode_array, _encode_array),  # noqa: FBT003 - a column
+        CommandType(FLOAT64, False, _decode_number, _encode_number),  # noqa: FBT003 - of a table
+        CommandType(JOINT_STATE, True, _decode_joint_state, _encode_joint_state),  # noqa: FBT003
+        CommandType(TRAJECTORY, True, _decode_trajectory, _encode_trajectory),  # noqa: FBT003
+    )
+}
+"""Name to the type, in the order in which the node's setting `command.type` offers them."""

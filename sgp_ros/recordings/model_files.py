@@ -1,0 +1,143 @@
+"""Files of saved models and of settings: written whole or not at all, read with every check.
+
+Settings stand in ROS 2 parameter files, the same for the node and for the commands.
+"""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import yaml
+
+import sgp_ros
+from sgp_ros.engine.samples import SettingValue
+from sgp_ros.errors import ConfigError
+
+NODE_ONLY = frozenset({
+    'command.type', 'diagnostics.period', 'model.path', 'parameters.period', 'qos.depth',
+    'record.path', 'robot', 'save.path', 'start_type_description_service', 'use_sim_time',
+})  # fmt: skip
+"""Parameters of the node that mean nothing to a command; a test holds them to the node's."""
+
+_EXPECTED = 'a ROS 2 parameter file: /**: ros__parameters: name: value'
+
+
+def save_model(
+    path: Path,
+    snapshot: Mapping[str, np.ndarray],
+    settings: Mapping[str, SettingValue] | None = None,
+) -> None:
+    """Write the snapshot (.npz) and, beside it, the settings as a parameter file (.yaml).
+
+    Args:
+        path: of the .npz; missing folders are made.
+        snapshot: arrays without objects.
+        settings: by dotted name; None writes no parameter file.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if settings is not None:
+        text = yaml.safe_dump(_parameter_file(settings), sort_keys=False)
+        _replace(path.with_suffix('.yaml'), lambda file: file.write(text.encode()))
+    arrays: dict[str, Any] = dict(snapshot)
+    _replace(path, lambda file: np.savez(file, **arrays))
+
+
+def load_model(path: Path) -> dict[str, np.ndarray]:
+    """Read a saved snapshot.
+
+    Raises:
+        ConfigError: no such file, or none that `save_model` wrote.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return {name: file[name] for name in file.files}
+    except FileNotFoundError as error:
+        raise ConfigError(
+            f'no model file {path}', 'a model.npz of `sgp replay` or ~/save'
+        ) from error
+    except (ValueError, EOFError, AttributeError, OSError, zipfile.BadZipFile) as error:
+        raise ConfigError(
+            f'{path} is no saved model', 'a model.npz of `sgp replay` or ~/save'
+        ) from error
+
+
+def load_parameters(path: str | Path) -> dict[str, object]:
+    """Return the settings of a ROS 2 parameter file by dotted name.
+
+    Raises:
+        ConfigError: no such file, no YAML, or another structure; all problems in one error.
+    """
+    source = Path(path)
+    if not source.is_file():
+        raise ConfigError(f'no parameter file {source}', _EXPECTED)
+    try:
+        document = yaml.safe_load(source.read_text(encoding='utf-8'))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ConfigError(f'{source} is not YAML ({error})', _EXPECTED) from error
+    if not isinstance(document, dict):
+        raise ConfigError(f'{source} holds {type(document).__name__}', _EXPECTED)
+    settings: dict[str, object] = {}
+    problems: list[str] = []
+    for section, body in document.items():
+        if not isinstance(body, dict) or not isinstance(body.get('ros__parameters'), dict):
+            problems.append(f'section {section!r} has no ros__parameters')
+            continue
+        _flatten('', body['ros__parameters'], settings)
+    if problems:
+        raise ConfigError(f'{source}: ' + ' | '.join(problems), _EXPECTED)
+    return {
+        name: value
+        for name, value in settings.items()
+        if name not in NODE_ONLY and not name.startswith('qos_overrides.')
+    }
+
+
+def find_shipped(name: str) -> Path | None:
+    """Return a file of `config/`, from the source tree or from where it was installed."""
+    package = Path(sgp_ros.__file__).parent
+    folders = [package.parent / 'config']
+    # <prefix>/lib/python3.X/site-packages/sgp_ros with share/ beside lib/, for pip and colcon.
+    folders += [parent / 'share' / 'sgp_ros' / 'config' for parent in package.parents[2:5]]
+    return next((folder / name for folder in folders if (folder / name).is_file()), None)
+
+
+def _flatten(prefix: str, entries: dict[Any, Any], settings: dict[str, object]) -> None:
+    for key, value in entries.items():
+        name = f'{prefix}{key}'
+        if isinstance(value, dict):
+            _flatten(f'{name}.', value, settings)
+        else:
+            settings[name] = value
+
+
+def _parameter_file(settings: Mapping[str, SettingValue]) -> dict[str, object]:
+    tree: dict[str, object] = {}
+    for name, value in settings.items():
+        *parents, last = name.split('.')
+        branch = tree
+        for parent in parents:
+            child = branch.setdefault(parent, {})
+            assert isinstance(child, dict)
+            branch = child
+        branch[last] = list(value) if isinstance(value, tuple) else value
+    return {'/**': {'ros__parameters': tree}}
+
+
+def _replace(path: Path, write: Callable[[BinaryIO], object]) -> None:
+    part = path.with_name(f'{path.name}.{os.getpid()}.part')
+    try:
+        with part.open('wb') as file:
+            write(file)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
