@@ -13,7 +13,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from sgp_ros.diagnosis.decide.decision import LEAST_SHARE
 from sgp_ros.diagnosis.result import Equivalent
-from sgp_ros.report.diagnosis_text import EFFECT_NAMES, equivalence_sentence, percent
+from sgp_ros.report.diagnosis_text import equivalence_sentence, percent, plain_name
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / 'docs'
@@ -56,7 +56,7 @@ def worst(machine):
 
 def named(machine):
     """Return what a diagnosis names, each effect once."""
-    names = [EFFECT_NAMES[f['effect']] for f in machine['findings'] if f['effect'] != 'unknown']
+    names = [plain_name(f['effect']) for f in machine['findings'] if f['effect'] != 'unknown']
     return ', '.join(dict.fromkeys(names)) or 'nothing'
 
 
@@ -68,7 +68,7 @@ def effects(machine):
             numbers = ', '.join(
                 f'{key.replace("_", " ")} {quantity(p)}' for key, p in f['parameters'].items()
             )
-            cells = (kind, f['joint'], EFFECT_NAMES[f['effect']], numbers or f['why'])
+            cells = (kind, f['joint'], plain_name(f['effect']), numbers or f['why'])
             lines.append(f'| {" | ".join(cells)} | {f["probability"]:.2f} |')
     return '\n'.join(lines)
 
@@ -133,7 +133,7 @@ def nearest(machine):
     """Return the best model that was not asserted, and the share of the effort that it leaves."""
     top = machine['alternatives'][0]
     together = [
-        f'{EFFECT_NAMES[f["effect"]]} on {f["joint"]}'
+        f'{plain_name(f["effect"])} on {f["joint"]}'
         for f in machine['alternatives']
         if f['log_bayes_factor'] == top['log_bayes_factor']
     ]

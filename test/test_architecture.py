@@ -21,7 +21,7 @@ MESSAGES = {
 LAYERS = {
     'errors': set(),
     'gp': NUMERIC | {'numba', 'errors'},
-    'physics': {'numpy', 'numba', 'rigid', 'errors'},
+    'physics': {'numpy', 'numba', 'errors'},
     'rigid': NUMERIC | {'numba', 'pinocchio', 'clarabel', 'gp', 'physics', 'errors'},
     'robots': {'numpy', 'yaml', 'physics', 'rigid', 'errors'},
     'simulation': NUMERIC | {'mujoco', 'errors'},

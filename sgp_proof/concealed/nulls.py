@@ -34,6 +34,7 @@ from sgp_ros.diagnosis.decide.decision import Scale, decide
 from sgp_ros.diagnosis.decide.referee import structure
 from sgp_ros.diagnosis.explain.hypotheses import compete
 from sgp_ros.diagnosis.places import joint_name
+from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import nominal_tree
@@ -42,7 +43,7 @@ from sgp_ros.simulation.registry import EFFECTS
 NOTHING, PARAMETERS, SLIGHT = 'nothing', 'wrong parameters', 'slight unlisted effect'
 LISTED, UNLISTED = 'one effect of the list', 'unlisted effect'
 KINDS = (NOTHING, PARAMETERS, SLIGHT, LISTED, UNLISTED)
-NAMES = tuple(name for name in EFFECTS if name != 'velocity_filter_lag')
+NAMES = tuple(name for name in EFFECTS if name != VELOCITY_FILTER_LAG.name)
 """What is concealed as one effect; the lag of a sensor's velocity does not compete."""
 _CONCEALED = {SLIGHT: (2e-4, 3e-3), LISTED: (0.006, 0.2), UNLISTED: (0.006, 0.2)}
 """Range of the share of the squared effort that a concealed effect makes."""

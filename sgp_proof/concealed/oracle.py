@@ -15,8 +15,9 @@ command add up, as in the diagnosis; in the simulation a dead zone sees what a d
 
 from __future__ import annotations
 
+import copy
 import csv
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,24 +28,13 @@ from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
-from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
+from sgp_ros.diagnosis.explain.suspects import Columns
 from sgp_ros.diagnosis.places import joint_name
 from sgp_ros.diagnosis.prove.final_model import FinalModel
-from sgp_ros.physics.catalogue import EFFECTS
-from sgp_ros.physics.effect import (
-    Effect,
-    Fitted,
-    Place,
-    always,
-    every_joint,
-    named,
-    no_shape,
-)
-from sgp_ros.physics.stated import (
-    VELOCITY_FILTER_LAG,
-    place_of,
-    shape_and_coefficients,
-)
+from sgp_ros.physics.catalogue import BACKLASH, EFFECTS
+from sgp_ros.physics.effect import Effect
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place, Quantity
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import nominal_tree
@@ -87,10 +77,10 @@ class Oracle:
         """Return its effects as `diagnosis.json` has them."""
         model, found = self.final.model, []
         motion = model.frame.equations.motion
-        for suspect, c in zip(model.suspects, model.coefficients, strict=True):
-            numbers = suspect.effect.report(Fitted(motion, suspect.place, suspect.shape, c))
+        for suspect in model.suspects:
+            numbers = suspect.report(motion)
             found.append({
-                'effect': suspect.effect.name, 'joint': joint_name(motion, suspect.place.joint),
+                'effect': suspect.name, 'joint': joint_name(motion, suspect.place.joint),
                 'parameters': {name: {'value': value} for name, value in numbers.items()},
             })  # fmt: skip
         return found
@@ -167,7 +157,8 @@ def suspects(answer, motion):
     """Return the effects of an answer where they act, with their true shapes."""
     return tuple(
         _suspect(effect, motion)
-        for effect in answer['effects'] if effect['effect'] != VELOCITY_FILTER_LAG
+        for effect in answer['effects']
+        if effect['effect'] not in EFFECTS or EFFECTS[effect['effect']].is_force
     )  # fmt: skip
 
 
@@ -175,19 +166,18 @@ def _suspect(effect, motion):
     name, numbers, tree = effect['effect'], effect['parameters'], motion.tree
     if name == 'unknown':
         joint = tree.moving_names.index(effect['joint'])
-        return Suspect(unlisted(joint, numbers, tree.moving_names), Place(joint), np.zeros(0))
-    words = {word: numbers[word] for word in _WORDS if word in numbers}
-    place = place_of(name, effect['joint'], words, numbers, tree)
-    shape, _ = shape_and_coefficients(name, place.kind, numbers)
-    if name == 'backlash':
-        shape[0] = numbers['motor_inertia'] / motion.mass_diagonal[:, place.joint].mean()
-    return Suspect(_reaching(EFFECTS[name], shape), place, shape)
+        return EffectAt(Unlisted(joint, numbers, tree.moving_names), Place(joint))
+    stated = {k: x for k, x in numbers.items() if k in _WORDS or not isinstance(x, str)}
+    found = EffectAt.stated(EFFECTS[name], effect['joint'], stated, tree)
+    if found.effect is BACKLASH:
+        share = numbers['motor_inertia'] / motion.mass_diagonal[:, found.place.joint].mean()
+        found = found.with_shape(np.array([share, *found.shape[1:]]))
+    return EffectAt(_reaching(found.effect, found.shape), found.place, found.shape)
 
 
 def _reaching(effect, shape):
     """Return an effect with bounds that hold a shape with room on either side."""
-    if effect.bounds is None:
-        return effect
+    wide = copy.copy(effect)
 
     def bounds(motion, place):
         low, high = effect.bounds(motion, place)
@@ -195,27 +185,32 @@ def _reaching(effect, shape):
         return (np.where(beyond, np.minimum(low, shape - room), low),
                 np.where(beyond, np.maximum(high, shape + room), high))  # fmt: skip
 
-    return replace(effect, bounds=bounds)
+    wide.bounds = bounds
+    return wide
 
 
-def unlisted(joint, numbers, names):
-    """Return an effect outside the list as one whose only coefficient is its size."""
-    source = names.index(numbers['source']) if numbers['source'] in names else -1
-    unit = numbers | {'a': 1.0, 'source': source}
-    (action,) = UNKNOWN[numbers['kind']](joint, unit, names)
+class Unlisted(Effect):
+    """An effect outside the catalogue as one whose only coefficient is its size."""
 
-    def force(moment):
-        if action.force is not None:
-            return action.force(moment)
-        return action.drive(moment) - moment.drive[joint]
+    name = 'unknown'
+    quantities = (Quantity('a', '1'),)
+    linear = ('a',)
 
-    def columns(motion, _place, _shape):
+    def __init__(self, joint, numbers, names):
+        source = names.index(numbers['source']) if numbers['source'] in names else -1
+        unit = numbers | {'a': 1.0, 'source': source}
+        self.joint = joint
+        (self.action,) = UNKNOWN[numbers['kind']](joint, unit, names)
+
+    def _force(self, moment):
+        if self.action.force is not None:
+            return self.action.force(moment)
+        return self.action.drive(moment) - moment.drive[self.joint]
+
+    def columns(self, motion, _place, _shape):
+        """Return the force for a size of 1, (n, 1)."""
         rows = zip(motion.time, motion.position, motion.velocity, motion.effort, strict=True)
-        return np.array([[force(Moment(*row, np.zeros(0)))] for row in rows])
-
-    return Effect(
-        'unknown', (), columns, every_joint, no_shape, named('a'), always, numbers['kind']
-    )
+        return np.array([[self._force(Moment(*row, np.zeros(0)))] for row in rows])
 
 
 def _trajectory(path, robot):

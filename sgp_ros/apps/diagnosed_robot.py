@@ -17,7 +17,7 @@ import yaml
 
 from sgp_ros.diagnosis.result import Diagnosis, Finding, Parameter
 from sgp_ros.errors import ConfigError
-from sgp_ros.physics.stated import SIDED, effect_names
+from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.report.files import write_text
 from sgp_ros.rigid.pseudo_inertia import is_consistent
 from sgp_ros.rigid.tree import read_urdf
@@ -62,7 +62,6 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis) -> None:
 
 def stated_findings(findings: Iterable[Finding]) -> list[dict[str, Any]]:
     """Return the findings as the `effects` of a robot YAML; what is unknown has no effect."""
-    known = effect_names()
     return [
         {
             'effect': finding.effect,
@@ -71,7 +70,7 @@ def stated_findings(findings: Iterable[Finding]) -> list[dict[str, Any]]:
             | _side(finding),
         }
         for finding in findings
-        if finding.effect in known
+        if finding.effect in EFFECTS
     ]
 
 
@@ -87,9 +86,10 @@ def _entry(parameter: Parameter) -> dict[str, Any]:
 def _side(finding: Finding) -> dict[str, Any]:
     """Return at which end of the range an effect sits: its region begins where it sets in."""
     regions = finding.location.intervals.get('position')
-    if finding.effect not in SIDED or not regions:
+    name = EFFECTS[finding.effect].edge
+    if not name or not regions:
         return {}
-    edge = finding.parameters['onset' if finding.effect == 'limit_friction' else 'position'].value
+    edge = finding.parameters[name].value
     assert not isinstance(edge, str)
     lo, hi = regions[0]
     return {'side': {'value': 'upper' if abs(lo - edge) < abs(hi - edge) else 'lower'}}

@@ -7,21 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.robots.effect_terms import ON_TREE
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Value
 from sgp_ros.robots.nominal import Nominal, nominal_model
 from sgp_ros.robots.registry import load_robot
-from sgp_ros.robots.stated_effects import StatedEffect
 from sgp_ros.robots.urdf_robot import stated_part, urdf_text
 from sgp_ros.simulation.assembly import find_simulator
 from sgp_ros.simulation.effects import ChosenEffect
 from sgp_ros.simulation.simulator import Simulator
 from sgp_ros.simulation.tree_part import Load, TreePart
 from sgp_ros.simulation.tree_simulator import tree_simulator
-
-_ABOUT_ZERO = (
-    'stribeck_friction', 'asymmetric_coulomb', 'load_friction', 'friction_drift',
-)  # fmt: skip
-"""Effects of which a diagnosis may leave one level just below zero, where it is none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,14 +59,14 @@ def _of_urdf(path: Path) -> Simulator:
 
 def _of_yaml(path: Path) -> SimulatedRobot:
     nominal = nominal_model(load_robot(str(path)))
-    last = {e.name: e for e in nominal.effects if e.name in ON_TREE}
+    last = {e.name: e for e in nominal.effects if e.effect.is_on_tree}
     before = [e for e in nominal.effects if last.get(e.name, e) is not e]
     simulator = tree_simulator(urdf_text(nominal.robot), _part(nominal, before))
     effects = tuple(_chosen(e, nominal) for e in nominal.effects if e not in before)
     return SimulatedRobot(simulator, path.stem, effects)
 
 
-def _part(nominal: Nominal, before: Iterable[StatedEffect]) -> TreePart:
+def _part(nominal: Nominal, before: Iterable[EffectAt]) -> TreePart:
     """Return what moves, is driven and carried as a robot from a URDF states it.
 
     Args:
@@ -86,7 +81,7 @@ def _part(nominal: Nominal, before: Iterable[StatedEffect]) -> TreePart:
     ]  # fmt: skip
     loads += [
         Load(last, e.numbers['mass'], tuple(e.numbers[axis] for axis in 'xyz'))
-        for e in before if e.name == 'payload'
+        for e in before if e.effect.is_body
     ]  # fmt: skip
     return TreePart(
         robot.joint_names,
@@ -97,17 +92,15 @@ def _part(nominal: Nominal, before: Iterable[StatedEffect]) -> TreePart:
     )
 
 
-def _chosen(stated: StatedEffect, nominal: Nominal) -> ChosenEffect:
-    """Return a stated effect in the words of the simulation."""
-    values: dict[str, float | str] = {
-        name: max(number, 0.0) if stated.name in _ABOUT_ZERO else number
-        for name, number in stated.numbers.items()
+def _chosen(stated: EffectAt, nominal: Nominal) -> ChosenEffect:
+    """Return a stated effect in the words of the simulation.
+
+    A diagnosis may leave one level just below zero, where it is none.
+    """
+    quantities = stated.effect.stated_quantities(stated.kind)
+    lowest = {q.name: min(0.0, q.low) for q in quantities}
+    values: dict[str, Value] = {
+        name: max(number, lowest[name]) for name, number in stated.numbers.items()
     }
-    if stated.kind:
-        values['kind'] = stated.kind
-    place = stated.place
-    if place is not None and place.source >= 0:
-        values['source_joint'] = nominal.tree.joint_names[place.source]
-    if place is not None and place.side:
-        values['side'] = 'upper' if place.side > 0 else 'lower'
+    values |= stated.effect.stated_words(stated.place, nominal.tree)
     return ChosenEffect(stated.name, stated.joint, values)

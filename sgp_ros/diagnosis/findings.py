@@ -17,7 +17,9 @@ from sgp_ros.diagnosis.locate.confinement import ENERGY, region
 from sgp_ros.diagnosis.locate.remainder import Remainder
 from sgp_ros.diagnosis.places import joint_name
 from sgp_ros.diagnosis.result import Dependence, Finding, Location, Parameter, ParameterError
-from sgp_ros.physics.effect import Fitted, Quantity, Value
+from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 MODEL_ERROR = 0.003
 """Relative standard deviation that approximations of the signals add to every number."""
@@ -48,9 +50,8 @@ def asserted(
         unit = Parameter(lag.time_constant, max(lag.std, MODEL_ERROR * lag.time_constant), 's')
         findings.append(
             Finding(
-                names[lag.joint], 'velocity_filter_lag', {'time_constant': unit}, Location(),
-                lag.nats, 0.9 * (1.0 - min(lag.rest, 1.0)), lag.share,
-                'the velocity field is the velocity behind a first-order low-pass',
+                names[lag.joint], VELOCITY_FILTER_LAG.name, {'time_constant': unit}, Location(),
+                lag.nats, 0.9 * (1.0 - min(lag.rest, 1.0)), lag.share, VELOCITY_FILTER_LAG.formula,
             )
         )  # fmt: skip
     forces += [np.zeros_like(equations.d)] * (len(findings) - len(forces))
@@ -79,40 +80,35 @@ def _finding(
     chances: Probabilities,
     why: str = '',
 ) -> Finding:
-    suspect, c = model.suspects[index], model.coefficients[index]
+    suspect = model.suspects[index]
     motion = model.frame.equations.motion
-    fitted = Fitted(motion, suspect.place, suspect.shape, c)
-    values = suspect.effect.report(fitted)
-    units = {q.name: q for q in suspect.effect.quantities}
-    prismatic = suspect.place.joint >= 0 and bool(motion.tree.is_prismatic[suspect.place.joint])
-    parameters = {
-        name: _parameter(
-            value, std.get(name), units.get(name), suspect.place.kind, prismatic=prismatic
-        )
-        for name, value in values.items()
-    }
-    location = Location()
-    if suspect.effect.interval is not None:
-        variable, intervals = suspect.effect.interval(fitted)
-        location = Location((variable,), {variable: intervals})
+    inside = suspect.effect.interval(suspect, motion)
+    location = Location((inside[0],), {inside[0]: inside[1]}) if inside else Location()
     return Finding(
-        joint_name(motion, suspect.place.joint), suspect.effect.name, parameters, location,
-        float(model.score - decision.against), chances.of(model, index), model.shares[index],
-        suspect.effect.formula, why,
+        joint_name(motion, suspect.place.joint), suspect.name,
+        _parameters(suspect, motion, std), location, float(model.score - decision.against),
+        chances.of(model, index), model.shares[index], suspect.effect.formula, why,
     )  # fmt: skip
 
 
-def _parameter(
-    value: Value, std: float | None, quantity: Quantity | None, kind: str, *, prismatic: bool
-) -> Parameter:
-    if isinstance(value, str):
-        return Parameter(value)
-    unit = '' if quantity is None else quantity.unit_on(is_prismatic=prismatic)
-    if kind == 'viscous' and unit in {'N m', 'N'}:
-        unit = Quantity('', 'N m s/rad').unit_on(is_prismatic=prismatic)
-    if std is not None:
-        std = float(np.hypot(std, MODEL_ERROR * abs(value)))
-    return Parameter(value, std, unit)
+def _parameters(
+    effect: EffectAt, motion: ObservedMotion, std: dict[str, float]
+) -> dict[str, Parameter]:
+    """Return the reported numbers with units and standard deviations, and the words."""
+    joint = effect.place.joint
+    prismatic = joint >= 0 and bool(motion.tree.is_prismatic[joint])
+    known = effect.effect.stated_quantities(effect.kind)
+    units = {q.name: q.unit_on(is_prismatic=prismatic) for q in known}
+    found = {}
+    for name, value in effect.report(motion).items():
+        spread = std.get(name)
+        if isinstance(value, str):
+            found[name] = Parameter(value)
+            continue
+        if spread is not None:
+            spread = float(np.hypot(spread, MODEL_ERROR * abs(value)))
+        found[name] = Parameter(value, spread, units[name])
+    return found
 
 
 def _unknown(

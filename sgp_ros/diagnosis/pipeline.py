@@ -26,9 +26,9 @@ from sgp_ros.diagnosis.prove.proof import prove
 from sgp_ros.diagnosis.result import Band, Dependence, Diagnosis, Traces
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.robot import Robot
-from sgp_ros.robots.stated_effects import StatedEffect
 
 
 def diagnose(
@@ -37,7 +37,7 @@ def diagnose(
     tree: Tree,
     tests: Mapping[str, Iterable[Event]],
     *,
-    stated: tuple[StatedEffect, ...] = (),
+    stated: tuple[EffectAt, ...] = (),
     holds_out: bool = False,
     config: EngineConfig = USUAL,
     progress: Callable[[float], None] = lambda _share: None,

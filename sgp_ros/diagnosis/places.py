@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 PLACES = {-1: 'base', -2: 'tool', -3: 'all'}
 

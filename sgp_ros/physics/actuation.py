@@ -1,134 +1,174 @@
-"""What a drive does to its command: gain, dead zone, saturation, lag and delay."""
+"""Drives that change their command: gain, dead zone, saturation, lag and delay."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-from sgp_ros.physics.effect import (
-    Effect,
-    Fitted,
-    Place,
-    Quantity,
-    every_motor,
-    no_shape,
-    shaped,
-)
-from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.physics.effect import EMPTY, Effect, Numbers
+from sgp_ros.physics.motion import Commands, SeenMotion
+from sgp_ros.physics.parts import MOTOR, PLACES, Place, Placed, Quantity, Value
+
+_MECHATRONICS = 'Isermann 2005, Mechatronic Systems'
+_ALL = PLACES['all']
 
 
-def _commanded(motion: ObservedMotion) -> list[Place]:
-    return every_motor(motion) if motion.drive is not None else []
+def _sizes(motion: SeenMotion, place: Place) -> np.ndarray:
+    return np.abs(_commands(motion).values[:, place.joint])
 
 
-def _delayed(motion: ObservedMotion) -> list[Place]:
-    """Return each motor, and all of them together."""
-    motors = _commanded(motion)
-    return [*motors, Place(-3)] if len(motors) > 1 else motors
+def _commands(motion: SeenMotion) -> Commands:
+    assert motion.drive is not None
+    return motion.drive
 
 
-def _gain(motion: ObservedMotion, place: Place, _shape: np.ndarray) -> np.ndarray:
-    return motion.effort[:, place.joint, None]
-
-
-def _instead(motion: ObservedMotion, joint: int, effort: np.ndarray) -> np.ndarray:
+def _instead(motion: SeenMotion, joint: int, effort: np.ndarray) -> np.ndarray:
     return effort - motion.effort[:, joint]
 
 
-def _dead_zone(motion: ObservedMotion, place: Place, shape: np.ndarray) -> np.ndarray:
-    assert motion.drive is not None
-    w = abs(shape[0])
-    given = motion.drive.effort(place.joint, characteristic=lambda u: u - np.clip(u, -w, w))
-    return _instead(motion, place.joint, given)[:, None]
+class _Drive(Effect):
+    """A drive whose shape says all."""
+
+    source = _MECHATRONICS
+    site = MOTOR
+    is_of_command = True
+    has_memory = True
 
 
-def _saturation(motion: ObservedMotion, place: Place, shape: np.ndarray) -> np.ndarray:
-    assert motion.drive is not None
-    limit = abs(shape[0])
-    given = motion.drive.effort(place.joint, characteristic=lambda u: np.clip(u, -limit, limit))
-    return _instead(motion, place.joint, given)[:, None]
+class TorqueGain(Effect):
+    """A motor that delivers gain times its command."""
+
+    name = 'torque_gain'
+    words = 'a wrong torque constant'
+    formula = 'motor torque = gain x command'
+    source = _MECHATRONICS
+    appearance = 'the effort that is left is proportional to the effort'
+    quantities = (Quantity('gain', '1', is_positive=True),)
+    linear = ('gain',)
+    site = MOTOR
+    drawn_over = 'effort'
+
+    def model(self, numbers: Numbers, kind: str = '') -> tuple[np.ndarray, np.ndarray]:
+        return EMPTY, np.array([numbers['gain'] - 1.0])
+
+    def report(self, at: Placed, motion: SeenMotion) -> dict[str, Value]:
+        return {'gain': 1.0 + float(at.coefficients[0])}
+
+    def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
+        return bool(-0.7 < at.coefficients[0] < 1.5)
+
+    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        return motion.effort[:, place.joint, None]
+
+    def effort_columns(self, kind: str) -> tuple[int, ...]:
+        return (0,)
 
 
-def _lag(motion: ObservedMotion, place: Place, shape: np.ndarray) -> np.ndarray:
-    assert motion.drive is not None
-    given = motion.drive.effort(place.joint, time_constant=max(shape[0], 0.0))
-    return _instead(motion, place.joint, given)[:, None]
+class DeadZone(_Drive):
+    """A motor that does not answer to small commands."""
 
+    name = 'dead_zone'
+    words = 'a dead zone of the drive'
+    formula = 'motor torque = u - clip(u, -width, width)'
+    appearance = 'small commands have no consequence; large ones lack a constant'
+    quantities = (Quantity('width', 'N m', low=0.0, is_positive=True),)
+    drawn_over = 'effort'
 
-def _delay(motion: ObservedMotion, place: Place, shape: np.ndarray) -> np.ndarray:
-    drive = motion.drive
-    assert drive is not None
-    if place.joint >= 0:
-        given = drive.effort(place.joint, delay=shape[0])
+    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        w = abs(shape[0])
+        given = _commands(motion).effort(
+            place.joint, characteristic=lambda u: u - np.clip(u, -w, w)
+        )
         return _instead(motion, place.joint, given)[:, None]
-    columns = np.zeros((*motion.position.shape, 1))
-    for motor in every_motor(motion):
-        j = motor.joint
-        columns[:, j, 0] = _instead(motion, j, drive.effort(j, delay=shape[0]))
-    return columns
+
+    def effort_columns(self, kind: str) -> tuple[int, ...]:
+        return (0,)
+
+    def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
+        shares = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7)
+        return np.unique(np.quantile(_sizes(motion, place), shares))[:, None]
+
+    def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(1), np.array([np.quantile(_sizes(motion, place), 0.9)])
 
 
-def _times(_motion: ObservedMotion, _place: Place) -> np.ndarray:
-    return np.geomspace(0.002, 0.12, 16)[:, None]
+class Saturation(_Drive):
+    """A motor that gives no more than a limit."""
+
+    name = 'saturation'
+    words = 'an early saturation of the drive'
+    formula = 'motor torque = clip(u, -limit, limit)'
+    appearance = 'the largest commands have less consequence than they should'
+    quantities = (Quantity('limit', 'N m', low=0.0, is_positive=True),)
+    drawn_over = 'effort'
+
+    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        limit = abs(shape[0])
+        given = _commands(motion).effort(
+            place.joint, characteristic=lambda u: np.clip(u, -limit, limit)
+        )
+        return _instead(motion, place.joint, given)[:, None]
+
+    def effort_columns(self, kind: str) -> tuple[int, ...]:
+        return (0,)
+
+    def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
+        shares = (0.3, 0.5, 0.65, 0.8, 0.88, 0.94, 0.97, 0.99)
+        return np.unique(np.quantile(_sizes(motion, place), shares))[:, None]
+
+    def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
+        size = _sizes(motion, place)
+        return np.array([np.quantile(size, 0.2)]), np.array([size.max()])
 
 
-def _levels(*shares: float) -> Callable[[ObservedMotion, Place], np.ndarray]:
-    """Return starts at these quantiles of the commands' sizes."""
+class _Late(_Drive):
+    """A drive whose torque comes late; the shape is a time [s]."""
 
-    def starts(motion: ObservedMotion, place: Place) -> np.ndarray:
-        assert motion.drive is not None
-        size = np.abs(motion.drive.values[:, place.joint])
-        return np.unique(np.quantile(size, shares))[:, None]
+    drawn_over = 'seconds'
+    is_online = False
 
-    return starts
+    def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
+        return np.geomspace(0.002, 0.12, 16)[:, None]
 
-
-def _level_bounds(motion: ObservedMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-    assert motion.drive is not None
-    size = np.abs(motion.drive.values[:, place.joint])
-    return np.zeros(1), np.array([np.quantile(size, 0.9)])
+    def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(1), np.full(1, 0.25)
 
 
-def _limit_bounds(motion: ObservedMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-    assert motion.drive is not None
-    size = np.abs(motion.drive.values[:, place.joint])
-    return np.array([np.quantile(size, 0.2)]), np.array([size.max()])
+class ActuatorLag(_Late):
+    """A first-order lag between command and torque."""
+
+    name = 'actuator_lag'
+    words = 'a lag of the drive'
+    formula = 'time_constant d tau/dt + tau = command'
+    appearance = 'the torque follows quick commands late and rounded off'
+    quantities = (Quantity('time_constant', 's', low=1e-4, is_positive=True),)
+
+    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        given = _commands(motion).effort(place.joint, time_constant=max(shape[0], 0.0))
+        return _instead(motion, place.joint, given)[:, None]
 
 
-def _is_some(f: Fitted) -> bool:
-    return bool(f.shape[0] > 0.0)
+class CommandDelay(_Late):
+    """A pure delay of the command, of one motor or of all."""
 
+    name = 'command_delay'
+    words = 'a delay of the command'
+    formula = 'motor torque(t) = command(t - delay)'
+    appearance = 'the motion answers to commands later than they were given, unchanged in shape'
+    quantities = (Quantity('delay', 's', low=0.0, is_positive=True),)
+    takes_all = True
 
-def _quarter(_motion: ObservedMotion, _place: Place) -> tuple[np.ndarray, np.ndarray]:
-    """Return the bounds of times [s]."""
-    return np.zeros(1), np.full(1, 0.25)
+    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        drive = _commands(motion)
+        if place.joint >= 0:
+            given = drive.effort(place.joint, delay=shape[0])
+            return _instead(motion, place.joint, given)[:, None]
+        columns = np.zeros((*motion.position.shape, 1))
+        for motor in super().places(motion):
+            j = motor.joint
+            columns[:, j, 0] = _instead(motion, j, drive.effort(j, delay=shape[0]))
+        return columns
 
-
-TORQUE_GAIN = Effect(
-    'torque_gain', (Quantity('gain', '1'),), _gain, every_motor, no_shape,
-    lambda f: {'gain': 1.0 + float(f.coefficients[0])},
-    lambda f: bool(-0.7 < f.coefficients[0] < 1.5), 'motor torque = gain x command',
-)  # fmt: skip
-DEAD_ZONE = Effect(
-    'dead_zone', (Quantity('width', 'N m'),), _dead_zone, _commanded,
-    _levels(0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7), shaped('width'), _is_some,
-    'motor torque = u - clip(u, -width, width)', is_given=True, has_memory=True,
-    bounds=_level_bounds,
-)  # fmt: skip
-SATURATION = Effect(
-    'saturation', (Quantity('limit', 'N m'),), _saturation, _commanded,
-    _levels(0.3, 0.5, 0.65, 0.8, 0.88, 0.94, 0.97, 0.99), shaped('limit'), _is_some,
-    'motor torque = clip(u, -limit, limit)', is_given=True, has_memory=True, bounds=_limit_bounds,
-)  # fmt: skip
-ACTUATOR_LAG = Effect(
-    'actuator_lag', (Quantity('time_constant', 's'),), _lag, _commanded, _times,
-    shaped('time_constant'), _is_some, 'time_constant d tau/dt + tau = command',
-    is_given=True, has_memory=True,
-    bounds=_quarter,
-)  # fmt: skip
-COMMAND_DELAY = Effect(
-    'command_delay', (Quantity('delay', 's'),), _delay, _delayed, _times, shaped('delay'),
-    _is_some, 'motor torque(t) = command(t - delay)', is_given=True, has_memory=True,
-    bounds=_quarter,
-)  # fmt: skip
+    def places(self, motion: SeenMotion) -> list[Place]:
+        """Return each motor, and all of them together."""
+        motors = super().places(motion)
+        return [*motors, Place(_ALL)] if len(motors) > 1 else motors

@@ -1,38 +1,71 @@
-"""All effects that a diagnosis can name, except that of the velocity sensor."""
+"""The catalogue of effects: all laws that a robot may have beside its rigid bodies.
+
+What stands here is found by a diagnosis, stated in a robot YAML, named in the report, drawn for
+the worlds of `sgp_proof.concealed` and documented in docs/effects.md. A new law is one class in
+this folder, one line here, and one law in `simulation`.
+"""
 
 from __future__ import annotations
 
-from sgp_ros.physics import actuation, friction, loads, memory
+from sgp_ros.physics import actuation, confined, friction, loads, memory, sensing
 from sgp_ros.physics.effect import Effect
+
+VISCOUS_FRICTION = friction.ViscousFriction()
+COULOMB_FRICTION = friction.CoulombFriction()
+STRIBECK_FRICTION = friction.StribeckFriction()
+ASYMMETRIC_COULOMB = friction.AsymmetricCoulomb()
+POSITION_FRICTION = confined.PositionFriction()
+LIMIT_FRICTION = confined.LimitFriction()
+SPRING = loads.Spring()
+CONSTANT_LOAD = loads.ConstantLoad()
+ARMATURE = loads.Armature()
+GRAVITY_TILT = loads.GravityTilt()
+PAYLOAD = loads.Payload()
+TORQUE_GAIN = actuation.TorqueGain()
+COMMAND_DELAY = actuation.CommandDelay()
+BACKLASH = memory.Backlash()
+JOINT_COUPLING = loads.JointCoupling()
+VELOCITY_FILTER_LAG = sensing.VelocityFilterLag()
 
 EFFECTS: dict[str, Effect] = {
     effect.name: effect
     for effect in (
-        friction.VISCOUS_FRICTION,
-        friction.COULOMB_FRICTION,
-        friction.STRIBECK_FRICTION,
-        friction.QUADRATIC_DRAG,
-        friction.POSITION_FRICTION,
-        friction.LIMIT_FRICTION,
-        friction.ASYMMETRIC_COULOMB,
-        friction.LOAD_FRICTION,
-        friction.FRICTION_DRIFT,
-        loads.SPRING,
-        loads.GRAVITY_TILT,
-        loads.COGGING,
-        loads.ARMATURE,
-        loads.JOINT_COUPLING,
-        loads.CONSTANT_LOAD,
-        loads.TIP_FORCE,
-        loads.PAYLOAD,
-        loads.END_STOP,
-        actuation.TORQUE_GAIN,
-        actuation.DEAD_ZONE,
-        actuation.SATURATION,
-        actuation.ACTUATOR_LAG,
-        actuation.COMMAND_DELAY,
-        memory.BACKLASH,
-        memory.HYSTERESIS,
-        memory.ENCODER_ECCENTRICITY,
+        VISCOUS_FRICTION,
+        COULOMB_FRICTION,
+        STRIBECK_FRICTION,
+        friction.QuadraticDrag(),
+        POSITION_FRICTION,
+        LIMIT_FRICTION,
+        ASYMMETRIC_COULOMB,
+        friction.LoadFriction(),
+        friction.FrictionDrift(),
+        SPRING,
+        GRAVITY_TILT,
+        loads.Cogging(),
+        ARMATURE,
+        JOINT_COUPLING,
+        CONSTANT_LOAD,
+        loads.TipForce(),
+        PAYLOAD,
+        confined.EndStop(),
+        TORQUE_GAIN,
+        actuation.DeadZone(),
+        actuation.Saturation(),
+        actuation.ActuatorLag(),
+        COMMAND_DELAY,
+        BACKLASH,
+        memory.Hysteresis(),
+        sensing.EncoderEccentricity(),
+        VELOCITY_FILTER_LAG,
     )
 }
+
+
+def exerts_force(name: str) -> bool:
+    """Return whether an effect of this name is known and exerts a force."""
+    return name in EFFECTS and EFFECTS[name].is_force
+
+
+def words_of(name: str) -> str:
+    """Return the plain name of an effect; of one that is not in the catalogue, the name itself."""
+    return EFFECTS[name].words if name in EFFECTS else name.replace('_', ' ')

@@ -1,176 +1,294 @@
-"""What a left-out effect is to the diagnosis: forces with linear coefficients and a shape.
+"""Effects: physics beside the rigid bodies of a robot, one value per law.
 
-The extra generalised force is `tau_x = columns(shape) @ coefficients` in the convention
+The extra generalised force of a law is `tau_x = columns(shape) @ coefficients` in the convention
 `M a + h = tau + tau_x`. The shape holds what enters otherwise (a width, an onset, a time
-constant). Effects that change what the motor or the encoder does are written as the force that
-would look the same.
+constant). What a motor or an encoder does is written as the force that would look the same.
+Everything that the rest of the package says of a law is an attribute of its value.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping
 
 import numpy as np
 
-from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.physics.motion import SeenMotion, Structure
+from sgp_ros.physics.parts import (
+    BASE,
+    JOINT,
+    LAST,
+    MOTOR,
+    TOOL,
+    OwnMotion,
+    Place,
+    Placed,
+    Quantity,
+    Site,
+    SmallEffect,
+    TermForm,
+    Value,
+    side_word,
+)
 
-Value = float | str
-
-_LINEAR_UNITS = {
-    'N m': 'N', 'N m s/rad': 'N s/m', 'N m s2/rad2': 'N s2/m2', 'rad': 'm', 'rad/s': 'm/s',
-    'N m/rad': 'N/m', '1/revolution': '1/m', 'kg m2': 'kg',
-}  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Where an effect is supposed to act, and in which variant.
-
-    Attributes:
-        joint: index of the joint.
-        kind: such as `coulomb` or `viscous`; empty where there is but one.
-        source: index of the joint it comes from; -1 where there is none.
-        side: 1 or -1 for an effect at one end of the range; 0 elsewhere.
-    """
-
-    joint: int
-    kind: str = ''
-    source: int = -1
-    side: int = 0
+EMPTY = np.zeros(0)
+Numbers = Mapping[str, float]
 
 
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """A parameter of an effect, in the words of the schema.
-
-    Attributes:
-        name: as in `diagnosis.json`.
-        unit: on a revolute joint.
-    """
-
-    name: str
-    unit: str
-
-    def unit_on(self, *, is_prismatic: bool) -> str:
-        """Return the unit on a joint of this kind; a phase is an angle on any."""
-        if not is_prismatic or self.name == 'phase':
-            return self.unit
-        return _LINEAR_UNITS.get(self.unit, self.unit)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Fitted:
-    """An effect at a place of a robot with numbers.
-
-    Attributes:
-        motion: it was fitted on.
-        place: where it acts.
-        shape: (s,).
-        coefficients: (m,).
-    """
-
-    motion: ObservedMotion
-    place: Place
-    shape: np.ndarray
-    coefficients: np.ndarray
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SmallEffect:
-    """What an effect whose shape says all is to first order in its size: where a search starts.
-
-    Attributes:
-        columns: from motion, place and one of the effect's `starts` to forces per coefficient, as
-            those of an `Effect`.
-        shape: from that start and coefficients (m,) to the shape of the effect itself, (s,).
-    """
-
-    columns: Callable[[ObservedMotion, Place, np.ndarray], np.ndarray]
-    shape: Callable[[np.ndarray, np.ndarray], np.ndarray]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Effect:
-    """A kind of physics that a nominal model may lack.
+    """A law of physics that a robot may have beside its rigid bodies.
+
+    A subclass states attributes, and the methods in which it differs from the usual ones. A law
+    of one joint's own motion needs `local` alone:
+
+    >>> class CubicDrag(Effect):
+    ...     name = 'cubic_drag'
+    ...     words = 'cubic drag'
+    ...     formula = 'tau_x = -c v^3'
+    ...     quantities = (Quantity('c', 'N m s3/rad3', low=0.0),)
+    ...     linear = ('c',)
+    ...
+    ...     def local(self, x, shape):
+    ...         return (-(x.v**3),)
+    >>> law = CubicDrag()
+    >>> v = np.array([2.0, -1.0])
+    >>> law.local(OwnMotion(v, v, v, np.sign(v)), EMPTY)
+    (array([-8.,  1.]),)
+    >>> law.model({'c': 0.5})
+    (array([], dtype=float64), array([0.5]))
+    >>> law.quantities[0].unit_on(is_prismatic=True)
+    'N s3/m3'
+
+    `EFFECTS[law.name] = law` (see `catalogue`) makes it known to everything else.
 
     Attributes:
-        name: as in the schema.
-        quantities: the parameters that are reported.
-        columns: from motion, place and shape (s,) to forces per coefficient, (n, m) on the joint
-            of the place or (n, k, m) on all joints [N m or N per unit of the coefficient].
-        places: where it could act on a robot, in which variants.
-        starts: shapes from which a search starts, (starts, s); (1, 0) for none. Where the effect
-            has a `small` one, what that needs.
-        report: the values of `quantities`.
-        is_possible: whether coefficients and shape have physical signs and sizes.
+        name: as in the schema of a diagnosis.
+        words: for people, as in "missing on elbow: Coulomb friction".
         formula: for people.
-        is_given: the coefficient is 1: the shape alone says how large the effect is.
+        source: where the equation comes from.
+        appearance: what it looks like in data.
+        quantities: the parameters that are stated and reported.
+        linear: names of those that are coefficients, in the order of the columns. Without any,
+            the coefficient is 1: the shape alone says how large the effect is.
+        kinds: the variants it comes in.
+        has_source: whether it comes from another joint.
+        site: what it sits on.
+        edge: quantity that says where it begins, of an effect at one end of the range.
+        needs_limits: whether the joint must have limits.
+        takes_all: whether it may act on every motor at once.
+        size: stated number in which an effect without linear ones is linear nevertheless.
+        term: how it enters a robot YAML under `terms`; None where it does not.
+        small: to first order in its size; None where starts are shapes.
+        drawn_over: what its force is drawn over: `position`, `velocity`, `acceleration`,
+            `effort`, `time` (its magnitude over the recording) or `seconds` (a few of them).
+        is_force: it exerts a force; else it only changes what a sensor shows.
+        is_online: a model that sees one time at once can hold it.
         is_dry: it holds a joint at rest; where there are kinds, only `coulomb` does.
         is_inertial: proportional to the acceleration.
         uses_bodies: its columns depend on the inertial parameters of the robot.
         sees_acceleration: its force depends on the acceleration.
         is_body: it changes a body; where bodies may differ, it adds nothing.
+        is_on_tree: it changes gravity or bodies, see `gravity` and `added_body`.
+        is_of_command: it lies before the motor's current: a measured effort is behind it.
         has_memory: its force at a time depends on other times too, of the motion or the commands.
-        bounds: of the shape, (s,) each.
-        small: to first order in its size; None where starts are shapes.
-        interval: variable and intervals of the region it is confined to; None for everywhere.
     """
 
-    name: str
-    quantities: tuple[Quantity, ...]
-    columns: Callable[[ObservedMotion, Place, np.ndarray], np.ndarray]
-    places: Callable[[ObservedMotion], list[Place]]
-    starts: Callable[[ObservedMotion, Place], np.ndarray]
-    report: Callable[[Fitted], dict[str, Value]]
-    is_possible: Callable[[Fitted], bool]
-    formula: str
-    is_given: bool = False
+    name: str = ''
+    words: str = ''
+    formula: str = ''
+    source: str = ''
+    appearance: str = ''
+    quantities: tuple[Quantity, ...] = ()
+    linear: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ()
+    has_source: bool = False
+    site: Site = JOINT
+    edge: str = ''
+    needs_limits: bool = False
+    takes_all: bool = False
+    size: str = ''
+    term: TermForm | None = None
+    small: SmallEffect | None = None
+    drawn_over: str = 'position'
+    is_force: bool = True
+    is_online: bool = True
     is_dry: bool = False
     is_inertial: bool = False
     uses_bodies: bool = False
     sees_acceleration: bool = False
     is_body: bool = False
+    is_on_tree: bool = False
+    is_of_command: bool = False
     has_memory: bool = False
-    bounds: Callable[[ObservedMotion, Place], tuple[np.ndarray, np.ndarray]] | None = None
-    small: SmallEffect | None = None
-    interval: Callable[[Fitted], tuple[str, list[list[float]]]] | None = None
+
+    @property
+    def is_given(self) -> bool:
+        """Whether the coefficient is 1."""
+        return not self.linear
 
     def holds(self, place: Place) -> bool:
         """Return whether it can hold the joint at rest."""
         return self.is_dry and place.kind != 'viscous'
 
+    # -- names and numbers ------------------------------------------------------------------
 
-def every_joint(motion: ObservedMotion) -> list[Place]:
-    """Return a place on each joint that moves."""
-    return [Place(j) for j in motion.moving_joints]
+    def stated_quantities(self, kind: str = '') -> tuple[Quantity, ...]:
+        """Return the numbers that state the effect, with their units on a revolute joint."""
+        return tuple(q.of_kind(kind) for q in self.quantities if q.kinds in {(), (kind,)})
 
+    def coefficient_quantities(self, kind: str = '') -> tuple[Quantity, ...]:
+        """Return names and units of the linear coefficients, in the order of the columns."""
+        known = {q.name: q for q in self.stated_quantities(kind)}
+        return tuple(known[n] for n in self.linear if n in known) or (Quantity('scale', '1'),)
 
-def every_motor(motion: ObservedMotion) -> list[Place]:
-    """Return a place on each actuated joint that moves."""
-    return [Place(j) for j in motion.moving_joints if motion.tree.is_actuated[j]]
+    def shape_names(self, kind: str = '') -> tuple[str, ...]:
+        """Return the stated numbers that are no coefficients."""
+        return tuple(q.name for q in self.stated_quantities(kind) if q.name not in self.linear)
 
+    def model(self, numbers: Numbers, kind: str = '') -> tuple[np.ndarray, np.ndarray]:
+        """Return shape (s,) and coefficients (m,) of stated numbers, the inverse of `report`.
 
-def no_shape(_motion: ObservedMotion, _place: Place) -> np.ndarray:
-    """Return the one start of an effect without shape, (1, 0)."""
-    return np.zeros((1, 0))
+        NaN stands where the numbers do not say it.
+        """
+        linear = [numbers[q.name] for q in self.coefficient_quantities(kind)] if self.linear else 1
+        shape = [numbers[name] for name in self.shape_names(kind)]
+        return np.array(shape, dtype=np.float64), np.array(linear, dtype=np.float64, ndmin=1)
 
+    def report(self, at: Placed, motion: SeenMotion) -> dict[str, Value]:
+        """Return the values of `quantities`, and the words that say which variant it is."""
+        kind = at.place.kind
+        named = dict(zip((q.name for q in self.coefficient_quantities(kind)), at.coefficients,
+                         strict=False))  # fmt: skip
+        named |= dict(zip(self.shape_names(kind), at.shape, strict=False))
+        values: dict[str, Value] = {
+            q.name: float(named[q.name]) for q in self.stated_quantities(kind)
+        }
+        if kind:
+            values['kind'] = kind
+        if at.place.source >= 0:
+            values['source_joint'] = motion.tree.joint_names[at.place.source]
+        return values
 
-def always(_fitted: Fitted) -> bool:
-    """Say yes to any numbers."""
-    return True
+    def coefficient_std(self, numbers: Numbers, std: Numbers, kind: str = '') -> np.ndarray:
+        """Return the standard deviations of the coefficients from those of the numbers, (m,).
 
+        Errors of the numbers count as independent, to first order:
+        `var c_i = sum_k (dc_i / dx_k)^2 var x_k`. Infinite where one that matters is not known,
+        or none does.
+        """
+        if self.size:  # its coefficient scales the whole
+            return np.array([std.get(self.size, math.inf) / max(abs(numbers[self.size]), 1e-300)])
+        variance = np.zeros(len(self.model(numbers, kind)[1]))
+        for name, value in numbers.items():
+            step = 1e-6 * max(abs(value), 1.0)
+            ends = (
+                self.model({**numbers, name: value + sign * step}, kind)[1] for sign in (1.0, -1.0)
+            )
+            slope = np.subtract(*ends) / (2.0 * step)
+            matters = slope != 0.0
+            variance[matters] += (slope[matters] * std.get(name, math.inf)) ** 2
+        return np.sqrt(np.where(variance > 0.0, variance, math.inf))
 
-def is_positive(fitted: Fitted) -> bool:
-    """Return whether all coefficients are positive."""
-    return bool(np.all(fitted.coefficients > 0.0))
+    def stated_words(self, place: Place, tree: Structure) -> dict[str, str]:
+        """Return the words that `EffectAt.stated` takes beside joint and numbers."""
+        words = {'kind': place.kind} if place.kind else {}
+        if place.source >= 0:
+            words['source_joint'] = tree.joint_names[place.source]
+        return words | ({'side': side_word(place.side)} if self.edge else {})
 
+    def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
+        """Return whether coefficients and shape have physical signs and sizes.
 
-def named(*names: str) -> Callable[[Fitted], dict[str, Value]]:
-    """Return a report of the coefficients under these names."""
-    return lambda f: dict(zip(names, map(float, f.coefficients), strict=True))
+        Usually: what must not be negative is positive.
+        """
+        kind = at.place.kind
+        if self.is_given:
+            named = zip(self.stated_quantities(kind), at.shape, strict=False)
+        else:
+            named = zip(self.coefficient_quantities(kind), at.coefficients, strict=False)
+        return all(bool(x > 0.0) for q, x in named if q.low >= 0.0)
 
+    def interval(self, at: Placed, motion: SeenMotion) -> tuple[str, list[list[float]]] | None:
+        """Return variable and intervals of the region it is confined to; None for everywhere."""
+        return None
 
-def shaped(*names: str) -> Callable[[Fitted], dict[str, Value]]:
-    """Return a report of the shape under these names."""
-    return lambda f: dict(zip(names, map(float, f.shape), strict=True))
+    # -- force ------------------------------------------------------------------------------
+
+    def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return the force per coefficient where it follows from one joint's own motion.
+
+        Element by element, for arrays of any shape.
+        """
+        raise NotImplementedError
+
+    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        """Return the force per coefficient [N m or N per unit of the coefficient].
+
+        Args:
+            motion: of n rows.
+            place: where it acts.
+            shape: (s,).
+
+        Returns:
+            (n, m) on the joint of the place, or (n, k, m).
+        """
+        j = place.joint
+        seen = (motion.position, motion.velocity, motion.acceleration, motion.direction)
+        return np.column_stack(self.local(OwnMotion(*(x[:, j] for x in seen)), shape))
+
+    def term_columns(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return the columns of its term, see `TermForm`, element by element as `local`."""
+        assert self.term is not None
+        force = self.local(x, shape)
+        return tuple(-self.term.sign * force[i] for i in self.term.columns)
+
+    def effort_columns(self, kind: str) -> tuple[int, ...]:
+        """Return the columns that depend on the effort itself."""
+        return ()
+
+    def gravity(self, shape: np.ndarray, magnitude: float) -> np.ndarray:
+        """Return gravity in the axes of the root for a law that turns it, (3,) [m/s^2]."""
+        return np.array([0.0, 0.0, -magnitude])
+
+    def added_body(self, shape: np.ndarray) -> np.ndarray:
+        """Return the inertial parameters that it adds to the last link, (10,)."""
+        return np.zeros(10)
+
+    # -- search -----------------------------------------------------------------------------
+
+    def places(self, motion: SeenMotion) -> list[Place]:
+        """Return where it could act on a robot, in which variants."""
+        if self.site is BASE:
+            return [Place(-1)]
+        if self.site is TOOL:
+            return [Place(-2)] if motion.tool_columns.shape[2] else []
+        if self.site is LAST:
+            return [Place(motion.tree.size - 1)]
+        if not self.is_force or (self.is_of_command and motion.drive is None):
+            return []
+        return [
+            Place(j, kind, side=side)
+            for j in motion.moving_joints
+            if self.site is not MOTOR or motion.tree.is_actuated[j]
+            for kind in self.kinds or ('',)
+            for side in ((-1, 1) if self.edge else (0,))
+        ]
+
+    def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
+        """Return shapes from which a search starts, (starts, s); (1, 0) without shape.
+
+        Where the effect has a `small` one, what that needs.
+        """
+        return np.zeros((1, 0))
+
+    def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
+        """Return the bounds of the shape, (s,) each."""
+        return np.zeros(0), np.zeros(0)
+
+    def bins(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return columns of narrow bins (n, b) and their edges (b + 1,); None for most laws.
+
+        The shape of a law with bins is the lower and upper edge of an interval, and its column
+        the sum of those of the bins inside.
+        """
+        return None

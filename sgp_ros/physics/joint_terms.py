@@ -1,22 +1,23 @@
-"""Physics of single joints by name: friction, offset, rotor inertia, spring.
+"""Terms of a robot YAML: laws of the catalogue in `effort = ... + coefficient * column`.
 
-Each enters the equation of its own joint with one or two columns of the joint's motion, so that
-`effort = ... + coefficient * column`. A dry friction would jump with the sign of the velocity;
-`tanh(v / width)` is that sign, made smooth over `width`, because a measured velocity near zero has
-a sign by chance.
+A dry friction would jump with the sign of the velocity; `tanh(v / width)` is that sign, made
+smooth over `width`, because a measured velocity near zero has a sign by chance. Coefficients are
+named and signed as the `TermForm` of their law says: friction and inertia that take effort from
+the motor are positive, and so is an `offset` that it must give.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect import Effect
+from sgp_ros.physics.parts import OwnMotion, TermForm
 from sgp_ros.physics.term import Coefficient, Joint, Motion, Term
-
-_FRICTION = 'Armstrong-Helouvry, Dupont, Canudas de Wit 1994'
-_MECHANICS = 'Khalil and Dombre 2002, Modeling, Identification and Control of Robots, chapter 9'
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,100 +32,56 @@ class Shape:
     coulomb_width: float = 0.01
     stribeck_velocity: float = 0.1
 
-
-@dataclass(frozen=True, slots=True)
-class JointTerm:
-    """A term of single joints.
-
-    Attributes:
-        names: of its coefficients, one or two, each after the name of the joint.
-        revolute_unit: unit of the coefficients of a revolute joint.
-        prismatic_unit: unit of those of a prismatic joint.
-        columns: from position, velocity, acceleration, (n, j) each, to one (n, j) per name.
-        source: where the equation comes from.
-    """
-
-    names: tuple[str, ...]
-    revolute_unit: str
-    prismatic_unit: str
-    columns: Callable[[np.ndarray, np.ndarray, np.ndarray, Shape], tuple[np.ndarray, ...]]
-    source: str
+    def of(self, law: Effect) -> np.ndarray:
+        """Return the shape of a law, (s,)."""
+        return np.array([getattr(self, name) for name in law.shape_names()])
 
 
-def _asymmetric(v: np.ndarray, shape: Shape) -> tuple[np.ndarray, np.ndarray]:
-    sign = np.tanh(v / shape.coulomb_width)
-    return np.maximum(sign, 0.0), np.minimum(sign, 0.0)
-
-
-def _stribeck(v: np.ndarray, shape: Shape) -> np.ndarray:
-    return np.tanh(v / shape.coulomb_width) * np.exp(-((v / shape.stribeck_velocity) ** 2))
-
-
-JOINT_TERMS: dict[str, JointTerm] = {
-    'viscous': JointTerm(
-        ('viscous',), 'N m s/rad', 'N s/m', lambda _q, v, _a, _s: (v,), _FRICTION
-    ),
-    'coulomb': JointTerm(
-        ('coulomb',), 'N m', 'N', lambda _q, v, _a, s: (np.tanh(v / s.coulomb_width),), _FRICTION
-    ),
-    'asymmetric_coulomb': JointTerm(
-        ('coulomb_positive', 'coulomb_negative'), 'N m', 'N',
-        lambda _q, v, _a, s: _asymmetric(v, s), _FRICTION,
-    ),
-    'stribeck': JointTerm(
-        ('stribeck',), 'N m', 'N', lambda _q, v, _a, s: (_stribeck(v, s),), _FRICTION
-    ),
-    'quadratic': JointTerm(
-        ('quadratic',), 'N m s^2/rad^2', 'N s^2/m^2',
-        lambda _q, v, _a, _s: (v * np.abs(v),), _FRICTION,
-    ),
-    'offset': JointTerm(
-        ('offset',), 'N m', 'N', lambda q, _v, _a, _s: (np.ones_like(q),), _MECHANICS
-    ),
-    'armature': JointTerm(
-        ('armature',), 'kg m^2', 'kg', lambda _q, _v, a, _s: (a,), _MECHANICS
-    ),
-    'spring': JointTerm(
-        ('stiffness',), 'N m/rad', 'N/m', lambda q, _v, _a, _s: (q,), _MECHANICS
-    ),
-}  # fmt: skip
-"""Name in a robot YAML to term. Positive coefficients of the first four and `quadratic` oppose the
-motion; `coulomb_positive` acts at positive velocity, `coulomb_negative` at negative."""
+def term_laws() -> dict[str, tuple[Effect, TermForm]]:
+    """Return the laws that are terms of single joints, by the name of the term."""
+    return {e.term.name: (e, e.term) for e in EFFECTS.values() if e.term is not None}
 
 
 def joint_term(
     name: str, joints: Sequence[Joint], chosen: Sequence[int], shape: Shape | None = None
 ) -> Term:
-    """Return a term of `JOINT_TERMS` for some joints of a robot.
+    """Return a term for some joints of a robot.
 
     Args:
-        name: in `JOINT_TERMS`.
+        name: of the term.
         joints: all k joints of the robot.
         chosen: indices of those that get it.
         shape: None for the defaults.
     """
-    term, shape = JOINT_TERMS[name], shape or Shape()
+    (law, form), settings = term_laws()[name], shape or Shape()
     index = np.array(chosen, dtype=np.intp)
+    quantities = [law.coefficient_quantities()[i] for i in form.columns]
     coefficients = tuple(
         Coefficient(
             f'{joints[j].name}.{part}',
-            term.revolute_unit if joints[j].kind == 'revolute' else term.prismatic_unit,
+            _raised(quantity.unit_on(is_prismatic=joints[j].kind == 'prismatic')),
             joints[j].name,
         )
         for j in chosen
-        for part in term.names
+        for part, quantity in zip(form.names, quantities, strict=True)
     )
-    width = len(term.names)
+    width, own_shape = len(form.names), settings.of(law)
 
     def columns(motion: Motion) -> np.ndarray:
         n, k = motion.position.shape
         block = np.zeros((n, k, len(index) * width))
-        signals = term.columns(
-            motion.position[:, index], motion.velocity[:, index], motion.acceleration[:, index],
-            shape,
+        v = motion.velocity[:, index]
+        own = OwnMotion(
+            motion.position[:, index], v, motion.acceleration[:, index],
+            np.tanh(v / settings.coulomb_width),
         )  # fmt: skip
-        for part, signal in enumerate(signals):
+        for part, signal in enumerate(law.term_columns(own, own_shape)):
             block[:, index, width * np.arange(len(index)) + part] = signal
         return block
 
-    return Term(coefficients, columns, term.source)
+    return Term(coefficients, columns, law.source)
+
+
+def _raised(unit: str) -> str:
+    """Return a unit with `^` before its exponents, as coefficients have it."""
+    return re.sub(r'(?<=[a-z])2', '^2', unit)

@@ -11,6 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from sgp_ros.diagnosis.prove.held_out import HELD_OUT
 from sgp_ros.diagnosis.result import Diagnosis, Finding, ParameterError
 from sgp_ros.gp.scores import INTERVAL_95
+from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.report.diagnosis_bands import band_sentences
 from sgp_ros.report.diagnosis_figures import draw_diagnosis
 from sgp_ros.report.diagnosis_maps import important_joints
@@ -41,7 +42,6 @@ from sgp_ros.report.metrics import versions
 _NAMED = ('kind', 'source_joint')
 """Parameters that are part of the name of an effect."""
 _SHOWN_RIVALS = 4
-_SENSOR = ('velocity_filter_lag',)
 """Effects that change what is measured, not the motion."""
 _WITHOUT_FORCES = ('parameters_only', 'unexplained')
 _VERDICTS = {
@@ -132,7 +132,11 @@ def _finding(f: Finding) -> dict[str, Any]:
         'place': place(f),
         'probability': f'{f.probability:.2f}',
         'share': f'{percent(f.share)} of the '
-        + ('variance of the velocity' if f.effect in _SENSOR else 'mean squared effort'),
+        + (
+            'variance of the velocity'
+            if f.effect in EFFECTS and not EFFECTS[f.effect].is_force
+            else 'mean squared effort'
+        ),
         'formula': f.formula,
         'why': f.why[:1].upper() + f.why[1:],
         'parameters': [

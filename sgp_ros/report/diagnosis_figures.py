@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sgp_ros.diagnosis.result import Diagnosis, Finding
+from sgp_ros.physics.catalogue import EFFECTS, exerts_force
 from sgp_ros.report.diagnosis_bands import draw_bands
 from sgp_ros.report.diagnosis_charts import draw_dependence, draw_proof
 from sgp_ros.report.diagnosis_maps import (
@@ -22,23 +23,12 @@ from sgp_ros.report.diagnosis_maps import (
     reach_of,
     shown_position,
 )
-from sgp_ros.report.diagnosis_text import effect_name
+from sgp_ros.report.diagnosis_text import UNKNOWN, effect_name
 from sgp_ros.report.figures import BAND, GREY, MEASURED, PREDICTED
 
 FORCES = (PREDICTED, '#009E73', '#CC79A7')
 """One colour for each finding on a joint (Okabe and Ito 2008)."""
 _LARGE, _ZOOM_S = 3, 4.0
-LAWS = {
-    'viscous_friction': 'velocity', 'coulomb_friction': 'velocity',
-    'stribeck_friction': 'velocity', 'quadratic_drag': 'velocity',
-    'asymmetric_coulomb': 'velocity', 'load_friction': 'velocity', 'hysteresis': 'velocity',
-    'torque_gain': 'effort', 'dead_zone': 'effort', 'saturation': 'effort',
-    'friction_drift': 'time', 'actuator_lag': 'time', 'command_delay': 'time',
-    'backlash': 'time', 'payload': 'time', 'armature': 'acceleration',
-}  # fmt: skip
-"""Variable over which the force of an effect is drawn; the position for all others."""
-_OVER_SECONDS = ('actuator_lag', 'command_delay', 'backlash', 'payload')
-"""Effects whose force is no function of one variable: drawn over a few seconds."""
 _GAP = 1.5
 """Sampling periods from which on no line joins two rows."""
 
@@ -51,13 +41,13 @@ def draw_diagnosis(found: Diagnosis) -> dict[str, Figure]:
     if found.bands:
         reach = {found.joints[j]: reach_of(found, j) for j in important_joints(found)}
         figures['bands'] = draw_bands(found, reach)
-    if any(f.effect != 'unknown' for f, _ in _forces(found)):
+    if _forces(found):
         figures['law'] = draw_laws(found)
     if found.findings:
         large = {found.joints[j] for j in important_joints(found)}
         figures['dependence'] = draw_dependence(found, large)
     for f in found.findings:
-        if f.effect == 'unknown' and f.joint in found.joints:
+        if f.effect == UNKNOWN and f.joint in found.joints:
             figures['shape'] = draw_shape(found, f)
     figures['proof'] = draw_proof(found)
     return figures
@@ -94,12 +84,13 @@ def draw_laws(found: Diagnosis) -> Figure:
         x, label = _abscissa(found, finding, j)
         law, measured = force[:, j], found.traces.after[:, j] + force[:, j]
         style = '.'
-        if finding.effect in _OVER_SECONDS:
+        over = EFFECTS[finding.effect].drawn_over
+        if over == 'seconds':
             zoom, style = _zoom(found, j), '-'
             x, law, measured = (
                 y[zoom] for y in (x, _broken(found, law), _broken(found, measured))
             )
-        elif finding.effect == 'friction_drift':
+        elif over == 'time':
             law, measured = np.abs(law), np.abs(measured)
         colour = next((c for f, _, c in _acting(found, j) if f is finding), FORCES[0])
         axes.plot(x, measured, style, ms=6, lw=3.5, color=MEASURED, label='measured')
@@ -164,7 +155,7 @@ def _acting(found: Diagnosis, j: int) -> list[tuple[Finding, np.ndarray, str]]:
 def _forces(found: Diagnosis) -> list[tuple[Finding, np.ndarray]]:
     """Return the findings that exert forces, with these."""
     pairs = zip(found.findings, found.traces.forces, strict=False)
-    return [(f, x) for f, x in pairs if f.effect not in {'velocity_filter_lag', 'unknown'}]
+    return [(f, x) for f, x in pairs if exerts_force(f.effect)]
 
 
 def _strongest(found: Diagnosis, finding: Finding, force: np.ndarray) -> int:
@@ -176,7 +167,7 @@ def _strongest(found: Diagnosis, finding: Finding, force: np.ndarray) -> int:
 def _abscissa(
     found: Diagnosis, finding: Finding, j: int, name: str | None = None
 ) -> tuple[np.ndarray, str]:
-    name, unit = name or LAWS.get(finding.effect, 'position'), position_unit(found, j)
+    name, unit = name or EFFECTS[finding.effect].drawn_over, position_unit(found, j)
     traces = found.traces
     words = {key: p.value for key, p in finding.parameters.items()}
     if words.get('kind') == 'torque' and words.get('source_joint') in found.joints:
@@ -184,6 +175,7 @@ def _abscissa(
         return traces.effort[:, source], f'effort of {found.joints[source]}'
     curves = {
         'time': (traces.time, 'time [s]'),
+        'seconds': (traces.time, 'time [s]'),
         'velocity': (traces.velocity[:, j], f'velocity [{unit}/s]'),
         'effort': (traces.effort[:, j], f'commanded effort [{found.units[j]}]'),
         'acceleration': (

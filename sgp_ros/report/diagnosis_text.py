@@ -17,38 +17,11 @@ from sgp_ros.diagnosis.result import (
     Proof,
 )
 from sgp_ros.gp.scores import INTERVAL_95
+from sgp_ros.physics.catalogue import exerts_force, words_of
 from sgp_ros.report.diagnosis_proof import recording_name
 
-EFFECT_NAMES = {
-    'viscous_friction': 'viscous friction',
-    'coulomb_friction': 'Coulomb friction',
-    'stribeck_friction': 'Stribeck friction',
-    'quadratic_drag': 'quadratic drag',
-    'position_friction': 'friction in a part of the range',
-    'limit_friction': 'friction that rises towards the limit',
-    'asymmetric_coulomb': 'Coulomb friction that differs with direction',
-    'spring': 'a spring',
-    'gravity_tilt': 'a base that is not level',
-    'payload': 'a payload',
-    'cogging': 'cogging',
-    'torque_gain': 'a wrong torque constant',
-    'dead_zone': 'a dead zone of the drive',
-    'saturation': 'an early saturation of the drive',
-    'actuator_lag': 'a lag of the drive',
-    'command_delay': 'a delay of the command',
-    'backlash': 'backlash',
-    'hysteresis': 'hysteresis (presliding friction)',
-    'armature': 'rotor inertia',
-    'joint_coupling': 'a coupling between joints',
-    'encoder_eccentricity': 'an eccentric encoder',
-    'velocity_filter_lag': 'a lag of the measured velocity',
-    'friction_drift': 'friction that drifts with time',
-    'constant_load': 'a constant load',
-    'tip_force': 'a constant force on the tool',
-    'load_friction': 'friction that grows with the load',
-    'end_stop': 'an end stop',
-    'unknown': 'an unknown effect',
-}
+UNKNOWN = 'unknown'
+"""Name of what no effect of the catalogue describes."""
 _PLACES = {'base': 'at the base', 'tool': 'at the tool', 'all': 'on all joints'}
 _ENTRIES = {f'com_{axis}': f'{axis} of the centre' for axis in 'xyz'}
 _MEANINGLESS = 1e6
@@ -118,10 +91,15 @@ def phrase(finding: Finding) -> str:
     return ', '.join([effect_name(finding), *numbers(finding)])
 
 
+def plain_name(effect: str) -> str:
+    """Return the plain name of an effect, also of an unknown one."""
+    return 'an unknown effect' if effect == UNKNOWN else words_of(effect)
+
+
 def effect_name(finding: Finding) -> str:
     """Return the plain name of an effect and of its variant."""
     words = {name: p.value for name, p in finding.parameters.items() if isinstance(p.value, str)}
-    name = EFFECT_NAMES.get(finding.effect, finding.effect.replace('_', ' '))
+    name = plain_name(finding.effect)
     kind = str(words.get('kind', ''))
     if 'source_joint' in words:
         return f'{name} ({kind} from {words["source_joint"]})'
@@ -171,7 +149,7 @@ def quantity(p: Parameter, *, is_short: bool = False) -> str:
 def equivalence_sentence(found: Equivalent) -> str:
     """Say what this motion cannot tell from the findings, and which motion would."""
     parts = [
-        f'{EFFECT_NAMES.get(effect, effect)} {_PLACES.get(joint, f"on {joint}")}'
+        f'{plain_name(effect)} {_PLACES.get(joint, f"on {joint}")}'
         for joint, effect in found.effects
     ]
     text = f'On this motion {" with ".join(parts) or "another set of bodies"} fits as well'
@@ -225,7 +203,7 @@ def _missing(found: Diagnosis) -> str:
     for previous, f in pairwise(found.findings):
         where = '' if f.joint == previous.joint else f'{place(f)}: '
         text += f'; and {where}{phrase(f)} (probability {f.probability:.2f})'
-    if any(f.effect != 'velocity_filter_lag' for f in found.findings):
+    if any(exerts_force(f.effect) for f in found.findings):
         subject = 'it explains' if len(found.findings) == 1 else 'together they explain'
         if found.parameter_errors:
             subject = 'with corrected bodies it explains'
@@ -253,7 +231,7 @@ def _calm(found: Diagnosis) -> str:
 
 
 def _unexplained(found: Diagnosis) -> str:
-    named = [f for f in found.findings if f.effect == 'unknown']
+    named = [f for f in found.findings if f.effect == UNKNOWN]
     joint = named[0].joint if named else found.joints[0]
     certainty = named[0].probability if named else found.certainty
     share = named[0].share if named else explained(found)
@@ -270,7 +248,7 @@ def _unexplained(found: Diagnosis) -> str:
         return f'{text}; no effect of the list fits.'
     top = found.alternatives[0]
     nearest = [f for f in found.alternatives if f.log_bayes_factor == top.log_bayes_factor]
-    names = ' with '.join(dict.fromkeys(EFFECT_NAMES.get(f.effect, f.effect) for f in nearest))
+    names = ' with '.join(dict.fromkeys(plain_name(f.effect) for f in nearest))
     return f'{text}; no effect of the list fits: the nearest, {names}, {top.why.split(", ")[0]}.'
 
 

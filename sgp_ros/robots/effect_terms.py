@@ -9,62 +9,38 @@ one that acts, `tau + tau_x(tau)`. Tilt and payload belong to the tree.
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sgp_ros.physics.observed_motion import ObservedMotion
-from sgp_ros.physics.stated import coefficient_quantities
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.term import Coefficient, Motion, Term
 from sgp_ros.rigid.tree import Tree
-from sgp_ros.robots.stated_effects import StatedEffect
+from sgp_ros.robots.observed_motion import ObservedMotion
 
-ON_TREE = ('gravity_tilt', 'payload')
-"""Effects that change the tree instead of adding a force."""
-_OF_COMMAND = ('dead_zone', 'saturation')
-"""Of the drive's input: a measured effort lies behind them."""
-_OF_EFFORT = {
-    'torque_gain': (0,), 'dead_zone': (0,), 'saturation': (0,), 'joint_coupling torque': (0,),
-    'load_friction': (1,),
-}  # fmt: skip
-"""Effects to the columns that depend on the effort."""
 _SOURCE = 'stated effect of a diagnosis'
 
 
-def changed_tree(tree: Tree, effects: Sequence[StatedEffect]) -> Tree:
-    """Return the tree with stated tilt of the base and payload.
-
-    With the base oriented by `Ry(pitch) Rx(roll)`, gravity in its axes is that transposed times
-    `(0, 0, -g)`.
-    """
+def changed_tree(tree: Tree, effects: Sequence[EffectAt]) -> Tree:
+    """Return the tree with stated tilt of the base and payload."""
     for stated in effects:
-        if stated.name == 'gravity_tilt':
-            roll, pitch = stated.shape
-            down = np.array([
-                -math.sin(pitch), math.cos(pitch) * math.sin(roll),
-                math.cos(pitch) * math.cos(roll),
-            ])  # fmt: skip
-            tree = replace(tree, gravity=-float(np.linalg.norm(tree.gravity)) * down)
-        elif stated.name == 'payload':
+        law = stated.effect
+        if not law.is_on_tree:
+            continue
+        if law.is_body:
             parameters = tree.parameters.copy()
-            parameters[tree.size - 1] += _point_mass(*stated.shape)
+            parameters[tree.size - 1] += law.added_body(stated.shape)
             tree = replace(tree, parameters=parameters)
+        else:
+            size = float(np.linalg.norm(tree.gravity))
+            tree = replace(tree, gravity=law.gravity(stated.shape, size))
     return tree
 
 
-def _point_mass(mass: float, x: float, y: float, z: float) -> np.ndarray:
-    """Return the inertial parameters of a point mass, (10,)."""
-    centre = np.array([x, y, z])
-    tensor = (centre @ centre) * np.eye(3) - np.outer(centre, centre)
-    rows, columns = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)
-    return mass * np.concatenate([[1.0], centre, tensor[rows, columns]])
-
-
 def effect_terms(
-    tree: Tree, effects: Sequence[StatedEffect], coulomb_width: float
+    tree: Tree, effects: Sequence[EffectAt], coulomb_width: float
 ) -> tuple[Term, ...]:
     """Return a term for each effect that is a force of the motion.
 
@@ -78,20 +54,20 @@ def effect_terms(
     seen: Counter[tuple[str, str]] = Counter()
     terms = []
     for stated in effects:
-        if not stated.is_online or stated.name in ON_TREE or stated.place is None:
+        law = stated.effect
+        if not law.is_online or law.is_on_tree:
             continue
-        key = stated.name, stated.joint
+        key = law.name, stated.joint
         seen[key] += 1
-        name = stated.name if seen[key] == 1 else f'{stated.name}_{seen[key]}'
-        kept = [i for i in range(len(stated.coefficients)) if i not in _effort_columns(stated)]
+        name = law.name if seen[key] == 1 else f'{law.name}_{seen[key]}'
+        others = law.effort_columns(stated.kind)
+        kept = [i for i in range(len(stated.coefficients)) if i not in others]
         if kept:
             terms.append(_term(tree, stated, name, kept, coulomb_width))
     return tuple(terms)
 
 
-def effort_map(
-    tree: Tree, effects: Sequence[StatedEffect], coulomb_width: float
-) -> EffortMap | None:
+def effort_map(tree: Tree, effects: Sequence[EffectAt], coulomb_width: float) -> EffortMap | None:
     """Return how recorded efforts become those that act; None where they are the same.
 
     Args:
@@ -99,7 +75,7 @@ def effort_map(
         effects: stated ones.
         coulomb_width: velocity over which dry friction changes its sign [rad/s or m/s].
     """
-    chosen = tuple(e for e in effects if e.is_online and _effort_columns(e))
+    chosen = tuple(e for e in effects if e.effect.is_online and e.effect.effort_columns(e.kind))
     return EffortMap(tree, chosen, coulomb_width) if chosen else None
 
 
@@ -114,7 +90,7 @@ class EffortMap:
     """
 
     tree: Tree
-    effects: tuple[StatedEffect, ...]
+    effects: tuple[EffectAt, ...]
     coulomb_width: float
 
     def __call__(
@@ -131,9 +107,9 @@ class EffortMap:
         motion = Motion(still, velocity, still, effort)
         acting = effort.copy()
         for stated in self.effects:
-            if is_measured and stated.name in _OF_COMMAND:
+            if is_measured and stated.effect.is_of_command:
                 continue
-            columns = list(_effort_columns(stated))
+            columns = list(stated.effect.effort_columns(stated.kind))
             force = _forces(self.tree, stated, motion, self.coulomb_width)[:, :, columns]
             acting += force @ stated.coefficients[columns]
         return acting
@@ -141,36 +117,30 @@ class EffortMap:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Instant:
-    """The efforts of a drive without memory, as effects ask for them."""
+    """The efforts of a drive without memory, so without delay and lag."""
 
     values: np.ndarray
 
     def effort(
-        self, joint: int, *, characteristic: Callable[[np.ndarray], np.ndarray] | None = None
-    ) -> np.ndarray:
+        self, joint: int, *, delay: float = 0.0, time_constant: float = 0.0,
+        characteristic: Callable[[np.ndarray], np.ndarray] | None = None,
+    ) -> np.ndarray:  # fmt: skip
+        assert delay == time_constant == 0.0
         u = self.values[:, joint]
         return u if characteristic is None else characteristic(u)
 
 
-def _effort_columns(stated: StatedEffect) -> tuple[int, ...]:
-    name = f'{stated.name} {stated.kind}' if stated.name == 'joint_coupling' else stated.name
-    return _OF_EFFORT.get(name, ())
-
-
-def _forces(tree: Tree, stated: StatedEffect, motion: Motion, width: float) -> np.ndarray:
+def _forces(tree: Tree, stated: EffectAt, motion: Motion, width: float) -> np.ndarray:
     """Return the force per coefficient on every joint, (n, k, m).
 
     The rows stand alone, so the direction of motion is the velocity's, made smooth over `width`.
     """
-    assert stated.effect is not None
-    assert stated.place is not None
     n, k = motion.position.shape
     seen = ObservedMotion(
         tree, np.zeros(n), 0.0, motion.position, motion.velocity, motion.acceleration,
-        motion.effort, _Instant(motion.effort),  # type: ignore[arg-type]  # all they ask of it
+        motion.effort, _Instant(motion.effort), given_direction=np.tanh(motion.velocity / width),
     )  # fmt: skip
-    seen.__dict__['direction'] = np.tanh(motion.velocity / width)
-    columns = stated.effect.columns(seen, stated.place, stated.shape)
+    columns = stated.columns(seen)
     if columns.ndim == 3:
         return columns
     forces = np.zeros((n, k, columns.shape[1]))
@@ -178,16 +148,13 @@ def _forces(tree: Tree, stated: StatedEffect, motion: Motion, width: float) -> n
     return forces
 
 
-def _term(
-    tree: Tree, stated: StatedEffect, name: str, kept: list[int], coulomb_width: float
-) -> Term:
+def _term(tree: Tree, stated: EffectAt, name: str, kept: list[int], coulomb_width: float) -> Term:
     def columns(motion: Motion) -> np.ndarray:
         return -_forces(tree, stated, motion, coulomb_width)[:, :, kept]
 
-    assert stated.place is not None
     joint = stated.place.joint
     prismatic = joint >= 0 and bool(tree.is_prismatic[joint])
-    quantities = coefficient_quantities(stated.name, stated.kind)
+    quantities = stated.effect.coefficient_quantities(stated.kind)
     coefficients = tuple(
         Coefficient(
             f'{stated.joint}.{name}.{quantities[i].name}',

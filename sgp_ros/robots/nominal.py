@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.built_in_nominal import NOMINAL, built_in_document
-from sgp_ros.robots.effect_terms import ON_TREE, changed_tree
+from sgp_ros.robots.effect_terms import changed_tree
 from sgp_ros.robots.robot import Robot
-from sgp_ros.robots.stated_effects import StatedEffect, read_effects
+from sgp_ros.robots.stated_effects import read_effects
 from sgp_ros.robots.urdf_robot import build_urdf_robot, nominal_tree
 
 
@@ -31,13 +32,13 @@ class Nominal:
     robot: Robot
     plain: Tree
     tree: Tree
-    effects: tuple[StatedEffect, ...]
+    effects: tuple[EffectAt, ...]
     is_lumped: bool = False
 
     @property
-    def stated(self) -> tuple[StatedEffect, ...]:
+    def stated(self) -> tuple[EffectAt, ...]:
         """The effects that are not part of the tree."""
-        return tuple(e for e in self.effects if e.is_complete and e.name not in ON_TREE)
+        return tuple(e for e in self.effects if e.is_complete and not e.effect.is_on_tree)
 
     @property
     def remarks(self) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from sgp_ros.physics.joint_terms import JOINT_TERMS
+from sgp_ros.physics.joint_terms import term_laws
 from sgp_ros.physics.term import Term
 from sgp_ros.rigid.tree import Tree
 
@@ -56,7 +56,7 @@ def inertial_prior(
 def joint_prior(
     tree: Tree, kind: str, chosen: list[int], term: Term, spread: float
 ) -> dict[str, tuple[float, float]]:
-    """Return mean and standard deviation by name of a term of `JOINT_TERMS`.
+    """Return mean and standard deviation by name of a term of single joints.
 
     Viscous and Coulomb friction have a nominal value in `<dynamics>`, with that of joints that
     follow; others have the mean 0.
@@ -69,16 +69,17 @@ def joint_prior(
         spread: relative, positive.
     """
     prior = {}
+    _, form = term_laws()[kind]
     names = iter(term.coefficients)
     for joint in chosen:
         group, gains = tree.follows == joint, np.abs(tree.multipliers)
         nominal = 0.0
-        if kind == 'viscous':
+        if form.dynamics == 'damping':
             nominal = float(np.sum((tree.damping * gains**2)[group]))
-        elif kind in {'coulomb', 'asymmetric_coulomb'}:
+        elif form.dynamics:
             nominal = float(np.sum((tree.friction * gains)[group]))
         limit = float(tree.effort_limit[joint])
         floor = LIMIT_SHARE * limit if 0.0 < limit < math.inf else LEAST_EFFORT
-        for _ in JOINT_TERMS[kind].names:
+        for _ in form.names:
             prior[next(names).name] = (nominal, spread * max(nominal, floor))
     return prior

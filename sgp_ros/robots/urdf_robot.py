@@ -31,7 +31,8 @@ from pathlib import Path
 from typing import Any
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.physics.joint_terms import JOINT_TERMS, Shape, joint_term
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.joint_terms import Shape, joint_term, term_laws
 from sgp_ros.physics.term import Joint, Term
 from sgp_ros.rigid.inertial import inertial_term
 from sgp_ros.rigid.locking import Plan, plan_joints
@@ -41,12 +42,11 @@ from sgp_ros.robots.effect_terms import changed_tree, effect_terms, effort_map
 from sgp_ros.robots.entries import Entries
 from sgp_ros.robots.nominal_prior import inertial_prior, joint_prior
 from sgp_ros.robots.robot import Robot
-from sgp_ros.robots.stated_effects import StatedEffect, read_effects
+from sgp_ros.robots.stated_effects import read_effects
 
 DEFAULT_TERMS: Mapping[str, str] = dict.fromkeys(
     ('inertial', 'viscous', 'coulomb', 'offset'), 'all'
 )
-_TERMS = ('inertial', *JOINT_TERMS)
 
 
 def build_urdf_robot(
@@ -173,11 +173,11 @@ def _payload(entries: Entries) -> Payload | None:
     )
 
 
-def _description(tree: Tree, place: Path | str, effects: Sequence[StatedEffect]) -> str:
+def _description(tree: Tree, place: Path | str, effects: Sequence[EffectAt]) -> str:
     file = place.name if isinstance(place, Path) else 'a URDF'
     text = f'Rigid-body tree of {tree.size} joints from {file}'
     for is_online, lead in ((True, 'with'), (False, 'not modelled online:')):
-        named = [f'{e.name} of {e.joint}' for e in effects if e.is_online == is_online]
+        named = [f'{e.name} of {e.joint}' for e in effects if e.effect.is_online == is_online]
         text += f'; {lead} {", ".join(named)}' if named else ''
     return text
 
@@ -250,8 +250,9 @@ def _spreads(entries: Entries, wanted: Mapping[str, object]) -> dict[str, float]
 
 def _chosen(kind: str, who: object, tree: Tree, problems: list[str]) -> list[int] | None:
     """Return the joints a term is for; None where it or they are unknown."""
-    if kind not in _TERMS:
-        problems.append(f'term {kind!r} is not one of {list(_TERMS)}')
+    known = ['inertial', *term_laws()]
+    if kind not in known:
+        problems.append(f'term {kind!r} is not one of {known}')
         return None
     names = list(tree.moving_names)
     if who == 'all':

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
-from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
+from sgp_ros.diagnosis.explain.suspects import Columns
 from sgp_ros.physics.catalogue import EFFECTS
-from sgp_ros.physics.effect import Place
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 
 
 def fitted(equations, *names, is_free=False):
     """Return a model of effects on joint 0, from the first of their shapes."""
     suspects = tuple(
-        Suspect(EFFECTS[n], Place(0), EFFECTS[n].starts(equations.motion, Place(0))[0])
+        EffectAt(EFFECTS[n], Place(0), EFFECTS[n].starts(equations.motion, Place(0))[0])
         for n in names
     )
     start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
     return fit(Columns(equations), suspects, start, is_free=is_free)
+
+
+def with_coefficients(model, coefficients):
+    """Return a model of one effect with other coefficients."""
+    (effect,) = model.suspects
+    return replace(model, suspects=(replace(effect, coefficients=coefficients),))

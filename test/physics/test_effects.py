@@ -10,12 +10,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.confined import inside
 from sgp_ros.physics.drive import Drive
-from sgp_ros.physics.effect import Fitted, Place, Quantity
-from sgp_ros.physics.friction import inside
-from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place, Quantity
 from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.rigid.tree import read_urdf
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 STEP, ROWS = 0.01, 400
 SOUTH = (0.0, 0.0, -9.81)
@@ -81,7 +82,7 @@ CONTRACT = [
     pytest.param(effect, place, id=f'{effect.name}-{place.joint}{place.kind}{place.side or ""}')
     for effect in EFFECTS.values() for place in effect.places(MOTION)
 ]  # fmt: skip
-SHAPED = [p for p in CONTRACT if p.values[0].bounds is not None]
+SHAPED = [p for p in CONTRACT if len(p.values[0].bounds(MOTION, p.values[1])[0])]
 
 
 def columns(name, joint, shape=(), motion=MOTION, **variant):
@@ -89,8 +90,9 @@ def columns(name, joint, shape=(), motion=MOTION, **variant):
 
 
 def report(name, joint, shape, coefficients, motion=MOTION, **variant):
-    fitted = Fitted(motion, Place(joint, **variant), np.array(shape), np.array(coefficients))
-    return EFFECTS[name].report(fitted), EFFECTS[name].is_possible(fitted)
+    place = Place(joint, **variant)
+    found = EffectAt(EFFECTS[name], place, np.array(shape), np.array(coefficients))
+    return found.report(motion), found.is_possible(motion)
 
 
 def _starts(effect, place, motion=MOTION):
@@ -121,7 +123,7 @@ def test_the_report_has_the_names_of_its_quantities_and_finite_numbers(effect, p
     """What is a word is a kind or a joint; what is a number has a unit."""
     shape = _starts(effect, place)[0]
     m = effect.columns(MOTION, place, shape).shape[-1]
-    values = effect.report(Fitted(MOTION, place, shape, np.linspace(0.5, 0.8, m)))
+    values = EffectAt(effect, place, shape, np.linspace(0.5, 0.8, m)).report(MOTION)
     units = {q.name: q.unit for q in effect.quantities}
     for name, value in values.items():
         if isinstance(value, str):
@@ -205,10 +207,10 @@ def test_an_effect_without_memory_sees_each_sample_alone(effect, place):
     """In any order of the rows the force is the same; with memory it must not be."""
     order = np.random.default_rng(5).permutation(ROWS)
     sliding = _motion(drive=effect.has_memory)
-    sliding.__dict__['direction'] = np.sign(sliding.velocity)
+    sliding = replace(sliding, given_direction=np.sign(sliding.velocity))
     fields = ('time', 'position', 'velocity', 'acceleration', 'effort')
     mixed = replace(sliding, **{name: getattr(sliding, name)[order] for name in fields})
-    mixed.__dict__['direction'] = sliding.direction[order]
+    mixed = replace(mixed, given_direction=sliding.direction[order])
     starts = _starts(effect, place)
     shape = starts[len(starts) // 2]
     given, found = (effect.columns(m, place, shape) for m in (sliding, mixed))
@@ -331,7 +333,7 @@ def test_friction_near_a_limit_rises_linearly_to_it(side):
     rows = _steady()
     np.testing.assert_allclose(x[rows], (-ramp * np.sign(_v(0)))[rows], atol=1e-12)
     effect = EFFECTS['limit_friction']
-    region = effect.interval(Fitted(MOTION, Place(0, side=side), np.array([0.2 * side]), None))
+    region = effect.interval(EffectAt(effect, Place(0, side=side), np.array([0.2 * side])), MOTION)
     assert region == ('position', [sorted([0.2 * side, limit])])
 
 

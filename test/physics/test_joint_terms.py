@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sgp_ros.physics.joint_terms import JOINT_TERMS, Shape, joint_term
+from sgp_ros.physics.joint_terms import Shape, joint_term, term_laws
 from sgp_ros.physics.term import Joint, Motion
 
+JOINT_TERMS = term_laws()
 JOINTS = (Joint('a'), Joint('b', kind='prismatic'), Joint('c'))
 
 
@@ -29,7 +30,7 @@ def test_a_term_acts_on_its_own_joint_alone(name):
     columns = term.columns(motion)
     assert columns.shape == (6, 3, len(term.coefficients))
     for i, coefficient in enumerate(term.coefficients):
-        j = chosen[i // len(JOINT_TERMS[name].names)]
+        j = chosen[i // len(JOINT_TERMS[name][1].names)]
         assert coefficient.joint == JOINTS[j].name
         assert coefficient.name.startswith(f'{JOINTS[j].name}.')
         assert not np.any(np.delete(columns[:, :, i], j, axis=1))

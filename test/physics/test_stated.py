@@ -9,18 +9,10 @@ import pytest
 
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.drive import Drive
-from sgp_ros.physics.effect import Fitted, Place
-from sgp_ros.physics.observed_motion import ObservedMotion
-from sgp_ros.physics.stated import (
-    SIDED,
-    coefficient_quantities,
-    coefficient_std,
-    place_of,
-    shape_and_coefficients,
-    stated_quantities,
-    stated_words,
-)
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 from sgp_ros.rigid.tree import read_urdf
+from sgp_ros.robots.observed_motion import ObservedMotion
 from test.rigid.test_tree import ARM, FINGER
 
 URDF = (
@@ -56,7 +48,7 @@ def _id(value):
 
 def _values(effect, kind, seed):
     rng = np.random.default_rng(seed)
-    values = {q.name: float(rng.uniform(0.1, 0.9)) for q in stated_quantities(effect.name, kind)}
+    values = {q.name: float(rng.uniform(0.1, 0.9)) for q in effect.stated_quantities(kind)}
     if effect.name == 'position_friction':
         values['hi'] += 1.0
     return values
@@ -67,8 +59,8 @@ def test_what_was_stated_is_reported(effect, place):
     """Values to shape and coefficients and back by the report of the diagnosis, all effects."""
     for seed in range(3):
         values = _values(effect, place.kind, seed)
-        shape, c = shape_and_coefficients(effect.name, place.kind, values)
-        report = effect.report(Fitted(MOTION, place, shape, c))
+        shape, c = effect.model(values, place.kind)
+        report = EffectAt(effect, place, shape, c).report(MOTION)
         numbers = {k: v for k, v in report.items() if not isinstance(v, str)}
         hidden = {'motor_inertia'} if effect.name == 'backlash' else set()
         assert {k: numbers[k] for k in values if k not in hidden} == pytest.approx(
@@ -88,30 +80,29 @@ def test_what_was_reported_is_stated_at_the_same_place(effect, place):
     if not effect.is_given:
         columns = effect.columns(MOTION, place, shape)
         c = rng.uniform(0.2, 1.0, size=columns.shape[-1])
-        assert columns.shape[-1] == len(coefficient_quantities(effect.name, place.kind))
-    report = effect.report(Fitted(MOTION, place, shape, c))
+        assert columns.shape[-1] == len(effect.coefficient_quantities(place.kind))
+    report = EffectAt(effect, place, shape, c).report(MOTION)
     numbers = {k: v for k, v in report.items() if not isinstance(v, str)}
-    again, d = shape_and_coefficients(effect.name, place.kind, numbers)
+    again, d = effect.model(numbers, place.kind)
     hidden = np.isnan(again)
     assert hidden.any() == (effect.name == 'backlash')
     np.testing.assert_allclose(again[~hidden], shape[~hidden], rtol=1e-12)
     np.testing.assert_allclose(d, c, rtol=1e-12)
     names = {-1: 'base', -2: 'tool', -3: 'all'}
     joint = names.get(place.joint) or MOTION.tree.joint_names[place.joint]
-    words = stated_words(effect.name, place, MOTION.tree)
+    words = effect.stated_words(place, MOTION.tree)
     assert words.items() >= {k: v for k, v in report.items() if isinstance(v, str)}.items()
-    assert place_of(effect.name, joint, words, numbers, MOTION.tree) == place
+    assert EffectAt.stated(effect, joint, numbers | words, MOTION.tree).place == place
 
 
-@pytest.mark.parametrize('effect', SIDED)
+@pytest.mark.parametrize('effect', [e for e in EFFECTS.values() if e.edge], ids=_id)
 @pytest.mark.parametrize('side', [-1, 1])
 def test_an_unstated_side_is_the_nearer_end_of_the_range(effect, side):
     tree = MOTION.tree
     j = next(j for j in range(tree.size) if np.isfinite(tree.upper[j]))
     joint = tree.joint_names[j]
     edge = 0.5 * (tree.upper[j] + tree.lower[j]) + side * 0.4 * (tree.upper[j] - tree.lower[j])
-    numbers = {'onset': edge, 'position': edge}
-    assert place_of(effect, joint, {}, numbers, tree) == Place(j, side=side)
+    assert Place.of(effect.edge, joint, {}, {effect.edge: edge}, tree) == Place(j, side=side)
 
 
 def test_the_spread_of_coefficients_is_that_of_the_values():
@@ -124,28 +115,27 @@ def test_the_spread_of_coefficients_is_that_of_the_values():
         std = dict.fromkeys(values, 0.01)
         drawn = np.array(
             [
-                shape_and_coefficients(
-                    name, '', {k: x + 0.01 * rng.normal() for k, x in values.items()}
-                )[1]
+                EFFECTS[name].model({k: x + 0.01 * rng.normal() for k, x in values.items()})[1]
                 for _ in range(4000)
             ]
         )
-        found = coefficient_std(name, '', values, std)
+        found = EFFECTS[name].coefficient_std(values, std)
         np.testing.assert_allclose(found, drawn.std(axis=0), rtol=0.05)  # 4.5 / sqrt(2 * 4000)
 
 
 def test_a_coefficient_is_unknown_where_a_value_that_matters_is():
-    std = coefficient_std('spring', '', {'stiffness': 2.0, 'rest': 0.5}, {'stiffness': 0.1})
+    std = EFFECTS['spring'].coefficient_std({'stiffness': 2.0, 'rest': 0.5}, {'stiffness': 0.1})
     assert std[0] == pytest.approx(0.1)
     assert std[1] == math.inf
 
 
 def test_an_eccentric_encoder_is_as_uncertain_as_its_amplitude():
     """Its one coefficient scales what the stated numbers say."""
+    encoder = EFFECTS['encoder_eccentricity']
     numbers = {'amplitude': 0.05, 'periods': 3.0, 'phase': 0.4}
-    shape, c = shape_and_coefficients('encoder_eccentricity', '', numbers)
+    shape, c = encoder.model(numbers)
     assert c == pytest.approx([1.0])
     assert shape == pytest.approx([3.0, 0.05 * np.cos(0.4), 0.05 * np.sin(0.4)])
-    std = coefficient_std('encoder_eccentricity', '', numbers, {'amplitude': 0.005})
+    std = encoder.coefficient_std(numbers, {'amplitude': 0.005})
     assert std == pytest.approx([0.1])
-    assert np.isinf(coefficient_std('encoder_eccentricity', '', numbers, {})).all()
+    assert np.isinf(encoder.coefficient_std(numbers, {})).all()

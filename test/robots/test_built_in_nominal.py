@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.physics.observed_motion import ObservedMotion
 from sgp_ros.physics.term import Motion
 from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.robots.built_in_nominal import NOMINAL
 from sgp_ros.robots.nominal import nominal_model
+from sgp_ros.robots.observed_motion import ObservedMotion
 from sgp_ros.robots.registry import ROBOTS
 from sgp_ros.simulation.registry import SIMULATORS
 
@@ -45,9 +45,18 @@ def test_bodies_and_effects_move_as_the_coefficients_say(name):
     W = np.array([VALUES[name][c.name] for c in robot.coefficients])
     gains = np.array([joint.effort_gain for joint in nominal.robot.joints])
     seen = ObservedMotion(
-        nominal.tree, np.zeros(len(q)), 0.0, q, v, a, command * gains, None, (), nominal.stated
+        nominal.tree,
+        np.zeros(len(q)),
+        0.0,
+        q,
+        v,
+        a,
+        command * gains,
+        None,
+        (),
+        nominal.stated,
+        np.sign(v),
     )
-    seen.__dict__['direction'] = np.sign(v)
     needed = seen.nominal_effort - seen.stated_force
     if robot.target == 'effort':
         predicted = robot.regressor(Motion(q, v, a, command)) @ W

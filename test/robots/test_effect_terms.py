@@ -15,13 +15,12 @@ from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.drive import Drive
-from sgp_ros.physics.observed_motion import ObservedMotion
-from sgp_ros.physics.stated import place_of, shape_and_coefficients, stated_quantities
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.term import Motion
 from sgp_ros.rigid.rigid_body import inverse_dynamics
 from sgp_ros.rigid.tree import read_urdf
+from sgp_ros.robots.observed_motion import ObservedMotion
 from sgp_ros.robots.registry import load_robot
-from sgp_ros.robots.stated_effects import NOT_ONLINE
 from test.physics.test_stated import URDF
 
 WIDTH = 0.01
@@ -33,7 +32,7 @@ JOINTS = {
 }  # fmt: skip
 KINDS = {'joint_coupling': ('spring', 'torque'), 'position_friction': ('coulomb', 'viscous')}
 ONLINE = [
-    (name, kind) for name in EFFECTS if name not in NOT_ONLINE for kind in KINDS.get(name, ('',))
+    (name, kind) for name in EFFECTS if EFFECTS[name].is_online for kind in KINDS.get(name, ('',))
 ]
 
 
@@ -47,7 +46,7 @@ def _robot(folder, effects, terms='{viscous: all}'):
 
 def _entry(name, kind, std=0.01):
     joint = JOINTS.get(name, 'elbow')
-    numbers = {q.name: 0.3 + 0.1 * i for i, q in enumerate(stated_quantities(name, kind))}
+    numbers = {q.name: 0.3 + 0.1 * i for i, q in enumerate(EFFECTS[name].stated_quantities(kind))}
     if name == 'tip_force':
         numbers['fz'] = -2.0
     numbers |= {'position_friction': {'hi': 2.5}, 'torque_gain': {'gain': 0.6}}.get(name, {})
@@ -70,13 +69,12 @@ def _diagnosed_force(name, kind, numbers, motion):
     drive = Drive(time - 0.5, motion.effort, ((0.0, n),), 1e-3)
     seen = ObservedMotion(
         TREE, time, 0.0, motion.position, motion.velocity, motion.acceleration, motion.effort,
-        drive,
+        drive, given_direction=np.tanh(motion.velocity / WIDTH),
     )  # fmt: skip
-    seen.__dict__['direction'] = np.tanh(motion.velocity / WIDTH)
     words = {'kind': kind} if kind else {}
     words |= {'source_joint': 'shoulder'} if name == 'joint_coupling' else {}
-    place = place_of(name, JOINTS.get(name, 'elbow'), words, numbers, TREE)
-    shape, c = shape_and_coefficients(name, kind, numbers)
+    stated = EffectAt.stated(EFFECTS[name], JOINTS.get(name, 'elbow'), numbers | words, TREE)
+    place, shape, c = stated.place, stated.shape, stated.coefficients
     if name in {'dead_zone', 'saturation'}:
         u, x = motion.effort[:, place.joint], shape[0]
         clipped = np.clip(u, -x, x)
@@ -154,7 +152,9 @@ def test_every_effect_of_one_time_is_in_the_model(tmp_path):
     assert (c.prior_mean, c.prior_std) == (0.3, pytest.approx(0.02))
 
 
-@pytest.mark.parametrize('name', [n for n in NOT_ONLINE if n != 'friction_drift'])
+@pytest.mark.parametrize(
+    'name', [n for n, e in EFFECTS.items() if not e.is_online and n != 'friction_drift']
+)
 def test_effects_with_memory_are_named_but_not_modelled(tmp_path, name):
     robot = _robot(tmp_path, [_entry(name, '')[0]])
     assert f'not modelled online: {name} of elbow' in robot.description

@@ -20,9 +20,9 @@ from sgp_ros.diagnosis.compare.trajectory import (
     observe,
     parallel_filter,
 )
-from sgp_ros.physics.observed_motion import ObservedMotion
 from sgp_ros.rigid.rigid_body import mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 SPREAD = 0.25
 """Prior standard deviation of mass and inertia, relative; of the centre, to the radius."""

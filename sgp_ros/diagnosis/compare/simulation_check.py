@@ -13,13 +13,13 @@ from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.decide.decision import LEAST_SHARE
 from sgp_ros.engine.samples import Event
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.robot import Robot
-from sgp_ros.robots.stated_effects import StatedEffect
 
 
 def nominal_shares(
-    events: Iterable[Event], robot: Robot, tree: Tree, stated: tuple[StatedEffect, ...] = ()
+    events: Iterable[Event], robot: Robot, tree: Tree, stated: tuple[EffectAt, ...] = ()
 ) -> dict[str, float]:
     """Return the share of the mean squared effort that the nominal robot leaves, by joint.
 

@@ -22,10 +22,10 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event, JointSample
 from sgp_ros.errors import RecordingError
 from sgp_ros.physics.drive import Drive
-from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.observed_motion import ObservedMotion
 from sgp_ros.robots.robot import Robot
-from sgp_ros.robots.stated_effects import StatedEffect
 
 SHORTEST_ROWS = 64
 NOISE_SHARE = 3e-6
@@ -67,14 +67,14 @@ class RawTrajectory:
     refused: dict[str, int]
     noise_density: np.ndarray
     start_ns: int
-    stated: tuple[StatedEffect, ...] = ()
+    stated: tuple[EffectAt, ...] = ()
     remarks: tuple[str, ...] = ()
 
 
 def collect(
     events: Iterable[Event],
     robot: Robot,
-    stated: tuple[StatedEffect, ...] = (),
+    stated: tuple[EffectAt, ...] = (),
     config: EngineConfig = USUAL,
 ) -> RawTrajectory:
     """Bring a recording to its uniform grid.

@@ -15,8 +15,8 @@ from scipy import optimize, signal
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.diagnosis.decide.decision import LEAST_SHARE, NATS
-from sgp_ros.physics.observed_motion import ObservedMotion
-from sgp_ros.physics.stated import VELOCITY_FILTER_LAG
+from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ def known_lag(raw: RawTrajectory, motion: ObservedMotion, joint: int) -> np.ndar
     """Return the velocity of a joint behind the lags that the nominal robot states, (n,)."""
     v = motion.velocity[:, joint]
     for effect in raw.stated:
-        if effect.name == VELOCITY_FILTER_LAG and effect.joint == motion.tree.joint_names[joint]:
+        if effect.effect is VELOCITY_FILTER_LAG and effect.place.joint == joint:
             v = lagged(v, effect.numbers['time_constant'], motion.step)
     return v
 

@@ -22,7 +22,7 @@ from sgp_ros.diagnosis.places import joint_name
 from sgp_ros.diagnosis.prove.prediction import imbalance
 from sgp_ros.diagnosis.result import Equivalent
 from sgp_ros.physics.drive import Drive
-from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 ALIKE = math.log(20.0) / TEMPER
 """Difference of the fits below which a recording prefers neither model [nats]."""

@@ -10,11 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
+from sgp_ros.diagnosis.explain.suspects import Columns
 from sgp_ros.diagnosis.parts import PARTS, parts_of
+from sgp_ros.physics.effect_at import EffectAt
 
 
-def left_out(columns: Columns, model: Model, suspects: tuple[Suspect, ...]) -> np.ndarray:
+def left_out(columns: Columns, model: Model, suspects: tuple[EffectAt, ...]) -> np.ndarray:
     """Return what a model with some of its suspects leaves of parts left out in turn.
 
     Args:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,11 +12,11 @@ from sgp_ros.diagnosis.explain.fitted_model import Model, floors, price_of
 from sgp_ros.diagnosis.explain.regression import Frame
 from sgp_ros.diagnosis.explain.suspects import (
     Columns,
-    Suspect,
     dry_joints,
     shape_bounds,
     with_shapes,
 )
+from sgp_ros.physics.effect_at import EffectAt
 
 UNSEEN = 1e-12
 """A column that is this much smaller than the largest acts on nothing; its coefficient is zero."""
@@ -23,7 +24,7 @@ UNSEEN = 1e-12
 
 def fit(
     columns: Columns,
-    suspects: tuple[Suspect, ...],
+    suspects: tuple[EffectAt, ...],
     sigma: np.ndarray,
     *,
     is_free: bool = True,
@@ -56,7 +57,7 @@ def fit(
 
 
 def split(
-    frame: Frame, columns: Columns, suspects: tuple[Suspect, ...], w: np.ndarray | None = None
+    frame: Frame, columns: Columns, suspects: tuple[EffectAt, ...], w: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, list[int]]:
     """Return target less given effects, free columns (projected), and their widths."""
     y = frame.y
@@ -83,7 +84,7 @@ def _least(A: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def residual_of(
-    frame: Frame, columns: Columns, suspects: tuple[Suspect, ...], w: np.ndarray | None = None
+    frame: Frame, columns: Columns, suspects: tuple[EffectAt, ...], w: np.ndarray | None = None
 ) -> np.ndarray:
     """Return the scaled residual, (N k + p,)."""
     y, A, _ = split(frame, columns, suspects, w)
@@ -93,10 +94,10 @@ def residual_of(
 def _searched(
     frame: Frame,
     columns: Columns,
-    suspects: tuple[Suspect, ...],
+    suspects: tuple[EffectAt, ...],
     steps: int,
     w: np.ndarray | None,
-) -> tuple[Suspect, ...]:
+) -> tuple[EffectAt, ...]:
     """Improve the shapes by Levenberg-Marquardt within bounds."""
     low, high = shape_bounds(frame.equations, suspects)
     if not len(low):
@@ -134,40 +135,38 @@ def _searched(
     return with_shapes(suspects, x)
 
 
-def added_inertia(
-    suspects: Sequence[Suspect], coefficients: Sequence[np.ndarray], equations: Equations
-) -> np.ndarray:
+def added_inertia(suspects: Sequence[EffectAt], equations: Equations) -> np.ndarray:
     """Return what rotors and loads add to the mass matrix, (`POSES`, k, k) [kg m^2 or kg]."""
     still, *pushed = equations.poses
     added = np.zeros((*still.position.shape, len(pushed)))
-    for s, c in zip(suspects, coefficients, strict=True):
+    for s in suspects:
         if not s.effect.sees_acceleration or s.effect.uses_bodies:
             continue
-        before = s.effect.columns(still, s.place, s.shape) @ c
+        before = s.columns(still) @ s.coefficients
         for j, motion in enumerate(pushed):
-            force = s.effect.columns(motion, s.place, s.shape) @ c - before
+            force = s.columns(motion) @ s.coefficients - before
             added[:, s.place.joint if force.ndim == 1 else slice(None), j] -= force
     return added
 
 
 def _solved(
-    frame: Frame, columns: Columns, suspects: tuple[Suspect, ...], w_before: np.ndarray | None
+    frame: Frame, columns: Columns, suspects: tuple[EffectAt, ...], w_before: np.ndarray | None
 ) -> Model:
     equations = frame.equations
     y, A, widths = split(frame, columns, suspects, w_before)
     c = _least(A, y)
-    coefficients, forces, at = [], [], 0
+    placed, forces, at = [], [], 0
     for s, m in zip(suspects, widths, strict=True):
         x = columns.of(s, equations, w_before)
         own = np.ones(1) if s.effect.is_given else c[at : at + m]
         at += m
-        coefficients.append(own)
+        placed.append(replace(s, coefficients=own))
         forces.append(x @ own)
     left = equations.d - sum(forces, np.zeros_like(equations.d))
     w = frame.parameters(left)
     residual = left - equations.base @ w
     mean = (residual**2).mean(axis=0)
-    heavier = equations.log_inertia(w, added_inertia(suspects, coefficients, equations))
+    heavier = equations.log_inertia(w, added_inertia(placed, equations))
     # what is measured is the motion: the floor is one of accelerations
     variance = mean + floors(equations) * np.exp(2.0 * max(heavier, -50.0) / len(mean))
     N = len(residual)
@@ -179,6 +178,6 @@ def _solved(
         - price_of(frame, size)
     )
     return Model(
-        suspects, tuple(coefficients), w, np.sqrt(variance), heavier, score, residual,
+        tuple(placed), w, np.sqrt(variance), heavier, score, residual,
         tuple(forces), frame,
     )  # fmt: skip

@@ -9,8 +9,8 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.regression import Frame
-from sgp_ros.diagnosis.explain.suspects import Suspect
-from sgp_ros.physics.effect import Fitted, Place
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 
 FLOOR_SHARE = 1e-5
 """Errors of signals and filters that no model explains, as a share of the mean square."""
@@ -21,8 +21,7 @@ class Model:
     """A fitted hypothesis.
 
     Attributes:
-        suspects: effects with their shapes.
-        coefficients: linear coefficients per suspect.
+        suspects: effects with their numbers.
         w: (p,) inertial parameters' changes in standard deviations.
         sigma: (k,) root mean square of the residual with its floor.
         heavier: mean of log det(M / M nominal) of its bodies and rotors.
@@ -31,8 +30,7 @@ class Model:
         forces: filtered force of each suspect, (N, k).
     """
 
-    suspects: tuple[Suspect, ...]
-    coefficients: tuple[np.ndarray, ...]
+    suspects: tuple[EffectAt, ...]
     w: np.ndarray
     sigma: np.ndarray
     heavier: float
@@ -60,8 +58,7 @@ class Model:
     def size(self) -> int:
         """Number of fitted parameters of the suspects."""
         return sum(
-            len(s.shape) + (0 if s.effect.is_given else len(c))
-            for s, c in zip(self.suspects, self.coefficients, strict=True)
+            len(s.shape) + (0 if s.effect.is_given else len(s.coefficients)) for s in self.suspects
         )
 
     @property
@@ -77,10 +74,7 @@ class Model:
     def is_possible(self) -> bool:
         """Return whether every effect has signs and sizes that it can have."""
         motion = self.frame.equations.motion
-        return all(
-            s.effect.is_possible(Fitted(motion, s.place, s.shape, c))
-            for s, c in zip(self.suspects, self.coefficients, strict=True)
-        )
+        return all(s.is_possible(motion) for s in self.suspects)
 
     @property
     def freedom(self) -> int:
@@ -108,13 +102,11 @@ class Model:
         """
         equations = self.frame.equations
         found = []
-        for s, c, filtered in zip(
-            self.suspects, self.coefficients, self.filtered_shares, strict=True
-        ):
+        for s, filtered in zip(self.suspects, self.filtered_shares, strict=True):
             if s.effect.sees_acceleration and not s.effect.has_memory:
                 found.append(filtered)
                 continue
-            force = s.effect.columns(equations.motion, s.place, s.shape) @ c
+            force = s.columns(equations.motion) @ s.coefficients
             power = equations.power if force.ndim == 2 else equations.power[s.place.joint]
             found.append(float(((force**2).mean(axis=0) / power).max()))
         return found

@@ -12,9 +12,10 @@ from sgp_ros.diagnosis.decide.colour import correlation_factor
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
 from sgp_ros.diagnosis.explain.screening import screen
-from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
+from sgp_ros.diagnosis.explain.suspects import Columns
 from sgp_ros.physics.catalogue import EFFECTS
-from sgp_ros.physics.effect import Place
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 
 FIRST, SECOND, PARENTS = 12, 5, 6
 """Screened suspects that are fitted alone; as a second effect; first effects that get a second."""
@@ -150,14 +151,14 @@ def _simpler(columns: Columns, model: Model) -> list[Model]:
     What was best while other effects were still missing may have more freedom than it needs.
     """
     motion = columns.equations(frozenset()).motion
-    simple = [e for e in EFFECTS.values() if e.bounds is None and len(e.quantities) == 1]
+    simple = [e for e in EFFECTS.values() if len(e.quantities) == 1 and not e.shape_names()]
     found: list[Model] = []
     whole = model
     for i, suspect in enumerate(model.suspects):
         if len(suspect.effect.quantities) == 1:
             continue
         place = Place(suspect.place.joint)
-        others = [Suspect(e, place, np.zeros(0)) for e in simple if place in e.places(motion)]
+        others = [EffectAt(e, place) for e in simple if place in e.places(motion)]
         trials = [_replaced(columns, model, i, s) for s in others if s.key not in model.key]
         best = _ranked(trials)
         if best:
@@ -166,7 +167,7 @@ def _simpler(columns: Columns, model: Model) -> list[Model]:
     return _ranked([*found, whole]) if found else []
 
 
-def _replaced(columns: Columns, model: Model, index: int, suspect: Suspect) -> Model:
+def _replaced(columns: Columns, model: Model, index: int, suspect: EffectAt) -> Model:
     suspects = (*model.suspects[:index], suspect, *model.suspects[index + 1 :])
     return fit(columns, suspects, model.sigma, is_free=model.is_free, w=model.w, rounds=2, steps=4)
 
@@ -197,7 +198,7 @@ def _varied(singles: list[Model]) -> list[Model]:
     return chosen
 
 
-def _distinct(found: list[tuple[float, Suspect]], count: int) -> list[Suspect]:
+def _distinct(found: list[tuple[float, EffectAt]], count: int) -> list[EffectAt]:
     """Return the best `count` effects at places, with both of their shapes."""
     keys: list[object] = []
     for _, suspect in found:

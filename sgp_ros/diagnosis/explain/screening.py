@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -12,17 +11,18 @@ from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.candidates import split
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
 from sgp_ros.diagnosis.explain.regression import Frame
-from sgp_ros.diagnosis.explain.suspects import Columns, Suspect, dry_joints
-from sgp_ros.physics.effect import Effect, Fitted, Place, SmallEffect
-from sgp_ros.physics.friction import POSITION_FRICTION, inside, position_edges, rubbing
-from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.diagnosis.explain.suspects import Columns, dry_joints
+from sgp_ros.physics.effect import Effect
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place, SmallEffect
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 TRIALS = 2
 """Shapes per effect and place that are worth a fit."""
 _WIDEST = 0.75
 """Widest interval of position, as a share of the range: wider ones are no region."""
 
-Trial = tuple[float, Suspect]
+Trial = tuple[float, EffectAt]
 
 
 def screen(columns: Columns, model: Model, effects: Iterable[Effect]) -> list[Trial]:
@@ -85,22 +85,23 @@ class _Rest:
 def _trials(
     rest: _Rest, effect: Effect, place: Place, motion: ObservedMotion, before: np.ndarray
 ) -> Iterator[Trial]:
-    if effect is POSITION_FRICTION:
-        yield from _intervals(rest, place, before)
+    bins = effect.bins(rest.equations.motion, place)
+    if bins is not None:
+        yield from _intervals(rest, EffectAt(effect, place), bins, before)
         return
     for shape in effect.starts(rest.equations.motion, place):
-        trial = _trial(rest, Suspect(effect, place, shape), motion, before)
+        trial = _trial(rest, EffectAt(effect, place, shape), motion, before)
         if trial is not None:
             yield trial
 
 
 def _trial(
-    rest: _Rest, suspect: Suspect, motion: ObservedMotion, before: np.ndarray
+    rest: _Rest, suspect: EffectAt, motion: ObservedMotion, before: np.ndarray
 ) -> Trial | None:
     effect = suspect.effect
     if effect.small is not None:
         return _small_trial(rest, suspect, effect.small, motion, before)
-    raw = effect.columns(motion, suspect.place, suspect.shape)
+    raw = suspect.columns(motion)
     if raw.shape[-1] == 0:
         return None
     x = rest.apart(raw, suspect.place, is_inertial=effect.is_inertial)
@@ -110,42 +111,41 @@ def _trial(
         # a start may have the wrong size, not the wrong sign
         if c[0] <= 0.0:
             return None
-    elif not effect.is_possible(Fitted(motion, suspect.place, suspect.shape, c)):
+    elif not replace(suspect, coefficients=c).is_possible(motion):
         return None
     return rest.gain(rest.y - x @ c, before, len(c) + len(suspect.shape)), suspect
 
 
 def _small_trial(
-    rest: _Rest, start: Suspect, small: SmallEffect, motion: ObservedMotion, before: np.ndarray
+    rest: _Rest, start: EffectAt, small: SmallEffect, motion: ObservedMotion, before: np.ndarray
 ) -> Trial | None:
     """Return the trial of an effect that is linear in its size while it is small."""
     x = rest.apart(small.columns(motion, start.place, start.shape), start.place)
     scale = np.sqrt((x * x).sum(axis=0)) + 1e-300
     c = np.linalg.lstsq(x / scale, rest.y, rcond=1e-7)[0] / scale
     shape = small.shape(start.shape, c)
-    fitted = Fitted(motion, start.place, shape, np.ones(1))
-    if not start.effect.is_possible(fitted):
+    found = start.with_shape(shape)
+    if not found.is_possible(motion):
         return None
-    return rest.gain(rest.y - x @ c, before, len(shape)), replace(start, shape=shape)
+    return rest.gain(rest.y - x @ c, before, len(shape)), found
 
 
-def _intervals(rest: _Rest, place: Place, before: np.ndarray) -> Iterator[Trial]:
-    """Yield the best interval of position, and the best that is not its neighbour.
+def _intervals(
+    rest: _Rest, suspect: EffectAt, bins: tuple[np.ndarray, np.ndarray], before: np.ndarray
+) -> Iterator[Trial]:
+    """Yield the best interval, and the best that is not its neighbour.
 
     With the columns of narrow bins and their Gram matrix every interval costs a few sums.
     """
-    motion = rest.equations.motion
-    edges = position_edges(motion, place.joint)
-    rub = rubbing(motion, place)
-    bins = [-inside(motion, place.joint, a, b) * rub for a, b in pairwise(edges)]
-    x = rest.apart(np.column_stack(bins), place)
+    columns, edges = bins
+    x = rest.apart(columns, suspect.place)
     i, j = np.triu_indices(len(edges), 1)
     area = np.zeros((len(edges), len(edges)))
     area[1:, 1:] = np.cumsum(np.cumsum(x.T @ x, axis=0), axis=1)
     size = area[j, j] - area[i, j] - area[j, i] + area[i, i]
     sums = np.concatenate([[0.0], np.cumsum(x.T @ rest.y)])
     push = sums[j] - sums[i]
-    usable = (push > 0.0) & (j - i <= _WIDEST * len(bins)) & (size > 1e-12 * area[-1, -1])
+    usable = (push > 0.0) & (j - i <= _WIDEST * columns.shape[1]) & (size > 1e-12 * area[-1, -1])
     gain = np.where(usable, push**2 / np.maximum(size, 1e-300), 0.0)
     order = np.argsort(-gain)
     far = (abs(i[order] - i[order[0]]) > TRIALS * 2) | (abs(j[order] - j[order[0]]) > TRIALS * 2)
@@ -153,4 +153,4 @@ def _intervals(rest: _Rest, place: Place, before: np.ndarray) -> Iterator[Trial]
         if gain[c] > 0.0:
             column = x[:, i[c] : j[c]].sum(axis=1) * (push[c] / size[c])
             shape = np.array([edges[i[c]], edges[j[c]]])
-            yield rest.gain(rest.y - column, before, 3), Suspect(POSITION_FRICTION, place, shape)
+            yield rest.gain(rest.y - column, before, 3), suspect.with_shape(shape)

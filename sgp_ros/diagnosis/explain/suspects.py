@@ -2,27 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.physics.effect import Effect, Place
-from sgp_ros.physics.observed_motion import ObservedMotion
-
-
-@dataclass(frozen=True, eq=False)
-class Suspect:
-    """An effect at a place with a shape."""
-
-    effect: Effect
-    place: Place
-    shape: np.ndarray
-
-    @property
-    def key(self) -> tuple[str, Place]:
-        """Name and place."""
-        return self.effect.name, self.place
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 
 class Columns:
@@ -55,36 +41,35 @@ class Columns:
         return self._motions[key]
 
     def of(
-        self, suspect: Suspect, equations: Equations, w: np.ndarray | None = None
+        self, suspect: EffectAt, equations: Equations, w: np.ndarray | None = None
     ) -> np.ndarray:
         """Return the filtered columns, (N, k, m), for bodies that differ by w (p,)."""
         bodies = w if suspect.effect.uses_bodies else None
         tail = b'' if bodies is None else bodies.tobytes()
-        key = (*suspect.key, suspect.shape.tobytes(), id(equations), tail)
+        key = (*suspect.key, suspect.shape.tobytes(), equations, tail)
         if key not in self._known:
             if len(self._known) > 400:
                 self._known.clear()
             motion = self.corrected(bodies)
-            raw = suspect.effect.columns(motion, suspect.place, suspect.shape)
+            raw = suspect.columns(motion)
             self._known[key] = equations.filtered(
                 raw, suspect.place.joint, is_inertial=suspect.effect.is_inertial
             )
         return self._known[key]
 
 
-def dry_joints(suspects: tuple[Suspect, ...]) -> frozenset[int]:
+def dry_joints(suspects: tuple[EffectAt, ...]) -> frozenset[int]:
     """Return the joints that some suspect can hold at rest."""
-    return frozenset(s.place.joint for s in suspects if s.effect.holds(s.place))
+    return frozenset(s.place.joint for s in suspects if s.is_holding)
 
 
 def shape_bounds(
-    equations: Equations, suspects: tuple[Suspect, ...]
+    equations: Equations, suspects: tuple[EffectAt, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the bounds of all shapes, (s,) each."""
     low, high = [], []
     for s in suspects:
         if len(s.shape):
-            assert s.effect.bounds is not None
             a, b = s.effect.bounds(equations.motion, s.place)
             low.append(a)
             high.append(b)
@@ -93,11 +78,11 @@ def shape_bounds(
     return np.concatenate(low), np.concatenate(high)
 
 
-def with_shapes(suspects: tuple[Suspect, ...], x: np.ndarray) -> tuple[Suspect, ...]:
+def with_shapes(suspects: tuple[EffectAt, ...], x: np.ndarray) -> tuple[EffectAt, ...]:
     """Return the suspects with shapes from one vector."""
     result, at = [], 0
     for s in suspects:
         m = len(s.shape)
-        result.append(replace(s, shape=x[at : at + m].copy()) if m else s)
+        result.append(s.with_shape(x[at : at + m].copy()) if m else s)
         at += m
     return tuple(result)

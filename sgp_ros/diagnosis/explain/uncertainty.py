@@ -7,27 +7,28 @@ the correlation of the residual in time. Reported values follow by the delta met
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from sgp_ros.diagnosis.decide.colour import correlation_factor
 from sgp_ros.diagnosis.explain.candidates import UNSEEN
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Frame
-from sgp_ros.diagnosis.explain.suspects import Columns, Suspect, shape_bounds, with_shapes
-from sgp_ros.physics.effect import Fitted
-from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.diagnosis.explain.suspects import Columns, shape_bounds, with_shapes
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 
 def _force(
     columns: Columns,
     frame: Frame,
-    suspects: tuple[Suspect, ...],
-    coefficients: tuple[np.ndarray, ...],
+    suspects: tuple[EffectAt, ...],
     w: np.ndarray,
 ) -> np.ndarray:
     total = np.zeros_like(frame.equations.d)
-    for s, c in zip(suspects, coefficients, strict=True):
-        total = total + columns.of(s, frame.equations, w) @ c
+    for s in suspects:
+        total = total + columns.of(s, frame.equations, w) @ s.coefficients
     return total
 
 
@@ -55,13 +56,7 @@ def covariance(model: Model, columns: Columns) -> np.ndarray:
                 moved.append(
                     (
                         y[i],
-                        _force(
-                            columns,
-                            frame,
-                            with_shapes(model.suspects, y),
-                            model.coefficients,
-                            model.w,
-                        ),
+                        _force(columns, frame, with_shapes(model.suspects, y), model.w),
                     )
                 )
             (a, fa), (b, fb) = moved
@@ -86,36 +81,30 @@ def reported_std(model: Model, columns: Columns) -> list[dict[str, float]]:
     """Return the standard deviation of each reported number of each suspect."""
     motion = model.frame.equations.motion
     C = covariance(model, columns)
-    free = sum(
-        len(c)
-        for s, c in zip(model.suspects, model.coefficients, strict=True)
-        if not s.effect.is_given
-    )
+    free = sum(len(s.coefficients) for s in model.suspects if not s.effect.is_given)
     result, at, shape_at = [], 0, free
-    for s, c in zip(model.suspects, model.coefficients, strict=True):
-        m = 0 if s.effect.is_given else len(c)
+    for s in model.suspects:
+        m = 0 if s.effect.is_given else len(s.coefficients)
         rows = [*range(at, at + m), *range(shape_at, shape_at + len(s.shape))]
         at, shape_at = at + m, shape_at + len(s.shape)
-        result.append(_delta(s, c, motion, C[np.ix_(rows, rows)], m))
+        result.append(_delta(s, motion, C[np.ix_(rows, rows)], m))
     return result
 
 
-def _delta(
-    suspect: Suspect, c: np.ndarray, motion: ObservedMotion, C: np.ndarray, m: int
-) -> dict[str, float]:
-    values = suspect.effect.report(Fitted(motion, suspect.place, suspect.shape, c))
+def _delta(suspect: EffectAt, motion: ObservedMotion, C: np.ndarray, m: int) -> dict[str, float]:
+    values = suspect.report(motion)
     numbers = [name for name, value in values.items() if isinstance(value, float)]
     std = np.sqrt(np.maximum(np.diag(C), 0.0))
     slopes = np.zeros((len(numbers), len(std)))
     for i, step in enumerate(std):
         if step <= 0.0:
             continue
-        moved_c, moved_s = c.copy(), suspect.shape.copy()
+        moved_c, moved_s = suspect.coefficients.copy(), suspect.shape.copy()
         if i < m:
             moved_c[i] += 0.1 * step
         else:
             moved_s[i - m] += 0.1 * step
-        after = suspect.effect.report(Fitted(motion, suspect.place, moved_s, moved_c))
+        after = replace(suspect, shape=moved_s, coefficients=moved_c).report(motion)
         for row, name in enumerate(numbers):
             change = float(after[name]) - float(values[name])
             if name == 'phase':

@@ -16,7 +16,7 @@ from sgp_ros.gp.model import CoefficientPrior, Observations
 from sgp_ros.gp.model import Model as Hyperparameters
 from sgp_ros.gp.posterior import Posterior
 from sgp_ros.gp.selection import select_inputs
-from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 SIZE = 400
 CONDITIONED = 500

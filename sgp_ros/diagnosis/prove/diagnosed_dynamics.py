@@ -16,9 +16,9 @@ from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.locate.remainder import Remainder
 from sgp_ros.diagnosis.prove.prediction import extra_force
 from sgp_ros.physics.effect import Effect
-from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.rigid.tree import Tree
-from sgp_ros.robots.stated_effects import StatedEffect
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 _SMALL = 1e-6
 """Difference of positions and velocities [rad or m, per second]."""
@@ -43,7 +43,7 @@ class DiagnosedDynamics:
     tree: Tree
     step: float
     remainders: tuple[Remainder, ...] = ()
-    stated: tuple[StatedEffect, ...] = ()
+    stated: tuple[EffectAt, ...] = ()
 
     def equations(
         self, q: np.ndarray, v: np.ndarray, loads: np.ndarray
@@ -76,23 +76,14 @@ class DiagnosedDynamics:
     def level_of_dry_friction(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """Return half the jump of each joint's force as its velocity changes sign, (m, k)."""
         level = np.zeros_like(q)
-        known = [
-            (s.effect, s.place, s.shape, c)
-            for s, c in zip(self.model.suspects, self.model.coefficients, strict=True)
-        ]
-        known += [
-            (x.effect, x.place, x.shape, x.coefficients)
-            for x in self.stated
-            if x.effect is not None and x.place is not None
-        ]
-        dry = [entry for entry in known if entry[0].holds(entry[1])]
+        dry = [x for x in (*self.model.suspects, *self.stated) if x.is_holding]
         if dry:
             still = np.zeros_like(q)
             motion = self._motion(q, still, still, loads)
             up, down = motion.sliding(1.0), motion.sliding(-1.0)
-            for effect, place, shape, c in dry:
-                jump = effect.columns(down, place, shape) - effect.columns(up, place, shape)
-                level[:, place.joint] += 0.5 * (jump @ c)
+            for x in dry:
+                jump = x.columns(down) - x.columns(up)
+                level[:, x.place.joint] += 0.5 * (jump @ x.coefficients)
         return level
 
     def fastest_rate(self, q: np.ndarray, v: np.ndarray, loads: np.ndarray) -> float:
@@ -123,16 +114,15 @@ class DiagnosedDynamics:
         v: np.ndarray,
         a: np.ndarray,
         loads: np.ndarray,
-        stated: tuple[StatedEffect, ...] = (),
+        stated: tuple[EffectAt, ...] = (),
     ) -> ObservedMotion:
         """Return states as the effects see them; loads are repeated as often as needed."""
         k = q.shape[1]
         given = np.tile(loads, (len(q) // len(loads), 1))
-        motion = ObservedMotion(
-            self.tree, given[:, 2 * k], self.step, q, v, a, given[:, :k], None, stated=stated
-        )
-        motion.__dict__['direction'] = np.sign(v)
-        return motion
+        return ObservedMotion(
+            self.tree, given[:, 2 * k], self.step, q, v, a, given[:, :k], None, stated=stated,
+            given_direction=np.sign(v),
+        )  # fmt: skip
 
 
 def dynamics_of(
@@ -170,18 +160,11 @@ def _sees_no_acceleration(effect: Effect) -> bool:
     return not effect.sees_acceleration
 
 
-def _chosen(
-    stated: tuple[StatedEffect, ...], is_in: Callable[[Effect], bool]
-) -> tuple[StatedEffect, ...]:
+def _chosen(stated: tuple[EffectAt, ...], is_in: Callable[[Effect], bool]) -> tuple[EffectAt, ...]:
     """Return some of the stated effects."""
-    return tuple(x for x in stated if x.effect is not None and is_in(x.effect))
+    return tuple(x for x in stated if is_in(x.effect))
 
 
 def _part(model: Model, is_in: Callable[[Effect], bool]) -> Model:
     """Return a model of some of the effects."""
-    chosen = [i for i, s in enumerate(model.suspects) if is_in(s.effect)]
-    return replace(
-        model,
-        suspects=tuple(model.suspects[i] for i in chosen),
-        coefficients=tuple(model.coefficients[i] for i in chosen),
-    )
+    return replace(model, suspects=tuple(s for s in model.suspects if is_in(s.effect)))

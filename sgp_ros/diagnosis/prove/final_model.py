@@ -12,8 +12,8 @@ from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.locate.remainder import Remainder
 from sgp_ros.diagnosis.prove.prediction import accelerations, held_joints, imbalance
 from sgp_ros.diagnosis.result import Predictions
-from sgp_ros.physics.observed_motion import ObservedMotion
 from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 _SHARP = 4.0
 """States are smoothed at this multiple of the cut-off where accelerations are predicted."""

@@ -16,14 +16,14 @@ from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.suspects import dry_joints
 from sgp_ros.diagnosis.locate.remainder import Remainder
-from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 
 def extra_force(model: Model, motion: ObservedMotion) -> np.ndarray:
     """Return the force of all effects at the full rate, (n, k) [N m or N]."""
     force = motion.stated_force.copy()
-    for suspect, c in zip(model.suspects, model.coefficients, strict=True):
-        x = suspect.effect.columns(motion, suspect.place, suspect.shape) @ c
+    for suspect in model.suspects:
+        x = suspect.columns(motion) @ suspect.coefficients
         if x.ndim == 2:
             force += x
         else:

@@ -16,8 +16,8 @@ from sgp_ros.diagnosis.prove.intervals import Interval, mean_interval, ratio_int
 from sgp_ros.diagnosis.prove.prediction import accelerations
 from sgp_ros.diagnosis.prove.rollouts import cut, roll_out
 from sgp_ros.diagnosis.result import Proof
-from sgp_ros.physics.observed_motion import ObservedMotion
 from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 _MOST_STATES = 4000
 

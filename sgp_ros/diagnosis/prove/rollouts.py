@@ -26,7 +26,7 @@ from sgp_ros.diagnosis.prove.diagnosed_dynamics import (
     dynamics_of,
     remembered_force,
 )
-from sgp_ros.physics.observed_motion import ObservedMotion
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 HORIZON_S = 0.3
 STEP_S = 0.005

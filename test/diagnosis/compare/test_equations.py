@@ -11,9 +11,10 @@ from sgp_ros.diagnosis.compare.equations import body_directions, make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
-from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
+from sgp_ros.diagnosis.explain.suspects import Columns
 from sgp_ros.physics.catalogue import EFFECTS
-from sgp_ros.physics.effect import Place
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 from test.diagnosis.worlds import CHAINS, World, events_of
 
 
@@ -128,13 +129,13 @@ def test_columns_know_whom_they_were_made_for(equations_for, viscous):
     """Other bodies, other columns; the same question, the same array."""
     _, equations = equations_for(viscous)
     columns = Columns(equations)
-    tilt = Suspect(EFFECTS['gravity_tilt'], Place(-1), np.array([0.0, 0.1]))
+    tilt = EffectAt(EFFECTS['gravity_tilt'], Place(-1), np.array([0.0, 0.1]))
     w = np.zeros(10)
     nominal = columns.of(tilt, equations, w)
     assert columns.of(tilt, equations, w) is nominal
     w[0] = 1.0
     np.testing.assert_allclose(columns.of(tilt, equations, w), 1.25 * nominal, atol=1e-12)
-    rub = Suspect(EFFECTS['viscous_friction'], Place(0), np.zeros(0))
+    rub = EffectAt(EFFECTS['viscous_friction'], Place(0), np.zeros(0))
     assert columns.of(rub, equations, w) is columns.of(rub, equations)
     for i in range(450):
         columns.of(replace(tilt, shape=np.array([0.0, 0.001 * i])), equations, w)

@@ -14,11 +14,12 @@ from sgp_ros.diagnosis.decide.decision import LEAST_SHARE, NATS, SHARE_TOLERANCE
 from sgp_ros.diagnosis.explain.candidates import added_inertia, fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.hypotheses import Competition, compete
-from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
+from sgp_ros.diagnosis.explain.suspects import Columns
 from sgp_ros.physics.catalogue import EFFECTS
-from sgp_ros.physics.effect import Place
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 from sgp_ros.rigid.rigid_body import mass_matrix
-from test.diagnosis.fitted_models import fitted
+from test.diagnosis.fitted_models import fitted, with_coefficients
 from test.diagnosis.worlds import CHAINS, events_of, robot_of, simulate
 
 
@@ -110,9 +111,9 @@ def test_a_share_is_measured_before_the_filter(equations_for):
     _, equations = equations_for(world)
     at = EFFECTS['cogging'].starts(equations.motion, Place(0))[0]
     start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
-    ripple = Suspect(EFFECTS['cogging'], Place(0), np.full_like(at, 150.0))
+    ripple = EffectAt(EFFECTS['cogging'], Place(0), np.full_like(at, 150.0))
     model = fit(Columns(equations), (ripple,), start, is_free=False, rounds=1, steps=1)
-    loud = replace(model, coefficients=(np.array([1.0, 0.0]),))
+    loud = with_coefficients(model, np.array([1.0, 0.0]))
     assert loud.shares[0] > 0.05
     assert loud.filtered_shares[0] < 0.2 * loud.shares[0]
 
@@ -169,7 +170,7 @@ def test_noise_of_the_acceleration_makes_no_rotor_large(equations_for):
     _, equations = equations_for(world, quantum=2e-3)
     model = fitted(equations, 'armature')
     force = model.suspects[0].effect.columns(equations.motion, Place(0), np.zeros(0))
-    raw = float(np.mean((force @ model.coefficients[0]) ** 2) / equations.power[0])
+    raw = float(np.mean((force @ model.suspects[0].coefficients) ** 2) / equations.power[0])
     assert model.shares[0] == pytest.approx(model.filtered_shares[0])
     assert raw > 2.0 * model.shares[0]
 
@@ -197,9 +198,9 @@ def test_a_weak_motor_and_heavy_bodies_fit_alike(tmp_path):
 def test_a_load_and_a_heavier_body_have_the_same_inertia(equations_for):
     """What a point mass adds to the mass matrix is what its body parameters add."""
     _, equations = equations_for(simulate(CHAINS[2], 2, 6.0))
-    load = Suspect(EFFECTS['payload'], Place(1), np.array([0.4, 0.0, 0.0, -0.2]))
-    rotor = Suspect(EFFECTS['armature'], Place(0), np.zeros(0))
-    added = added_inertia((load, rotor), (np.ones(1), np.array([0.03])), equations)
+    load = EffectAt(EFFECTS['payload'], Place(1), np.array([0.4, 0.0, 0.0, -0.2]), np.ones(1))
+    rotor = EffectAt(EFFECTS['armature'], Place(0), coefficients=np.array([0.03]))
+    added = added_inertia((load, rotor), equations)
     tree, q = equations.motion.tree, equations.poses[0].position
     heavier = tree.parameters.copy()
     heavier[1] += 0.4 * np.array([1.0, 0.0, 0.0, -0.2, 0.04, 0.0, 0.04, 0.0, 0.0, 0.0])

@@ -9,9 +9,10 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.regression import Frame
 from sgp_ros.diagnosis.explain.screening import screen
-from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
+from sgp_ros.diagnosis.explain.suspects import Columns
 from sgp_ros.physics.catalogue import EFFECTS
-from sgp_ros.physics.effect import Place
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 from test.diagnosis.worlds import CHAINS, simulate
 
 NONE = np.zeros(0)
@@ -22,7 +23,7 @@ def _start(equations):
 
 
 def _suspect(name, joint, shape=()):
-    return Suspect(EFFECTS[name], Place(joint), np.array(shape, dtype=float))
+    return EffectAt(EFFECTS[name], Place(joint), np.array(shape, dtype=float))
 
 
 @pytest.mark.parametrize('k', [1, 2])
@@ -64,7 +65,7 @@ def test_viscous_friction_is_found_with_its_size(equations_for, viscous):
     _, equations = equations_for(viscous)
     model = fit(Columns(equations), (_suspect('viscous_friction', 0),), _start(equations),
                 is_free=False)  # fmt: skip
-    np.testing.assert_allclose(model.coefficients[0], [0.3], rtol=2e-3)
+    np.testing.assert_allclose(model.suspects[0].coefficients, [0.3], rtol=2e-3)
     assert model.mean_square[0] < 2e-5 * equations.power[0]
     assert model.size == 1
     assert model.is_possible()

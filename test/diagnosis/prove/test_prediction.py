@@ -7,12 +7,14 @@ import pytest
 
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
-from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
+from sgp_ros.diagnosis.explain.suspects import Columns
 from sgp_ros.diagnosis.prove.final_model import FinalModel
 from sgp_ros.diagnosis.prove.prediction import accelerations, extra_force, imbalance
 from sgp_ros.diagnosis.prove.proof import prove
 from sgp_ros.physics.catalogue import EFFECTS
-from sgp_ros.physics.effect import Place
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
+from test.diagnosis.fitted_models import with_coefficients
 from test.diagnosis.worlds import CHAINS, simulate
 
 INNER = slice(80, -80)
@@ -24,7 +26,7 @@ def _fitted(equations, *suspects, is_free=False):
 
 
 def _suspect(name, joint):
-    return Suspect(EFFECTS[name], Place(joint), np.zeros(0))
+    return EffectAt(EFFECTS[name], Place(joint), np.zeros(0))
 
 
 def _error(found, true):
@@ -73,7 +75,7 @@ def test_a_joint_that_friction_holds_does_not_accelerate(equations_for, dry):
     """In the middle of its rests; where it slides, friction brakes."""
     _, equations = equations_for(dry)
     model = _fitted(equations, _suspect('coulomb_friction', 0))
-    assert model.coefficients[0][0] == pytest.approx(1.2, rel=0.02)
+    assert model.suspects[0].coefficients[0] == pytest.approx(1.2, rel=0.02)
     motion, rests = equations.motion, equations.rests
     a = accelerations(model, equations, motion, rests)
     still = rests[:, 0] & (dry.velocity[:, 0] == 0.0) & (dry.acceleration[:, 0] == 0.0)
@@ -83,7 +85,7 @@ def test_a_joint_that_friction_holds_does_not_accelerate(equations_for, dry):
     assert np.median(np.abs(free[still])) > 0.1
     sliding = np.abs(motion.velocity[:, 0]) > 0.3
     force = extra_force(model, motion)[sliding, 0]
-    np.testing.assert_allclose(force, -model.coefficients[0][0] * np.sign(
+    np.testing.assert_allclose(force, -model.suspects[0].coefficients[0] * np.sign(
         motion.velocity[sliding, 0]))  # fmt: skip
 
 
@@ -134,11 +136,10 @@ def test_roll_outs_show_what_an_effect_takes_away(robots, equations_for, viscous
 
 def test_both_models_are_judged_on_the_roll_outs_that_both_finish(robots, equations_for, viscous):
     """Where one runs away the other gains nothing: counted, and in neither mean."""
-    from dataclasses import replace
 
     raw, equations = equations_for(viscous)
     model = _fitted(equations, _suspect('quadratic_drag', 0))
-    mad = replace(model, coefficients=(np.array([-1e5]),))
+    mad = with_coefficients(model, np.array([-1e5]))
     proof = prove(FinalModel(model, mad, equations, ()), raw, robots[1][1])
     assert proof.failed > 0
     turned = prove(FinalModel(mad, model, equations, ()), raw, robots[1][1])

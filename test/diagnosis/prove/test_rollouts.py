@@ -10,12 +10,14 @@ import pytest
 
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
-from sgp_ros.diagnosis.explain.suspects import Columns, Suspect
+from sgp_ros.diagnosis.explain.suspects import Columns
 from sgp_ros.diagnosis.prove import rollouts
 from sgp_ros.diagnosis.prove.diagnosed_dynamics import dynamics_of
 from sgp_ros.diagnosis.prove.rollouts import cut, roll_out
 from sgp_ros.physics.catalogue import EFFECTS
-from sgp_ros.physics.effect import Place
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
+from test.diagnosis.fitted_models import with_coefficients
 from test.diagnosis.worlds import CHAINS, PERIOD, World, acceleration, delayed, simulate
 
 TRIM = 40
@@ -30,7 +32,7 @@ def _model(equations, *suspects, is_free=False):
 
 
 def _suspect(name, joint, *shape):
-    return Suspect(EFFECTS[name], Place(joint), np.array(shape))
+    return EffectAt(EFFECTS[name], Place(joint), np.array(shape))
 
 
 def _errors(windows, q, ends):
@@ -98,7 +100,7 @@ def test_a_joint_that_friction_holds_does_not_creep(equations_for, dry):
     dynamics = dynamics_of(model, equations, motion)
     loads = np.column_stack([motion.effort, np.zeros_like(motion.effort), motion.time])
     level = dynamics.level_of_dry_friction(motion.position, loads)
-    np.testing.assert_allclose(level, model.coefficients[0][0])
+    np.testing.assert_allclose(level, model.suspects[0].coefficients[0])
     windows = cut(motion, TRIM, horizon=0.05)
     q, _ = roll_out(windows, model, equations)
     steps = np.abs(np.diff(q[:, :, 0], axis=1))
@@ -122,7 +124,7 @@ def test_what_remembers_the_motion_is_iterated_to_a_fixed_point(equations_for, h
     """The bristle along the roll-out, from the one measured before its window."""
     _, equations = equations_for(hysteretic)
     model = _model(equations, _suspect('hysteresis', 0, 0.8 * PRESLIDING))
-    assert model.coefficients[0][0] == pytest.approx(LEVEL, rel=0.02)
+    assert model.suspects[0].coefficients[0] == pytest.approx(LEVEL, rel=0.02)
     windows = cut(equations.motion, TRIM)
     nominal = _errors(windows, *roll_out(windows, _model(equations), equations))
     found = _errors(windows, *roll_out(windows, model, equations))
@@ -143,7 +145,7 @@ def test_a_roll_out_that_runs_away_is_counted(equations_for, viscous):
     """Friction that drives, beyond what numbers can hold."""
     _, equations = equations_for(viscous)
     model = _model(equations, _suspect('quadratic_drag', 0))
-    mad = replace(model, coefficients=(np.array([-1e5]),))
+    mad = with_coefficients(model, np.array([-1e5]))
     _, ends = roll_out(cut(equations.motion, TRIM), mad, equations)
     assert not ends.all()
 
@@ -153,7 +155,7 @@ def test_stiff_friction_is_integrated_in_smaller_steps(equations_for, perfect):
     _, equations = equations_for(perfect[1])
     model = _model(equations, _suspect('viscous_friction', 0))
     inertia = float(equations.motion.mass_diagonal.mean())
-    stiff = replace(model, coefficients=(np.array([10.0 / PERIOD * inertia]),))
+    stiff = with_coefficients(model, np.array([10.0 / PERIOD * inertia]))
     windows = cut(equations.motion, TRIM)
     q, ends = roll_out(windows, stiff, equations)
     assert ends.all()

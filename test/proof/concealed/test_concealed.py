@@ -9,11 +9,11 @@ import pytest
 
 from sgp_proof.concealed import draw, paper, robots, run, scoring, sizes
 from sgp_proof.concealed.concealed_effect import SCORED
-from sgp_proof.concealed.oracle import Oracle, error, nominal_error, share, suspects, unlisted
+from sgp_proof.concealed.oracle import Oracle, Unlisted, error, nominal_error, share, suspects
 from sgp_proof.concealed.unknown import UNKNOWN
-from sgp_ros.physics.observed_motion import ObservedMotion
 from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.robots.nominal import nominal_model
+from sgp_ros.robots.observed_motion import ObservedMotion
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.simulation.effects import Moment
 from sgp_ros.simulation.figure_eight import ARM
@@ -213,7 +213,7 @@ def test_of_an_unlisted_effect_the_size_alone_is_open(kind):
     )
     numbers = {'kind': kind, 'v': 1.3, 'reach': 0.8, 'start': 2.0, 'end': 5.0, 'hz': 0.7,
                'source_v': 0.6, 'a': 0.3}  # fmt: skip
-    column = unlisted(0, numbers | {'source': 'b'}, names).columns(motion, None, None)
+    column = Unlisted(0, numbers | {'source': 'b'}, names).columns(motion, None, None)
     (action,) = UNKNOWN[kind](0, numbers | {'source': 1}, names)
     for i in range(n):
         seen = Moment(motion.time[i], motion.position[i], motion.velocity[i], motion.effort[i],

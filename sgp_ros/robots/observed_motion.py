@@ -1,4 +1,4 @@
-"""What an effect can see of a recording: the motion, the commands and the robot they belong to.
+"""The motion of a robot in a recording, with what its nominal model makes of it.
 
 All arrays stand on one uniform grid. The direction of motion is averaged over each cell of the
 grid, so that a reversal between two samples counts at its time.
@@ -8,16 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgp_ros.physics.drive import Drive
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.motion import Commands
 from sgp_ros.rigid.rigid_body import inverse_dynamics, mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
-
-if TYPE_CHECKING:
-    from sgp_ros.robots.stated_effects import StatedEffect
 
 STILL = 1e-9
 """Range of the position within which a joint does not move [rad or m]."""
@@ -36,6 +33,8 @@ class ObservedMotion:
         drive: what the drives receive; None where only efforts were measured.
         starts: rows at which the grid begins anew after a pause.
         stated: effects that the nominal robot has, beside those that are part of the tree.
+        given_direction: (n, k) that stands for the sign of the velocity; None takes its mean over
+            the cells of the grid.
     """
 
     tree: Tree
@@ -45,13 +44,16 @@ class ObservedMotion:
     velocity: np.ndarray
     acceleration: np.ndarray
     effort: np.ndarray
-    drive: Drive | None
+    drive: Commands | None
     starts: tuple[int, ...] = (0,)
-    stated: tuple[StatedEffect, ...] = ()
+    stated: tuple[EffectAt, ...] = ()
+    given_direction: np.ndarray | None = None
 
     @cached_property
     def direction(self) -> np.ndarray:
         """Mean of sign(v) over each cell of the grid, (n, k)."""
+        if self.given_direction is not None:
+            return self.given_direction
         v = self.velocity
         middle = 0.5 * (v[1:] + v[:-1])
         before = np.concatenate([v[:1], middle])
@@ -104,7 +106,7 @@ class ObservedMotion:
     @property
     def dry_joints(self) -> frozenset[int]:
         """Indices of the joints that the nominal robot's dry friction may hold."""
-        return frozenset(x.place.joint for x in self.stated if x.place and x.is_holding)
+        return frozenset(x.place.joint for x in self.stated if x.is_holding)
 
     @cached_property
     def gravity_columns(self) -> np.ndarray:
@@ -114,6 +116,22 @@ class ObservedMotion:
         return np.stack(
             [inverse_dynamics(t, t.parameters, self.position, still, still) for t in fields],
             axis=2,
+        )
+
+    @cached_property
+    def tool_columns(self) -> np.ndarray:
+        """Efforts of a unit force along the root axes at `tool0`, (n, k, 3); else (n, k, 0)."""
+        n, k = self.position.shape
+        frame = next((f for f in self.tree.frames if f.name == 'tool0' and f.body >= 0), None)
+        if frame is None:
+            return np.zeros((n, k, 0))
+        mass = np.zeros_like(self.tree.parameters)
+        mass[frame.body, 0] = 1.0
+        mass[frame.body, 1:4] = frame.translation
+        still = np.zeros((n, k))
+        fields = (replace(self.tree, gravity=axis) for axis in np.eye(3))
+        return np.stack(
+            [-inverse_dynamics(t, mass, self.position, still, still) for t in fields], axis=2
         )
 
     @cached_property
@@ -147,9 +165,17 @@ class ObservedMotion:
 
     def sliding(self, direction: float) -> ObservedMotion:
         """Return the same motion with every joint about to slide in one direction."""
-        changed = replace(self)
-        changed.__dict__['direction'] = np.full(self.velocity.shape, direction)
-        return changed
+        return replace(self, given_direction=np.full(self.velocity.shape, direction))
+
+    def free_inertia(self, joint: int, rows: slice) -> float:
+        """Return the least inertia of a joint while all others are free [kg m^2 or kg].
+
+        Args:
+            joint: index.
+            rows: those that are looked at.
+        """
+        M = mass_matrix(self.tree, self.tree.parameters, self.position[rows])
+        return 1.0 / float(np.linalg.inv(M)[:, joint, joint].max())
 
     def effort_for(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the efforts of the nominal robot for a motion, (n, k) [N m or N]."""

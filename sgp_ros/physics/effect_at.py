@@ -1,0 +1,121 @@
+"""Effects at places of a robot, with their numbers: fitted, stated in a file, or simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from sgp_ros.physics.effect import EMPTY, Effect, Numbers
+from sgp_ros.physics.motion import SeenMotion, Structure
+from sgp_ros.physics.parts import Place, Value
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EffectAt:
+    """An effect at a place of a robot, with its numbers.
+
+    In equations these are shape and coefficients; in files and reports they are `parameters` by
+    name, and the place is the name of a joint. `stated` gives the first from the second.
+
+    Attributes:
+        effect: the law.
+        place: where it acts.
+        shape: (s,).
+        coefficients: (m,); empty while only the shape is chosen.
+        joint: name of the place, as stated; empty where it was not stated.
+        parameters: stated numbers (SI) and words by name; empty where they were not stated.
+        std: (m,) standard deviations of the coefficients; infinite where not known.
+    """
+
+    effect: Effect
+    place: Place
+    shape: np.ndarray = field(default_factory=lambda: EMPTY)
+    coefficients: np.ndarray = field(default_factory=lambda: EMPTY)
+    joint: str = ''
+    parameters: Mapping[str, Value] = field(default_factory=dict)
+    std: np.ndarray = field(default_factory=lambda: EMPTY)
+
+    @classmethod
+    def stated(
+        cls, effect: Effect, joint: str, parameters: Mapping[str, Value], tree: Structure,
+        std: Numbers | None = None,
+    ) -> EffectAt:  # fmt: skip
+        """Return the effect with stated parameters on a robot.
+
+        Args:
+            effect: the law.
+            joint: name of a joint that moves on its own, or a word for a place that is no joint.
+            parameters: the stated numbers, and `kind`, `source_joint`, `side` where there are.
+            tree: the robot.
+            std: standard deviations of the numbers that have one.
+
+        Raises:
+            ValueError: a joint that does not move on its own.
+        """
+        words = {k: x for k, x in parameters.items() if isinstance(x, str)}
+        numbers = {k: x for k, x in parameters.items() if not isinstance(x, str)}
+        place = Place.of(effect.edge, joint, words, numbers, tree)
+        if not effect.is_force:
+            return cls(effect, place, joint=joint, parameters=parameters)
+        shape, coefficients = effect.model(numbers, place.kind)
+        spread = effect.coefficient_std(numbers, std or {}, place.kind)
+        return cls(effect, place, shape, coefficients, joint, parameters, spread)
+
+    @property
+    def name(self) -> str:
+        """Name of the law."""
+        return self.effect.name
+
+    @property
+    def key(self) -> tuple[str, Place]:
+        """Name and place."""
+        return self.effect.name, self.place
+
+    @property
+    def kind(self) -> str:
+        """Its kind, where the law comes in kinds."""
+        return self.place.kind
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The stated parameters that are numbers."""
+        return {k: x for k, x in self.parameters.items() if not isinstance(x, str)}
+
+    @property
+    def is_holding(self) -> bool:
+        """Whether it can hold a joint at rest."""
+        return self.effect.holds(self.place)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the stated numbers say what it does; of backlash they do not say enough."""
+        return bool(np.isfinite(self.shape).all() and np.isfinite(self.coefficients).all())
+
+    def columns(self, motion: SeenMotion) -> np.ndarray:
+        """Return the force per coefficient, (n, m) on the joint of the place or (n, k, m)."""
+        return self.effect.columns(motion, self.place, self.shape)
+
+    def force(self, motion: SeenMotion) -> np.ndarray:
+        """Return what it exerts in a motion, (n, k) [N m or N]; zeros where it is no force."""
+        force = np.zeros(motion.position.shape)
+        if not self.effect.is_force:
+            return force
+        x = self.columns(motion) @ self.coefficients
+        if x.ndim == 2:
+            return force + x
+        force[:, self.place.joint] = x
+        return force
+
+    def report(self, motion: SeenMotion) -> dict[str, Value]:
+        """Return its parameters in the words of the schema."""
+        return self.effect.report(self, motion)
+
+    def is_possible(self, motion: SeenMotion) -> bool:
+        """Return whether coefficients and shape have physical signs and sizes."""
+        return self.effect.is_possible(self, motion)
+
+    def with_shape(self, shape: np.ndarray) -> EffectAt:
+        """Return the same with another shape."""
+        return replace(self, shape=shape)

@@ -1,0 +1,199 @@
+"""Parts of an effect: place, parameters, the form of its term, its first order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Protocol
+
+import numpy as np
+
+from sgp_ros.physics.motion import SeenMotion, Structure
+
+Value = float | str
+
+PLACES = {'base': -1, 'tool': -2, 'all': -3}
+"""Words for places that are no joint."""
+SIDES = {'lower': -1, 'upper': 1}
+
+
+class Site(Enum):
+    """What an effect may be put on."""
+
+    JOINT = 'a joint'
+    MOTOR = 'a motor'
+    LAST = 'the last link of a URDF'
+    BASE = 'base'
+    TOOL = 'tool'
+
+
+JOINT, MOTOR, LAST, BASE, TOOL = Site
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where an effect acts, and in which variant.
+
+    Attributes:
+        joint: index of the joint, or one of `PLACES`.
+        kind: such as `coulomb` or `viscous`; empty where there is but one.
+        source: index of the joint it comes from; -1 where there is none.
+        side: 1 or -1 for an effect at one end of the range; 0 elsewhere.
+    """
+
+    joint: int
+    kind: str = ''
+    source: int = -1
+    side: int = 0
+
+    @classmethod
+    def of(
+        cls, edge: str, joint: str, words: Mapping[str, str], numbers: Mapping[str, float],
+        tree: Structure,
+    ) -> Place:  # fmt: skip
+        """Return the place that a file states.
+
+        Args:
+            edge: number that says where an effect at one end of the range begins; empty for
+                others. The side is the nearer end, unless the word `side` says it.
+            joint: name of a joint that moves on its own, or one of `PLACES`.
+            words: `kind`, `source_joint` and `side`, where there are such.
+            numbers: the stated ones.
+            tree: the robot.
+
+        Raises:
+            ValueError: a joint that does not move on its own.
+        """
+        names = tree.moving_names
+        at = PLACES[joint] if joint in PLACES else names.index(joint)
+        source = names.index(words['source_joint']) if 'source_joint' in words else -1
+        side = 0
+        if edge:
+            side = SIDES[words['side']] if 'side' in words else _side(tree, at, numbers[edge])
+        return cls(at, words.get('kind', ''), source, side)
+
+
+class Placed(Protocol):
+    """A place with shape and coefficients, as a law reads them."""
+
+    @property
+    def place(self) -> Place:
+        """Place where it acts."""
+
+    @property
+    def shape(self) -> np.ndarray:
+        """Shape, (s,)."""
+
+    @property
+    def coefficients(self) -> np.ndarray:
+        """Coefficients of the columns, (m,)."""
+
+
+def side_word(side: int) -> str:
+    """Return the word for a side of the range."""
+    return 'upper' if side > 0 else 'lower'
+
+
+def _side(tree: Structure, joint: int, edge: float) -> int:
+    """Return the nearer end of the range; without limits, which side of zero."""
+    lower, upper = float(tree.lower[joint]), float(tree.upper[joint])
+    if not (math.isfinite(lower) and math.isfinite(upper)):
+        return 1 if edge > 0.0 else -1
+    return 1 if upper - edge < edge - lower else -1
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A parameter of an effect, in the words of the schema.
+
+    Attributes:
+        name: as in `diagnosis.json`.
+        unit: on a revolute joint.
+        low: least value that makes sense.
+        is_positive: whether a stated value must be above zero.
+        is_optional: whether a model does without.
+        is_scored: whether estimates are compared with the truth where worlds are drawn.
+        kinds: the kind of the effect that it belongs to; empty for all.
+    """
+
+    name: str
+    unit: str
+    low: float = -math.inf
+    is_positive: bool = False
+    is_optional: bool = False
+    is_scored: bool = True
+    kinds: tuple[str, ...] = ()
+
+    def of_kind(self, kind: str) -> Quantity:
+        """Return the quantity of a kind of the effect: viscous levels are per velocity."""
+        is_level = kind == 'viscous' and self.unit == 'N m'
+        return replace(self, unit='N m s/rad') if is_level else self
+
+    def on(self, *, is_prismatic: bool) -> Quantity:
+        """Return the quantity with its unit on a joint of this kind."""
+        return replace(self, unit=self.unit_on(is_prismatic=is_prismatic))
+
+    def unit_on(self, *, is_prismatic: bool) -> str:
+        """Return the unit on a joint of this kind; a phase is an angle on any."""
+        if not is_prismatic or self.name == 'phase':
+            return self.unit
+        return linear_unit(self.unit)
+
+
+def linear_unit(unit: str) -> str:
+    """Return the unit on a prismatic joint of what has this unit on a revolute one."""
+    if unit == 'kg m2':
+        return 'kg'
+    return unit.replace('N m', 'N').replace('rad', 'm').replace('revolution', 'm')
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SmallEffect:
+    """An effect whose shape says all, to first order in its size: where a search starts.
+
+    Attributes:
+        columns: from motion, place and one of the effect's `starts` to forces per coefficient, as
+            those of an `Effect`.
+        shape: from that start and coefficients (m,) to the shape of the effect itself, (s,).
+    """
+
+    columns: Callable[[SeenMotion, Place, np.ndarray], np.ndarray]
+    shape: Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OwnMotion:
+    """Motion of single joints, arrays of any one shape.
+
+    Attributes:
+        q: position [rad or m].
+        v: velocity [rad/s or m/s].
+        a: acceleration [rad/s^2 or m/s^2].
+        s: direction of the motion: sign(v), its mean over a cell of the grid, or a smooth form.
+    """
+
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    s: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class TermForm:
+    """How a law enters a robot YAML under `terms`: `tau = ... + c * column`.
+
+    Attributes:
+        name: of the term.
+        names: of its coefficients, each after the name of the joint.
+        columns: indices of the law's own coefficients.
+        sign: of the term's coefficients over the law's: 1 for what takes effort from the motor.
+        dynamics: attribute of `<dynamics>` in a URDF that states it; empty for none.
+    """
+
+    name: str
+    names: tuple[str, ...]
+    columns: tuple[int, ...] = (0,)
+    sign: float = 1.0
+    dynamics: str = ''

@@ -1,0 +1,120 @@
+"""Sensors that show another motion than there is: eccentric encoders, slow velocities."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sgp_ros.physics.effect import Effect, Numbers
+from sgp_ros.physics.loads import per_turn, wave_coefficients
+from sgp_ros.physics.motion import SeenMotion
+from sgp_ros.physics.parts import Place, Placed, Quantity, SmallEffect, Value
+
+_NEWTON = 6
+"""Steps to the true position."""
+_STEEPEST = 0.9
+"""Greatest slope of an encoder's error: one that turned back would be no encoder."""
+
+
+def _error(
+    x: np.ndarray, rate: float, size: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return e, de/dx and d^2 e/dx^2 of an encoder, (n,) each."""
+    sine, cosine = np.sin(rate * x), np.cos(rate * x)
+    e = size[0] * sine + size[1] * cosine
+    return e, rate * (size[0] * cosine - size[1] * sine), -(rate**2) * e
+
+
+def _slightly_eccentric(motion: SeenMotion, place: Place, start: np.ndarray) -> np.ndarray:
+    """Return the change of the nominal efforts per sine and cosine of a small error, (n, k, 2)."""
+    j = place.joint
+    rate = start[0] * per_turn(motion, j)
+    q, v, a = motion.position[:, j], motion.velocity[:, j], motion.acceleration[:, j]
+    by_q, by_v, by_a = motion.effort_slopes(j)
+    columns = []
+    for size in np.eye(2):
+        e, slope, bend = _error(q, rate, size)
+        change = by_v * (slope * v)[:, None] + by_a * (slope * a + bend * v**2)[:, None]
+        columns.append(by_q * e[:, None] + change)
+    return np.stack(columns, axis=2)
+
+
+class EncoderEccentricity(Effect):
+    """An encoder disc that is not centred.
+
+    The encoder shows `q = x + e(x)` with `e = s sin(r x) + c cos(r x)`, r the periods per turn;
+    shape is (periods, s, c). The true x, dx and ddx follow without approximation; the efforts
+    change with them to first order.
+    """
+
+    name = 'encoder_eccentricity'
+    words = 'an eccentric encoder'
+    formula = 'encoder shows q + amplitude sin(periods q + phase)'
+    source = 'Kavanagh 2001'
+    appearance = 'a ripple of the effort over the position that grows with speed and acceleration'
+    quantities = (
+        Quantity('amplitude', 'rad'),
+        Quantity('periods', '1/revolution'),
+        Quantity('phase', 'rad', is_scored=False),
+    )
+    size = 'amplitude'
+    small = SmallEffect(_slightly_eccentric, lambda start, c: np.array([start[0], *c]))
+    uses_bodies = True
+    sees_acceleration = True
+
+    def model(self, numbers: Numbers, kind: str = '') -> tuple[np.ndarray, np.ndarray]:
+        return np.array([numbers['periods'], *wave_coefficients(numbers)]), np.ones(1)
+
+    def report(self, at: Placed, motion: SeenMotion) -> dict[str, Value]:
+        periods, sine, cosine = (float(x) for x in at.shape)
+        return {
+            'amplitude': math.hypot(sine, cosine), 'periods': periods,
+            'phase': math.atan2(cosine, sine),
+        }  # fmt: skip
+
+    def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
+        """Return whether the encoder never turns back."""
+        slope = np.hypot(*at.shape[1:]) * at.shape[0] * per_turn(motion, at.place.joint)
+        return bool(slope < _STEEPEST)
+
+    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        j = place.joint
+        rate = shape[0] * per_turn(motion, j)
+        q, v, a = motion.position[:, j], motion.velocity[:, j], motion.acceleration[:, j]
+        x = q.copy()
+        for _ in range(_NEWTON):
+            e, slope, _ = _error(x, rate, shape[1:])
+            x -= (x + e - q) / np.maximum(1.0 + slope, 0.1)
+        e, slope, bend = _error(x, rate, shape[1:])
+        dx = v / np.maximum(1.0 + slope, 0.1)
+        ddx = (a - bend * dx**2) / np.maximum(1.0 + slope, 0.1)
+        by_q, by_v, by_a = motion.effort_slopes(j)
+        change = by_q * (q - x)[:, None] + by_v * (v - dx)[:, None] + by_a * (a - ddx)[:, None]
+        return np.asarray(change[:, :, None])
+
+    def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
+        """Return periods, on prismatic joints from half a wave in the range."""
+        if motion.tree.is_prismatic[place.joint]:
+            span = float(np.ptp(motion.position[:, place.joint]))
+            return np.arange(0.5, 9.0, 0.5)[:, None] / max(span, 1e-9)
+        return np.arange(1.0, 11.0)[:, None]
+
+    def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
+        turns = self.starts(motion, place)
+        low, high = 0.9 * float(turns[0, 0]), 1.5 * float(turns[-1, 0])
+        most = _STEEPEST / (low * per_turn(motion, place.joint))
+        return np.array([low, -most, -most]), np.array([high, most, most])
+
+
+class VelocityFilterLag(Effect):
+    """A velocity field behind a first-order low-pass; the position is right."""
+
+    name = 'velocity_filter_lag'
+    words = 'a lag of the measured velocity'
+    formula = 'the velocity field is the velocity behind a first-order low-pass'
+    source = 'a first-order filter in the drive'
+    appearance = 'the velocity field trails the derivative of the position'
+    quantities = (Quantity('time_constant', 's', low=1e-4, is_positive=True),)
+    is_force = False
+    is_online = False
