@@ -44,6 +44,19 @@ def test_commands_in_documents_exist(path):
             assert name in targets, name
 
 
+@pytest.mark.parametrize('path', DOCUMENTS, ids=lambda p: p.name)
+def test_modules_named_in_documents_exist(path):
+    """Paths in backticks are files below the repository, the package or its tests."""
+    text = path.read_text(encoding='utf-8')
+    folders = (ROOT, ROOT / 'sgp_ros')
+    for name in re.findall(r'`((?:\w+/)+\w+\.(?:py|yaml|urdf|md))`', text):
+        if not name.startswith('out/'):
+            assert any((folder / name).is_file() for folder in folders), f'{path.name}: {name}'
+    for name in re.findall(r'python -m (sgp_proof[\w.]*)', text):
+        file = ROOT / name.replace('.', '/')
+        assert file.with_suffix('.py').is_file(), f'{path.name}: {name}'
+
+
 def test_numbers_in_the_filter_page_are_the_measured_ones():
     """The table is that of the committed result."""
     result = json.loads((ROOT / 'sgp_proof/results/filter.json').read_text(encoding='utf-8'))
