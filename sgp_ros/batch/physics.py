@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from sgp_ros.gp.linear_algebra import least_norm
+
 _RANK_TOLERANCE = 1e-10
 
 
@@ -28,7 +30,7 @@ def solved(parts: list[np.ndarray]) -> np.ndarray:
     A, b = R[:, :-1], R[:, -1]
     norms = np.linalg.norm(A, axis=0)
     norms[norms == 0.0] = 1.0
-    scaled = np.linalg.lstsq(A / norms, b, rcond=_RANK_TOLERANCE)[0]
+    scaled = least_norm(A / norms, b, _RANK_TOLERANCE)
     return np.asarray(scaled / norms)
 
 

@@ -24,6 +24,7 @@ from scipy import linalg
 from sgp_ros.batch.colour import autoregression, coloured_products, inflation
 from sgp_ros.batch.pivoted import PivotedBasis, pivoted_basis
 from sgp_ros.gp.kernel import Kernel
+from sgp_ros.gp.linear_algebra import symmetric_eigen
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior
 
@@ -212,5 +213,5 @@ def _square_root(covariance: np.ndarray) -> np.ndarray:
     """Return S with `S S^T = covariance`, positive semidefinite up to rounding."""
     scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     scale[scale == 0.0] = 1.0
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    values, vectors = symmetric_eigen(covariance / np.outer(scale, scale))
     return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))

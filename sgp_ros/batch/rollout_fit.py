@@ -18,6 +18,7 @@ from sgp_ros.batch.forward import Residual
 from sgp_ros.batch.rollout import roll_out
 from sgp_ros.batch.rollout_windows import Windows
 from sgp_ros.errors import ConfigError, NumericalError
+from sgp_ros.gp.linear_algebra import svd
 from sgp_ros.physics.term import Motion
 from sgp_ros.robots.robot import Robot
 
@@ -243,9 +244,7 @@ def _sandwich(jacobian: np.ndarray, errors: np.ndarray, block: np.ndarray) -> np
     sums = np.zeros((len(labels), size))
     np.add.at(sums, members, scores)
     unit = np.sqrt(np.sum(jacobian**2, axis=0))
-    _, singular, basis = np.linalg.svd(
-        jacobian / np.where(unit > 0.0, unit, 1.0), full_matrices=False
-    )
+    _, singular, basis = svd(jacobian / np.where(unit > 0.0, unit, 1.0))
     if singular[-1] <= _UNDETERMINED * singular[0]:
         raise NumericalError(
             'roll-outs that do not determine all coefficients',

@@ -14,6 +14,7 @@ import numpy as np
 
 from sgp_ros.batch.excitation import JointRange, joint_ranges, judge_excitation, structural_base
 from sgp_ros.errors import ConfigError
+from sgp_ros.gp.linear_algebra import singular_values
 from sgp_ros.physics.term import Motion
 from sgp_ros.rigid.base_parameters import BaseParameters, RegressorFactor
 from sgp_ros.robots.robot import Robot
@@ -153,7 +154,7 @@ def _score(structural: BaseParameters, factor: RegressorFactor) -> tuple[int, fl
     """Return the rank and the sum of logarithms of the singular values, in structural scales."""
     excited = factor.base_parameters(structural.names)
     shown = factor.R / structural.scale @ structural.directions[: structural.rank].T
-    values = np.linalg.svd(shown, compute_uv=False)
+    values = singular_values(shown)
     return excited.rank, float(np.log(np.maximum(values, excited.tolerance)).sum())
 
 

@@ -12,6 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from sgp_ros.errors import NumericalError
+from sgp_ros.gp.linear_algebra import covariance_factor, svd
 from sgp_ros.gp.regression import OnlinePrediction
 
 _LEAST_RECIPROCAL_CONDITION = 1e-12
@@ -49,7 +51,10 @@ def solve_complement(
         if not np.all(np.isfinite(np.diag(prediction.covariance))):
             return None
         total = prediction.covariance + np.diag(noise)
-        whitening = np.linalg.inv(np.linalg.cholesky(total))
+        try:
+            whitening = np.linalg.inv(covariance_factor(total))
+        except NumericalError:
+            return None
         solved = _least_squares(slope, target - prediction.mean, whitening)
         if solved is None:
             return None
@@ -62,7 +67,7 @@ def _least_squares(
     slope: np.ndarray, residual: np.ndarray, whitening: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
     white = whitening @ slope  # (k, c)
-    U, S, Vt = np.linalg.svd(white, full_matrices=False)
+    U, S, Vt = svd(white)
     if len(S) < slope.shape[1] or not S[-1] > _LEAST_RECIPROCAL_CONDITION * S[0]:
         return None
     spread = Vt.T / S

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from sgp_ros.errors import NumericalError
 from sgp_ros.gp.kernel import Kernel
+from sgp_ros.gp.linear_algebra import covariance_factor
 from sgp_ros.gp.model import Model, Observations
 
 
@@ -88,14 +88,7 @@ def _factored_block(
     rows: np.ndarray,
     y: np.ndarray,
 ) -> Block:
-    try:
-        L = linalg.cholesky(K, lower=True, overwrite_a=True, check_finite=False)
-    except linalg.LinAlgError as error:
-        raise NumericalError(
-            f'the covariance of {len(K)} samples is not positive definite',
-            'a noise variance above the rounding error of the signal variance',
-            'raise the noise variance',
-        ) from error
+    L = covariance_factor(K, may_overwrite=True)
     stacked = np.column_stack([rows, y])
     white = linalg.solve_triangular(L, stacked, lower=True, check_finite=False)
     return Block(components, gain, L, 0.0, white[:, :-1], white[:, -1])

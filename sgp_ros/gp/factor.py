@@ -21,6 +21,7 @@ from sgp_ros.gp.factor_loops import (
     move_to_front,
     solve_lower,
 )
+from sgp_ros.gp.linear_algebra import covariance_factor
 from sgp_ros.gp.model import OutputGroup
 
 ROOM = 64
@@ -250,14 +251,7 @@ class GrowingFactor:
             return
         K = self._kernel.matrix(U)
         K[np.diag_indices(n)] += self._noise
-        try:
-            L = linalg.cholesky(K, lower=True, check_finite=False)
-        except linalg.LinAlgError as error:
-            raise NumericalError(
-                f'the covariance of {n} samples is not positive definite',
-                'a noise variance above the rounding error of the signal variance',
-                'raise the noise variance',
-            ) from error
+        L = covariance_factor(K, may_overwrite=True)
         self._U[:n, :n] = L.T
         self._S.replace(self._kernel.scale(U))
         self._white.replace(linalg.solve_triangular(L, flat, lower=True))

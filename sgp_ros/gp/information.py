@@ -13,6 +13,7 @@ from collections.abc import Iterable
 import numpy as np
 from scipy import linalg
 
+from sgp_ros.gp.linear_algebra import symmetric_eigen
 from sgp_ros.gp.model import CoefficientPrior
 from sgp_ros.gp.posterior import NULL_TOLERANCE, RANK_TOLERANCE, ZERO_COLUMN
 from sgp_ros.gp.rotations import (
@@ -90,7 +91,7 @@ class Information:
         scale = np.sqrt((self.R * self.R).sum(axis=0))
         scale[scale == 0.0] = 1.0
         own, others = self.R / scale, other.R / scale
-        values, vectors = np.linalg.eigh(own.T @ own - others.T @ others)
+        values, vectors = symmetric_eigen(own.T @ own - others.T @ others)
         is_known = values > DIFFERENCE_TOLERANCE
         roots, rows = np.sqrt(values[is_known]), vectors[:, is_known].T
         z = rows @ (own.T @ self.z - others.T @ other.z) / roots

@@ -16,7 +16,14 @@ from scipy import linalg
 
 from sgp_ros.gp.blocks import Block, build_blocks
 from sgp_ros.gp.kernel import Kernel
-from sgp_ros.gp.linear_algebra import subtract_symmetric
+from sgp_ros.gp.linear_algebra import (
+    column_space,
+    null_space,
+    require_finite,
+    singular_values,
+    subtract_symmetric,
+    svd,
+)
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 
 
@@ -93,13 +100,15 @@ class Posterior:
     Cost O(k n^3 / 3 + k n^2 p) to build, O(k n^2) per query with variance.
 
     Raises:
-        NumericalError: a covariance is not positive definite in double precision.
+        NumericalError: a covariance is not positive definite in double precision, or numbers are
+            not finite.
     """
 
     def __init__(self, model: Model, data: Observations, prior: CoefficientPrior) -> None:
         self.model = model
         self.data = data
         self.prior = prior
+        require_finite(data.U, data.F, data.y)
         self._blocks = build_blocks(model, data)
         A = np.vstack([block.A for block in self._blocks] + [prior.root])
         b = np.concatenate([block.b for block in self._blocks] + [prior.target])
@@ -225,8 +234,14 @@ def _diagonal(kernel: Kernel | None, U: np.ndarray) -> np.ndarray:
 
 
 def column_scale(F: np.ndarray, root: np.ndarray) -> np.ndarray:
-    """Return a positive scale per column of the stacked rows of F (n, k, p) and root (r, p)."""
-    scale = np.sqrt((F * F).sum(axis=(0, 1)) + (root * root).sum(axis=0))
+    """Return a positive scale per column of the stacked rows of F (n, k, p) and root (r, p).
+
+    Raises:
+        NumericalError: the square of a number is not finite.
+    """
+    with np.errstate(over='ignore'):
+        scale = np.sqrt((F * F).sum(axis=(0, 1)) + (root * root).sum(axis=0))
+    require_finite(scale)
     scale[scale == 0.0] = 1.0
     return scale
 
@@ -240,7 +255,7 @@ def _solve(A: np.ndarray, b: np.ndarray, data: Observations, prior: CoefficientP
     is_zero = size <= ZERO_COLUMN * size.max(initial=0.0)
     A, scale = np.where(is_zero, 0.0, A), np.where(is_zero, 1.0, scale)
     norms = np.where(is_zero, 1.0, np.linalg.norm(A / scale, axis=0))
-    U, S, Vt = np.linalg.svd(A / (scale * norms), full_matrices=False)
+    U, S, Vt = svd(A / (scale * norms))
     limit = RANK_TOLERANCE * (S[0] if len(S) else 0.0)
     rank = int((limit < S).sum())
     U, S = U[:, :rank], S[:rank]
@@ -250,7 +265,7 @@ def _solve(A: np.ndarray, b: np.ndarray, data: Observations, prior: CoefficientP
     if rank == p:
         log_det = 2.0 * float(np.log(S).sum() + np.log(scale * norms).sum())
     else:
-        log_det = 2.0 * float(np.log(linalg.svdvals(A / scale)[:rank]).sum()) if rank else 0.0
+        log_det = 2.0 * float(np.log(singular_values(A / scale)[:rank]).sum()) if rank else 0.0
     return _Solution(w, spread, null, scale, U, b - A @ w, log_det)
 
 
@@ -258,8 +273,8 @@ def _null_space(Vt: np.ndarray, rank: int, norms: np.ndarray) -> np.ndarray:
     p = Vt.shape[1]
     if rank == p:
         return np.zeros((p, 0))
-    basis = linalg.null_space(Vt[:rank]) if rank else np.eye(p)
-    return linalg.orth(basis / norms[:, None])
+    basis = null_space(Vt[:rank]) if rank else np.eye(p)
+    return column_space(basis / norms[:, None])
 
 
 def _curvature(block: Block, residual: np.ndarray, left: np.ndarray) -> np.ndarray:

@@ -16,6 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
+from sgp_ros.gp.linear_algebra import singular_values, svd
+
 _EPS = float(np.finfo(np.float64).eps)
 _OPERATIONS = 4096.0
 """Rounding errors that one entry of a regressor may carry, in units of eps times the length of
@@ -183,12 +185,12 @@ def base_parameters(
     is_zero = scale <= _OPERATIONS * _EPS * scale.max(initial=0.0)
     scale[is_zero] = 1.0
     scaled = np.where(is_zero, 0.0, R / scale)  # (p, p)
-    _, values, directions = np.linalg.svd(scaled)
+    _, values, directions = svd(scaled, is_full=True)
     rank = int((values > tolerance).sum())
     independent, K = _combinations(scaled, rank)
     combinations = K * (scale / scale[independent][:, None])  # (r, p), of w again
     combinations[np.arange(rank), independent] = 1.0
-    base = np.linalg.svd(scaled[:, independent], compute_uv=False)
+    base = singular_values(scaled[:, independent])
     return BaseParameters(
         tuple(names),
         tuple(int(i) for i in independent),
