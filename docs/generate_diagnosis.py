@@ -46,8 +46,7 @@ sgp diagnose out/toy/toy_pendulum.mcap --robot toy_pendulum --out out/diagnose
 ```
 
 A built-in robot stands for the simplest bodies with its coefficients: those that its robot YAML states, else
-those of the simulated robot of that name. `simple_pendulum` and `double_pendulum` have no numbers of their own
-and need the YAML.
+the values that its file in `config/robots` states with their source.
 
 ## How it decides
 1. **Compare.** The nominal robot's inverse dynamics of the measured motion, less the commanded effort, is the

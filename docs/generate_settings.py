@@ -8,7 +8,7 @@ from pathlib import Path
 
 from sgp_ros.engine.config import describe_settings
 from sgp_ros.gp.kernels import KERNELS
-from sgp_ros.robots.registry import ROBOTS
+from sgp_ros.robots.registry import load_robot
 
 TARGET = Path(__file__).parent / 'settings.md'
 HEAD = """# Settings
@@ -54,7 +54,7 @@ def _line(setting, name):
 def text():
     """Return the page."""
     lines = []
-    for setting in describe_settings(ROBOTS['linear_axis']):
+    for setting in describe_settings(load_robot('linear_axis')):
         name = setting.name.replace('hyper.axis.', 'hyper.<joint>.')
         unit = setting.unit.replace('(N)^2', 'target squared')
         lines.append(_line(setting, name).replace(setting.unit or '\0', unit or '\0'))

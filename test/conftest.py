@@ -22,12 +22,14 @@ _NEEDED = {
         'physics': ('effects', 'stated'),
         'rigid': ('inertial', 'rigid_body', 'tree', 'urdf_writer'),
         'robots': (
-            'effect_terms', 'pendulums', 'built_in_nominal', 'ready_robots', 'urdf_robot',
+            'effect_terms', 'pendulums', 'built_in_nominal', 'lumped', 'ready_robots',
+            'urdf_robot',
         ),
         'simulation': ('random_tree', 'serial_arm', 'tree', 'tree_part'),
     },
     'mujoco': {
-        'apps': ('built_in_diagnosis', 'simulation', 'stated_simulation'),
+        'apps': ('built_in_diagnosis', 'shipped_robots', 'simulation', 'stated_simulation'),
+        'robots': ('lumped',),
         'proof/concealed': ('concealed',),
         'simulation': ('effect_laws', 'tree', 'tree_part'),
     },

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 import sgp_ros
-from sgp_ros.recordings.model_files import find_shipped
+from sgp_ros.robots.shipped import find_shipped
 
 ROOT = Path(__file__).parents[1]
 
@@ -133,6 +133,6 @@ def test_an_executable_built_by_colcon_runs(workspace):
     assert 'usage: sgp' in run_in(workspace, command, '--help')
     run_in(workspace, command, 'simulate', 'reaction_wheel', '--duration', '1')
     assert (workspace / 'out' / 'simulate' / 'reaction_wheel.mcap').is_file()
-    text = 'import sgp_ros.recordings.model_files as p; print(p.find_shipped("linear_axis.yaml"))'
+    text = 'import sgp_ros.robots.shipped as p; print(p.find_shipped("linear_axis.yaml"))'
     found = run_in(workspace, sys.executable, '-c', text).strip()
     assert Path(found).is_relative_to(workspace)

@@ -15,7 +15,7 @@ from sgp_ros.engine.samples import CommandSample, JointSample
 from sgp_ros.engine.windows import Equation, WindowFilter
 from sgp_ros.gp.model import Observations
 from sgp_ros.physics.term import Motion
-from sgp_ros.robots.registry import ROBOTS
+from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.recording import SimulatedRecording, simulate
@@ -45,7 +45,7 @@ def make_world(seed: int, robot: str = 'reaction_wheel_6', effects: tuple[str, .
         robot: `reaction_wheel_6` (no viscous friction) or `reaction_wheel` (all ten).
         effects: physics in the truth that is in neither model.
     """
-    model = ROBOTS[robot]
+    model = load_robot(robot)
     train = _differences(_record(seed, 'sinusoids', effects, Sensors()), model)
     tests = {
         region: _differences(
@@ -66,7 +66,7 @@ def make_encoder_world(
         settings: of the package's own filter; None for differences of positions, paired with the
             command by index.
     """
-    model = ROBOTS['reaction_wheel_6']
+    model = load_robot('reaction_wheel_6')
     filtered = _index_paired if settings is None else partial(_filtered, settings=settings)
     train = filtered(_record(seed, 'sinusoids', (), None), model)
     tests = {
@@ -120,7 +120,7 @@ def _filtered(recording: SimulatedRecording, model: Robot, settings: Mapping[str
     the true coefficients at the true states, averaged like everything else.
     """
     config = EngineConfig.from_mapping(settings, model)
-    complete = ROBOTS['reaction_wheel']
+    complete = load_robot('reaction_wheel')
     w = _coefficients(recording.truth, complete)
     U, F, y = [], [], []
     for equation in _equations(recording, recording.position, model, config):

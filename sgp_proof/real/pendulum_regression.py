@@ -26,10 +26,12 @@ from sgp_ros.physics.term import Coefficient, Joint
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.report.findings import collect_findings
 from sgp_ros.report.metrics import Timing, collect_metrics
-from sgp_ros.robots.double_pendulum import DOUBLE_PENDULUM
+from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
-from sgp_ros.robots.simple_pendulum import SIMPLE_PENDULUM
 from sgp_ros.robots.terms import constant, direction, sine, single_column, velocity
+
+SIMPLE_PENDULUM = load_robot('simple_pendulum')
+DOUBLE_PENDULUM = load_robot('double_pendulum')
 
 DOUBLES = {
     f'{design[:3]} run {run}': DOUBLE.format(design, run)

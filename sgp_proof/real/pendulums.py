@@ -26,8 +26,10 @@ from sgp_ros.batch.rollout_windows import cut_windows, joined
 from sgp_ros.gp.methods import FitOptions, fit_gp
 from sgp_ros.gp.model import CoefficientPrior, Observations
 from sgp_ros.physics.term import Motion
-from sgp_ros.robots.double_pendulum import DOUBLE_PENDULUM
-from sgp_ros.robots.simple_pendulum import SIMPLE_PENDULUM
+from sgp_ros.robots.registry import load_robot
+
+SIMPLE_PENDULUM = load_robot('simple_pendulum')
+DOUBLE_PENDULUM = load_robot('double_pendulum')
 
 SMOOTHING_HZ, GRID, STEP = 25.0, 0.002, 0.004
 DOUBLE_DATA = DATA / 'dfki_double_pendulum'

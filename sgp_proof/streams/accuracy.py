@@ -32,7 +32,7 @@ from sgp_ros.gp.posterior import Posterior
 from sgp_ros.gp.scores import coverage95, nlpd, nmse
 from sgp_ros.recordings.model_files import load_parameters
 from sgp_ros.recordings.reader import open_recording
-from sgp_ros.robots.registry import ROBOTS
+from sgp_ros.robots.registry import load_robot
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.recording import simulate
 
@@ -69,7 +69,7 @@ def _reaction_wheel():
         ),
         100.0,
     )
-    robot = ROBOTS['reaction_wheel_6']
+    robot = load_robot('reaction_wheel_6')
     return robot, _gathered(robot, {}, events_of(recording)), 200
 
 

@@ -30,7 +30,7 @@ from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.recordings.model_files import load_parameters
 from sgp_ros.recordings.reader import open_recording
-from sgp_ros.robots.registry import ROBOTS
+from sgp_ros.robots.registry import load_robot
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.recording import simulate
 
@@ -125,7 +125,7 @@ def _engine_run(robot, settings, events):
 
 
 def _wheels(seeds):
-    robot = ROBOTS['reaction_wheel']
+    robot = load_robot('reaction_wheel')
     found = {'exact': [], 'basis': []}
     for seed in seeds:
         run = simulate(

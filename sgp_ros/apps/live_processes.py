@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from sgp_ros.errors import RecordingError
-from sgp_ros.recordings.model_files import find_shipped
+from sgp_ros.robots.shipped import find_shipped
 
 _DOMAINS = range(30, 102)
 _STOP_LIMIT_S = 5.0

@@ -23,7 +23,6 @@ from sgp_ros.engine.samples import CommandSample, Event, JointSample
 from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import ConfigError, NumericalError, RecordingError
 from sgp_ros.recordings.model_files import (
-    find_shipped,
     load_model,
     load_parameters,
     save_model,
@@ -37,6 +36,7 @@ from sgp_ros.report.html import write_report
 from sgp_ros.report.metrics import Timing, collect_metrics
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
+from sgp_ros.robots.shipped import find_shipped
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,8 @@ from sgp_ros.physics.parts import Value
 from sgp_ros.robots.nominal import Nominal, nominal_model
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import stated_part, urdf_text
-from sgp_ros.simulation.assembly import find_simulator
 from sgp_ros.simulation.effects import ChosenEffect
+from sgp_ros.simulation.registry import SIMULATORS
 from sgp_ros.simulation.simulator import Simulator
 from sgp_ros.simulation.tree_part import Load, TreePart
 from sgp_ros.simulation.tree_simulator import tree_simulator
@@ -37,17 +37,18 @@ class SimulatedRobot:
 def find_robot(robot: str) -> SimulatedRobot:
     """Return what to simulate for a name, a URDF file or a robot YAML.
 
+    Three robots have dynamics of their own, written apart from their model. Every other one is
+    simulated by its nominal bodies and the effects that it states.
+
     Raises:
         ConfigError: nothing of the kind, or an effect that the simulation cannot have.
     """
     path = Path(robot)
-    if path.suffix in {'.yaml', '.yml'}:
-        return _of_yaml(path)
-    if path.suffix != '.urdf':
-        return SimulatedRobot(find_simulator(robot), robot)
-    if not path.is_file():
-        raise ConfigError(f'no file {path}', 'a URDF')
-    return SimulatedRobot(_of_urdf(path), path.stem)
+    if robot in SIMULATORS:
+        return SimulatedRobot(SIMULATORS[robot], robot)
+    if path.suffix == '.urdf' and path.is_file():
+        return SimulatedRobot(_of_urdf(path), path.stem)
+    return _of_nominal(nominal_model(load_robot(robot)), path.stem)
 
 
 def _of_urdf(path: Path) -> Simulator:
@@ -57,13 +58,12 @@ def _of_urdf(path: Path) -> Simulator:
         raise ConfigError(f'URDF {path} is not UTF-8 ({error})', 'a URDF in UTF-8') from error
 
 
-def _of_yaml(path: Path) -> SimulatedRobot:
-    nominal = nominal_model(load_robot(str(path)))
+def _of_nominal(nominal: Nominal, name: str) -> SimulatedRobot:
     last = {e.name: e for e in nominal.effects if e.effect.is_on_tree}
     before = [e for e in nominal.effects if last.get(e.name, e) is not e]
     simulator = tree_simulator(urdf_text(nominal.robot), _part(nominal, before))
     effects = tuple(_chosen(e, nominal) for e in nominal.effects if e not in before)
-    return SimulatedRobot(simulator, path.stem, effects)
+    return SimulatedRobot(simulator, name, effects)
 
 
 def _part(nominal: Nominal, before: Iterable[EffectAt]) -> TreePart:

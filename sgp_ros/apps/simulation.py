@@ -68,6 +68,7 @@ def run_simulation(
     write_simulated(recording, path, transport, seed=seed)
     truth, motion = write_truth(recording, out)
     n = len(recording.stamps_ns)
+    print(simulator.description)
     print(f'{n} samples of {", ".join(recording.joint_names)} in {path}, the truth in {truth}')
     return {
         'recording': str(path), 'truth': str(truth), 'motion': str(motion), 'samples': n,

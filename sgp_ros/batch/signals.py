@@ -11,7 +11,7 @@ other.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +22,6 @@ from sgp_ros.batch.stencils import sharpened
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import RecordingError
-from sgp_ros.robots.effect_terms import EffortMap
 from sgp_ros.robots.robot import Robot
 
 SHORTEST_SEGMENT = 16
@@ -137,7 +136,7 @@ class _Part:
         start = (int(stamps[0]) - int(accepted.stamps_ns[0])) * 1e-9
         return cls(start + np.arange(n) * step, path(grid), velocity, effort, command)
 
-    def acting(self, effort_map: EffortMap, *, is_measured: bool) -> _Part:
+    def acting(self, effort_map: Callable[..., np.ndarray], *, is_measured: bool) -> _Part:
         """Return the segment with the efforts that act in place of the recorded ones."""
         v = self.velocity
         if v is None:

@@ -14,7 +14,6 @@ from typing import Any, BinaryIO
 import numpy as np
 import yaml
 
-import sgp_ros
 from sgp_ros.engine.samples import SettingValue
 from sgp_ros.errors import ConfigError
 
@@ -98,15 +97,6 @@ def load_parameters(path: str | Path) -> dict[str, object]:
         for name, value in settings.items()
         if name not in NODE_ONLY and not name.startswith('qos_overrides.')
     }
-
-
-def find_shipped(name: str) -> Path | None:
-    """Return a file of `config/`, from the source tree or from where it was installed."""
-    package = Path(sgp_ros.__file__).parent
-    folders = [package.parent / 'config']
-    # <prefix>/lib/python3.X/site-packages/sgp_ros with share/ beside lib/, for pip and colcon.
-    folders += [parent / 'share' / 'sgp_ros' / 'config' for parent in package.parents[2:5]]
-    return next((folder / name for folder in folders if (folder / name).is_file()), None)
 
 
 def _flatten(prefix: str, entries: dict[Any, Any], settings: dict[str, object]) -> None:

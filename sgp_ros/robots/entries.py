@@ -7,6 +7,9 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from sgp_ros.errors import ConfigError
+from sgp_ros.physics.formula import Formula, read_formula
+
 
 @dataclass(frozen=True, slots=True)
 class Entries:
@@ -66,6 +69,20 @@ class Entries:
         if not is_finite(value) or value <= 0.0:
             return self._wrong(key, value, 'a positive number', 1.0)
         return float(value)
+
+    def formula(self, key: str, names: Collection[str]) -> Formula | None:
+        """Return a formula of known names, 0 where there is none; None where it is wrong."""
+        try:
+            formula = read_formula(self.document.get(key, 0.0))
+        except ConfigError as error:
+            self.problems.append(f'{self.prefix}{key}: {error}')
+            return None
+        if formula.signals or not formula.parameters <= set(names):
+            self.problems.append(
+                f'{self.prefix}{key} is {formula.text!r}; it may use {sorted(names)} alone'
+            )
+            return None
+        return formula
 
     def vector(self, key: str, size: int) -> tuple[float, ...]:
         """Return a list of finite numbers; zeros where there is none."""

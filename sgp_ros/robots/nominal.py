@@ -10,7 +10,6 @@ import numpy as np
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.rigid.tree import Tree
-from sgp_ros.robots.built_in_nominal import NOMINAL, built_in_document
 from sgp_ros.robots.effect_terms import changed_tree
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.stated_effects import read_effects
@@ -26,7 +25,7 @@ class Nominal:
         plain: the tree of the URDF.
         tree: the same with stated tilt of the base and payload.
         effects: all that it states.
-        is_lumped: whether it is a built-in robot, known by its coefficients alone.
+        is_lumped: whether it is known by its coefficients alone.
     """
 
     robot: Robot
@@ -60,19 +59,21 @@ class Nominal:
 
 
 def nominal_model(robot: Robot) -> Nominal:
-    """Return the nominal model of a robot; a built-in one becomes a robot with a URDF.
+    """Return the nominal model of a robot; one of lumped coefficients becomes one with a URDF.
 
     Raises:
         ConfigError: the robot has no nominal bodies, or its URDF is no longer what it was.
     """
     problems: list[str] = []
-    is_lumped = robot.name in NOMINAL and 'urdf' not in robot.source
-    if is_lumped:
-        built = build_urdf_robot(built_in_document(robot), Path(), problems)
-        assert built is not None, problems
+    bodies = robot.bodies
+    if bodies is not None:
+        document = bodies.document(robot.name, robot.joints, robot.coefficients)
+        built = build_urdf_robot(document, Path(), problems)
+        if built is None or problems:
+            raise ConfigError(f'robot {robot.name}: ' + ' | '.join(problems), 'bodies that exist')
         robot = built
     plain = nominal_tree(robot)
     effects = read_effects(robot.source.get('effects'), plain, problems)
     if problems:
         raise ConfigError(f'robot {robot.name}: ' + ' | '.join(problems), 'as it was before')
-    return Nominal(robot, plain, changed_tree(plain, effects), effects, is_lumped)
+    return Nominal(robot, plain, changed_tree(plain, effects), effects, bodies is not None)

@@ -1,74 +1,78 @@
 """Robots by name or file.
 
-A robot YAML names a built-in robot and changes what differs: joint names, and prior means and
-standard deviations of coefficients. Or it names a URDF, see `urdf_robot`. `sgp replay` writes its
-result in the same form, so what was identified on one recording is the prior for the next.
+A robot YAML is one of three. It states a few lumped coefficients by formulas, see `lumped`. It
+names a URDF, see `urdf_robot`. Or it names a robot that comes with the package and changes what
+differs: joint names, and prior means and standard deviations of coefficients. `sgp replay` writes
+its result in the same forms, so what was identified on one recording is the prior for the next.
 
     schema: 1
     robot: linear_axis
     joints: [slide]
     parameters:
       M: {value: 95.1, std: 0.2, unit: kg}
+
+The robots that come with the package are the files of `config/robots`: one more file there is one
+more robot.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.robots.double_pendulum import DOUBLE_PENDULUM
 from sgp_ros.robots.entries import Entries, is_finite
-from sgp_ros.robots.linear_axis import LINEAR_AXIS
-from sgp_ros.robots.reaction_wheel import REACTION_WHEEL, REACTION_WHEEL_6
+from sgp_ros.robots.lumped import LUMPED_KEYS, build_lumped_robot
 from sgp_ros.robots.robot import Robot
-from sgp_ros.robots.simple_pendulum import SIMPLE_PENDULUM
-from sgp_ros.robots.toy_pendulum import TOY_PENDULUM
+from sgp_ros.robots.shipped import shipped_folder
 
-ROBOTS: dict[str, Robot] = {
-    robot.name: robot
-    for robot in (
-        REACTION_WHEEL,
-        REACTION_WHEEL_6,
-        TOY_PENDULUM,
-        LINEAR_AXIS,
-        SIMPLE_PENDULUM,
-        DOUBLE_PENDULUM,
-    )
-}
-_KEYS = {'schema', 'robot', 'joints', 'parameters'}
-_URDF_KEYS = {
+_KEYS = frozenset({'schema', 'robot', 'joints', 'parameters'})
+_URDF_KEYS = frozenset({
     'schema', 'urdf', 'name', 'joints', 'locked', 'passive', 'effort_gain', 'payload', 'terms',
     'coulomb_width', 'stribeck_velocity', 'prior', 'residual_inputs', 'effects', 'parameters',
-}  # fmt: skip
+})  # fmt: skip
+
+
+def robot_names() -> tuple[str, ...]:
+    """Return the names of the robots that come with the package, sorted."""
+    return tuple(sorted(path.stem for path in _folder().glob('*.yaml')))
 
 
 def load_robot(name_or_path: str) -> Robot:
-    """Return a built-in robot, or the robot that a robot YAML or a URDF describes.
+    """Return a robot that comes with the package, or one that a robot YAML or a URDF describes.
 
     Raises:
-        ConfigError: neither a built-in name nor a readable robot file; all problems of a file are
+        ConfigError: neither a known name nor a readable robot file; all problems of a file are
             listed in one error.
     """
-    if name_or_path in ROBOTS:
-        return ROBOTS[name_or_path]
+    if name_or_path in robot_names():
+        return _shipped(_folder() / f'{name_or_path}.yaml')
     path = Path(name_or_path)
-    expected = f'one of {sorted(ROBOTS)} or a robot file (.yaml, .urdf)'
+    expected = f'one of {list(robot_names())} or a robot file (.yaml, .urdf)'
     if not path.is_file():
         raise ConfigError(f'robot {name_or_path!r} is no built-in name and no file', expected)
     if path.suffix == '.urdf':
         return _plain(path)
     if path.suffix not in ('.yaml', '.yml'):
         raise ConfigError(f'robot file {path} with ending {path.suffix!r}', expected)
-    try:
-        document = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ConfigError(f'robot file {path} is not YAML ({error})', expected) from error
-    return _build(document, path)
+    return _build(path)
+
+
+def _folder() -> Path:
+    return shipped_folder() / 'robots'
+
+
+@cache
+def _shipped(path: Path) -> Robot:
+    """Return a robot of the package; a lumped one is known by its name from then on."""
+    robot = _build(path)
+    return robot if 'urdf' in robot.source else replace(robot, source={})
 
 
 def _plain(path: Path) -> Robot:
@@ -79,14 +83,18 @@ def _plain(path: Path) -> Robot:
     return robot
 
 
-def _build(document: object, path: Path) -> Robot:
+def _build(path: Path) -> Robot:
+    try:
+        document = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ConfigError(f'robot file {path} is not YAML ({error})', 'a robot YAML') from error
     if not isinstance(document, dict):
         raise ConfigError(f'robot file {path} holds {type(document).__name__}', 'a mapping')
     problems: list[str] = []
     if document.get('schema') != 1:
         problems.append(f'schema is {document.get("schema")!r}, not 1')
-    is_tree = 'urdf' in document
-    robot = _from_urdf(document, path, problems) if is_tree else _built_in(document, problems)
+    read, keys = _form(document, path)
+    robot = read(document, problems)
     prior = _read_parameters(document.get('parameters', {}), problems)
     if robot is not None:
         try:
@@ -95,14 +103,24 @@ def _build(document: object, path: Path) -> Robot:
             problems.append(str(error))
     if problems or robot is None:
         raise ConfigError(
-            f'robot file {path}: ' + ' | '.join(problems),
-            f'the keys {sorted(_URDF_KEYS if is_tree else _KEYS)}',
+            f'robot file {path}: ' + ' | '.join(problems), f'the keys {sorted(keys)}'
         )
     return robot
 
 
+def _form(
+    document: Mapping[str, Any], path: Path
+) -> tuple[Callable[[Mapping[str, Any], list[str]], Robot | None], frozenset[str]]:
+    """Return how a robot YAML of this form is read, and the keys that it may have."""
+    if 'urdf' in document:
+        return lambda entries, problems: _from_urdf(entries, path, problems), _URDF_KEYS
+    if 'coefficients' in document:
+        return build_lumped_robot, LUMPED_KEYS
+    return _changed, _KEYS
+
+
 def _from_urdf(document: Mapping[str, Any], path: Path, problems: list[str]) -> Robot | None:
-    from sgp_ros.robots.urdf_robot import (  # noqa: PLC0415  # a built-in robot needs no Pinocchio
+    from sgp_ros.robots.urdf_robot import (  # noqa: PLC0415  # a lumped robot needs no Pinocchio
         build_urdf_robot,
     )
 
@@ -110,18 +128,20 @@ def _from_urdf(document: Mapping[str, Any], path: Path, problems: list[str]) -> 
     return build_urdf_robot(document, path.parent, problems)
 
 
-def _built_in(document: Mapping[str, Any], problems: list[str]) -> Robot | None:
+def _changed(document: Mapping[str, Any], problems: list[str]) -> Robot | None:
+    """Return a robot of the package with the joint names that the document states."""
     entries = Entries(document, problems)
     entries.refuse_others(_KEYS)
     base = document.get('robot')
     joints = entries.names('joints')
-    if not isinstance(base, str) or base not in ROBOTS:
-        problems.append(f'robot is {base!r}, not one of {sorted(ROBOTS)}, and there is no urdf')
+    if not isinstance(base, str) or base not in robot_names():
+        problems.append(
+            f'robot is {base!r}, not one of {list(robot_names())}, '
+            'and there are no urdf and no coefficients'
+        )
         return None
-    if joints is None:
-        return ROBOTS[base]
     try:
-        return ROBOTS[base].renamed(joints)
+        return load_robot(base) if joints is None else load_robot(base).renamed(joints)
     except ConfigError as error:
         problems.append(str(error))
         return None

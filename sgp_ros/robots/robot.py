@@ -7,17 +7,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.term import INPUT_CHANNELS, Coefficient, Joint, Motion, Term
-
-if TYPE_CHECKING:
-    from sgp_ros.robots.effect_terms import EffortMap
+from sgp_ros.robots.bodies import LumpedBodies
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +29,29 @@ class Robot:
         residual_inputs: per joint, the names (`velocity:pole`) of what its Z sees.
         description: one sentence with the source of the model.
         source: the entries of a robot YAML that build this robot; empty for a built-in one.
-        effort_map: from recorded efforts to those that act on the joints; None for the same.
+        effort_map: from recorded efforts to those that act on the joints, see
+            `effect_terms.EffortMap`; None for the same.
+        bodies: of a robot that lumped coefficients describe; None for one from a URDF.
+
+    Examples:
+        A driven pendulum, `effort = J a + G sin(q)`, from columns of f(u):
+
+        >>> import numpy as np
+        >>> from sgp_ros.physics.formula import read_formula
+        >>> def term(name, unit, text):
+        ...     column = read_formula(text).column(['hinge'])
+        ...     columns = lambda motion: column(motion)[:, None, None]
+        ...     return Term((Coefficient(name, unit, 'hinge'),), columns, 'Newton')
+        >>> robot = Robot(
+        ...     name='pendulum', joints=(Joint('hinge'),), target='effort',
+        ...     terms=(term('J', 'kg m^2', 'ddq[hinge]'), term('G', 'N m', 'sin(q[hinge])')),
+        ...     residual_inputs=(('velocity:hinge',),),
+        ... )
+        >>> q, v, a, effort = np.array([[[0.5]], [[2.0]], [[3.0]], [[0.0]]])
+        >>> robot.regressor(Motion(q, v, a, effort)).round(2)
+        array([[[3.  , 0.48]]])
+        >>> robot.target_unit('hinge'), robot.residual_columns(('default',))
+        ('N m', ((1,),))
     """
 
     name: str
@@ -42,7 +61,8 @@ class Robot:
     residual_inputs: tuple[tuple[str, ...], ...]
     description: str = ''
     source: Mapping[str, object] = field(default_factory=dict, compare=False)
-    effort_map: EffortMap | None = None
+    effort_map: Callable[..., np.ndarray] | None = None
+    bodies: LumpedBodies | None = field(default=None, compare=False)
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -133,6 +153,22 @@ class Robot:
                 for inputs in self.residual_inputs
             ),
         )
+
+    def with_inputs(self, spec: object) -> Robot:
+        """Return this robot with another choice of what Z sees.
+
+        Args:
+            spec: one name or a list of names, as `residual_columns` takes them.
+
+        Raises:
+            ConfigError: not of this form, or a name that is no input of this robot.
+        """
+        names = [spec] if isinstance(spec, str) else spec
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+            raise ConfigError(f'residual_inputs is {spec!r}', 'own, all or a list of inputs')
+        columns = self.residual_columns(tuple(names))
+        inputs = tuple(tuple(self.input_name(c) for c in chosen) for chosen in columns)
+        return replace(self, residual_inputs=inputs)
 
     def with_prior(self, prior: Mapping[str, tuple[float, float]]) -> Robot:
         """Return this robot with prior mean and standard deviation of some coefficients.

@@ -86,7 +86,11 @@ def build_urdf_robot(
         | {'urdf': str(place.resolve()) if isinstance(place, Path) else place},
         effort_map=effort_map(tree, effects, width),
     )
-    return _with_inputs(robot, document.get('residual_inputs', 'own'), problems)
+    try:
+        return robot.with_inputs(document.get('residual_inputs', 'own'))
+    except ConfigError as error:
+        problems.append(str(error))
+        return robot
 
 
 def nominal_robot(robot: Robot) -> Robot:
@@ -264,17 +268,3 @@ def _chosen(kind: str, who: object, tree: Tree, problems: list[str]) -> list[int
         problems.append(f'term {kind} names a joint twice: {who}')
         return None
     return [names.index(name) for name in who]
-
-
-def _with_inputs(robot: Robot, spec: object, problems: list[str]) -> Robot:
-    wanted = [spec] if isinstance(spec, str) else spec
-    if not isinstance(wanted, list) or not all(isinstance(name, str) for name in wanted):
-        problems.append(f'residual_inputs is {spec!r}, not own, all or a list of inputs')
-        return robot
-    try:
-        columns = robot.residual_columns(tuple(wanted))
-    except ConfigError as error:
-        problems.append(str(error))
-        return robot
-    inputs = tuple(tuple(robot.input_name(c) for c in chosen) for chosen in columns)
-    return replace(robot, residual_inputs=inputs)

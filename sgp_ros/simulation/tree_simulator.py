@@ -9,6 +9,7 @@ from sgp_ros.simulation.simulator import Simulator
 from sgp_ros.simulation.tracking import middle_and_reach, multisine_tracking
 from sgp_ros.simulation.tree import Tree
 from sgp_ros.simulation.tree_part import TreePart
+from sgp_ros.simulation.tree_text import STAND_IN_MASS, STAND_IN_RADIUS
 
 _BITS = 17
 _LINEAR_RESOLUTION_M = 1e-6
@@ -48,10 +49,19 @@ def tree_simulator(urdf: str, part: TreePart | None = None) -> Simulator:
         ),
         torque_noise=(0.0,) * len(joints),
         rate_hz=_RATE_HZ,
-        description='The robot of a URDF',
+        description=_description(tree),
         last_joint=tree.text.last_joint,
         longest_substep_s=_LONGEST_SUBSTEP_S,
         effort_gain=gains,
+    )
+
+
+def _description(tree: Tree) -> str:
+    if not tree.text.stand_ins:
+        return 'The robot of a URDF'
+    return (
+        f'The robot of a URDF without masses: each link is a ball of {STAND_IN_MASS:g} kg and '
+        f'{STAND_IN_RADIUS:g} m, so its efforts are those of no real machine'
     )
 
 

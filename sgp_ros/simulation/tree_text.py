@@ -11,10 +11,12 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.simulation.followers import Follower, read_followers
 from sgp_ros.simulation.mechanism import SimulatedJoint
 from sgp_ros.simulation.tree_part import TreePart
-from sgp_ros.simulation.urdf_elements import MOVING, link_of, number_of, root_of
+from sgp_ros.simulation.urdf_elements import MOVING, link_of, number_of, root_of, vector_of
 
 _PREFIX = 'link:'
 _PAYLOAD = 'payload'
+STAND_IN_MASS, STAND_IN_RADIUS = 1.0, 0.1
+"""Of the balls that stand in for the links of a URDF without masses [kg, m]."""
 _SMALLEST = 1e-14
 """Mass [kg] and principal inertia [kg m^2] of links without: the library asks for some."""
 
@@ -33,6 +35,7 @@ class TreeText:
         last_joint: the joint nearest to `tool0`, or the last one of the file.
         last_link: the link on it.
         tool_link: `tool0`, or the last link.
+        stand_ins: links with a ball in place of a body, see `stand_in_bodies`.
     """
 
     name: str
@@ -43,6 +46,7 @@ class TreeText:
     last_joint: str
     last_link: str
     tool_link: str
+    stand_ins: tuple[str, ...] = ()
 
 
 def read_tree(urdf: str, part: TreePart | None = None) -> TreeText:
@@ -77,6 +81,7 @@ def read_tree(urdf: str, part: TreePart | None = None) -> TreeText:
         last.get('name', ''),
         link_of(last, 'child'),
         tool,
+        tuple(stand_in_bodies(root)),
     )
 
 
@@ -124,9 +129,11 @@ def plain_tree(urdf: str, tree: TreeText, payload: tuple[float, float, float, fl
         'boundmass': repr(_SMALLEST), 'boundinertia': repr(_SMALLEST),
     }  # fmt: skip
     ET.SubElement(ET.SubElement(plain, 'mujoco'), 'compiler', options)
+    stand_ins = stand_in_bodies(root)
     for link in root.findall('link'):
-        copy = ET.SubElement(plain, 'link', name=_PREFIX + link.get('name', ''))
-        copy.extend(link.findall('inertial'))
+        name = link.get('name', '')
+        copy = ET.SubElement(plain, 'link', name=_PREFIX + name)
+        copy.extend([stand_ins[name]] if name in stand_ins else link.findall('inertial'))
     for joint in root.findall('joint'):
         kind = 'continuous' if joint.get('type') == 'revolute' else joint.get('type', '')
         copy = ET.SubElement(plain, 'joint', name=joint.get('name', ''), type=kind)
@@ -140,6 +147,32 @@ def plain_tree(urdf: str, tree: TreeText, payload: tuple[float, float, float, fl
     if payload[0] > 0.0:
         _add_payload(plain, _PREFIX + tree.last_link, payload)
     return ET.tostring(plain, encoding='unicode')
+
+
+def stand_in_bodies(root: ET.Element) -> dict[str, ET.Element]:
+    """Return a body for each moving link of a URDF that states no mass at all, by link.
+
+    Such a file tells the kinematics alone. Each link becomes a solid ball halfway to its next
+    joints, so that the robot can be moved; its efforts are those of no real machine.
+    """
+    if any(number_of(mass, 'value', 0.0) for mass in root.iter('mass')):
+        return {}
+    joints = root.findall('joint')
+    bodies = {}
+    for link in [link_of(joint, 'child') for joint in joints if joint.get('type') in MOVING]:
+        following = [
+            vector_of(joint.find('origin'), 'xyz', '0 0 0')
+            for joint in joints if link_of(joint, 'parent') == link
+        ]  # fmt: skip
+        middle = [sum(x) / (2.0 * len(following)) for x in zip(*following, strict=True)]
+        body = ET.Element('inertial')
+        ET.SubElement(body, 'origin', xyz=' '.join(map(repr, middle or (0.0, 0.0, 0.0))))
+        ET.SubElement(body, 'mass', value=repr(STAND_IN_MASS))
+        about = 0.4 * STAND_IN_MASS * STAND_IN_RADIUS**2
+        tensor = dict.fromkeys(('ixx', 'iyy', 'izz'), repr(about))
+        ET.SubElement(body, 'inertia', dict.fromkeys(('ixy', 'ixz', 'iyz'), '0') | tensor)
+        bodies[link] = body
+    return bodies
 
 
 def tree_link(name: str) -> str:

@@ -24,6 +24,7 @@ def describe_truth(scenario: Scenario) -> dict[str, object]:
     return {
         'schema': 1,
         'robot': simulator.name,
+        'description': simulator.description,
         'seed': scenario.seed,
         'controller': scenario.controller,
         'rate_hz': 1e9 / scenario.period_ns,

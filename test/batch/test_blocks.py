@@ -9,8 +9,10 @@ from sgp_ros.batch.blocks import distance_to, holdout
 from sgp_ros.batch.plan import FilterPlan
 from sgp_ros.batch.regression_data import filtered_data
 from sgp_ros.errors import ConfigError
-from sgp_ros.robots.linear_axis import LINEAR_AXIS
+from sgp_ros.robots.registry import load_robot
 from test.batch.worlds import moved_axis
+
+LINEAR_AXIS = load_robot('linear_axis')
 
 
 @pytest.fixture(scope='module')

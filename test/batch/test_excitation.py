@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sgp_ros.batch.excitation import judge_excitation, structural_base
-from sgp_ros.robots.registry import ROBOTS
+from sgp_ros.robots.registry import load_robot
 from test.batch.chains import chain, recorded_motion, states
 
 LINK = ('mass', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
@@ -47,7 +47,7 @@ def test_two_parallel_joints_regroup_the_distal_mass():
 @pytest.mark.parametrize('name', ['reaction_wheel', 'linear_axis', 'toy_pendulum'])
 def test_built_in_robots_can_show_all_their_parameters(name):
     """None of their terms repeats another."""
-    assert structural_base(ROBOTS[name], np.random.default_rng(0)).identifiable.all()
+    assert structural_base(load_robot(name), np.random.default_rng(0)).identifiable.all()
 
 
 def test_a_random_motion_leaves_nothing_to_wish_for():

@@ -11,8 +11,10 @@ from sgp_ros.batch.plan import FilterPlan, choose_plan
 from sgp_ros.batch.regression_data import filtered_data
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.gp.scores import INTERVAL_95, coverage95, nmse
-from sgp_ros.robots.linear_axis import LINEAR_AXIS
+from sgp_ros.robots.registry import load_robot
 from test.batch.worlds import AXIS_TRUTH, emps_signals, moved_axis
+
+LINEAR_AXIS = load_robot('linear_axis')
 
 PLAN = FilterPlan(10.0, 50.0, 11)
 FEW = OfflineOptions(max_points=150)

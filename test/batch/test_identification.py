@@ -13,11 +13,12 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.rigid.inertial import PARAMETERS
 from sgp_ros.rigid.pseudo_inertia import is_consistent
-from sgp_ros.robots.linear_axis import LINEAR_AXIS
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import nominal_robot
 from test.batch.arm_world import COULOMB, VISCOUS, arm_motion, arm_samples, write_arm
 from test.batch.worlds import AXIS_TRUTH, axis_signals, moved_axis
+
+LINEAR_AXIS = load_robot('linear_axis')
 
 QUICK = IdentificationOptions(methods=('PR', 'SGP'))
 PHYSICS = IdentificationOptions(methods=('PR',))

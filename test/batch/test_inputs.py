@@ -13,11 +13,13 @@ from sgp_ros.batch.plan import FilterPlan
 from sgp_ros.batch.regression_data import FilteredData, filtered_data
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.term import Coefficient, Joint, Motion
-from sgp_ros.robots.linear_axis import LINEAR_AXIS
-from sgp_ros.robots.reaction_wheel import REACTION_WHEEL
+from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.terms import acceleration, single_column
 from test.batch.worlds import moved_axis
+
+LINEAR_AXIS = load_robot('linear_axis')
+REACTION_WHEEL = load_robot('reaction_wheel')
 
 PLAN = FilterPlan(4.0, 20.0, 25)
 SMOOTH_AXIS = replace(LINEAR_AXIS, terms=(*LINEAR_AXIS.terms[:2], LINEAR_AXIS.terms[3]))

@@ -10,8 +10,10 @@ import pytest
 from sgp_ros.batch.motion import require_motion
 from sgp_ros.errors import RecordingError
 from sgp_ros.physics.term import Joint
-from sgp_ros.robots.linear_axis import LINEAR_AXIS
+from sgp_ros.robots.registry import load_robot
 from test.batch.worlds import moved_axis
+
+LINEAR_AXIS = load_robot('linear_axis')
 
 SIGNALS = moved_axis(0, duration=5.0)
 NOISE = np.random.default_rng(0).normal(size=SIGNALS.position.shape)

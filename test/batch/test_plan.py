@@ -14,9 +14,11 @@ from sgp_ros.batch.regression_data import filtered_data
 from sgp_ros.batch.signals import collect_signals
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.errors import RecordingError
-from sgp_ros.robots.linear_axis import LINEAR_AXIS
-from sgp_ros.robots.reaction_wheel import REACTION_WHEEL
+from sgp_ros.robots.registry import load_robot
 from test.batch.worlds import AXIS_TRUTH, emps_signals, moved_axis, simulated_events
+
+LINEAR_AXIS = load_robot('linear_axis')
+REACTION_WHEEL = load_robot('reaction_wheel')
 
 WORLDS = {
     'noisy force': {'force': 5.0, 'encoder': 1e-6},

@@ -9,8 +9,10 @@ from sgp_ros.batch import regression_data
 from sgp_ros.batch.plan import FilterPlan
 from sgp_ros.batch.regression_data import filtered_data
 from sgp_ros.errors import ConfigError, RecordingError
-from sgp_ros.robots.linear_axis import LINEAR_AXIS
+from sgp_ros.robots.registry import load_robot
 from test.batch.worlds import AXIS_TRUTH, axis_signals, emps_signals
+
+LINEAR_AXIS = load_robot('linear_axis')
 
 PLAN = FilterPlan(cutoff=10.0, state_cutoff=50.0, decimation=10)
 PUBLISHED = np.array([95.1089, 203.5034, 20.3935, -3.1648])

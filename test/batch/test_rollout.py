@@ -11,11 +11,11 @@ from scipy.integrate import solve_ivp
 from sgp_ros.batch.forward import forward
 from sgp_ros.batch.rollout import roll_out
 from sgp_ros.physics.term import Motion
-from sgp_ros.robots.registry import ROBOTS
+from sgp_ros.robots.registry import load_robot
 
 EPS = np.finfo(float).eps
 DOUBLE, SIMPLE, AXIS = (
-    ROBOTS[name] for name in ('double_pendulum', 'simple_pendulum', 'linear_axis')
+    load_robot(name) for name in ('double_pendulum', 'simple_pendulum', 'linear_axis')
 )
 W_DOUBLE = np.array([0.14, 0.05, 0.06, 0.03, 2.4, 1.4, 0.02, 0.01, 0.15, 0.1, 0.01, -0.02])
 SMOOTH = np.where(np.arange(12) // 2 == 4, 0.0, W_DOUBLE)  # no Coulomb friction
@@ -36,7 +36,7 @@ def test_forward_inverts_the_inverse_model():
 
 def test_forward_of_a_forward_model_is_its_regressor():
     """With target acceleration nothing has to be solved."""
-    robot = ROBOTS['reaction_wheel']
+    robot = load_robot('reaction_wheel')
     q, v, effort = _states(2)
     W = np.random.default_rng(1).normal(size=10)
     expected = robot.regressor(Motion(q, v, np.zeros_like(q), effort)) @ W
@@ -54,7 +54,7 @@ def test_residual_is_felt_on_the_side_of_the_target():
         forward(DOUBLE, W_DOUBLE, q, v, effort, z),
         forward(DOUBLE, W_DOUBLE, q, v, effort - z(q, v)),
     )
-    robot, W = ROBOTS['reaction_wheel'], np.ones(10)
+    robot, W = load_robot('reaction_wheel'), np.ones(10)
     np.testing.assert_allclose(
         forward(robot, W, q, v, effort, z), forward(robot, W, q, v, effort) + z(q, v)
     )

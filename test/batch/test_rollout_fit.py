@@ -11,10 +11,10 @@ from sgp_ros.batch.rollout import roll_out
 from sgp_ros.batch.rollout_fit import RolloutFitOptions, fit_rollouts
 from sgp_ros.batch.rollout_windows import Windows, cut_windows, joined
 from sgp_ros.errors import ConfigError, NumericalError
-from sgp_ros.robots.registry import ROBOTS
+from sgp_ros.robots.registry import load_robot
 
 STEP = 0.01
-PENDULUM, DOUBLE = ROBOTS['simple_pendulum'], ROBOTS['double_pendulum']
+PENDULUM, DOUBLE = load_robot('simple_pendulum'), load_robot('double_pendulum')
 W = np.array([0.15, 3.0, 0.05, 0.1, 0.05])
 W_DOUBLE = np.array([0.14, 0.03, 0.04, 0.03, 2.4, 1.0, 0.02, 0.01, 0.15, 0.1, 0.01, -0.02])
 

@@ -9,9 +9,9 @@ from sgp_ros.batch.rollout import roll_out
 from sgp_ros.batch.rollout_scores import rollout_scores, score_windows
 from sgp_ros.batch.rollout_windows import cut_windows, joined
 from sgp_ros.errors import RecordingError
-from sgp_ros.robots.registry import ROBOTS
+from sgp_ros.robots.registry import load_robot
 
-ROBOT = ROBOTS['simple_pendulum']
+ROBOT = load_robot('simple_pendulum')
 W = np.array([0.15, 3.0, 0.05, 0.1, 0.02])
 STEP = 0.01
 

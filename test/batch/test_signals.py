@@ -16,9 +16,11 @@ from sgp_ros.batch.zero_phase import ZeroPhase
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.errors import ConfigError, RecordingError
-from sgp_ros.robots.linear_axis import LINEAR_AXIS
-from sgp_ros.robots.reaction_wheel import REACTION_WHEEL
+from sgp_ros.robots.registry import load_robot
 from test.batch.worlds import CART, START_NS, cart_events
+
+LINEAR_AXIS = load_robot('linear_axis')
+REACTION_WHEEL = load_robot('reaction_wheel')
 
 
 def _state(time, position, *, velocity=None, effort=None, names=('axis',)):

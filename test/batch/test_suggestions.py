@@ -13,7 +13,7 @@ from sgp_ros.batch.suggestions import suggest_motions
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.term import Joint, Motion
 from sgp_ros.rigid.base_parameters import RegressorFactor
-from sgp_ros.robots.registry import ROBOTS
+from sgp_ros.robots.registry import load_robot
 from test.batch.chains import chain, recorded_motion, states
 
 
@@ -94,6 +94,6 @@ def test_half_open_limits_leave_room_and_zeros_are_none(limits, expected):
 
 def test_a_forward_model_gets_no_suggestions():
     """Its regressor needs efforts, which a motion does not prescribe."""
-    robot = ROBOTS['reaction_wheel']
+    robot = load_robot('reaction_wheel')
     with pytest.raises(ConfigError, match='acceleration'):
         suggest_motions(robot, RegressorFactor.nothing(10), np.random.default_rng(0))

@@ -13,11 +13,13 @@ from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.physics.term import Coefficient, Joint
 from sgp_ros.recordings.table_map import read_map
 from sgp_ros.recordings.tables import read_table
-from sgp_ros.robots.linear_axis import LINEAR_AXIS
+from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.terms import acceleration, single_column
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.recording import simulate
+
+LINEAR_AXIS = load_robot('linear_axis')
 
 ROOT = Path(__file__).parents[2]
 EMPS = ROOT.parent / 'shared' / 'data' / 'emps'

@@ -10,8 +10,7 @@ import pytest
 
 from sgp_ros.engine.config import EngineConfig, describe_settings
 from sgp_ros.physics.term import Motion
-from sgp_ros.robots.registry import ROBOTS as BUILT_IN
-from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.registry import load_robot, robot_names
 from test.rigid.random_urdf import random_urdf
 
 CHAIN = """
@@ -46,7 +45,7 @@ def _from_urdf(name, text, yaml=None):
 
 
 ROBOTS = (
-    BUILT_IN
+    {name: load_robot(name) for name in robot_names()}
     | {'chain': _from_urdf('chain', CHAIN), 'full': _from_urdf('full', CHAIN, EVERYTHING)}
     | {
         f'tree_{seed}': _from_urdf(f'tree_{seed}', random_urdf(seed, joints, mimics))

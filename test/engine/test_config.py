@@ -6,9 +6,9 @@ import pytest
 
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.errors import ConfigError
-from sgp_ros.robots.registry import ROBOTS
+from sgp_ros.robots.registry import load_robot
 
-ROBOT = ROBOTS['reaction_wheel']
+ROBOT = load_robot('reaction_wheel')
 
 
 def _problems(**settings):

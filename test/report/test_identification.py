@@ -23,8 +23,10 @@ from sgp_ros.report.identification import (
     render,
     verdict,
 )
-from sgp_ros.robots.linear_axis import LINEAR_AXIS
+from sgp_ros.robots.registry import load_robot
 from test.batch.worlds import moved_axis
+
+LINEAR_AXIS = load_robot('linear_axis')
 
 
 @pytest.fixture(scope='module')

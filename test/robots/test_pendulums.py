@@ -6,7 +6,7 @@ import numpy as np
 
 from sgp_ros.physics.term import Motion
 from sgp_ros.rigid.inertial import inertial_term, revolute_chain
-from sgp_ros.robots.registry import ROBOTS
+from sgp_ros.robots.registry import load_robot
 
 GRAVITY = 9.81
 M1, R1, I1, M2, R2, I2, L1, GEAR, ROTOR = 0.6, 0.25, 0.05, 0.5, 0.3, 0.06, 0.2, 6.0, 1e-4
@@ -37,13 +37,13 @@ def _pinocchio_torques(motion):
 def test_double_pendulum_without_rotors_is_a_rigid_chain():
     """Column by column it agrees with Pinocchio's regressor."""
     motion = _motion(2, 0)
-    torque = ROBOTS['double_pendulum'].regressor(motion) @ _double_coefficients(0.0)
+    torque = load_robot('double_pendulum').regressor(motion) @ _double_coefficients(0.0)
     np.testing.assert_allclose(torque, _pinocchio_torques(motion), atol=1e-12)
 
 
 def test_rotors_of_the_double_pendulum_add_their_spin():
     """A rotor turns with its carrier and, against it, by the gear ratio with its own joint."""
-    robot, motion = ROBOTS['double_pendulum'], _motion(2, 1)
+    robot, motion = load_robot('double_pendulum'), _motion(2, 1)
     added = robot.regressor(motion) @ (_double_coefficients(ROTOR) - _double_coefficients(0.0))
     a1, a2 = motion.acceleration.T
     first = np.stack([GEAR**2 * a1, 0.0 * a2], axis=1)  # its carrier stands still
@@ -54,7 +54,7 @@ def test_rotors_of_the_double_pendulum_add_their_spin():
 
 def test_friction_and_offsets_of_the_double_pendulum_stay_in_their_joint():
     """Viscous, Coulomb and constant torques act where they are named."""
-    robot, motion = ROBOTS['double_pendulum'], _motion(2, 2)
+    robot, motion = load_robot('double_pendulum'), _motion(2, 2)
     w = np.array([0.0] * 6 + [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
     v = motion.velocity
     expected = [0.1, 0.2] * v + [0.3, 0.4] * np.sign(v) + [0.5, 0.6]
@@ -65,6 +65,6 @@ def test_simple_pendulum_satisfies_its_equation():
     """Inertia, gravity that pulls back, friction against the motion, offset."""
     motion = _motion(1, 3)
     q, v, a = motion.position, motion.velocity, motion.acceleration
-    torque = ROBOTS['simple_pendulum'].regressor(motion) @ [0.2, 3.0, 0.05, 0.1, -0.02]
+    torque = load_robot('simple_pendulum').regressor(motion) @ [0.2, 3.0, 0.05, 0.1, -0.02]
     expected = 0.2 * a + 3.0 * np.sin(q) + 0.05 * v + 0.1 * np.sign(v) - 0.02
     np.testing.assert_allclose(torque, expected, atol=1e-14)

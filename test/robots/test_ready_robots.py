@@ -10,7 +10,7 @@ import pytest
 from sgp_ros.rigid.inertial import PARAMETERS
 from sgp_ros.rigid.rigid_body import inverse_dynamics, torque_regressor
 from sgp_ros.rigid.tree import read_urdf
-from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.registry import load_robot, robot_names
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / 'config' / 'robots'
@@ -52,8 +52,9 @@ def test_ready_robot_has_the_joints_of_its_recording(name):
     assert all(joint.is_actuated for joint in robot.joints)
 
 
-def test_every_robot_file_is_tested_here():
-    assert {path.stem for path in FOLDER.glob('*.yaml')} == set(READY)
+def test_every_robot_from_a_urdf_is_tested_here():
+    from_urdf = {name for name in robot_names() if load_robot(name).bodies is None}
+    assert from_urdf == set(READY)
 
 
 def test_panda_carries_a_weight_as_its_denavit_hartenberg_table_says():

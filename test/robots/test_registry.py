@@ -9,7 +9,7 @@ import pytest
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.term import Motion
-from sgp_ros.robots.registry import ROBOTS, load_robot
+from sgp_ros.robots.registry import load_robot
 
 
 def _write(tmp_path, text):
@@ -86,7 +86,7 @@ def test_unknown_residual_inputs_are_refused():
     """The error lists what exists; an acceleration is no input of a forward model."""
     for spec in (('speed:pole',), ('acceleration:pole',), ('effort:pole',)):
         with pytest.raises(ConfigError, match='velocity:pole'):
-            ROBOTS['reaction_wheel'].residual_columns(spec)
+            load_robot('reaction_wheel').residual_columns(spec)
 
 
 def test_ten_parameter_wheel_satisfies_equation_27():
@@ -94,7 +94,7 @@ def test_ten_parameter_wheel_satisfies_equation_27():
     w = np.arange(1.0, 11.0)
     rng = np.random.default_rng(0)
     theta, speed, m = rng.normal(size=2), rng.normal(size=2), 0.7
-    robot = ROBOTS['reaction_wheel']
+    robot = load_robot('reaction_wheel')
     names = [int(c.name[1:]) - 1 for c in robot.coefficients]
     motion = Motion(theta[None], speed[None], np.zeros((1, 2)), np.array([[0.0, m]]))
     state = np.array([np.sin(theta[0]), theta[1], *speed])
@@ -104,7 +104,7 @@ def test_ten_parameter_wheel_satisfies_equation_27():
 
 def test_six_parameter_wheel_satisfies_equation_28():
     """The paper's feature matrix: no velocities."""
-    robot = ROBOTS['reaction_wheel_6']
+    robot = load_robot('reaction_wheel_6')
     assert [c.name for c in robot.coefficients] == ['w1', 'w2', 'w9', 'w5', 'w6', 'w10']
     motion = Motion(
         np.array([[0.4, 2.0]]), np.array([[5.0, 6.0]]), np.zeros((1, 2)), np.array([[0.0, 3.0]])
@@ -117,8 +117,8 @@ def test_six_parameter_wheel_satisfies_equation_28():
 
 def test_units_follow_the_kind_of_joint():
     """Metres and newtons on a prismatic joint, radians and volts where stated."""
-    assert ROBOTS['linear_axis'].target_unit('axis') == 'N'
-    wheel = ROBOTS['reaction_wheel']
+    assert load_robot('linear_axis').target_unit('axis') == 'N'
+    wheel = load_robot('reaction_wheel')
     assert wheel.target_unit('pole') == 'rad/s^2'
     assert wheel.joints[1].unit('effort') == 'V'
-    assert ROBOTS['linear_axis'].joints[0].unit('velocity') == 'm/s'
+    assert load_robot('linear_axis').joints[0].unit('velocity') == 'm/s'

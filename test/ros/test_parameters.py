@@ -10,11 +10,11 @@ from rclpy.parameter import Parameter
 
 from sgp_ros.engine.config import EngineConfig, describe_settings
 from sgp_ros.engine.setting import Setting
-from sgp_ros.robots.registry import ROBOTS, load_robot
+from sgp_ros.robots.registry import load_robot, robot_names
 from sgp_ros.ros.parameters import descriptor, from_ros, to_ros
 from sgp_ros.ros.start import ROBOT, node_settings
 
-SETTINGS = (ROBOT, *node_settings(), *describe_settings(ROBOTS['reaction_wheel']))
+SETTINGS = (ROBOT, *node_settings(), *describe_settings(load_robot('reaction_wheel')))
 CONFIG = Path(__file__).parents[2] / 'config'
 
 
@@ -54,12 +54,12 @@ def test_a_shipped_file_configures_the_robot_of_its_name(path: Path) -> None:
     known = {setting.name: setting for setting in node_settings()}
     for name in set(given) & set(known):
         assert known[name].problem(given.pop(name)) is None
-    found = load_robot(robot if robot in ROBOTS else str(CONFIG.parent / robot))
+    found = load_robot(robot if robot in robot_names() else str(CONFIG.parent / robot))
     EngineConfig.from_mapping(given, found)
 
 
 def test_every_robot_has_a_file() -> None:
-    assert {path.stem for path in CONFIG.glob('*.yaml')} >= set(ROBOTS)
+    assert {path.stem for path in CONFIG.glob('*.yaml')} <= set(robot_names())
 
 
 def _flat(prefix: str, tree: dict[str, object]) -> dict[str, object]:
