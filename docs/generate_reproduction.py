@@ -58,8 +58,8 @@ a squared exponential of the paper's inputs with one length scale each.
 
 ## Which inputs Z should see
 
-Starting from all candidates, evidence drops what is not worth three nats, then takes Z for linear
-where that raises the evidence (`gp/selection.py`). Chosen per component, by column. Wheel: 0 pole
+Starting from all candidate inputs, those worth less than three nats of evidence are dropped; then Z is made linear
+where this raises the evidence (`gp/selection.py`). Columns chosen per component. Wheel: 0 pole
 angle, 1 wheel angle, 2 and 3 their velocities, 7 voltage, 8 and 9 their directions. Arm: 0 to 2
 positions, 3 to 5 velocities, 12 to 14 directions of the joints:
 
@@ -67,12 +67,12 @@ positions, 3 to 5 velocities, 12 to 14 directions of the joints:
 
 The physics that was left out is viscous friction and back-EMF, linear in the two velocities; in the
 third experiment it is friction that depends on the angle of the pole and its direction; in the last
-one friction that depends on position and direction of joint 3. Nobody told the selection. A direction
+one it is friction that depends on position and direction of joint 3. The selection was given none of this. A direction
 is `tanh(velocity / width)`: dry friction jumps with it, and a smooth function of the velocity can follow
-a jump only with length scales that leave it without memory elsewhere.
+a jump only with length scales too short to generalise elsewhere.
 
-A squared exponential that has to be linear needs long length scales and a large variance, hence a
-large free constant too. Upright, where the data end, that constant was what went wrong: a linear kernel
+A squared exponential that is to be linear needs long length scales and a large variance, hence also a
+large free constant. Upright, where there are no data, this constant caused the errors: a linear kernel
 has none.
 
 ## Where SGP is not the best
@@ -82,16 +82,16 @@ Cells in which the median of SGP is more than 15 % above the best method:
 {not_best}
 
 Seeds in which SGP is not below PR, cell by cell. Joints 1 and 2 of the arm and the wheel axis of the third
-experiment lack no physics: there both are as good as the noise allows, and either may be ahead. On the
-toy, six samples say little about the sparse region:
+experiment lack no physics: there both are limited by noise, and either may be better. In the
+toy world, six samples contain little information on the sparse region:
 
 {behind}
 
-From encoders, the noise of the positions enters the inputs and columns too, which the model takes
-for exact; on the wheel axis hanging down everything but this is so small that the intervals are too
-narrow, and evidence may choose more than the two velocities there.
+With encoders, the noise of the positions also enters the inputs and columns, which the model assumes to be
+exact. On the wheel axis hanging down all other errors are so small that the intervals are too
+narrow for this reason, and evidence may choose more than the two velocities there.
 
-## Worlds that went wrong
+## Outlying worlds
 
 Seeds whose nMSE is more than ten times the median:
 
@@ -103,7 +103,7 @@ Medians over {choice_seeds} worlds; only the named choice differs from the defau
 
 {choices}
 
-What follows for the defaults of the package: a flat prior of W; standard deviations as starting
+The defaults of the package follow from this: a flat prior of W; standard deviations as starting
 values, screened; one kernel and one noise variance per output; inputs and structure by evidence where
 the recording is at hand (`gp/selection.py`), and the inputs that evidence found for the robots that
 come with the package (`residual_inputs`); the weak form of 0.1 s with windows that overlap by half.

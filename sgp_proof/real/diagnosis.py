@@ -152,7 +152,7 @@ def inside(folder: Path) -> Iterator[None]:
         os.chdir(before)
 
 
-def run(name: str, folder: Path) -> dict:
+def run(name: str, folder: Path, images: Path) -> dict:
     """Carry out the commands of a machine and return what its diagnosis says."""
     seconds = {}
     with inside(folder):
@@ -165,7 +165,7 @@ def run(name: str, folder: Path) -> dict:
     out = folder / 'out' / 'diagnosis'
     return {
         'commands': MACHINES[name],
-        'pictures': take_pictures(out, IMAGES / name),
+        'pictures': take_pictures(out, images / name),
         **read(out, printed),
         'seconds': seconds,
         'steps': steps,
@@ -195,11 +195,13 @@ def read(out: Path, printed: str) -> dict:
 
 def main() -> None:
     """Run the named machines, or all, beside results that are there."""
-    arguments = make_parser(__doc__, 'real_diagnosis', MACHINES).parse_args()
+    parser = make_parser(__doc__, 'real_diagnosis', MACHINES)
+    parser.add_argument('--images', type=Path, default=IMAGES, help='folder of the pictures')
+    arguments = parser.parse_args()
     machines = read_result(arguments.out).get('machines', {})
     for name in arguments.names:
         with tempfile.TemporaryDirectory() as folder:
-            machines[name] = run(name, Path(folder))
+            machines[name] = run(name, Path(folder), arguments.images)
         result = {
             'command': 'python -m sgp_proof.real.diagnosis',
             'versions': versions(),
