@@ -24,7 +24,9 @@ LAYERS = {
     'physics': {'numpy', 'numba', 'errors'},
     'rigid': NUMERIC | {'numba', 'pinocchio', 'clarabel', 'gp', 'physics', 'errors'},
     'robots': {'numpy', 'yaml', 'physics', 'rigid', 'errors'},
-    'simulation': NUMERIC | {'mujoco', 'errors'},
+    'simulation': NUMERIC | {
+        'mujoco', 'physics.catalogue', 'physics.effect', 'physics.parts', 'rigid', 'errors',
+    },
     'engine': {'numpy', 'gp', 'physics', 'rigid', 'robots', 'errors'},
     'batch': NUMERIC | {
         'numba', 'gp', 'physics', 'rigid', 'robots', 'engine', 'errors',

@@ -26,14 +26,14 @@ from sgp_proof.concealed.concealed_effect import UnsuitableError
 from sgp_proof.concealed.kinds import draw_effect
 from sgp_proof.concealed.robots import urdf
 from sgp_ros.apps.simulated_files import write_simulated
-from sgp_ros.simulation.registry import EFFECTS
+from sgp_ros.simulation.registry import LAWS
 from sgp_ros.simulation.sensors import Sensors
 from sgp_ros.simulation.transport import Transport
 
 NOTHING, PARAMETERS, UNKNOWN, PAIR = 'none', 'parameters', 'unknown', 'pair'
 PLAN = [
-    *list(EFFECTS)[:7], NOTHING, PARAMETERS, UNKNOWN, PAIR, *list(EFFECTS)[7:14], UNKNOWN,
-    NOTHING, PARAMETERS, *list(EFFECTS)[14:21], PAIR, UNKNOWN, *list(EFFECTS)[21:], NOTHING,
+    *list(LAWS)[:7], NOTHING, PARAMETERS, UNKNOWN, PAIR, *list(LAWS)[7:14], UNKNOWN,
+    NOTHING, PARAMETERS, *list(LAWS)[14:21], PAIR, UNKNOWN, *list(LAWS)[21:], NOTHING,
     PARAMETERS,
 ]  # fmt: skip
 TOPIC = '/effort_controller/commands'
@@ -49,7 +49,7 @@ def main():
     parser.add_argument('--seeds', default='0:40', help='FIRST:LAST+1')
     parser.add_argument('--tier', choices=('A', 'B'), default='A')
     parser.add_argument('--out', type=Path, required=True)
-    parser.add_argument('--only', choices=(*EFFECTS, NOTHING, PARAMETERS, UNKNOWN, PAIR))
+    parser.add_argument('--only', choices=(*LAWS, NOTHING, PARAMETERS, UNKNOWN, PAIR))
     arguments = parser.parse_args()
     first, last = (int(x) for x in arguments.seeds.split(':'))
     for folder in ('cases', 'answers'):
@@ -112,7 +112,7 @@ def _names(rng, wanted):
     if wanted in {NOTHING, PARAMETERS}:
         return []
     if wanted == PAIR:
-        return [str(name) for name in rng.choice(list(EFFECTS), 2, replace=False)]
+        return [str(name) for name in rng.choice(list(LAWS), 2, replace=False)]
     return [wanted]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from sgp_proof.concealed.concealed_effect import Concealed, UnsuitableError
 from sgp_proof.concealed.unknown import UNKNOWN
-from sgp_ros.simulation.registry import EFFECTS
+from sgp_ros.physics.catalogue import EFFECTS
 
 _STEEPEST = 0.8
 """Greatest slope of an encoder's error: an encoder does not turn back."""
@@ -18,7 +18,7 @@ def draw_effect(rng, name, bodies, motion, is_hard):
     """Return an effect of this name on a random joint that can have it."""
     motors = [i for i, b in enumerate(bodies) if b.is_driven]
     everywhere = list(range(len(bodies)))
-    place = 'JOINT' if name == 'unknown' else EFFECTS[name].place.name
+    place = 'JOINT' if name == 'unknown' else EFFECTS[name].site.name
     joint = int(rng.choice(motors if place == 'MOTOR' else everywhere))
     if name in _SPECIAL:
         return _SPECIAL[name](rng, bodies, motion, motors, joint, is_hard)

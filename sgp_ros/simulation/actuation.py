@@ -7,26 +7,25 @@ from collections.abc import Mapping
 
 from sgp_ros.simulation.effects import (
     Action,
-    EffectKind,
-    EffectParameter,
     Moment,
     ParameterValue,
-    Place,
 )
 from sgp_ros.simulation.mechanism import SimulatedJoint
 
 _CONTACT_DAMPING = 0.7
 
 
-def _delay(
+def delay(
     _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
+    """Return a command that arrives later by exactly `delay`, also between two samples."""
     return (Action(joint, delay_s=float(values['delay'])),)
 
 
-def _dead_zone(
+def dead_zone(
     _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
+    """Return a motor that gives `u - clip(u, -width, width)`."""
     width = float(values['width'])
 
     def current(moment: Moment) -> float:
@@ -36,9 +35,10 @@ def _dead_zone(
     return (Action(joint, current=current),)
 
 
-def _lag(
+def lag(
     _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
+    """Return a first-order lag between the force wanted of a motor and the one it gives."""
     time_constant = float(values['time_constant'])
 
     def rate(moment: Moment) -> tuple[float]:
@@ -55,23 +55,31 @@ def _lag(
     )
 
 
-def _saturation(
+def saturation(
     _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
+    """Return a motor that gives `clip(u, -limit, limit)`."""
     limit = float(values['limit'])
     return (Action(joint, current=lambda m: min(max(float(m.drive[joint]), -limit), limit)),)
 
 
-def _gain(
+def gain(
     _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
+    """Return a motor that gives `gain u`; its current does not show that."""
     gain = float(values['gain'])
     return (Action(joint, drive=lambda moment: gain * float(moment.drive[joint])),)
 
 
-def _backlash(
+def backlash(
     _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
+    """Return play between motor and link, both with their own motion; the encoder is on the motor.
+
+    `motor_inertia` is part of the robot's own inertia, so the link keeps the rest. Where motor and
+    link touch, a spring and a damper act that never pull; the motor alone would swing on that
+    spring at `contact_hz`, with 0.7 of critical damping.
+    """
     half, inertia = 0.5 * float(values['gap']), float(values['motor_inertia'])
     rate = 2.0 * math.pi * float(values['contact_hz'])
     stiffness, damping = inertia * rate**2, 2.0 * _CONTACT_DAMPING * inertia * rate
@@ -100,48 +108,3 @@ def _backlash(
             substep_s=0.1 / rate,
         ),
     )
-
-
-COMMAND_DELAY = EffectKind(
-    'command_delay',
-    (EffectParameter('delay', 's', low=0.0),),
-    _delay,
-    Place.MOTOR,
-    takes_all=True,
-)
-"""The command arrives later by exactly `delay`, also between two steps of the control."""
-
-DEAD_ZONE = EffectKind(
-    'dead_zone', (EffectParameter('width', 'N m', low=0.0),), _dead_zone, Place.MOTOR
-)
-"""The motor gives `u - clip(u, -width, width)`."""
-
-ACTUATOR_LAG = EffectKind(
-    'actuator_lag', (EffectParameter('time_constant', 's', low=1e-4),), _lag, Place.MOTOR
-)
-"""First-order lag between the force that the motor should give and the one it gives."""
-
-SATURATION = EffectKind(
-    'saturation', (EffectParameter('limit', 'N m', low=0.0),), _saturation, Place.MOTOR
-)
-"""The motor gives `clip(u, -limit, limit)`."""
-
-TORQUE_GAIN = EffectKind('torque_gain', (EffectParameter('gain'),), _gain, Place.MOTOR)
-"""The motor gives `gain u`; its current does not show that."""
-
-BACKLASH = EffectKind(
-    'backlash',
-    (
-        EffectParameter('gap', 'rad', low=0.0),
-        EffectParameter('motor_inertia', 'kg m2', low=1e-12),
-        EffectParameter('contact_hz', 'Hz', low=1.0, default=60.0),
-    ),
-    _backlash,
-    Place.MOTOR,
-)
-"""Play between motor and link, both with their own motion; the encoder is on the motor.
-
-`motor_inertia` is part of the robot's own inertia, so the link keeps the rest. Where motor and
-link touch, a spring and a damper act that never pull; the motor alone would swing on that spring
-at `contact_hz`, with 0.7 of critical damping.
-"""

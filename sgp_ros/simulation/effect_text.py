@@ -9,14 +9,16 @@ import math
 from collections.abc import Iterable, Mapping
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect import Effect
+from sgp_ros.physics.parts import BASE, TOOL
 from sgp_ros.simulation.effects import (
     ChosenEffect,
-    EffectKind,
     EffectParameter,
+    Law,
     ParameterValue,
-    Place,
 )
-from sgp_ros.simulation.registry import EFFECTS
+from sgp_ros.simulation.registry import LAWS
 
 _EXAMPLE = 'write for example coulomb_friction:joint=pole,level=0.01'
 
@@ -28,7 +30,7 @@ def parse_effect(text: str) -> ChosenEffect:
         ConfigError: unknown name, missing, unknown, repeated or wrong parameters; all in one line.
     """
     name, _, rest = text.partition(':')
-    kind = _kind(name.strip(), text)
+    effect, law = _known(name.strip(), text)
     words: dict[str, str] = {}
     problems = []
     for part in filter(None, (piece.strip() for piece in rest.split(','))):
@@ -39,29 +41,28 @@ def parse_effect(text: str) -> ChosenEffect:
             problems.append(f'{key} is given twice')
         else:
             words[key] = value
-    place = kind.place.value if kind.place in {Place.BASE, Place.TOOL} else None
+    place = effect.site.value if effect.site in {BASE, TOOL} else None
     joint = words.pop('joint', place)
     if joint is None:
         problems.append('joint is missing')
-    known = {parameter.name: parameter for parameter in kind.parameters}
+    parameters = law.parameters(effect)
+    known = {parameter.name: parameter for parameter in parameters}
     values = {key: _value(known.get(key), word) for key, word in words.items()}
-    _refuse(problems + _problems(kind, {**_defaults(kind), **values}), text, kind)
-    return ChosenEffect(kind.name, str(joint), values)
+    _refuse(problems + _problems(law, parameters, values), text, effect.name, parameters)
+    return ChosenEffect(effect.name, str(joint), values)
 
 
-def checked_effect(effect: ChosenEffect) -> EffectKind:
-    """Return the kind of an effect whose values are complete and right.
+def checked_law(chosen: ChosenEffect) -> tuple[Effect, Law]:
+    """Return the effect of the catalogue and its law, the values being complete and right.
 
     Raises:
         ConfigError: as `parse_effect`.
     """
-    kind = _kind(effect.name, effect.name)
-    _refuse(
-        _problems(kind, {**_defaults(kind), **effect.parameters}),
-        f'{effect.name} on {effect.joint}',
-        kind,
-    )
-    return kind
+    effect, law = _known(chosen.name, chosen.name)
+    parameters = law.parameters(effect)
+    problems = _problems(law, parameters, chosen.parameters)
+    _refuse(problems, f'{chosen.name} on {chosen.joint}', effect.name, parameters)
+    return effect, law
 
 
 def parse_physical(texts: Iterable[str]) -> dict[str, float]:
@@ -82,12 +83,12 @@ def parse_physical(texts: Iterable[str]) -> dict[str, float]:
     return values
 
 
-def _kind(name: str, text: str) -> EffectKind:
-    if name not in EFFECTS:
+def _known(name: str, text: str) -> tuple[Effect, Law]:
+    if name not in LAWS:
         raise ConfigError(
-            f'effect {text!r} has the unknown name {name!r}', f'one of {list(EFFECTS)}', _EXAMPLE
+            f'effect {text!r} has the unknown name {name!r}', f'one of {list(LAWS)}', _EXAMPLE
         )
-    return EFFECTS[name]
+    return EFFECTS[name], LAWS[name]
 
 
 def _number(word: str) -> float | None:
@@ -103,12 +104,18 @@ def _value(parameter: EffectParameter | None, word: str) -> ParameterValue:
     return word if number is None or is_word else number
 
 
-def _defaults(kind: EffectKind) -> dict[str, ParameterValue]:
-    return {p.name: p.default for p in kind.parameters if p.default is not None}
+def with_defaults(
+    parameters: Iterable[EffectParameter], given: Mapping[str, ParameterValue]
+) -> dict[str, ParameterValue]:
+    """Return the given values and those of parameters that have a default."""
+    return {p.name: p.default for p in parameters if p.default is not None} | dict(given)
 
 
-def _problems(kind: EffectKind, values: Mapping[str, ParameterValue]) -> list[str]:
-    wanted = [p for p in kind.parameters if p.only_kind in {'', values.get('kind')}]
+def _problems(
+    law: Law, parameters: Iterable[EffectParameter], given: Mapping[str, ParameterValue]
+) -> list[str]:
+    values = with_defaults(parameters, given)
+    wanted = [p for p in parameters if not p.kinds or values.get('kind') in p.kinds]
     known = {parameter.name for parameter in wanted}
     problems = [f'there is no parameter {name}' for name in values if name not in known]
     for parameter in wanted:
@@ -116,8 +123,8 @@ def _problems(kind: EffectKind, values: Mapping[str, ParameterValue]) -> list[st
             problems.append(f'{parameter.name} is missing')
         elif not _suits(parameter, values[parameter.name]):
             problems.append(f'{parameter.name} = {values[parameter.name]}')
-    if not problems and kind.ordered:
-        first, second = kind.ordered
+    if not problems and law.ordered:
+        first, second = law.ordered
         if float(values[first]) >= float(values[second]):
             problems.append(f'{first} is not below {second}')
     return problems
@@ -132,11 +139,13 @@ def _suits(parameter: EffectParameter, value: ParameterValue) -> bool:
     return is_number and math.isfinite(float(value)) and float(value) >= parameter.low
 
 
-def _refuse(problems: list[str], text: str, kind: EffectKind) -> None:
+def _refuse(
+    problems: list[str], text: str, name: str, parameters: Iterable[EffectParameter]
+) -> None:
     if problems:
-        needed = ', '.join(_description(parameter) for parameter in kind.parameters)
+        needed = ', '.join(_description(parameter) for parameter in parameters)
         raise ConfigError(
-            f'effect {text!r}: ' + ' | '.join(problems), f'{kind.name}:joint=J with {needed}'
+            f'effect {text!r}: ' + ' | '.join(problems), f'{name}:joint=J with {needed}'
         )
 
 
@@ -147,5 +156,5 @@ def _description(parameter: EffectParameter) -> str:
     if parameter.is_joint:
         return f'{parameter.name} = another joint'
     limit = f' >= {parameter.low:g}' if math.isfinite(parameter.low) else ''
-    kind = f' for {parameter.only_kind}' if parameter.only_kind else ''
+    kind = f' for {" or ".join(parameter.kinds)}' if parameter.kinds else ''
     return f'{parameter.name}{limit} [{parameter.unit or "1"}]{kind}{usual}'

@@ -10,18 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from enum import Enum
 
 import numpy as np
 
+from sgp_ros.physics.effect import Effect
+from sgp_ros.physics.parts import SIDES, Quantity
 from sgp_ros.simulation.mechanism import SimulatedJoint
 
 ParameterValue = float | str
-
-_LINEAR_UNIT = {
-    'N m': 'N', 'N m s/rad': 'N s/m', 'N m s2/rad2': 'N s2/m2', 'N m/rad': 'N/m', 'rad': 'm',
-    'rad/s': 'm/s', '1/revolution': '1/m', 'kg m2': 'kg',
-}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,19 +75,8 @@ class Action:
     substep_s: float = math.inf
 
 
-class Place(Enum):
-    """What an effect may be put on."""
-
-    JOINT = 'a joint'
-    MOTOR = 'a motor'
-    LAST = 'the last link of a URDF'
-    BASE = 'base'
-    TOOL = 'tool'
-
-
 NEARER = 'nearer'
-SIDES = (NEARER, 'lower', 'upper')
-"""Ends of a joint's range: the one nearer to where an effect begins, or one by name."""
+"""The end of a joint's range nearer to where an effect begins, unless `SIDES` names one."""
 
 EVERY_MOTOR = 'all'
 """Joint of an effect that acts on every motor."""
@@ -99,16 +84,15 @@ EVERY_MOTOR = 'all'
 
 @dataclass(frozen=True, slots=True)
 class EffectParameter:
-    """A parameter of an effect.
+    """A parameter of an effect, as the text `NAME:joint=J,name=value` states it.
 
     Attributes:
-        name: as in the text `NAME:joint=J,name=value`.
+        name: as in the text.
         unit: on a revolute joint.
         low: smallest value.
         choices: the only values of a parameter that is a word; empty for a number.
-        unit_by_kind: other units, by the value of the parameter `kind`.
         default: value where none is given; None where one must be.
-        only_kind: the parameter belongs to this value of the parameter `kind`; empty for all.
+        kinds: the kinds of the effect that have it; empty for all.
         is_joint: whether the value is the name of another joint.
     """
 
@@ -116,19 +100,17 @@ class EffectParameter:
     unit: str = ''
     low: float = -math.inf
     choices: tuple[str, ...] = ()
-    unit_by_kind: Mapping[str, str] = field(default_factory=dict)
     default: ParameterValue | None = None
-    only_kind: str = ''
+    kinds: tuple[str, ...] = ()
     is_joint: bool = False
 
     def unit_on(self, joint: SimulatedJoint, kind: ParameterValue) -> str:
-        """Return the unit on this joint for this value of the parameter `kind`."""
-        unit = self.unit_by_kind.get(str(kind), self.unit)
-        return _LINEAR_UNIT.get(unit, unit) if joint.is_prismatic else unit
-
-
-SIDE = EffectParameter('side', choices=SIDES, default=NEARER)
-"""At which end of its joint's range an effect sits."""
+        """Return the unit on this joint for this kind of the effect."""
+        return (
+            Quantity(self.name, self.unit)
+            .of_kind(str(kind))
+            .unit_on(is_prismatic=joint.is_prismatic)
+        )
 
 
 def side_of(joint: SimulatedJoint, edge: float, side: ParameterValue) -> int:
@@ -137,7 +119,7 @@ def side_of(joint: SimulatedJoint, edge: float, side: ParameterValue) -> int:
     Args:
         joint: without limits, the nearer end is that of the sign.
         edge: where the effect begins [rad or m].
-        side: one of `SIDES`.
+        side: `NEARER` or one of `SIDES`.
     """
     if side != NEARER:
         return 1 if side == 'upper' else -1
@@ -152,28 +134,33 @@ Build = Callable[
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class EffectKind:
-    """A kind of effect, before it has a joint and values.
+class Law:
+    """What the simulation does for an effect of the catalogue.
 
     It either acts by what `build` returns or changes physical parameters of the mechanism.
 
     Attributes:
-        name: as in the text.
-        parameters: those without a default are required.
         build: the actions; None for an effect that changes physical parameters.
-        place: what it may be put on.
-        ordered: two parameters of which the first must be the smaller; empty for none.
         physical: physical parameter of the mechanism by parameter of the effect, to be added to.
-        takes_all: whether it may be put on every motor at once.
+        ordered: two parameters of which the first must be the smaller; empty for none.
+        own: parameters that only the simulation has.
     """
 
-    name: str
-    parameters: tuple[EffectParameter, ...]
     build: Build | None = None
-    place: Place = Place.JOINT
-    ordered: tuple[str, ...] = ()
     physical: Mapping[str, str] = field(default_factory=dict)
-    takes_all: bool = False
+    ordered: tuple[str, ...] = ()
+    own: tuple[EffectParameter, ...] = ()
+
+    def parameters(self, effect: Effect) -> tuple[EffectParameter, ...]:
+        """Return the parameters of an effect and those of its law; without default, required."""
+        words = [EffectParameter('source_joint', is_joint=True)] if effect.has_source else []
+        words += [EffectParameter('kind', choices=effect.kinds)] if effect.kinds else []
+        ends = (NEARER, *SIDES)
+        side = [EffectParameter('side', choices=ends, default=NEARER)] if effect.edge else []
+        numbers = (
+            EffectParameter(q.name, q.unit, q.low, kinds=q.kinds) for q in effect.quantities
+        )
+        return *words, *numbers, *side, *self.own
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,8 +168,8 @@ class ChosenEffect:
     """An effect on a joint with its values.
 
     Attributes:
-        name: of the kind.
-        joint: name of the joint.
+        name: in the catalogue.
+        joint: name of the joint, or the word for a place that is none.
         parameters: values by name [unit of the parameter].
     """
 

@@ -7,13 +7,9 @@ from collections.abc import Mapping
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.simulation.effects import (
-    SIDE,
     Action,
-    EffectKind,
-    EffectParameter,
     Moment,
     ParameterValue,
-    Place,
     side_of,
 )
 from sgp_ros.simulation.mechanism import SimulatedJoint
@@ -21,23 +17,26 @@ from sgp_ros.simulation.mechanism import SimulatedJoint
 _STIFF_S = 1e-3
 
 
-def _spring(
+def spring(
     _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
+    """Return `tau_x = -stiffness (q - rest)`."""
     stiffness, rest = float(values['stiffness']), float(values['rest'])
     return (Action(joint, force=lambda m: -stiffness * (float(m.position[joint]) - rest)),)
 
 
-def _constant(
+def constant(
     _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
+    """Return `tau_x = force`."""
     force = float(values['force'])
     return (Action(joint, force=lambda _moment: force),)
 
 
-def _cogging(
+def cogging(
     joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
+    """Return `amplitude sin(periods q + phase)`, `2 pi periods q` on a prismatic joint."""
     amplitude, phase = float(values['amplitude']), float(values['phase'])
     wave = joints[joint].turn * float(values['periods'])
     return (
@@ -47,9 +46,10 @@ def _cogging(
     )
 
 
-def _end_stop(
+def end_stop(
     joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
+    """Return a contact beyond `position` that pushes back, never pulls."""
     position = float(values['position'])
     stiffness, damping = float(values['stiffness']), float(values['damping'])
     side = side_of(joints[joint], position, values['side'])
@@ -64,9 +64,10 @@ def _end_stop(
     return (Action(joint, force=force, substep_s=_STIFF_S),)
 
 
-def _coupling(
+def coupling(
     joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
+    """Return a share of the force of another motor, or a cable between two joints."""
     names = [description.name for description in joints]
     if values['source_joint'] not in names or values['source_joint'] == names[joint]:
         raise ConfigError(
@@ -89,92 +90,8 @@ def _coupling(
     )
 
 
-SPRING = EffectKind(
-    'spring',
-    (EffectParameter('stiffness', 'N m/rad', low=0.0), EffectParameter('rest', 'rad')),
-    _spring,
-)
-"""`tau_x = -stiffness (q - rest)`."""
-
-CONSTANT_LOAD = EffectKind('constant_load', (EffectParameter('force', 'N m'),), _constant)
-"""`tau_x = force`."""
-
-COGGING = EffectKind(
-    'cogging',
-    (
-        EffectParameter('amplitude', 'N m'),
-        EffectParameter('periods', '1/revolution'),
-        EffectParameter('phase', 'rad'),
-    ),
-    _cogging,
-)
-"""`tau_x = amplitude sin(periods q + phase)`, with `2 pi periods q` on a prismatic joint."""
-
-END_STOP = EffectKind(
-    'end_stop',
-    (
-        EffectParameter('position', 'rad'),
-        EffectParameter('stiffness', 'N m/rad', low=0.0),
-        EffectParameter('damping', 'N m s/rad', low=0.0),
-        SIDE,
-    ),
-    _end_stop,
-)
-"""A contact beyond `position` towards the end `side` that pushes back, never pulls.
-
-`|tau_x| = max(stiffness depth + damping d(depth)/dt, 0)`.
-"""
-
-JOINT_COUPLING = EffectKind(
-    'joint_coupling',
-    (
-        EffectParameter('source_joint', is_joint=True),
-        EffectParameter('kind', choices=('torque', 'spring')),
-        EffectParameter('coefficient', only_kind='torque'),
-        EffectParameter('stiffness', 'N m/rad', low=0.0, only_kind='spring'),
-        EffectParameter('ratio', only_kind='spring'),
-    ),
-    _coupling,
-)
-"""`tau_x = coefficient` times the force of another motor, or a cable between two joints.
-
-The cable has the energy `stiffness (q - ratio q_source)^2 / 2` and so acts on both.
-"""
-
-ARMATURE = EffectKind(
-    'armature',
-    (EffectParameter('inertia', 'kg m2', low=0.0),),
-    lambda _joints, joint, values: (Action(joint, inertia=float(values['inertia'])),),
-)
-"""`tau_x = -inertia a`: the rotor of the motor."""
-
-GRAVITY_TILT = EffectKind(
-    'gravity_tilt',
-    (EffectParameter('roll', 'rad'), EffectParameter('pitch', 'rad')),
-    place=Place.BASE,
-    physical={'roll': 'base_roll', 'pitch': 'base_pitch'},
-)
-"""The base stands in the world turned by `Ry(pitch) Rx(roll)`."""
-
-PAYLOAD = EffectKind(
-    'payload',
-    (
-        EffectParameter('mass', 'kg', low=0.0),
-        EffectParameter('x', 'm'),
-        EffectParameter('y', 'm'),
-        EffectParameter('z', 'm'),
-    ),
-    place=Place.LAST,
-    physical={
-        'mass': 'payload_mass', 'x': 'payload_x', 'y': 'payload_y', 'z': 'payload_z',
-    },
-)  # fmt: skip
-"""A point mass on the last link, in the frame of that link."""
-
-TIP_FORCE = EffectKind(
-    'tip_force',
-    (EffectParameter('fx', 'N'), EffectParameter('fy', 'N'), EffectParameter('fz', 'N')),
-    place=Place.TOOL,
-    physical={'fx': 'tip_fx', 'fy': 'tip_fy', 'fz': 'tip_fz'},
-)
-"""A constant force in the axes of the root at the origin of `tool0`."""
+def armature(
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    """Return `tau_x = -inertia a`: the rotor of the motor."""
+    return (Action(joint, inertia=float(values['inertia'])),)

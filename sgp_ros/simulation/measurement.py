@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from sgp_ros.simulation.effects import Action, EffectKind, EffectParameter, Moment, ParameterValue
+from sgp_ros.simulation.effects import Action, Moment, ParameterValue
 from sgp_ros.simulation.mechanism import SimulatedJoint
 
 
-def _eccentricity(
+def eccentricity(
     joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
+    """Return an encoder that shows `q + amplitude sin(periods q + phase)`."""
     amplitude, phase = float(values['amplitude']), float(values['phase'])
     wave = joints[joint].turn * float(values['periods'])
 
@@ -23,9 +24,10 @@ def _eccentricity(
     return (Action(joint, sense=sense),)
 
 
-def _velocity_lag(
+def velocity_lag(
     _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
+    """Return a measured velocity behind a first-order low-pass; the position is right."""
     time_constant = float(values['time_constant'])
 
     def rate(moment: Moment) -> tuple[float]:
@@ -40,20 +42,3 @@ def _velocity_lag(
             substep_s=0.5 * time_constant,
         ),
     )
-
-
-ENCODER_ECCENTRICITY = EffectKind(
-    'encoder_eccentricity',
-    (
-        EffectParameter('amplitude', 'rad'),
-        EffectParameter('periods', '1/revolution'),
-        EffectParameter('phase', 'rad'),
-    ),
-    _eccentricity,
-)
-"""The encoder shows `q + amplitude sin(periods q + phase)`, its velocity the derivative."""
-
-VELOCITY_FILTER_LAG = EffectKind(
-    'velocity_filter_lag', (EffectParameter('time_constant', 's', low=1e-4),), _velocity_lag
-)
-"""The measured velocity is the true one behind a first-order low-pass; the position is right."""

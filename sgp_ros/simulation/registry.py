@@ -1,9 +1,13 @@
-"""The simulated robots and the kinds of effects, by name."""
+"""The simulated robots with dynamics of their own, and the law of each effect, by name.
+
+A law is one entry here. Names, parameters, units, kinds and places are those of the catalogue in
+`physics`; the laws share no code with its columns, so that a truth is not checked with itself.
+"""
 
 from __future__ import annotations
 
 from sgp_ros.simulation import actuation, friction, loads, measurement, varying_friction
-from sgp_ros.simulation.effects import EffectKind
+from sgp_ros.simulation.effects import EffectParameter, Law
 from sgp_ros.simulation.linear_axis import LINEAR_AXIS
 from sgp_ros.simulation.reaction_wheel import REACTION_WHEEL
 from sgp_ros.simulation.simulator import Simulator
@@ -13,36 +17,38 @@ SIMULATORS: dict[str, Simulator] = {
     simulator.name: simulator for simulator in (REACTION_WHEEL, TOY_PENDULUM, LINEAR_AXIS)
 }
 
-EFFECTS: dict[str, EffectKind] = {
-    kind.name: kind
-    for kind in (
-        friction.VISCOUS_FRICTION,
-        friction.COULOMB_FRICTION,
-        friction.STRIBECK_FRICTION,
-        friction.QUADRATIC_DRAG,
-        friction.ASYMMETRIC_COULOMB,
-        friction.LOAD_FRICTION,
-        varying_friction.POSITION_FRICTION,
-        varying_friction.LIMIT_FRICTION,
-        varying_friction.FRICTION_DRIFT,
-        varying_friction.HYSTERESIS,
-        loads.SPRING,
-        loads.CONSTANT_LOAD,
-        loads.COGGING,
-        loads.END_STOP,
-        loads.JOINT_COUPLING,
-        loads.ARMATURE,
-        loads.GRAVITY_TILT,
-        loads.PAYLOAD,
-        loads.TIP_FORCE,
-        actuation.COMMAND_DELAY,
-        actuation.DEAD_ZONE,
-        actuation.ACTUATOR_LAG,
-        actuation.SATURATION,
-        actuation.TORQUE_GAIN,
-        actuation.BACKLASH,
-        measurement.ENCODER_ECCENTRICITY,
-        measurement.VELOCITY_FILTER_LAG,
-    )
+_EDGE = EffectParameter('edge', 'rad', low=0.0, default=0.0)
+_CONTACT_HZ = EffectParameter('contact_hz', 'Hz', low=1.0, default=60.0)
+
+LAWS: dict[str, Law] = {
+    'viscous_friction': Law(friction.viscous),
+    'coulomb_friction': Law(friction.coulomb),
+    'stribeck_friction': Law(friction.stribeck, ordered=('coulomb', 'static')),
+    'quadratic_drag': Law(friction.quadratic),
+    'asymmetric_coulomb': Law(friction.asymmetric),
+    'load_friction': Law(friction.load),
+    'position_friction': Law(varying_friction.position, ordered=('lo', 'hi'), own=(_EDGE,)),
+    'limit_friction': Law(varying_friction.limit),
+    'friction_drift': Law(varying_friction.drift),
+    'hysteresis': Law(varying_friction.hysteresis),
+    'spring': Law(loads.spring),
+    'constant_load': Law(loads.constant),
+    'cogging': Law(loads.cogging),
+    'end_stop': Law(loads.end_stop),
+    'joint_coupling': Law(loads.coupling),
+    'armature': Law(loads.armature),
+    'gravity_tilt': Law(physical={'roll': 'base_roll', 'pitch': 'base_pitch'}),
+    'payload': Law(
+        physical={'mass': 'payload_mass', 'x': 'payload_x', 'y': 'payload_y', 'z': 'payload_z'}
+    ),
+    'tip_force': Law(physical={'fx': 'tip_fx', 'fy': 'tip_fy', 'fz': 'tip_fz'}),
+    'command_delay': Law(actuation.delay),
+    'dead_zone': Law(actuation.dead_zone),
+    'actuator_lag': Law(actuation.lag),
+    'saturation': Law(actuation.saturation),
+    'torque_gain': Law(actuation.gain),
+    'backlash': Law(actuation.backlash, own=(_CONTACT_HZ,)),
+    'encoder_eccentricity': Law(measurement.eccentricity),
+    'velocity_filter_lag': Law(measurement.velocity_lag),
 }
 """Several effects in a motor act in this order, from the command to the joint."""

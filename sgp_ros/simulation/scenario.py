@@ -6,17 +6,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.simulation.effect_text import checked_effect
+from sgp_ros.physics.effect import Effect
+from sgp_ros.physics.parts import BASE, JOINT, LAST, MOTOR, TOOL
+from sgp_ros.simulation.effect_text import checked_law, with_defaults
 from sgp_ros.simulation.effects import (
     EVERY_MOTOR,
     Action,
     ChosenEffect,
-    EffectKind,
-    ParameterValue,
-    Place,
 )
 from sgp_ros.simulation.mechanism import Mechanism
-from sgp_ros.simulation.registry import EFFECTS
+from sgp_ros.simulation.registry import LAWS
 from sgp_ros.simulation.sensors import Sensors
 from sgp_ros.simulation.simulator import Simulator
 
@@ -56,7 +55,7 @@ class Scenario:
     def actions(self) -> tuple[Action, ...]:
         """Return what the built-in and the added effects do."""
         chosen = (*self.mechanism.built_in(), *self.effects)
-        order = list(EFFECTS)
+        order = list(LAWS)
         return (
             tuple(
                 action
@@ -67,49 +66,48 @@ class Scenario:
         )
 
 
-def effect_actions(simulator: Simulator, effect: ChosenEffect) -> tuple[Action, ...]:
+def effect_actions(simulator: Simulator, chosen: ChosenEffect) -> tuple[Action, ...]:
     """Return what an effect does to a robot; nothing if it changes physical parameters.
 
     Raises:
         ConfigError: an effect, joint or value that does not exist or suit.
     """
-    kind = checked_effect(effect)
-    able = places(simulator, kind)
-    if effect.joint not in able:
-        lacking = kind.place if kind.place in {Place.JOINT, Place.MOTOR} else Place.LAST
+    effect, law = checked_law(chosen)
+    able = places(simulator, effect)
+    if chosen.joint not in able:
+        lacking = effect.site if effect.site in {JOINT, MOTOR} else LAST
         raise ConfigError(
-            f'effect {effect.name} on joint {effect.joint!r} of robot {simulator.name}',
+            f'effect {chosen.name} on joint {chosen.joint!r} of robot {simulator.name}',
             f'one of {list(able)}' if able else f'a robot with {lacking.value}',
         )
-    if kind.build is None:
+    if law.build is None:
         return ()
-    usual = {p.name: p.default for p in kind.parameters if p.default is not None}
-    values: dict[str, ParameterValue] = {**usual, **effect.parameters}
-    names = simulator.command_joints if effect.joint == EVERY_MOTOR else (effect.joint,)
+    values = with_defaults(law.parameters(effect), chosen.parameters)
+    names = simulator.command_joints if chosen.joint == EVERY_MOTOR else (chosen.joint,)
     return tuple(
         action
         for name in names
-        for action in kind.build(simulator.joints, simulator.joint_names.index(name), values)
+        for action in law.build(simulator.joints, simulator.joint_names.index(name), values)
     )
 
 
-def places(simulator: Simulator, kind: EffectKind) -> tuple[str, ...]:
+def places(simulator: Simulator, effect: Effect) -> tuple[str, ...]:
     """Return the joints of a robot that an effect may be put on."""
     last = () if simulator.last_joint is None else (simulator.last_joint,)
-    every = (EVERY_MOTOR,) if kind.takes_all and simulator.command_joints else ()
+    every = (EVERY_MOTOR,) if effect.takes_all and simulator.command_joints else ()
     return {
-        Place.JOINT: simulator.joint_names,
-        Place.MOTOR: simulator.command_joints + every,
-        Place.LAST: last,
-        Place.BASE: (Place.BASE.value,) if last else (),
-        Place.TOOL: (Place.TOOL.value,) if last else (),
-    }[kind.place]
+        JOINT: simulator.joint_names,
+        MOTOR: simulator.command_joints + every,
+        LAST: last,
+        BASE: (BASE.value,) if last else (),
+        TOOL: (TOOL.value,) if last else (),
+    }[effect.site]
 
 
 def with_effects(mechanism: Mechanism, effects: Iterable[ChosenEffect]) -> Mechanism:
     """Return the mechanism with the physical parameters that effects add to."""
     for effect in effects:
-        for name, physical in checked_effect(effect).physical.items():
+        for name, physical in checked_law(effect)[1].physical.items():
             value = getattr(mechanism, physical) + float(effect.parameters[name])
             mechanism = replace(mechanism, **{physical: value})
     return mechanism

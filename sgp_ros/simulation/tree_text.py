@@ -150,12 +150,12 @@ def plain_tree(urdf: str, tree: TreeText, payload: tuple[float, float, float, fl
 
 
 def stand_in_bodies(root: ET.Element) -> dict[str, ET.Element]:
-    """Return a body for each moving link of a URDF that states no mass at all, by link.
+    """Return a body for each moving link of a URDF that states no inertia at all, by link.
 
     Such a file tells the kinematics alone. Each link becomes a solid ball halfway to its next
     joints, so that the robot can be moved; its efforts are those of no real machine.
     """
-    if any(number_of(mass, 'value', 0.0) for mass in root.iter('mass')):
+    if root.find('.//inertial') is not None:
         return {}
     joints = root.findall('joint')
     bodies = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import asdict
 
-from sgp_ros.simulation.effect_text import checked_effect
+from sgp_ros.simulation.effect_text import checked_law
 from sgp_ros.simulation.effects import ChosenEffect
 from sgp_ros.simulation.mechanism import SimulatedJoint, physical_parameters
 from sgp_ros.simulation.scenario import Scenario
@@ -70,7 +70,8 @@ def _described(simulator: Simulator, effects: Iterable[ChosenEffect]) -> list[di
             (j for j in simulator.joints if j.name == effect.joint), SimulatedJoint(effect.joint)
         )
         parameters: dict[str, dict[str, object]] = {}
-        for parameter in checked_effect(effect).parameters:
+        known, law = checked_law(effect)
+        for parameter in law.parameters(known):
             if parameter.name not in effect.parameters:
                 continue
             entry: dict[str, object] = {'value': effect.parameters[parameter.name]}

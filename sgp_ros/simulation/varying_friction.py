@@ -7,10 +7,7 @@ from collections.abc import Callable, Mapping
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.simulation.effects import (
-    SIDE,
     Action,
-    EffectKind,
-    EffectParameter,
     Moment,
     ParameterValue,
     side_of,
@@ -31,9 +28,10 @@ def _of_kind(
     return (Action(joint, dry_level=lambda moment, _direction: strength(moment)),)
 
 
-def _position(
+def position(
     joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
+    """Return friction where `lo <= q <= hi`, on every turn, rising over the length `edge`."""
     amplitude, lo, hi = (float(values[name]) for name in ('amplitude', 'lo', 'hi'))
     is_continuous, edge = joints[joint].is_continuous, float(values['edge'])
     centre = 0.5 * (lo + hi)
@@ -50,9 +48,10 @@ def _position(
     return _of_kind(joint, values['kind'], strength)
 
 
-def _limit(
+def limit(
     joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
+    """Return dry friction that rises from 0 at `onset` to `amplitude` at the limit `side`."""
     amplitude, onset = float(values['amplitude']), float(values['onset'])
     description = joints[joint]
     side = side_of(description, onset, values['side'])
@@ -70,9 +69,10 @@ def _limit(
     return (Action(joint, dry_level=level),)
 
 
-def _drift(
+def drift(
     _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
+    """Return friction of the strength `end + (start - end) exp(-t / time_constant)`."""
     start, end = float(values['start']), float(values['end'])
     time_constant = float(values['time_constant'])
 
@@ -82,9 +82,10 @@ def _drift(
     return _of_kind(joint, values['kind'], strength)
 
 
-def _hysteresis(
+def hysteresis(
     _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
 ) -> tuple[Action, ...]:
+    """Return `tau_x = -level z` with `dz/dt = (v - |v| z) / presliding` (Dahl 1968)."""
     level, presliding = float(values['level']), float(values['presliding'])
     fastest = _MOST_DECAY * presliding / _STIFF_S
 
@@ -102,53 +103,3 @@ def _hysteresis(
             substep_s=_STIFF_S,
         ),
     )
-
-
-_KIND = EffectParameter('kind', choices=('coulomb', 'viscous'))
-_VISCOUS = {'viscous': 'N m s/rad'}
-
-POSITION_FRICTION = EffectKind(
-    'position_friction',
-    (
-        EffectParameter('amplitude', 'N m', low=0.0, unit_by_kind=_VISCOUS),
-        EffectParameter('lo', 'rad'),
-        EffectParameter('hi', 'rad'),
-        _KIND,
-        EffectParameter('edge', 'rad', low=0.0, default=0.0),
-    ),
-    _position,
-    ordered=('lo', 'hi'),
-)
-"""Coulomb or viscous friction where `lo <= q <= hi`, on every turn of a continuous joint.
-
-It rises from 0 to `amplitude` over the length `edge`, half way at `lo` and `hi`.
-"""
-
-LIMIT_FRICTION = EffectKind(
-    'limit_friction',
-    (EffectParameter('amplitude', 'N m', low=0.0), EffectParameter('onset', 'rad'), SIDE),
-    _limit,
-)
-"""Dry friction that rises linearly from 0 at `onset` to `amplitude` at the limit `side`."""
-
-FRICTION_DRIFT = EffectKind(
-    'friction_drift',
-    (
-        EffectParameter('start', 'N m', low=0.0, unit_by_kind=_VISCOUS),
-        EffectParameter('end', 'N m', low=0.0, unit_by_kind=_VISCOUS),
-        EffectParameter('time_constant', 's', low=1e-3),
-        _KIND,
-    ),
-    _drift,
-)
-"""Friction of the strength `end + (start - end) exp(-t / time_constant)`."""
-
-HYSTERESIS = EffectKind(
-    'hysteresis',
-    (
-        EffectParameter('level', 'N m', low=0.0),
-        EffectParameter('presliding', 'rad', low=1e-9),
-    ),
-    _hysteresis,
-)
-"""`tau_x = -level z` with `dz/dt = (v - |v| z) / presliding` (Dahl 1968)."""

@@ -13,14 +13,14 @@ import pytest
 import yaml
 
 from sgp_ros.apps.simulated_robot import find_robot
-from sgp_ros.physics.catalogue import EFFECTS as LAWS
+from sgp_ros.physics.catalogue import EFFECTS as CATALOGUE
 from sgp_ros.physics.term import Motion
 from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.recording import simulate
-from sgp_ros.simulation.registry import EFFECTS
+from sgp_ros.simulation.registry import LAWS
 from sgp_ros.simulation.sensors import Sensors
 from test.simulation.trees import arm
 
@@ -101,7 +101,7 @@ def written(folder, name):
 def sized(effect, force):
     """Return the values of an effect on a robot with forces of this size."""
     values = dict(EFFECT_VALUES[effect])
-    for quantity in LAWS[effect].stated_quantities(values.get('kind', '')):
+    for quantity in CATALOGUE[effect].stated_quantities(values.get('kind', '')):
         if 'N' in quantity.unit:
             values[quantity.name] *= force
     return values
@@ -190,7 +190,7 @@ APPLICABLE = {'arm': 27, 'turned': 27, 'underactuated': 27, 'forearm': 26, 'reac
 
 
 def test_the_tables_name_every_effect():
-    assert set(EFFECT_VALUES) == set(LAWS) == set(EFFECTS)
+    assert set(EFFECT_VALUES) == set(CATALOGUE) == set(LAWS)
 
 
 @pytest.mark.parametrize('name', APPLICABLE)
@@ -207,7 +207,7 @@ def test_every_stated_effect_is_simulated_as_its_robot_models_it(tmp_path, name)
         count += 1
         simulated = Simulated.of(path)
         assert np.ptp(simulated.motion.position) > 0.01, effect
-        if LAWS[effect].is_online:
+        if CATALOGUE[effect].is_online:
             force = (
                 np.abs(simulated.motion.effort).max()
                 + np.abs(simulated.robot.regressor(simulated.motion)).max()

@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.effects import Moment
 from sgp_ros.simulation.mechanism import SimulatedJoint
 from sgp_ros.simulation.recording import simulate
-from sgp_ros.simulation.registry import EFFECTS, SIMULATORS
+from sgp_ros.simulation.registry import LAWS, SIMULATORS
 from sgp_ros.simulation.scenario import places
 from sgp_ros.simulation.sensors import Sensors
-from sgp_ros.simulation.varying_friction import POSITION_FRICTION
+from sgp_ros.simulation.varying_friction import position
 
 FREE = {'viscosity': 0.0, 'coulomb': 0.0, 'offset': 0.0, 'mass': 1.0}
 AXIS = {
@@ -32,12 +33,13 @@ def step_response(effects, seconds=0.5):
     return np.arange(1, len(recording.stamps_ns) + 1) / 200.0, recording
 
 
-def example(kind, joint, other=None):
-    values = {p.name: EXAMPLE_VALUE.get(p.name, 0.05) for p in kind.parameters if not p.default}
-    if kind.name == 'joint_coupling':
+def example(name, joint, other=None):
+    known = LAWS[name].parameters(EFFECTS[name])
+    values = {p.name: EXAMPLE_VALUE.get(p.name, 0.05) for p in known if not p.default}
+    if name == 'joint_coupling':
         values = {'source_joint': other, 'kind': 'spring', 'stiffness': 0.05, 'ratio': 2.0}
     values = ','.join(f'{name}={value}' for name, value in values.items())
-    return f'{kind.name}:joint={joint},{values}'
+    return f'{name}:joint={joint},{values}'
 
 
 @pytest.mark.parametrize('delay', [0.0, 0.0123, 0.1])
@@ -81,15 +83,15 @@ def test_eccentricity_changes_what_is_seen_not_what_is():
 
 
 @pytest.mark.parametrize('robot', SIMULATORS)
-@pytest.mark.parametrize('name', EFFECTS)
+@pytest.mark.parametrize('name', LAWS)
 def test_every_effect_runs_on_every_joint_that_can_have_it(robot, name):
     """The motion stays finite and the truth, with units, survives JSON."""
-    kind, simulator = EFFECTS[name], SIMULATORS[robot]
+    effect, simulator = EFFECTS[name], SIMULATORS[robot]
     for joint in simulator.joint_names:
         other = next((x for x in simulator.joint_names if x != joint), None)
-        text = example(kind, joint, other)
+        text = example(name, joint, other)
         lacks_joints = name == 'joint_coupling' and other is None
-        if joint not in places(simulator, kind) or name == 'limit_friction' or lacks_joints:
+        if joint not in places(simulator, effect) or name == 'limit_friction' or lacks_joints:
             with pytest.raises(ConfigError, match=joint):
                 make_simulation(robot, effects=[text])
             continue
@@ -98,7 +100,7 @@ def test_every_effect_runs_on_every_joint_that_can_have_it(robot, name):
         assert json.loads(json.dumps(recording.truth)) == recording.truth
         described = recording.truth['effects'][0]
         assert (described['effect'], described['joint']) == (name, joint)
-        assert set(described['parameters']) <= {p.name for p in kind.parameters}
+        assert set(described['parameters']) <= {p.name for p in LAWS[name].parameters(effect)}
 
 
 @pytest.mark.parametrize(
@@ -119,8 +121,7 @@ def test_an_interval_across_the_wrap_is_one_interval(turns):
     """3.0 to 3.4 rad is also -3.28 to -2.88 rad, on every turn."""
     joint = SimulatedJoint('hinge', is_continuous=True)
     values = {'amplitude': 1.0, 'lo': 3.0, 'hi': 3.4, 'kind': 'coulomb', 'edge': 0.0}
-    assert POSITION_FRICTION.build is not None
-    (action,) = POSITION_FRICTION.build((joint,), 0, values)
+    (action,) = position((joint,), 0, values)
     q = np.array([2.9, 3.1, 3.3, 3.5, -3.1, -2.8]) + 2.0 * np.pi * turns
     moments = [Moment(0.0, np.array([x]), np.ones(1), np.zeros(1), np.zeros(0)) for x in q]
     assert [action.dry_level(m, 1) for m in moments] == [0.0, 1.0, 1.0, 0.0, 1.0, 0.0]

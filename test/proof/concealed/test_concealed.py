@@ -17,7 +17,7 @@ from sgp_ros.robots.observed_motion import ObservedMotion
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.simulation.effects import Moment
 from sgp_ros.simulation.figure_eight import ARM
-from sgp_ros.simulation.registry import EFFECTS
+from sgp_ros.simulation.registry import LAWS
 from sgp_ros.simulation.tree_text import read_tree
 
 KEYS = {
@@ -29,8 +29,8 @@ KEYS = {
 
 def test_plan_has_every_effect():
     """The 26 effects of the contract and `gravity_tilt` among them, in turn."""
-    assert set(EFFECTS) <= set(draw.PLAN)
-    assert set(SCORED) | {'joint_coupling'} == set(EFFECTS)
+    assert set(LAWS) <= set(draw.PLAN)
+    assert set(SCORED) | {'joint_coupling'} == set(LAWS)
 
 
 @pytest.mark.parametrize('family', robots.FAMILIES)
