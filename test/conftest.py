@@ -25,7 +25,9 @@ _NEEDED = {
             'effect_terms', 'pendulums', 'built_in_nominal', 'lumped', 'ready_robots',
             'urdf_robot',
         ),
-        'simulation': ('random_tree', 'serial_arm', 'tree', 'tree_part'),
+        'simulation': ('tree', 'tree_part'),
+        'proof/numerics': ('random_tree', 'trees'),
+        'proof/paper': ('serial_arm',),
     },
     'mujoco': {
         'apps': ('built_in_diagnosis', 'shipped_robots', 'simulation', 'stated_simulation'),

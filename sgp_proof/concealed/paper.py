@@ -29,8 +29,8 @@ from sgp_proof.concealed.robots import DOWN, UP, Body, Y, Z
 from sgp_proof.concealed.run import scored_case
 from sgp_proof.concealed.scoring import summary
 from sgp_proof.paper import toy
+from sgp_proof.paper.figure_eight import ARM
 from sgp_proof.result_files import make_parser, seed_range, write_result
-from sgp_ros.simulation.figure_eight import ARM
 from sgp_ros.simulation.reaction_wheel import ReactionWheel
 from sgp_ros.simulation.toy_pendulum import ToyPendulum
 

@@ -15,12 +15,12 @@ import numpy as np
 import pinocchio
 from scipy import linalg
 
+from sgp_proof.numerics.random_tree import random_tree
 from sgp_proof.result_files import make_parser, write_result
 from sgp_ros.errors import NumericalError
 from sgp_ros.rigid.base_parameters import RegressorFactor, base_parameters
 from sgp_ros.rigid.consistent import project_information
 from sgp_ros.rigid.pseudo_inertia import is_consistent
-from sgp_ros.simulation.random_tree import random_tree
 
 SAMPLES, SECONDS, HARMONICS = 300, 20.0, 6
 STILL, TINY, TINY_SIZE = 0.15, 0.1, 1e-3

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from sgp_proof.paper import toy
 from sgp_proof.paper.catalogue import Experiment
+from sgp_proof.paper.figure_eight import ARM, tip_positions
 from sgp_proof.paper.protocol import METHOD_NAMES, Outcome, World, thinned
-from sgp_ros.simulation.figure_eight import ARM, tip_positions
 
 COLOURS = dict(
     zip(METHOD_NAMES, ('#E69F00', '#009E73', '#CC79A7', '#0072B2', '#56B4E9'), strict=True)

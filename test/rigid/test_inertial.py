@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sgp_proof.paper.serial_arm import ArmLink, JointFriction, SerialArm
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.term import Motion
 from sgp_ros.rigid.inertial import PARAMETERS, inertial_term, revolute_chain
-from sgp_ros.simulation.serial_arm import ArmLink, JointFriction, SerialArm
 
 NAMES = ('a', 'b', 'c', 'd')
 

@@ -11,12 +11,12 @@ from sgp_proof.concealed import draw, paper, robots, run, scoring, sizes
 from sgp_proof.concealed.concealed_effect import SCORED
 from sgp_proof.concealed.oracle import Oracle, Unlisted, error, nominal_error, share, suspects
 from sgp_proof.concealed.unknown import UNKNOWN
+from sgp_proof.paper.figure_eight import ARM
 from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.observed_motion import ObservedMotion
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.simulation.effects import Moment
-from sgp_ros.simulation.figure_eight import ARM
 from sgp_ros.simulation.registry import LAWS
 from sgp_ros.simulation.tree_text import read_tree
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sgp_proof.paper import arm
+from sgp_proof.paper.figure_eight import ARM
 from sgp_proof.paper.protocol import run_method
-from sgp_ros.simulation.figure_eight import ARM
 
 SEED = 1
 

@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio
 import pytest
 
+from sgp_proof.numerics.random_tree import random_tree
 from sgp_proof.numerics.trees import pinocchio_model
-from sgp_ros.simulation.random_tree import random_tree
 
 
 @pytest.mark.parametrize('seed', range(6))

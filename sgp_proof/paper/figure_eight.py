@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sgp_ros.simulation.serial_arm import ArmLink, JointFriction, SerialArm
+from sgp_proof.paper.serial_arm import ArmLink, JointFriction, SerialArm
 
 SHOULDER, UPPER, FORE = 0.3, 0.4, 0.35
 """Height of the second joint, length of the second and of the third link [m]."""

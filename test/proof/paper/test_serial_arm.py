@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sgp_ros.simulation.figure_eight import (
+from sgp_proof.paper.figure_eight import (
     ARM,
     GAIN,
     FigureEight,
     follow,
     joint_positions,
 )
-from sgp_ros.simulation.serial_arm import GRAVITY, ArmLink, JointFriction, SerialArm
+from sgp_proof.paper.serial_arm import GRAVITY, ArmLink, JointFriction, SerialArm
 
 ROD = ArmLink((0, 1, 0), (0, 0, 0), 2.0, (0.3, 0, 0), (0.01, 0, 0.06, 0, 0, 0.06))
 CURVE = FigureEight((0.49, 0, 0.26), (0, 0.3, 0), (0.15, 0, 0), period=3.0)
