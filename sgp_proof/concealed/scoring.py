@@ -133,18 +133,18 @@ def summary(rows):
     )  # fmt: skip
     return {
         'worlds': len(rows),
-        'named_single': _rate(r['right'] for r in singles),
-        'named_pair_top': _rate(r['right'] for r in pairs),
-        'components_of_pairs': _rate(
+        'named_single': rate(r['right'] for r in singles),
+        'named_pair_top': rate(r['right'] for r in pairs),
+        'components_of_pairs': rate(
             hit for r in pairs for hit in _hits(r.get('components', 0), 2)
         ),
-        'false_alarms': _rate(r['said'] in {'missing_physics', 'unexplained'} and not r['right']
+        'false_alarms': rate(r['said'] in {'missing_physics', 'unexplained'} and not r['right']
                               for r in calm),
-        'unknown_called_unexplained': _rate(r['right'] for r in unknown),
+        'unknown_called_unexplained': rate(r['right'] for r in unknown),
         'failed': sum(r['said'] == 'failed' for r in rows),
         'overlap_median': _median(overlaps),
         'parameter_error_median': _median(errors),
-        'within_two_std': _rate(covered),
+        'within_two_std': rate(covered),
         'improvement': {s: _improvement(rows, s) for s in HELD_OUT},
         'oracle_parameter_error_median': _median(
             [p['error'] for r in rows for p in r.get('oracle_parameters', [])]
@@ -200,7 +200,7 @@ def _median(values):
     return float(np.median(values)) if len(values) else None
 
 
-def _rate(flags):
+def rate(flags):
     """Return share, number and 95 % interval."""
     flags = [bool(f) for f in flags]
     n = len(flags)
@@ -218,6 +218,6 @@ def _reliability(rows):
     bands = [(0.0, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.0)]
     stated = [(r['certainty'], r['right']) for r in rows if r.get('certainty') is not None]
     return [
-        {'from': a, 'to': b, **_rate(right for p, right in stated if a <= p < b or p == b == 1.0)}
+        {'from': a, 'to': b, **rate(right for p, right in stated if a <= p < b or p == b == 1.0)}
         for a, b in bands
     ]
