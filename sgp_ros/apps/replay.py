@@ -33,7 +33,7 @@ from sgp_ros.recordings.writer import RecordingWriter
 from sgp_ros.report.files import write_text
 from sgp_ros.report.history import History
 from sgp_ros.report.html import write_report
-from sgp_ros.report.metrics import Timing, collect_metrics
+from sgp_ros.report.metrics import Timing, collect_metrics, model_remarks
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.shipped import find_shipped
@@ -82,7 +82,7 @@ def run_replay(
     truth = load_truth(chosen.truth) if chosen.truth else None
     recording = open_recording(bag)
     engine = _make_engine(load_robot(robot), chosen)
-    remarks = list(recording.remarks)
+    remarks, asked = list(recording.remarks), engine.config
     history, timing = History(), Timing()
     out.mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:
@@ -101,6 +101,7 @@ def run_replay(
                 for reason, count in recording.unreadable.items()]  # fmt: skip
     remark = write_identified_robot(out, engine)
     remarks += [remark] if remark else []
+    remarks += model_remarks(engine, asked=asked)
     metrics = collect_metrics(engine, Path(bag).name, timing=timing, remarks=remarks)
     write_text(out / 'metrics.json', json.dumps(metrics, indent=1, allow_nan=False) + '\n')
     save_model(out / 'model.npz', engine.snapshot())
@@ -205,6 +206,8 @@ def print_summary(metrics: Mapping[str, Any], truth: Mapping[str, float] | None)
             )
     for parameter in metrics['parameters']:
         print(_parameter_line(parameter, truth))
+    for remark in metrics['remarks']:
+        print(f'remark: {remark}')
 
 
 def _parameter_line(parameter: Mapping[str, Any], truth: Mapping[str, float] | None) -> str:

@@ -8,7 +8,7 @@ end in one frozen `EngineConfig`. Hyper-parameters are settings too (`engine/hyp
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from sgp_ros.engine.hyperparameters import JointHyperparameters, describe, kernel_named
@@ -17,6 +17,9 @@ from sgp_ros.engine.setting import Setting
 from sgp_ros.errors import ConfigError
 from sgp_ros.gp.kernels import KERNELS, SquaredExponential
 from sgp_ros.robots.robot import Robot
+
+AUTOMATIC = -1.0
+"""Value of `filter.window` that has the first seconds choose it."""
 
 
 def _setting(
@@ -57,8 +60,9 @@ class EngineConfig:
         choices=('auto', 'state', 'command'),
     )  # fmt: skip
     filter_window: float = _setting(
-        'filter.window', 'float', 0.1, 'Length of the differentiation window; half is the delay.',
-        unit='s', low=0.0, high=10.0,
+        'filter.window', 'float', 0.1,
+        'Length of the differentiation window; half is the delay. -1: the first seconds choose.',
+        unit='s', low=-1.0, high=10.0,
     )  # fmt: skip
     filter_degree: int = _setting(
         'filter.degree', 'int', 4, 'Degree of the polynomial that follows the motion in a window.',
@@ -163,7 +167,8 @@ class EngineConfig:
         """
         kernel = kernel_named(values.get('model.kernel'))
         known = {setting.name: setting for setting in describe_settings(robot, kernel.name)}
-        problems, converted = [], {}
+        window = known['filter.window']
+        problems, converted = [], {window.name: window.default}
         for name, value in values.items():
             problem = known[name].problem(value) if name in known else f'{name}: unknown setting'
             if problem:
@@ -248,4 +253,8 @@ def describe_settings(robot: Robot, kernel: str = SquaredExponential.name) -> tu
     dynamic: list[Setting] = []
     for joint in robot.joint_names:
         dynamic += describe(joint, robot.target_unit(joint), kernel_named(kernel))
-    return tuple(_static_settings().values()) + tuple(dynamic)
+    static = _static_settings()
+    if 'effects' in robot.source:  # as a diagnosis leaves it: no settings were tuned for it
+        window = static['filter_window']
+        static['filter_window'] = replace(window, default=AUTOMATIC)
+    return tuple(static.values()) + tuple(dynamic)

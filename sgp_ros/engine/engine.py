@@ -8,9 +8,10 @@ import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.estimator import Estimator
+from sgp_ros.engine.filter_choice import StateFilter
 from sgp_ros.engine.fitting import FitRequest
 from sgp_ros.engine.hyperparameters import settings_of
-from sgp_ros.engine.intake import Intake, State
+from sgp_ros.engine.intake import Intake
 from sgp_ros.engine.ordering import ReorderBuffer
 from sgp_ros.engine.readout import read_parameters, read_scores
 from sgp_ros.engine.results import Counts, Estimate, ParameterEstimate, Score, Step
@@ -23,7 +24,7 @@ from sgp_ros.engine.samples import (
     SettingValue,
 )
 from sgp_ros.engine.snapshots import fill_from_snapshot, snapshot_config, take_snapshot
-from sgp_ros.engine.windows import WindowFilter
+from sgp_ros.engine.windows import Equation
 from sgp_ros.gp.scores import DriftTest
 from sgp_ros.robots.robot import Robot
 
@@ -36,7 +37,7 @@ class Engine:
         config: settings in force.
         counts: what became of every sample.
         delay_s: half the length of the last filter window [s].
-        order, intake, windows, estimator: the stages of the fold.
+        order, intake, filter, estimator: the stages of the fold.
         fits, next_fit: fits handed out so far, and the learned count at which the next is due.
     """
 
@@ -44,10 +45,10 @@ class Engine:
         self.robot = robot
         self.config = config
         self.counts = Counts()
-        self.delay_s = 0.5 * config.filter_window
+        self.delay_s = 0.5 * max(config.filter_window, 0.0)
         self.order = ReorderBuffer(round(config.reorder_window * 1e9))
         self.intake = Intake(robot, config, self.counts)
-        self.windows = WindowFilter(robot, config)
+        self.filter = StateFilter(self.robot, self.config)
         self.estimator = Estimator(robot, config, self.counts)
         self._is_fit_due = False
         self.fits = 0
@@ -85,7 +86,9 @@ class Engine:
 
     def flush(self) -> Step:
         """Release what waits in the reorder window: the stream has ended."""
-        return self._take(self.order.flush())
+        step = self._take(self.order.flush())
+        changes, estimates = self._estimates(*self.filter.finish(self.intake.commands))
+        return Step((*step.released, *changes), (*step.estimates, *estimates))
 
     def change(self, settings: Mapping[str, object]) -> SettingsChange:
         """Change settings now, between two samples.
@@ -203,7 +206,7 @@ class Engine:
         self.counts = Counts()
         self.order = ReorderBuffer(self.order.window_ns)
         self.intake = Intake(self.robot, self.config, self.counts)
-        self.windows = WindowFilter(self.robot, self.config)
+        self.filter = StateFilter(self.robot, self.config)
         self.estimator.begin_stream(self.counts)
         self._is_fit_due = False
         self.next_fit = self.config.refit_period
@@ -221,9 +224,12 @@ class Engine:
                 state = self.intake.take_state(event)
                 if is_duplicate:
                     continue
-                estimates += self._estimates(state)
+                changes, found = self._estimates(*self.filter.take(state, self.intake.commands))
+                released += [event, *changes]
+                estimates += found
                 self._schedule_fit()
-            elif isinstance(event, CommandSample):
+                continue
+            if isinstance(event, CommandSample):
                 self.intake.take_command(event)
             elif isinstance(event, SettingsChange):
                 self._apply(self.config.changed(event.settings, self.robot))
@@ -232,22 +238,25 @@ class Engine:
             released.append(event)
         return Step(tuple(released), tuple(estimates))
 
-    def _estimates(self, state: State | None) -> list[Estimate]:
-        """Return the estimates that the next state completes; without it no window goes on."""
-        if state is None:
-            self.windows.restart()
-            self.intake.commands.forget_before(self._now_ns)
-            return []
+    def _estimates(
+        self, equations: list[Equation], chosen: dict[str, SettingValue]
+    ) -> tuple[list[SettingsChange], list[Estimate]]:
+        """Take equations, and before them the filter that was chosen for them."""
+        changes = []
+        if chosen:
+            self.config = self.config.changed(chosen, self.robot)
+            self.estimator.configure(self.config)
+            changes.append(SettingsChange(self._now_ns, chosen))
         estimates = []
-        for equation in self.windows.push(state, self.intake.commands):
+        for equation in equations:
             self.delay_s = 0.5 * equation.span_s
             estimates.append(self.estimator.take(equation))
-        return estimates
+        return changes, estimates
 
     def _forget(self) -> None:
         self.estimator = Estimator(self.robot, self.config, self.counts)
         self.intake = Intake(self.robot, self.config, self.counts)
-        self.windows = WindowFilter(self.robot, self.config)
+        self.filter = StateFilter(self.robot, self.config)
         self._is_fit_due = False
         self.next_fit = self.counts.learned
 
@@ -262,7 +271,7 @@ class Engine:
         self.estimator.configure(config)
         filters = ('filter_window', 'filter_degree', 'filter_hop', 'filter_velocity')
         if any(getattr(config, name) != getattr(self.config, name) for name in filters):
-            self.windows = WindowFilter(self.robot, config)
+            self.filter = StateFilter(self.robot, config)
+        self.config = config
         self.intake.configure(config)
         self.order.window_ns = round(config.reorder_window * 1e9)
-        self.config = config

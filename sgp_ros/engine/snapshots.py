@@ -61,8 +61,11 @@ def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
                 intake.commands.stamps_ns, intake.commands.efforts, strict=True
             )
         ],
-        'states': [_encode_state(state) for state in engine.windows.states],
-        'next_ns': engine.windows.next_ns,
+        'states': [_encode_state(state) for state in engine.filter.windows.states],
+        'next_ns': engine.filter.windows.next_ns,
+        'trial': None
+        if engine.filter.trial is None
+        else [None if s is None else _encode_state(s) for s in engine.filter.trial.states],
         'last_state_ns': intake.last_state_ns,
         'is_measured': intake.is_measured,
         'scores': {c: [asdict(s) for s in scores] for c, scores in estimator.scores.items()},
@@ -111,8 +114,11 @@ def fill_from_snapshot(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> No
     intake = engine.intake
     for stamp, effort in text['commands']:
         intake.commands.add(stamp, np.array(effort))
-    engine.windows.states = [_decode_state(state) for state in text['states']]
-    engine.windows.next_ns = text['next_ns']
+    engine.filter.windows.states = [_decode_state(state) for state in text['states']]
+    engine.filter.windows.next_ns = text['next_ns']
+    if engine.filter.trial is not None:
+        for entry in text['trial']:
+            engine.filter.trial.add(None if entry is None else _decode_state(entry))
     intake.last_state_ns = text['last_state_ns']
     intake.is_measured = text['is_measured']
     released = text['released']

@@ -61,6 +61,7 @@ def joint_term(
             f'{joints[j].name}.{part}',
             _raised(quantity.unit_on(is_prismatic=joints[j].kind == 'prismatic')),
             joints[j].name,
+            low=quantity.low,
         )
         for j in chosen
         for part, quantity in zip(form.names, quantities, strict=True)

@@ -82,6 +82,7 @@ class Coefficient:
         joint: the joint it belongs to, None where it belongs to several.
         prior_mean: mean of its prior [unit].
         prior_std: standard deviation of its prior [unit]; infinite knows nothing.
+        low: least value that exists [unit]: no armature and no friction is negative.
     """
 
     name: str
@@ -89,6 +90,7 @@ class Coefficient:
     joint: str | None = None
     prior_mean: float = 0.0
     prior_std: float = math.inf
+    low: float = -math.inf
 
 
 @dataclass(frozen=True, slots=True)

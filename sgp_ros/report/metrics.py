@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 
 from sgp_ros import __version__
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.results import ParameterEstimate, Score
+from sgp_ros.robots.nominal import nominal_model
 
 SCHEMA = 1
 _PACKAGES = ('numpy', 'scipy', 'numba')
@@ -84,6 +86,37 @@ def collect_metrics(
         'versions': versions(),
         'remarks': list(remarks),
     }
+
+
+def model_remarks(engine: Engine, asked: EngineConfig) -> list[str]:
+    """Return what a reader of the scores must know of the filter and of the model.
+
+    Args:
+        engine: after the recording.
+        asked: the settings that it began with.
+    """
+    remarks, robot = [], engine.robot
+    if asked.filter_window < 0.0:
+        config = engine.config
+        remarks.append(
+            f'filter.window = {config.filter_window:g} s and filter.velocity = '
+            f'{config.filter_velocity} were chosen from the first seconds'
+        )
+    if robot.source.get('effects'):
+        effects = nominal_model(robot).effects
+        left_out = [f'{e.name} of {e.joint}' for e in effects if not e.effect.is_online]
+        if left_out:
+            remarks.append(
+                f'not modelled online, so the scores of these joints fall behind those of the '
+                f'diagnosis: {", ".join(left_out)}'
+            )
+    remarks += [
+        f'{p.name} ended at {p.value:.3g} {p.unit}, below {c.low:g}: no such value exists. '
+        'Something that the model lacks stands behind it, or the motion does not determine it'
+        for p, c in zip(engine.parameters(), robot.coefficients, strict=False)
+        if p.value < c.low
+    ]
+    return remarks
 
 
 def versions() -> dict[str, str]:

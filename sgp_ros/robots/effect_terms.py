@@ -162,6 +162,7 @@ def _term(tree: Tree, stated: EffectAt, name: str, kept: list[int], coulomb_widt
             stated.joint if joint >= 0 else None,
             float(stated.coefficients[i]),
             float(stated.std[i]),
+            quantities[i].low,
         )
         for i in kept
     )

@@ -154,10 +154,11 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
             self._session.health.note_unreadable(error)
             return
         self._diagnosing.take(event)
-        was_ready = self._session.engine.is_ready
+        engine = self._session.engine
+        before = engine.is_ready, engine.config
         for output in self._session.take(event):
             self._publish(output)
-        if self._session.engine.is_ready and not was_ready:
+        if engine.is_ready != before[0] or engine.config is not before[1]:
             self._write_back()
 
     def _publish(self, outputs: Outputs) -> None:
@@ -221,8 +222,11 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
         return SetParametersResult(successful=True)
 
     def _write_back(self) -> None:
-        """Show the hyper-parameters in force as parameters."""
-        learned = {n: to_ros(v) for n, v in self._session.engine.hyper_settings().items()}
+        """Show the hyper-parameters and the filter in force as parameters."""
+        engine = self._session.engine
+        values = engine.config.to_mapping()
+        chosen = {n: values[n] for n in ('filter.window', 'filter.velocity')}
+        learned = {n: to_ros(v) for n, v in (engine.hyper_settings() | chosen).items()}
         shown = {n: self.get_parameter(n).value for n in learned}
         self._is_writing_back = True
         try:

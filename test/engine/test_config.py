@@ -23,7 +23,7 @@ def _problems(**settings):
     ('name', 'value', 'expected'),
     [
         ('filter.window', 'long', 'a number'),
-        ('filter.window', -1.0, 'from 0 to 10'),
+        ('filter.window', -2.0, 'from -1 to 10'),
         ('filter.window', float('nan'), 'a number'),
         ('filter.degree', 4.0, 'an integer'),
         ('filter.degree', True, 'an integer'),
@@ -48,7 +48,7 @@ def test_a_wrong_setting_is_refused_with_what_was_expected(name, value, expected
 
 def test_all_wrong_settings_are_listed_at_once():
     """One error names every problem."""
-    message = _problems(filter__window=-1.0, filter__degree='x', nonsense=1)
+    message = _problems(filter__window=-2.0, filter__degree='x', nonsense=1)
     assert message.startswith('3 wrong settings')
     for name in ('filter.window', 'filter.degree', 'nonsense'):
         assert name in message

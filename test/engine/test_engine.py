@@ -326,7 +326,7 @@ def test_wrong_settings_change_nothing():
     """A refused change leaves configuration and estimates as they were."""
     engine, _ = _run(pendulum_events(100))
     before, parameters = engine.config, engine.parameters()
-    for settings_ in ({'filter.window': -1.0}, {'nonsense': 1}, {'model.method': 'PR'}):
+    for settings_ in ({'filter.window': -2.0}, {'nonsense': 1}, {'model.method': 'PR'}):
         with pytest.raises(ConfigError):
             engine.change(settings_)
     assert engine.config is before

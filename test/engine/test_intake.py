@@ -53,13 +53,13 @@ def _events(draw):
 def _online(events, config):
     """Return the stamps that the engine accepts, and its counts."""
     engine = Engine(ARM, config)
-    push, stamps = engine.windows.push, []
+    push, stamps = engine.filter.windows.push, []
 
     def spy(state, commands):
         stamps.append(state.stamp_ns)
         return push(state, commands)
 
-    engine.windows.push = spy
+    engine.filter.windows.push = spy
     for event in events:
         engine.push(event)
     engine.flush()
