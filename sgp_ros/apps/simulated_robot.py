@@ -15,8 +15,8 @@ from sgp_ros.robots.urdf_robot import stated_part, urdf_text
 from sgp_ros.simulation.effects import ChosenEffect
 from sgp_ros.simulation.registry import SIMULATORS
 from sgp_ros.simulation.simulator import Simulator
-from sgp_ros.simulation.tree_part import Load, TreePart
 from sgp_ros.simulation.tree_simulator import tree_simulator
+from sgp_ros.simulation.tree_text import Load, TreePart
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -42,7 +42,7 @@ def plan_joints(
     Raises:
         ConfigError: names that are not in the file, follow another joint, or stand in two places.
     """
-    chains = {name: _chain(urdf, name) for name, j in urdf.joints.items() if j.kind in MOVING}
+    chains = {name: leader_of(urdf, name) for name, j in urdf.joints.items() if j.kind in MOVING}
     free = [name for name, (leader, _, _) in chains.items() if leader == name]
     chosen = [name for name in free if name not in locked] if joints is None else list(joints)
     for what, names in (('joints', chosen), ('locked', locked), ('passive', passive or ())):
@@ -72,7 +72,7 @@ def plan_joints(
     )
 
 
-def _chain(urdf: Urdf, name: str) -> tuple[str, float, float]:
+def leader_of(urdf: Urdf, name: str) -> tuple[str, float, float]:
     """Return the independent joint behind a chain of followers, multiplier and offset."""
     multiplier, offset = 1.0, 0.0
     joint = urdf.joints[name]

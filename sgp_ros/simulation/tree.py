@@ -2,8 +2,7 @@
 
 MuJoCo gives the mass matrix (composite rigid bodies, Featherstone 2008, chapter 6) and the forces
 of gravity, inertia and joint damping (Newton and Euler); contacts, limits and its own friction are
-off. It is a second opinion on what the package's own model of a tree computes, and shares nothing
-with it.
+off. The package's own model of a tree shares nothing with it but the reading of the file.
 """
 
 from __future__ import annotations
@@ -19,8 +18,8 @@ import numpy as np
 from sgp_ros.errors import ConfigError
 from sgp_ros.simulation.effects import ChosenEffect
 from sgp_ros.simulation.mechanism import TrueCoefficient, quantity
-from sgp_ros.simulation.tree_part import TreePart, part_of_urdf
-from sgp_ros.simulation.tree_text import TreeText, plain_tree, read_tree, tree_link
+from sgp_ros.simulation.tree_text import TreePart, TreeText, read_tree
+from sgp_ros.simulation.tree_xml import plain_tree, tree_link
 
 GRAVITY = 9.81
 """Acceleration of gravity [m/s^2]."""
@@ -72,11 +71,10 @@ class Tree:
             ConfigError: a URDF that is no tree of bodies with inertia, or MuJoCo is missing.
         """
         library = _library()
-        urdf = self.urdf if self.part is None else part_of_urdf(self.urdf, self.part)
-        text = read_tree(urdf, self.part)
+        text = read_tree(self.urdf, self.part)
         payload = (self.payload_mass, self.payload_x, self.payload_y, self.payload_z)
         try:
-            model = library.MjModel.from_xml_string(plain_tree(urdf, text, payload))
+            model = library.MjModel.from_xml_string(plain_tree(text, payload))
         except ValueError as error:
             raise _impossible(text.name, ' '.join(str(error).split())) from error
         off = library.mjtDisableBit

@@ -8,8 +8,8 @@ from sgp_ros.simulation.sensors import Sensors, encoder_resolution
 from sgp_ros.simulation.simulator import Simulator
 from sgp_ros.simulation.tracking import middle_and_reach, multisine_tracking
 from sgp_ros.simulation.tree import Tree
-from sgp_ros.simulation.tree_part import TreePart
-from sgp_ros.simulation.tree_text import STAND_IN_MASS, STAND_IN_RADIUS
+from sgp_ros.simulation.tree_text import TreePart
+from sgp_ros.simulation.tree_xml import STAND_IN_MASS, STAND_IN_RADIUS
 
 _BITS = 17
 _LINEAR_RESOLUTION_M = 1e-6

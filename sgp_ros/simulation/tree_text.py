@@ -1,24 +1,77 @@
-"""The joints of a URDF text, with the same tree as the rigid-body library reads it."""
+"""The joints of a URDF, or of a part of one, as a simulation needs them.
+
+What the file says comes from `rigid`; the dynamics do not.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from xml.etree import ElementTree as ET
+from dataclasses import dataclass, field
 
-from sgp_ros.errors import ConfigError
-from sgp_ros.simulation.followers import Follower, read_followers
+import numpy as np
+
+from sgp_ros.rigid.locking import leader_of
+from sgp_ros.rigid.urdf_text import MOVING, Urdf, parse_urdf
 from sgp_ros.simulation.mechanism import SimulatedJoint
-from sgp_ros.simulation.tree_part import TreePart
-from sgp_ros.simulation.urdf_elements import MOVING, link_of, number_of, root_of, vector_of
 
-_PREFIX = 'link:'
-_PAYLOAD = 'payload'
-STAND_IN_MASS, STAND_IN_RADIUS = 1.0, 0.1
-"""Of the balls that stand in for the links of a URDF without masses [kg, m]."""
-_SMALLEST = 1e-14
-"""Mass [kg] and principal inertia [kg m^2] of links without: the library asks for some."""
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """A body that is fixed to a link.
+
+    Attributes:
+        link: name of the link.
+        mass: [kg].
+        centre: (3,) its centre of mass in the frame of the link [m].
+        inertia: xx, xy, yy, xz, yz, zz about that centre, axes of the link [kg m^2].
+    """
+
+    link: str
+    mass: float
+    centre: tuple[float, ...]
+    inertia: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class TreePart:
+    """What moves of a URDF, and how it is driven.
+
+    Attributes:
+        joints: that move on their own, in this order; the link of the last one carries payloads.
+        locked: position of those that stand still [rad or m].
+        motors: joints that are commanded, in the order of the commands.
+        effort_gain: force per unit of commands and measured efforts, by joint; 1 where none
+            stands [N m or N per unit].
+        loads: known ones.
+    """
+
+    joints: tuple[str, ...]
+    locked: Mapping[str, float] = field(default_factory=dict)
+    motors: tuple[str, ...] = ()
+    effort_gain: Mapping[str, float] = field(default_factory=dict)
+    loads: tuple[Load, ...] = ()
+
+    def gains(self, joints: tuple[str, ...]) -> np.ndarray:
+        """Return the force per unit of the effort of some joints, (n,) [N m or N per unit]."""
+        return np.array([self.effort_gain.get(name, 1.0) for name in joints])
+
+
+@dataclass(frozen=True, slots=True)
+class Follower:
+    """A joint without a motion of its own, `position = multiplier * leader + offset`.
+
+    Attributes:
+        name: of the joint.
+        leader: joint with a motion of its own.
+        multiplier: position per position of the leader.
+        offset: position where the leader is at 0 [rad or m].
+    """
+
+    name: str
+    leader: str
+    multiplier: float
+    offset: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,19 +79,20 @@ class TreeText:
     """What a simulation needs of a URDF.
 
     Attributes:
-        name: of the robot.
-        joints: k that move on their own, in the order of the file.
+        urdf: the file.
+        part: what of it is simulated; None for all.
+        joints: k that move on their own, in the order of the file or of the part.
         followers: joints that follow one of them.
         friction: (k,) dry friction of `<dynamics>`, with that of followers [N m or N].
         command_joints: those with an effort interface in `ros2_control`; where none has one, those
-            with any; all without such a block.
-        last_joint: the joint nearest to `tool0`, or the last one of the file.
+            with any; all without such a block; those of the part where there is one.
+        last_joint: the joint nearest to `tool0`, or the last one.
         last_link: the link on it.
         tool_link: `tool0`, or the last link.
-        stand_ins: links with a ball in place of a body, see `stand_in_bodies`.
     """
 
-    name: str
+    urdf: Urdf
+    part: TreePart | None
     joints: tuple[SimulatedJoint, ...]
     followers: tuple[Follower, ...]
     friction: tuple[float, ...]
@@ -46,159 +100,86 @@ class TreeText:
     last_joint: str
     last_link: str
     tool_link: str
-    stand_ins: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Name of the robot."""
+        return self.urdf.name
+
+    @property
+    def stand_ins(self) -> tuple[str, ...]:
+        """Moving links with a ball in place of a body: all, of a file that states no inertia.
+
+        Such a file tells the kinematics alone. Each link becomes a solid ball halfway to its next
+        joints, so that the robot can be moved; its efforts are those of no real machine.
+        """
+        if '<inertial' in self.urdf.plain:
+            return ()
+        return tuple(j.child for j in self.urdf.joints.values() if j.kind in MOVING)
 
 
-def read_tree(urdf: str, part: TreePart | None = None) -> TreeText:
+def read_tree(text: str, part: TreePart | None = None) -> TreeText:
     """Return the joints of a URDF text.
 
     Args:
-        urdf: the text, of the part where there is one.
-        part: says which joints have motors and which one is the last; None leaves it to the file.
+        text: the URDF.
+        part: says what of it is simulated; None leaves it to the file.
 
     Raises:
         ConfigError: no URDF, or joints that are no single degree of freedom.
     """
-    root = root_of(urdf)
-    moving = {j.get('name', ''): j for j in root.findall('joint') if j.get('type') != 'fixed'}
-    for name, joint in moving.items():
-        if joint.get('type') not in MOVING:
-            raise ConfigError(
-                f'joint {name!r} of type {joint.get("type")}', f'one of {[*MOVING, "fixed"]}'
-            )
-    followers = read_followers(root)
-    own = {name: joint for name, joint in moving.items() if name not in followers}
-    if not own:
-        raise ConfigError(f'robot {root.get("name")!r} without a moving joint', 'one at least')
-    tool, last = _ends(root, own)
-    last = last if part is None else own[part.joints[-1]]
+    urdf = parse_urdf(text)
+    locked = {} if part is None else part.locked
+    moving = [n for n, joint in urdf.joints.items() if joint.kind in MOVING and n not in locked]
+    followers = {
+        name: Follower(name, leader, multiplier, offset)
+        for name in moving
+        for leader, multiplier, offset in [leader_of(urdf, name)]
+        if leader != name
+    }
+    own = [n for n in moving if n not in followers] if part is None else list(part.joints)
+    tool, last = _ends(urdf, own)
+    last = last if part is None else own[-1]
+    driven = urdf.commanded
+    motors = tuple(n for n in own if driven is None or n in driven)
     return TreeText(
-        root.get('name') or 'robot',
-        tuple(_joint(joint) for joint in own.values()),
+        urdf,
+        part,
+        tuple(_joint(urdf, name) for name in own),
         tuple(followers.values()),
-        tuple(_dry(name, moving, followers) for name in own),
-        _driven(root, tuple(own)) if part is None else part.motors,
-        last.get('name', ''),
-        link_of(last, 'child'),
+        tuple(_dry(urdf, name, followers) for name in own),
+        motors if part is None else part.motors,
+        last,
+        urdf.joints[last].child,
         tool,
-        tuple(stand_in_bodies(root)),
     )
 
 
-def _ends(root: ET.Element, own: Mapping[str, ET.Element]) -> tuple[str, ET.Element]:
+def _joint(urdf: Urdf, name: str) -> SimulatedJoint:
+    joint = urdf.joints[name]
+    return SimulatedJoint(
+        name,
+        is_prismatic=joint.kind == 'prismatic',
+        is_continuous=joint.kind == 'continuous',
+        lower=joint.lower,
+        upper=joint.upper,
+        effort=joint.effort or math.inf,
+    )
+
+
+def _ends(urdf: Urdf, own: list[str]) -> tuple[str, str]:
     """Return the link of the tool and the joint with a motion of its own that carries it."""
-    carried = {link_of(joint, 'child'): joint for joint in root.findall('joint')}
-    final = list(own.values())[-1]
-    tool = 'tool0' if 'tool0' in carried else link_of(final, 'child')
+    carried = {joint.child: joint for joint in urdf.joints.values()}
+    tool = 'tool0' if 'tool0' in carried else urdf.joints[own[-1]].child
     last = carried[tool]
-    while last.get('name') not in own and link_of(last, 'parent') in carried:
-        last = carried[link_of(last, 'parent')]
-    return tool, last if last.get('name') in own else final
+    while last.name not in own and last.parent in carried:
+        last = carried[last.parent]
+    return tool, last.name if last.name in own else own[-1]
 
 
-def _dry(name: str, moving: Mapping[str, ET.Element], followers: Mapping[str, Follower]) -> float:
+def _dry(urdf: Urdf, name: str, followers: Mapping[str, Follower]) -> float:
     """Return the dry friction of a joint and of those that follow it."""
     ratios = {f.name: abs(f.multiplier) for f in followers.values() if f.leader == name}
     return sum(
-        ratio * number_of(moving[joint].find('dynamics'), 'friction', 0.0)
-        for joint, ratio in {name: 1.0, **ratios}.items()
-    )
-
-
-def _driven(root: ET.Element, names: tuple[str, ...]) -> tuple[str, ...]:
-    interfaces = [
-        (joint.get('name', ''), interface.get('name'))
-        for block in root.iter('ros2_control')
-        for joint in block.iter('joint')
-        for interface in joint.iter('command_interface')
-    ]
-    driven = {joint for joint, kind in interfaces if kind == 'effort'}
-    driven = driven or {joint for joint, _ in interfaces}
-    return tuple(name for name in names if name in driven or not driven)
-
-
-def plain_tree(urdf: str, tree: TreeText, payload: tuple[float, float, float, float]) -> str:
-    """Return links, inertias and joints alone, with a payload `(mass, x, y, z)` on the last link.
-
-    Links are renamed `link:NAME`: a name such as `world` means something to the library.
-    """
-    root = root_of(urdf)
-    plain = ET.Element('robot', name='tree')
-    options = {
-        'fusestatic': 'false', 'balanceinertia': 'false', 'discardvisual': 'true',
-        'boundmass': repr(_SMALLEST), 'boundinertia': repr(_SMALLEST),
-    }  # fmt: skip
-    ET.SubElement(ET.SubElement(plain, 'mujoco'), 'compiler', options)
-    stand_ins = stand_in_bodies(root)
-    for link in root.findall('link'):
-        name = link.get('name', '')
-        copy = ET.SubElement(plain, 'link', name=_PREFIX + name)
-        copy.extend([stand_ins[name]] if name in stand_ins else link.findall('inertial'))
-    for joint in root.findall('joint'):
-        kind = 'continuous' if joint.get('type') == 'revolute' else joint.get('type', '')
-        copy = ET.SubElement(plain, 'joint', name=joint.get('name', ''), type=kind)
-        for end in ('parent', 'child'):
-            ET.SubElement(copy, end, link=_PREFIX + link_of(joint, end))
-        copy.extend(x for tag in ('origin', 'axis') for x in joint.findall(tag))
-        damping = number_of(joint.find('dynamics'), 'damping', 0.0)
-        ET.SubElement(copy, 'dynamics', damping=repr(damping))
-        if kind == 'prismatic':
-            ET.SubElement(copy, 'limit', lower='-1e9', upper='1e9', effort='0', velocity='0')
-    if payload[0] > 0.0:
-        _add_payload(plain, _PREFIX + tree.last_link, payload)
-    return ET.tostring(plain, encoding='unicode')
-
-
-def stand_in_bodies(root: ET.Element) -> dict[str, ET.Element]:
-    """Return a body for each moving link of a URDF that states no inertia at all, by link.
-
-    Such a file tells the kinematics alone. Each link becomes a solid ball halfway to its next
-    joints, so that the robot can be moved; its efforts are those of no real machine.
-    """
-    if root.find('.//inertial') is not None:
-        return {}
-    joints = root.findall('joint')
-    bodies = {}
-    for link in [link_of(joint, 'child') for joint in joints if joint.get('type') in MOVING]:
-        following = [
-            vector_of(joint.find('origin'), 'xyz', '0 0 0')
-            for joint in joints if link_of(joint, 'parent') == link
-        ]  # fmt: skip
-        middle = [sum(x) / (2.0 * len(following)) for x in zip(*following, strict=True)]
-        body = ET.Element('inertial')
-        ET.SubElement(body, 'origin', xyz=' '.join(map(repr, middle or (0.0, 0.0, 0.0))))
-        ET.SubElement(body, 'mass', value=repr(STAND_IN_MASS))
-        about = 0.4 * STAND_IN_MASS * STAND_IN_RADIUS**2
-        tensor = dict.fromkeys(('ixx', 'iyy', 'izz'), repr(about))
-        ET.SubElement(body, 'inertia', dict.fromkeys(('ixy', 'ixz', 'iyz'), '0') | tensor)
-        bodies[link] = body
-    return bodies
-
-
-def tree_link(name: str) -> str:
-    """Return the name that a link has in `plain_tree`."""
-    return _PREFIX + name
-
-
-def _add_payload(plain: ET.Element, link: str, payload: tuple[float, float, float, float]) -> None:
-    body = ET.SubElement(ET.SubElement(plain, 'link', name=_PAYLOAD), 'inertial')
-    ET.SubElement(body, 'mass', value=repr(payload[0]))
-    tensor = dict.fromkeys(('ixx', 'iyy', 'izz', 'ixy', 'ixz', 'iyz'), '0')
-    ET.SubElement(body, 'inertia', tensor)
-    joint = ET.SubElement(plain, 'joint', name=_PAYLOAD, type='fixed')
-    ET.SubElement(joint, 'parent', link=link)
-    ET.SubElement(joint, 'child', link=_PAYLOAD)
-    ET.SubElement(joint, 'origin', xyz=' '.join(map(repr, payload[1:])))
-
-
-def _joint(joint: ET.Element) -> SimulatedJoint:
-    limit, kind = joint.find('limit'), joint.get('type')
-    is_free = kind == 'continuous'
-    return SimulatedJoint(
-        joint.get('name', ''),
-        is_prismatic=kind == 'prismatic',
-        is_continuous=is_free,
-        lower=-math.inf if is_free else number_of(limit, 'lower', -math.inf),
-        upper=math.inf if is_free else number_of(limit, 'upper', math.inf),
-        effort=number_of(limit, 'effort', math.inf) or math.inf,
+        ratio * urdf.joints[joint].friction for joint, ratio in {name: 1.0, **ratios}.items()
     )

@@ -132,11 +132,11 @@ def test_last_joint_carries_the_tool():
     [
         ('<robot', 'no XML'),
         ('<model/>', '<model>'),
-        ('<robot name="r"><link name="a"/></robot>', 'without a moving joint'),
+        ('<robot name="r"><link name="a"/></robot>', 'no joint that moves'),
         ('<!DOCTYPE robot><robot name="r"/>', 'document type'),
         (pendulum().replace('"continuous"', '"floating"'), 'floating'),
         (pendulum(mass=0.0, inertia=0.0), 'mass'),
-        (pendulum().replace('child link="bob"', 'child'), 'without <child>'),
+        (pendulum().replace('child link="bob"', 'child'), 'joint hinge names the links'),
     ],
 )
 def test_texts_that_are_no_tree_are_refused_in_one_line(text, part):

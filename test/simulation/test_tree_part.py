@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import re
-from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.simulation.assembly import make_simulation
-from sgp_ros.simulation.followers import Follower, read_followers
 from sgp_ros.simulation.recording import simulate
 from sgp_ros.simulation.sensors import Sensors
 from sgp_ros.simulation.tree import Tree
-from sgp_ros.simulation.tree_part import Load, TreePart
 from sgp_ros.simulation.tree_simulator import tree_simulator
-from sgp_ros.simulation.tree_text import read_tree
+from sgp_ros.simulation.tree_text import Follower, Load, TreePart, read_tree
 from test.simulation.test_tree import random_urdf
 from test.simulation.trees import arm, pendulum
 
@@ -108,12 +105,13 @@ def test_who_follows_a_follower_follows_its_leader():
     """`-3 (2 q + 0.5) + 1 = -6 q - 0.5`."""
     joints = {'a': '', 'b': 'joint="a" multiplier="2" offset="0.5"',
               'c': 'joint="b" multiplier="-3" offset="1"'}  # fmt: skip
-    text = ''.join(
-        f'<joint name="{name}" type="revolute">{f"<mimic {said}/>" if said else ""}</joint>'
+    text = '<link name="base"/>' + ''.join(
+        f'<link name="{name}"/><joint name="{name}" type="continuous"><parent link="base"/>'
+        f'<child link="{name}"/>{f"<mimic {said}/>" if said else ""}</joint>'
         for name, said in joints.items()
     )
-    followers = read_followers(ET.fromstring(f'<robot>{text}</robot>'))
-    assert followers['c'] == Follower('c', 'a', -6.0, -0.5)
+    _, last = read_tree(f'<robot name="r">{text}</robot>').followers
+    assert last == Follower('c', 'a', -6.0, -0.5)
 
 
 def test_dry_friction_of_a_follower_is_felt_by_its_leader():
