@@ -153,7 +153,7 @@ def test_the_page_opens_with_the_sentence_and_needs_no_other_file(tmp_path):
     page = (tmp_path / 'report.html').read_text()
     order = (
         verdict_sentence(found).replace('+-', '±'), '<h2>Where', '<h2>What', COULOMB.formula,
-        'why they lost', '<h2>How much better', '3 states refused',
+        'why they were rejected', '<h2>How much better', '3 states refused',
     )  # fmt: skip
     at = [page.index(text) for text in order]
     assert at == sorted(at)
