@@ -15,6 +15,7 @@ from sgp_ros.gp.factor import length_for
 from sgp_ros.gp.factor_loops import absorb_column, solve_lower
 from sgp_ros.gp.model import CoefficientPrior
 from sgp_ros.gp.online import OnlineRegression
+from sgp_ros.gp.regression import Memory
 
 SIZES = (250, 500, 1000, 2000)
 SHAPES = ((1, 8), (1, 21), (7, 21))
@@ -113,7 +114,7 @@ def _blocks() -> int:
 
 def _full(problem: Problem, n: int) -> OnlineRegression:
     prior = CoefficientPrior.flat(problem.F.shape[2])
-    online = OnlineRegression(problem.model, prior, n)
+    online = OnlineRegression(problem.model, prior, Memory(n))
     for u, f, y in zip(problem.U[:n], problem.F[:n], problem.y[:n], strict=True):
         online.learn(online.predict(u, f), y)
     return online

@@ -29,6 +29,7 @@ from sgp_ros.gp.methods import METHODS, FitOptions
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.posterior import Posterior
+from sgp_ros.gp.regression import Memory
 from sgp_ros.gp.scores import coverage95, nlpd, nmse
 from sgp_ros.recordings.model_files import load_parameters
 from sgp_ros.recordings.reader import open_recording
@@ -184,7 +185,7 @@ def _methods(data, prior, inputs, every, first):
     sgp_model, plain = fits['SGP'].model, fits['PR'].model
 
     def physics():
-        return _Joint(OnlineRegression(plain, prior, 1))
+        return _Joint(OnlineRegression(plain, prior, Memory(1)))
 
     methods = {
         'RLS, physics alone': physics(),
@@ -192,9 +193,13 @@ def _methods(data, prior, inputs, every, first):
         'RLS, then ISSGPR': _Features(fits['PRGP'].model, physics(), first),
     }
     for policy in ('oldest', 'least_informative', 'coverage'):
-        online = OnlineRegression(sgp_model, prior, BUDGET, features=FEATURES, policy=policy)
+        online = OnlineRegression(
+            sgp_model, prior, Memory(BUDGET, features=FEATURES, policy=policy)
+        )
         methods[f'SGP, exact, {policy}'] = _Joint(online)
-    methods['SGP, basis'] = _Joint(InducingPointRegression(sgp_model, prior, BUDGET, FEATURES))
+    methods['SGP, basis'] = _Joint(
+        InducingPointRegression(sgp_model, prior, Memory(BUDGET, FEATURES))
+    )
     return methods, sgp_model
 
 

@@ -27,6 +27,7 @@ from sgp_ros.gp.kernels import SquaredExponential
 from sgp_ros.gp.learning import learn
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.online import OnlineRegression
+from sgp_ros.gp.regression import Memory
 from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.recordings.model_files import load_parameters
 from sgp_ros.recordings.reader import open_recording
@@ -60,11 +61,11 @@ def _ways(model):
     yield from (
         (
             f'exact, {policy}',
-            OnlineRegression(model, PRIOR, BUDGET, features=FEATURES, policy=policy),
+            OnlineRegression(model, PRIOR, Memory(BUDGET, features=FEATURES, policy=policy)),
         )
         for policy in ('oldest', 'least_informative', 'coverage')
     )
-    yield 'basis', InducingPointRegression(model, PRIOR, BUDGET, FEATURES)
+    yield 'basis', InducingPointRegression(model, PRIOR, Memory(BUDGET, FEATURES))
 
 
 def _one_world(online, data, w):

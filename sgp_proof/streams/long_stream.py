@@ -24,6 +24,7 @@ from sgp_ros.gp.learning import initial_model, learn, screened
 from sgp_ros.gp.model import CoefficientPrior, Observations
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.posterior import Posterior
+from sgp_ros.gp.regression import Memory
 from sgp_ros.gp.scores import RunningScore
 
 BLOCK, FIRST, BUDGET, FEATURES, QUERIES = 20_000, 400, 300, 150, 1000
@@ -76,11 +77,13 @@ def _resident_mb():
 def _ways(model):
     ways = {
         f'exact, {policy}': lambda policy=policy: OnlineRegression(
-            model, PRIOR, BUDGET, features=FEATURES, policy=policy
+            model, PRIOR, Memory(BUDGET, features=FEATURES, policy=policy)
         )
         for policy in ('oldest', 'least_informative', 'coverage')
     }
-    return ways | {'basis': lambda: InducingPointRegression(model, PRIOR, BUDGET, FEATURES)}
+    return ways | {
+        'basis': lambda: InducingPointRegression(model, PRIOR, Memory(BUDGET, FEATURES))
+    }
 
 
 def _stream(online, world, queries, samples):

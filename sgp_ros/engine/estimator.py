@@ -13,9 +13,9 @@ from sgp_ros.engine.hyperparameters import kernel_named
 from sgp_ros.engine.prior_knowledge import (
     complement_columns,
     empty_regression,
+    memory_of_settings,
     model_of_settings,
     prior_of_robot,
-    sample_budget,
 )
 from sgp_ros.engine.results import Channel, Counts, Estimate
 from sgp_ros.engine.windows import Equation
@@ -23,12 +23,9 @@ from sgp_ros.errors import NumericalError
 from sgp_ros.gp.learning import initial_model
 from sgp_ros.gp.model import Model, Observations
 from sgp_ros.gp.online import OnlineRegression
-from sgp_ros.gp.regression import OnlinePrediction, Regression
+from sgp_ros.gp.regression import Memory, OnlinePrediction, Regression
 from sgp_ros.gp.scores import DriftTest, RunningScore
 from sgp_ros.robots.robot import Robot
-
-_BASELINE_BUDGET = 1
-_KEEPING = ('buffer_budget', 'buffer_remember', 'buffer_policy', 'forgetting_samples')
 
 Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Input u (4 k,), regressor f (k, p) and target y (k,) of one equation."""
@@ -91,25 +88,16 @@ class Estimator:
         if self.regression is None:
             return
         model = model_of_settings(config, self.inputs, self.regression.model)
-        if model == self.regression.model and all(
-            getattr(config, name) == getattr(old, name) for name in _KEEPING
-        ):
+        memory = memory_of_settings(config)
+        if model == self.regression.model and memory == self.regression.memory:
             return
-        forgetting = config.forgetting_samples
-        is_faded_anew = forgetting != old.forgetting_samples
         try:
-            self.regression.change(
-                model,
-                sample_budget(config),
-                remember=config.buffer_remember,
-                policy=config.buffer_policy if config.buffer_policy != old.buffer_policy else None,
-                forgetting=forgetting if is_faded_anew else None,
-            )
+            self.regression.change(model, memory)
         except NumericalError:
             self._config = old
             raise
-        if is_faded_anew and self.baseline is not None:
-            self.baseline.change(forgetting=forgetting)
+        if self.baseline is not None and config.forgetting_samples != old.forgetting_samples:
+            self.baseline.change(memory=_baseline_memory(config))
         self._refresh_baseline()
 
     def _refresh_baseline(self) -> None:
@@ -257,8 +245,7 @@ class Estimator:
 
     def make_baseline(self, model: Model) -> OnlineRegression:
         """Return an empty model of the physics alone."""
-        forgetting = self._config.forgetting_samples
-        return OnlineRegression(model, self._prior, _BASELINE_BUDGET, forgetting=forgetting)
+        return OnlineRegression(model, self._prior, _baseline_memory(self._config))
 
     def _start(self, arrays: list[Arrays]) -> None:
         """Make the first model from what was gathered, then learn that."""
@@ -294,3 +281,7 @@ class Estimator:
             is_scored=False,
             is_learned=self._config.learning_enabled,
         )
+
+
+def _baseline_memory(config: EngineConfig) -> Memory:
+    return Memory(1, forgetting=config.forgetting_samples)

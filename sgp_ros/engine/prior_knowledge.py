@@ -9,7 +9,7 @@ from sgp_ros.gp.inducing_regression import InducingPointRegression
 from sgp_ros.gp.kernel import Kernel
 from sgp_ros.gp.model import CoefficientPrior, Model
 from sgp_ros.gp.online import OnlineRegression
-from sgp_ros.gp.regression import Regression
+from sgp_ros.gp.regression import Memory, Regression
 from sgp_ros.robots.robot import Robot
 
 
@@ -36,38 +36,27 @@ def prior_of_robot(robot: Robot, config: EngineConfig) -> CoefficientPrior:
     return CoefficientPrior.from_std(mean, std)
 
 
-def sample_budget(config: EngineConfig) -> int:
-    """Return how many samples a model may keep.
+def memory_of_settings(config: EngineConfig) -> Memory:
+    """Return what a model keeps of the stream.
 
-    In a basis they are there to be fitted to, so they suffice for a fit.
+    In a basis the samples are there to be fitted to, so they suffice for a fit.
     """
+    budget = config.buffer_budget
     if config.buffer_mode == 'basis':
-        return max(config.buffer_budget, config.learning_initial)
-    return config.buffer_budget
+        budget = max(budget, config.learning_initial)
+    return Memory(
+        budget,
+        config.basis_features,
+        config.buffer_remember,
+        config.buffer_policy,
+        config.forgetting_samples,
+    )
 
 
 def empty_regression(model: Model, prior: CoefficientPrior, config: EngineConfig) -> Regression:
     """Return the kind of model that the settings name, before any sample."""
-    budget, remember = sample_budget(config), config.buffer_remember
-    forgetting = config.forgetting_samples
-    if config.buffer_mode == 'basis':
-        return InducingPointRegression(
-            model,
-            prior,
-            budget,
-            config.basis_features,
-            remember=remember,
-            forgetting=forgetting,
-        )
-    return OnlineRegression(
-        model,
-        prior,
-        budget,
-        features=config.basis_features,
-        remember=remember,
-        policy=config.buffer_policy,
-        forgetting=forgetting,
-    )
+    kind = InducingPointRegression if config.buffer_mode == 'basis' else OnlineRegression
+    return kind(model, prior, memory_of_settings(config))
 
 
 def complement_columns(robot: Robot) -> set[int]:

@@ -16,41 +16,27 @@ from sgp_ros.gp.factor import Whitening, part_of
 from sgp_ros.gp.inducing_information import InducingInformation
 from sgp_ros.gp.information import Forgetting, Information
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
-from sgp_ros.gp.regression import OnlinePrediction
+from sgp_ros.gp.regression import Memory, OnlinePrediction, Regression
 
 
-class InducingPointRegression:
+class InducingPointRegression(Regression):
     """The posterior after each sample, in a basis of bounded size.
 
     Args:
         model: hyper-parameters, k kernels and k noise variances.
         prior: of W.
-        budget: most samples kept for fits of the hyper-parameters, the last ones.
-        features: most features of each component.
-        remember: whether other hyper-parameters take over what samples told that are gone.
-        forgetting: samples after which what was learned counts 1/e; 0 never forgets.
+        memory: how many samples are kept for fits of the hyper-parameters, the last ones, and how
+            many inducing points there may be.
     """
 
-    def __init__(
-        self,
-        model: Model,
-        prior: CoefficientPrior,
-        budget: int,
-        features: int,
-        *,
-        remember: bool = True,
-        forgetting: float = 0.0,
-    ) -> None:
-        self._prior = Information.of_prior(prior)
-        self._forgetting = Forgetting(forgetting, self._prior)
-        self._features = features
-        self._budget = budget
-        self._remember = remember
+    def __init__(self, model: Model, prior: CoefficientPrior, memory: Memory) -> None:
+        super().__init__(prior, memory)
         self._model = model
-        self._version = 0
         self._gone = 0
-        self._samples = SampleBuffer.empty(len(model.kernels), prior.size).with_room(budget + 1)
-        self._basis = InducingInformation(model, self._prior, features)
+        self._samples = SampleBuffer.empty(len(model.kernels), prior.size).with_room(
+            memory.budget + 1
+        )
+        self._basis = InducingInformation(model, self._prior, memory.features)
 
     @property
     def model(self) -> Model:
@@ -90,10 +76,10 @@ class InducingPointRegression:
     @property
     def base(self) -> Information:
         """What the prior tells of W, and those that are gone beside the kept samples. O(n m^2)."""
-        if not (self._remember and self._gone):
+        if not (self._memory.remember and self._gone):
             return self._prior.copy()
         kept = InducingInformation.of_samples(
-            self._model, self._prior, self._features, self._samples
+            self._model, self._prior, self._memory.features, self._samples
         )
         gone = self._basis.total.less(kept.total)
         return self._prior.with_rows(gone.R, gone.z)
@@ -129,8 +115,7 @@ class InducingPointRegression:
         Raises:
             ValueError: the model changed since the prediction.
         """
-        if prediction.version != self._version:
-            raise ValueError('the prediction was made before the last change of the model')
+        self._require_current(prediction)
         data = np.concatenate([prediction.f, y[:, None]], axis=1)  # (k, p + 1)
         self._learn(prediction.u, prediction.whitenings, data)
 
@@ -149,43 +134,33 @@ class InducingPointRegression:
         self._keep_to_budget()
 
     def _keep_to_budget(self) -> None:
-        while self.size > self._budget:
+        while self.size > self._memory.budget:
             self._samples.drop(0)
             self._gone += 1
 
-    def change(
-        self,
-        model: Model | None = None,
-        budget: int | None = None,
-        *,
-        remember: bool | None = None,
-        policy: str | None = None,
-        forgetting: float | None = None,
-    ) -> None:
-        """Take other hyper-parameters, budget or memory; `policy` says nothing here.
+    def change(self, model: Model | None = None, memory: Memory | None = None) -> None:
+        """Take other hyper-parameters, another memory, or both.
 
         While the kept samples are the whole stream, it is learned again under other
-        hyper-parameters; later what it told is taken over (`gp.inducing_information`), or
-        without memory the kept samples are learned again. O(k m^3 + n k m^2).
+        hyper-parameters; later its information is taken over (`gp.inducing_information`), or
+        without remembering the kept samples are learned again. O(k m^3 + n k m^2).
         """
-        del policy
-        self._remember = self._remember if remember is None else remember
+        memory = memory or self._memory
         if model is not None and model != self._model:
-            if self._gone and not self._remember:
+            if self._gone and not memory.remember:
                 self._basis = InducingInformation.of_samples(
-                    model, self._prior, self._features, self._samples
+                    model, self._prior, memory.features, self._samples
                 )
                 self._gone = 0
             else:
                 self._basis = self._basis.under(model, self._samples, is_whole=not self._gone)
             self._model = model
             self._version += 1
-        if budget:
-            self._budget = budget
-            self._keep_to_budget()
-            self._samples = self._samples.with_room(budget + 1)
-        if forgetting is not None:
-            self._forgetting = Forgetting(forgetting, self._prior)
+        if memory.forgetting != self._memory.forgetting:
+            self._forgetting = Forgetting(memory.forgetting, self._prior)
+        self._memory = memory
+        self._keep_to_budget()
+        self._samples = self._samples.with_room(memory.budget + 1)
 
     def state(self) -> dict[str, np.ndarray]:
         """Return everything that was learned, as arrays; `restore` takes it back."""
@@ -199,9 +174,11 @@ class InducingPointRegression:
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue exactly where `state` was taken."""
-        self._samples = SampleBuffer(state['U'], state['data'], state['weights'], self._budget + 1)
+        self._samples = SampleBuffer(
+            state['U'], state['data'], state['weights'], self._memory.budget + 1
+        )
         self._gone, self._forgetting.turn = (int(count) for count in state['counts'])
         self._basis = InducingInformation.restored(
-            self._model, self._prior, self._features, part_of(state, 'basis_')
+            self._model, self._prior, self._memory.features, part_of(state, 'basis_')
         )
         self._version += 1

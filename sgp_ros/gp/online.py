@@ -19,41 +19,22 @@ from sgp_ros.gp.factor import Whitening, part_of
 from sgp_ros.gp.inducing_information import GradualFill, InducingInformation
 from sgp_ros.gp.information import Forgetting, Information
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
-from sgp_ros.gp.regression import OnlinePrediction
+from sgp_ros.gp.regression import Memory, OnlinePrediction, Regression
 
 
-class OnlineRegression:
+class OnlineRegression(Regression):
     """The posterior after each sample.
 
     Args:
         model: hyper-parameters, k kernels and k noise variances.
         prior: of W.
-        budget: most samples that Z is conditioned on.
-        features: most features of each component by which W keeps what dropped samples told.
-        remember: whether it does; else it is known from the prior and the buffer.
-        policy: which sample leaves a full buffer, a key of `RETENTIONS`.
-        forgetting: samples after which information on W counts 1/e; 0 never forgets.
+        memory: how many samples Z is conditioned on, and what W keeps of the others.
     """
 
-    def __init__(
-        self,
-        model: Model,
-        prior: CoefficientPrior,
-        budget: int,
-        *,
-        features: int = 100,
-        remember: bool = True,
-        policy: str = 'oldest',
-        forgetting: float = 0.0,
-    ) -> None:
-        self._prior = Information.of_prior(prior)
-        self._forgetting = Forgetting(forgetting, self._prior)
-        self._features = features
-        self._budget = budget
-        self._remember = remember
-        self._version = 0
+    def __init__(self, model: Model, prior: CoefficientPrior, memory: Memory) -> None:
+        super().__init__(prior, memory)
         samples = SampleBuffer.empty(len(model.kernels), prior.size)
-        self._held = FactoredBuffer(model, samples, budget + 1, policy)
+        self._held = FactoredBuffer(model, samples, memory.budget + 1, memory.policy)
         self._total = self._prior.copy()
         self._basis: InducingInformation | None = None
         self._ahead: GradualFill | None = None
@@ -124,8 +105,7 @@ class OnlineRegression:
             ValueError: the model changed since the prediction.
             NumericalError: the sample repeats others to rounding; nothing has changed.
         """
-        if prediction.version != self._version:
-            raise ValueError('the prediction was made before the last change of the model')
+        self._require_current(prediction)
         self._held.require_room(prediction.whitenings)
         self._version += 1
         if self._forgetting.factor != 1.0:
@@ -152,7 +132,7 @@ class OnlineRegression:
         n = len(data.U)
         rows = np.concatenate([data.F, data.y[..., None]], axis=2)
         samples = SampleBuffer(data.U, rows, np.ones(n), n)
-        room = max(self._budget, n) + 1
+        room = max(self._memory.budget, n) + 1
         self._take(FactoredBuffer(self.model, samples, room, self._held.policy))
         self._keep_to_budget()
 
@@ -164,18 +144,18 @@ class OnlineRegression:
             self._basis.fade(self._forgetting)
 
     def _look_ahead(self) -> None:
-        if self._basis is None and self._remember:
-            room = self._budget - self.size
+        if self._basis is None and self._memory.remember:
+            room = self._memory.budget - self.size
             # What fades as it ages can be absorbed only at the end.
             if room < 0 or self._forgetting.factor == 1.0:
                 if self._ahead is None:
-                    basis = InducingInformation(self.model, self._prior, self._features)
+                    basis = InducingInformation(self.model, self._prior, self._memory.features)
                     self._ahead = GradualFill(basis)
                 self._ahead.catch_up(self._held.samples, room)
 
     def _keep_to_budget(self) -> None:
         self._look_ahead()
-        while self.size > self._budget:
+        while self.size > self._memory.budget:
             if self._ahead is not None:
                 self._basis, self._ahead = self._ahead.information, None
             self._held.drop()
@@ -201,19 +181,13 @@ class OnlineRegression:
             NumericalError: the buffer has no factor in double precision; nothing has changed.
         """
         before = self._held
-        self._take(FactoredBuffer(self.model, before.samples, self._budget + 1, before.policy))
+        self._take(
+            FactoredBuffer(self.model, before.samples, self._memory.budget + 1, before.policy)
+        )
         return before.distance(self._held)
 
-    def change(
-        self,
-        model: Model | None = None,
-        budget: int | None = None,
-        *,
-        remember: bool | None = None,
-        policy: str | None = None,
-        forgetting: float | None = None,
-    ) -> None:
-        """Take other hyper-parameters, budget, memory or policy.
+    def change(self, model: Model | None = None, memory: Memory | None = None) -> None:
+        """Take other hyper-parameters, another memory, or both.
 
         O(n^3) for each factor whose hyper-parameters or room are others than before.
 
@@ -221,19 +195,17 @@ class OnlineRegression:
             NumericalError: the buffer has no factor under the new hyper-parameters; nothing has
                 changed.
         """
-        model, policy = model or self.model, policy or self._held.policy
-        budget = budget or self._budget
-        remember = self._remember if remember is None else remember
+        model, memory = model or self.model, memory or self._memory
         samples = self._held.samples
-        room = max(budget, self.size) + 1
-        held = FactoredBuffer(model, samples, room, policy, before=self._held)
-        basis = self._basis if remember else None
+        room = max(memory.budget, self.size) + 1
+        held = FactoredBuffer(model, samples, room, memory.policy, before=self._held)
+        basis = self._basis if memory.remember else None
         if basis is not None and model != self.model:
             basis = basis.under(model, samples, is_whole=False)
-        self._budget, self._remember, self._basis = budget, remember, basis
+        if memory.forgetting != self._memory.forgetting:
+            self._forgetting = Forgetting(memory.forgetting, self._prior)
+        self._memory, self._basis = memory, basis
         self._take(held)
-        if forgetting is not None:
-            self._forgetting = Forgetting(forgetting, self._prior)
         self._ahead = None
         self._keep_to_budget()
 
@@ -250,14 +222,14 @@ class OnlineRegression:
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue exactly where `state` was taken."""
-        self._held.restore(state, self._budget + 1)
+        self._held.restore(state, self._memory.budget + 1)
         self._total = Information(np.array(state['total_R']), np.array(state['total_z']))
         self._forgetting.turn = int(state['turn'])
         basis = part_of(state, 'basis_')
         self._basis = None
         if basis:
             self._basis = InducingInformation.restored(
-                self.model, self._prior, self._features, basis
+                self.model, self._prior, self._memory.features, basis
             )
         self._ahead = None
         self._version += 1

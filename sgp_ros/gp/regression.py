@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from sgp_ros.gp.factor import Whitening
-from sgp_ros.gp.information import Information
-from sgp_ros.gp.model import Model, Observations
+from sgp_ros.gp.information import Forgetting, Information
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,58 +37,108 @@ class OnlinePrediction:
     gains: tuple[np.ndarray, ...] = ()
 
 
-class Regression(Protocol):
-    """The posterior of W and Z after each sample."""
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """How much of a stream a regression keeps, and for how long.
+
+    Attributes:
+        budget: most samples kept: those that Z is conditioned on, or that fits need.
+        features: most inducing points of each component.
+        remember: whether samples that are gone count for W, and for other hyper-parameters; else
+            the prior and the samples kept are all that does.
+        policy: which sample leaves a full buffer, a key of `RETENTIONS`; of inducing points it is
+            always the oldest.
+        forgetting: samples after which what was learned counts 1/e; 0 never forgets.
+    """
+
+    budget: int
+    features: int = 100
+    remember: bool = True
+    policy: str = 'oldest'
+    forgetting: float = 0.0
+
+
+class Regression(ABC):
+    """The posterior of W and Z after each sample.
+
+    Args:
+        prior: of W.
+        memory: what is kept of the stream.
+    """
+
+    def __init__(self, prior: CoefficientPrior, memory: Memory) -> None:
+        self._prior = Information.of_prior(prior)
+        self._memory = memory
+        self._forgetting = Forgetting(memory.forgetting, self._prior)
+        self._version = 0
 
     @property
+    def memory(self) -> Memory:
+        """What is kept of the stream."""
+        return self._memory
+
+    @property
+    @abstractmethod
     def model(self) -> Model:
         """Hyper-parameters in force."""
 
     @property
+    @abstractmethod
     def information(self) -> Information:
         """What is known of W."""
 
     @property
+    @abstractmethod
     def size(self) -> int:
         """Number of samples kept."""
 
     @property
+    @abstractmethod
     def buffer(self) -> Observations:
         """The samples kept."""
 
     @property
+    @abstractmethod
     def base(self) -> Information:
         """What the prior tells of W, and the samples that are gone beside those kept."""
 
     @property
+    @abstractmethod
     def unresolved(self) -> int:
         """Samples at which the basis of Z had no room; 0 while there is no basis."""
 
+    @abstractmethod
     def predict(self, u: np.ndarray, f: np.ndarray) -> OnlinePrediction:
         """Predict X at input u (d,) with regressor f (k, p)."""
 
+    @abstractmethod
     def with_regressor(self, prediction: OnlinePrediction, f: np.ndarray) -> OnlinePrediction:
         """Predict for another regressor f (k, p) at an input that Z sees as the same."""
 
+    @abstractmethod
     def learn(self, prediction: OnlinePrediction, y: np.ndarray) -> None:
         """Add the sample that `prediction` was made for, observed as y (k,)."""
 
+    @abstractmethod
     def learn_all(self, data: Observations) -> None:
         """Learn the first samples of a stream."""
 
-    def change(
-        self,
-        model: Model | None = None,
-        budget: int | None = None,
-        *,
-        remember: bool | None = None,
-        policy: str | None = None,
-        forgetting: float | None = None,
-    ) -> None:
-        """Take other hyper-parameters, budget, memory, policy or forgetting."""
+    @abstractmethod
+    def change(self, model: Model | None = None, memory: Memory | None = None) -> None:
+        """Take other hyper-parameters, another memory, or both.
 
+        Raises:
+            NumericalError: no factor exists under these hyper-parameters; nothing has changed.
+        """
+
+    @abstractmethod
     def state(self) -> dict[str, np.ndarray]:
         """Return everything that was learned, as arrays."""
 
+    @abstractmethod
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue exactly where `state` was taken."""
+
+    def _require_current(self, prediction: OnlinePrediction) -> None:
+        if prediction.version != self._version:
+            raise ValueError('the prediction was made before the last change of the model')

@@ -15,6 +15,7 @@ from sgp_ros.gp.learning import initial_model, learn
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.posterior import Posterior
+from sgp_ros.gp.regression import Memory
 
 NAMES = sorted(KERNELS)
 
@@ -152,7 +153,7 @@ def test_inducing_points_hold_every_kernel(name):
     """With as many inducing points as inputs, W and Z are those of the batch."""
     model, data = _stream(_kernel(name, 10), 30)
     prior = CoefficientPrior.from_std(np.zeros(1), np.ones(1))
-    online = InducingPointRegression(model, prior, 10, 60)
+    online = InducingPointRegression(model, prior, Memory(10, 60))
     online.learn_all(data)
     batch = Posterior(model, data, prior)
     u, f = np.array([0.1, -0.4, 0.7]), np.ones((1, 1))
@@ -168,7 +169,10 @@ def test_a_buffer_changes_hyperparameters_of_every_kernel(name):
     model, data = _stream(_kernel(name, 11), 25)
     other = Model((_kernel(name, 12),), (0.2,))
     prior = CoefficientPrior.from_std(np.zeros(1), np.ones(1))
-    changed, fresh = OnlineRegression(model, prior, 40), OnlineRegression(other, prior, 40)
+    changed, fresh = (
+        OnlineRegression(model, prior, Memory(40)),
+        OnlineRegression(other, prior, Memory(40)),
+    )
     for online in (changed, fresh):
         online.learn_all(data)
     changed.change(other)

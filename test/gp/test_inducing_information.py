@@ -13,6 +13,7 @@ from sgp_ros.gp.kernels import SquaredExponential
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.posterior import Posterior
+from sgp_ros.gp.regression import Memory
 from test.gp.worlds import plane, random_problem, returning
 
 
@@ -81,11 +82,11 @@ def _learn(online, data):
 
 
 def _exact(model, prior):
-    return OnlineRegression(model, prior, 20, features=60)
+    return OnlineRegression(model, prior, Memory(20, features=60))
 
 
 def _basis(model, prior):
-    return InducingPointRegression(model, prior, 20, 60)
+    return InducingPointRegression(model, prior, Memory(20, 60))
 
 
 WAYS = [_exact, _basis]

@@ -11,6 +11,7 @@ from sgp_ros.gp.inducing_regression import InducingPointRegression
 from sgp_ros.gp.kernels import SquaredExponential
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior
+from sgp_ros.gp.regression import Memory
 from sgp_ros.gp.rotations import (
     absorb_equation,
     absorbed_equations_numpy,
@@ -69,7 +70,7 @@ def test_compiled_solve_equals_that_of_the_library():
 def test_a_feature_for_every_sample_equals_batch(prior):
     """With room for all of them nothing is approximated: mean, covariance and W are exact."""
     model, data = _spread_out(random_problem(0, n=25)[1])
-    online = _learn(InducingPointRegression(model, prior, 100, 25), data)
+    online = _learn(InducingPointRegression(model, prior, Memory(100, 25)), data)
     batch = Posterior(model, data, prior)
     assert online.features == (25, 25)
     rng = np.random.default_rng(1)
@@ -93,7 +94,7 @@ def test_more_features_come_closer_to_the_exact_posterior():
     exact = [batch.predict(np.array([[x]]), zero[None]) for x in queries]
     errors = []
     for features in (2, 4, 6, 8, 30):
-        online = _learn(InducingPointRegression(model, PRIORS[1], 300, features), data)
+        online = _learn(InducingPointRegression(model, PRIORS[1], Memory(300, features)), data)
         found = [online.predict(np.array([x]), zero) for x in queries]
         errors.append(
             max(
@@ -110,7 +111,7 @@ def test_without_process_it_is_least_squares_on_everything():
     """Where Z is zero nothing is approximated, and new noise is that of all samples."""
     model, data = random_problem(15, n=50, noise_like='parametric')
     other = Model(model.kernels, tuple(9.0 * x for x in model.noise))
-    online = _learn(InducingPointRegression(model, PRIORS[1], 8, 5), data)
+    online = _learn(InducingPointRegression(model, PRIORS[1], Memory(8, 5)), data)
     for taken in (model, other):
         online.change(model=taken)
         batch = Posterior(taken, data, PRIORS[1])
@@ -122,7 +123,7 @@ def test_memory_of_a_stream_does_not_grow():
     """After the basis is complete, ten times as many samples hold as many numbers."""
     model, _ = random_problem(1)
     rng = np.random.default_rng(2)
-    online = InducingPointRegression(model, PRIORS[1], 20, 30)
+    online = InducingPointRegression(model, PRIORS[1], Memory(20, 30))
     sizes = []
     for _ in range(2):
         for _ in range(400):
@@ -150,7 +151,7 @@ def test_w_is_calibrated_on_streams_that_return():
     squares = []
     for seed in range(60):
         model, prior, w, data = returning(seed)
-        online = _learn(InducingPointRegression(model, prior, 20, 40), data)
+        online = _learn(InducingPointRegression(model, prior, Memory(20, 40)), data)
         squares.append(_mean_square(online, w))
         assert online.unresolved == 0
     assert abs(np.mean(squares) - 1.0) < 4 * 0.105
@@ -159,7 +160,7 @@ def test_w_is_calibrated_on_streams_that_return():
 def test_far_from_all_features_the_prior_of_z_remains():
     """A basis without room does not pretend to know what it cannot express."""
     model, data = random_problem(4, n=30, k=1)
-    online = _learn(InducingPointRegression(model, PRIORS[1], 20, 3), data)
+    online = _learn(InducingPointRegression(model, PRIORS[1], Memory(20, 3)), data)
     variance = online.predict(np.full(3, 50.0), np.zeros((1, 3))).covariance[0, 0]
     assert variance == pytest.approx(model.kernels[0].variance)
 
@@ -168,9 +169,9 @@ def test_changed_hyperparameters_equal_a_fresh_start_while_the_stream_is_whole()
     """While the kept samples are the whole stream, new features see all of it."""
     model, data = random_problem(9, n=15)
     other = model.with_log_parameters(model.log_parameters + 0.4)
-    online = _learn(InducingPointRegression(model, PRIORS[1], 100, 15), data)
+    online = _learn(InducingPointRegression(model, PRIORS[1], Memory(100, 15)), data)
     online.change(model=other)
-    fresh = _learn(InducingPointRegression(other, PRIORS[1], 100, 15), data)
+    fresh = _learn(InducingPointRegression(other, PRIORS[1], Memory(100, 15)), data)
     u, f = data.U[0] + 0.1, data.F[1]
     one, two = online.predict(u, f), fresh.predict(u, f)
     np.testing.assert_allclose(one.mean, two.mean, atol=1e-12)
@@ -181,7 +182,7 @@ def test_the_kept_samples_and_what_is_gone_add_up():
     """The base of a fit is what the samples that are gone tell beside the kept ones."""
     data = _spread_out(random_problem(11, n=25)[1])
     model, data = data
-    online = _learn(InducingPointRegression(model, PRIORS[1], 10, 25), data)
+    online = _learn(InducingPointRegression(model, PRIORS[1], Memory(10, 25)), data)
     base = online.base
     joint = Posterior(model, online.buffer, CoefficientPrior(base.R, base.z, 0.0))
     np.testing.assert_allclose(joint.coefficients, online.information.coefficients, atol=1e-9)
@@ -193,11 +194,13 @@ def test_without_memory_only_the_kept_samples_count_under_new_hyperparameters():
     """What is gone is then left to the past, and a fit begins from the prior."""
     model, data = random_problem(11, n=60, k=1)
     other = model.with_log_parameters(model.log_parameters + 0.1)
-    online = _learn(InducingPointRegression(model, PRIORS[1], 20, 40, remember=False), data)
+    online = _learn(
+        InducingPointRegression(model, PRIORS[1], Memory(20, 40, remember=False)), data
+    )
     np.testing.assert_allclose(online.base.R.T @ online.base.R, np.diag(np.full(3, 0.25)))
     online.change(model=other)
     tail = Observations(data.U[-20:], data.F[-20:], data.y[-20:])
-    fresh = _learn(InducingPointRegression(other, PRIORS[1], 20, 40), tail)
+    fresh = _learn(InducingPointRegression(other, PRIORS[1], Memory(20, 40)), tail)
     np.testing.assert_allclose(
         online.information.coefficients, fresh.information.coefficients, rtol=1e-10
     )
@@ -206,7 +209,7 @@ def test_without_memory_only_the_kept_samples_count_under_new_hyperparameters():
 def test_stop_save_restore_continue_equals_never_stopped():
     """A restored state continues to the same bits, through a change of hyper-parameters too."""
     model, data = random_problem(8, n=40)
-    one, other = (InducingPointRegression(model, PRIORS[0], 12, 9) for _ in range(2))
+    one, other = (InducingPointRegression(model, PRIORS[0], Memory(12, 9)) for _ in range(2))
     changed = model.with_log_parameters(model.log_parameters + 0.2)
     for i in range(40):
         if i == 19:
@@ -222,7 +225,7 @@ def test_stop_save_restore_continue_equals_never_stopped():
 def test_predicting_changes_nothing():
     """A prediction may be made any number of times."""
     model, data = random_problem(7)
-    online = _learn(InducingPointRegression(model, PRIORS[0], 10, 6), data)
+    online = _learn(InducingPointRegression(model, PRIORS[0], Memory(10, 6)), data)
     before = online.state()
     prediction = online.predict(data.U[0], data.F[0])
     again = online.with_regressor(prediction, data.F[0])
@@ -234,7 +237,7 @@ def test_predicting_changes_nothing():
 def test_stale_predictions_are_refused():
     """Learning reuses the features of the prediction, so they must be the present ones."""
     model, data = random_problem(10)
-    online = InducingPointRegression(model, PRIORS[0], 10, 10)
+    online = InducingPointRegression(model, PRIORS[0], Memory(10, 10))
     prediction = online.predict(data.U[0], data.F[0])
     online.learn(prediction, data.y[0])
     with pytest.raises(ValueError, match='before the last change'):
@@ -244,6 +247,6 @@ def test_stale_predictions_are_refused():
 def test_process_without_physics_has_no_coefficients():
     """GP is the case p = 0."""
     model, data = random_problem(12, p=0)
-    online = _learn(InducingPointRegression(model, CoefficientPrior.flat(0), 6, 8), data)
+    online = _learn(InducingPointRegression(model, CoefficientPrior.flat(0), Memory(6, 8)), data)
     assert online.information.coefficients.shape == (0,)
     assert np.isfinite(online.predict(data.U[0], data.F[0]).covariance).all()

@@ -13,6 +13,7 @@ from sgp_ros.gp.kernels import SquaredExponential
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.posterior import Posterior
+from sgp_ros.gp.regression import Memory
 from test.gp.worlds import random_problem
 
 
@@ -72,11 +73,11 @@ FLAT = CoefficientPrior.flat(3)
 
 
 def _exact(model, prior, **options):
-    return OnlineRegression(model, prior, 5, **options)
+    return OnlineRegression(model, prior, Memory(5, **options))
 
 
 def _basis(model, prior, **options):
-    return InducingPointRegression(model, prior, 10, 30, **options)
+    return InducingPointRegression(model, prior, Memory(10, 30, **options))
 
 
 WAYS = [_exact, _basis]
@@ -104,7 +105,7 @@ def test_without_memory_only_the_buffer_counts_faded():
     """Weights go with their samples, also after the buffer has slid through its memory."""
     model, data = random_problem(5, n=150, noise_like='parametric')
     prior = CoefficientPrior.from_std(np.ones(3), np.full(3, 2.0))
-    online = OnlineRegression(model, prior, 5, remember=False, forgetting=7.0)
+    online = OnlineRegression(model, prior, Memory(5, remember=False, forgetting=7.0))
     _learn(online, data)
     root = np.exp(-0.5 * np.arange(4, -1, -1) / 7.0)
     tail = Observations(

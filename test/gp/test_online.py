@@ -17,6 +17,7 @@ from sgp_ros.gp.kernels import SquaredExponential
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.posterior import Posterior
+from sgp_ros.gp.regression import Memory
 from sgp_ros.gp.rotations import absorb_rows, absorbed_rows_numpy
 from test.gp.worlds import random_problem, returning
 
@@ -24,7 +25,7 @@ PRIORS = [CoefficientPrior.flat(3), CoefficientPrior.from_std(np.ones(3), np.ful
 
 
 def _stream(model, data, prior, budget=1000, **options):
-    online = OnlineRegression(model, prior, budget, **options)
+    online = OnlineRegression(model, prior, Memory(budget, **options))
     for u, f, y in zip(data.U, data.F, data.y, strict=True):
         online.learn(online.predict(u, f), y)
     return online
@@ -49,7 +50,7 @@ def test_chain_rule_of_predictions_is_the_evidence():
     """The sum of one-step log predictive densities is log N(y; E[Y], sigma_dd)."""
     model, data = random_problem(2, n=15)
     prior = PRIORS[1]
-    online = OnlineRegression(model, prior, 100)
+    online = OnlineRegression(model, prior, Memory(100))
     total = 0.0
     for u, f, y in zip(data.U, data.F, data.y, strict=True):
         prediction = online.predict(u, f)
@@ -211,7 +212,7 @@ def test_stop_save_restore_continue_equals_never_stopped():
     model, data = random_problem(8, n=30)
     changed = model.with_log_parameters(model.log_parameters + 0.2)
     for stop in (4, 12):
-        one, other = (OnlineRegression(model, PRIORS[0], 6) for _ in range(2))
+        one, other = (OnlineRegression(model, PRIORS[0], Memory(6)) for _ in range(2))
         for i in range(30):
             if i == stop:
                 other.restore(one.state())
@@ -280,7 +281,7 @@ def test_the_basis_is_filled_while_the_buffer_fills():
 def test_stale_predictions_are_refused():
     """Learning reuses the solve of the prediction, so it must belong to the present model."""
     model, data = random_problem(10)
-    online = OnlineRegression(model, PRIORS[0], 10)
+    online = OnlineRegression(model, PRIORS[0], Memory(10))
     prediction = online.predict(data.U[0], data.F[0])
     online.learn(prediction, data.y[0])
     with pytest.raises(ValueError, match='before the last change'):
@@ -290,7 +291,7 @@ def test_stale_predictions_are_refused():
 def test_first_samples_leave_directions_undetermined():
     """Under a flat prior, fewer equations than coefficients give an infinite variance."""
     model, data = random_problem(11, k=1, p=3)
-    online = OnlineRegression(model, PRIORS[0], 10)
+    online = OnlineRegression(model, PRIORS[0], Memory(10))
     assert np.isinf(online.predict(data.U[0], data.F[0]).covariance[0, 0])
     assert not online.information.is_identifiable.any()
     for i in range(4):
@@ -310,13 +311,13 @@ def test_process_without_physics_has_no_coefficients():
 def test_a_lost_factor_raises_and_changes_nothing():
     """Repeated inputs without noise are refused by append and by a change of model."""
     model = Model((SquaredExponential(1.0, (1.0,), (0,)),), (1e-300,))
-    online = OnlineRegression(model, CoefficientPrior.flat(0), 5)
+    online = OnlineRegression(model, CoefficientPrior.flat(0), Memory(5))
     u, f = np.zeros(1), np.zeros((1, 0))
     online.learn(online.predict(u, f), np.zeros(1))
     with pytest.raises(NumericalError, match='repeats'):
         online.learn(online.predict(u, f), np.zeros(1))
     good = Model((SquaredExponential(1.0, (1.0,), (0,)),), (0.1,))
-    other = OnlineRegression(good, CoefficientPrior.flat(0), 5)
+    other = OnlineRegression(good, CoefficientPrior.flat(0), Memory(5))
     for _ in range(3):
         other.learn(other.predict(u, f), np.zeros(1))
     with pytest.raises(NumericalError, match='not positive definite'):
@@ -348,7 +349,7 @@ def test_a_smaller_budget_drops_the_oldest():
     """A live change of the budget takes effect at once."""
     model, data = random_problem(13, n=12)
     online = _stream(model, data, PRIORS[0])
-    online.change(budget=5)
+    online.change(memory=replace(online.memory, budget=5))
     np.testing.assert_array_equal(online.buffer.U, data.U[-5:])
 
 
@@ -366,7 +367,7 @@ def test_all_at_once_equals_one_by_one(budget, forgetting):
     """Before and after samples leave, with and without forgetting."""
     model, prior, _, data = returning(1, n=40)
     one_by_one = _stream(model, data, prior, budget, forgetting=forgetting)
-    at_once = OnlineRegression(model, prior, budget, forgetting=forgetting)
+    at_once = OnlineRegression(model, prior, Memory(budget, forgetting=forgetting))
     at_once.learn_all(data)
     assert at_once.size == one_by_one.size
     u, f = data.U[3] + 0.1, data.F[0]

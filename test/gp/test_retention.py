@@ -11,6 +11,7 @@ from sgp_ros.errors import NumericalError
 from sgp_ros.gp.factor_loops import inverse_column, inverse_column_numpy
 from sgp_ros.gp.model import CoefficientPrior, Model
 from sgp_ros.gp.online import OnlineRegression
+from sgp_ros.gp.regression import Memory
 from sgp_ros.gp.retention import RETENTIONS
 from test.gp.worlds import random_problem
 
@@ -54,7 +55,7 @@ def test_least_informative_is_the_smallest_gain_about_z(seed):
     budget = 6
     held = []
     for i, gone in enumerate(
-        _learn(OnlineRegression(model, FLAT, budget, policy='least_informative'), data)
+        _learn(OnlineRegression(model, FLAT, Memory(budget, policy='least_informative')), data)
     ):
         held = list(range(budget + 1)) if i == 0 else [*held, budget + i]
         gains = np.zeros(len(held))
@@ -77,7 +78,7 @@ def test_a_shared_factor_counts_for_each_of_its_outputs():
     single = Model((a, b), (0.1, 0.2))
     two = type(data)(data.U, data.F[:, :2], data.y[:, :2])
     found, wanted, other = (
-        _learn(OnlineRegression(model, FLAT, 12, policy='least_informative'), samples)
+        _learn(OnlineRegression(model, FLAT, Memory(12, policy='least_informative')), samples)
         for model, samples in ((shared, data), (parted, data), (single, two))
     )
     assert found == wanted
@@ -91,7 +92,7 @@ def test_coverage_parts_the_closest_pair(seed):
     budget = 6
     held = []
     for i, gone in enumerate(
-        _learn(OnlineRegression(model, FLAT, budget, policy='coverage'), data)
+        _learn(OnlineRegression(model, FLAT, Memory(budget, policy='coverage')), data)
     ):
         held = list(range(budget + 1)) if i == 0 else [*held, budget + i]
         S = np.concatenate([kernel.scale(data.U[held]) for kernel in model.kernels], axis=1)
@@ -105,7 +106,7 @@ def test_coverage_parts_the_closest_pair(seed):
 def test_who_leaves_has_no_part_in_what_is_known_of_w(policy):
     """W is told by the whole stream, to the bit the same whichever samples Z is conditioned on."""
     model, data = random_problem(4, n=30)
-    one, other = (OnlineRegression(model, FLAT, 5, policy=x) for x in (policy, 'oldest'))
+    one, other = (OnlineRegression(model, FLAT, Memory(5, policy=x)) for x in (policy, 'oldest'))
     left = [_learn(online, data) for online in (one, other)]
     assert policy == 'oldest' or left[0] != left[1]
     np.testing.assert_array_equal(one.information.R, other.information.R)
@@ -116,7 +117,7 @@ def test_who_leaves_has_no_part_in_what_is_known_of_w(policy):
 def test_stop_save_restore_continue_equals_never_stopped(policy):
     """A policy's own memory is part of the state, to the bit."""
     model, data = random_problem(8, n=30)
-    one, other = (OnlineRegression(model, FLAT, 6, policy=policy) for _ in range(2))
+    one, other = (OnlineRegression(model, FLAT, Memory(6, policy=policy)) for _ in range(2))
     for i in range(30):
         if i == 15:
             other.restore(one.state())
@@ -131,11 +132,11 @@ def test_stop_save_restore_continue_equals_never_stopped(policy):
 def test_a_policy_taken_later_goes_on_from_the_buffer(policy):
     """What a change rebuilds is what would have grown sample by sample."""
     model, data = random_problem(9, n=40)
-    changed = OnlineRegression(model, FLAT, 8)
+    changed = OnlineRegression(model, FLAT, Memory(8))
     for i in range(8):
         changed.learn(changed.predict(data.U[i], data.F[i]), data.y[i])
-    changed.change(policy=policy)
-    always = OnlineRegression(model, FLAT, 8, policy=policy)
+    changed.change(memory=Memory(8, policy=policy))
+    always = OnlineRegression(model, FLAT, Memory(8, policy=policy))
     for i in range(40):
         always.learn(always.predict(data.U[i], data.F[i]), data.y[i])
         if i >= 8:
@@ -150,13 +151,15 @@ def test_a_refused_change_changes_nothing(policy, budget):
     model, data = random_problem(9, n=40)
     data.U[:20] = data.U[0] + 1e-9 * np.arange(20)[:, None]
     lost = Model(model.kernels, (1e-300, 1e-300))
-    online, untouched = (OnlineRegression(model, FLAT, budget, policy=policy) for _ in range(2))
+    online, untouched = (
+        OnlineRegression(model, FLAT, Memory(budget, policy=policy)) for _ in range(2)
+    )
     for i in range(40):
         for one in (online, untouched):
             one.learn(one.predict(data.U[i], data.F[i]), data.y[i])
         if i == 18:
             with pytest.raises(NumericalError):
-                online.change(lost, 12, policy='oldest', remember=False)
+                online.change(lost, Memory(12, policy='oldest', remember=False))
     for name, array in untouched.state().items():
         np.testing.assert_array_equal(array, online.state()[name])
 
@@ -165,14 +168,14 @@ def test_a_refused_change_changes_nothing(policy, budget):
 def test_where_z_is_zero_the_oldest_goes(policy):
     """Without a process no sample is nearer or more telling than another."""
     model, data = random_problem(5, n=12, noise_like='parametric')
-    assert _learn(OnlineRegression(model, FLAT, 4, policy=policy), data) == list(range(8))
+    assert _learn(OnlineRegression(model, FLAT, Memory(4, policy=policy)), data) == list(range(8))
 
 
 @pytest.mark.parametrize('policy', ['least_informative', 'coverage'])
 def test_a_long_stay_leaves_what_was_seen_elsewhere(policy):
     """A robot that stands still does not forget where it was."""
     model, data = random_problem(6, n=10, k=1)
-    online = OnlineRegression(model, FLAT, 10, policy=policy)
+    online = OnlineRegression(model, FLAT, Memory(10, policy=policy))
     _learn(online, data)
     rng = np.random.default_rng(1)
     for _ in range(200):
@@ -185,7 +188,7 @@ def test_rounding_does_not_gather_in_the_diagonal_of_the_inverse():
     """After thousands of updates at a condition number above 1e5 it is that of the factor."""
     base, _ = random_problem(7, k=1)
     model = Model(base.kernels, (1e-4,))
-    online = OnlineRegression(model, FLAT, 30, policy='least_informative')
+    online = OnlineRegression(model, FLAT, Memory(30, policy='least_informative'))
     rng = np.random.default_rng(2)
     for _ in range(5000):
         u = rng.uniform(-1.0, 1.0, size=3)
