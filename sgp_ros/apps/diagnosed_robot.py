@@ -1,14 +1,12 @@
-"""What a diagnosis leaves for the next run: robot_diagnosed.yaml beside its URDF.
+"""Diagnosed robots as files for the next run: robot_diagnosed.yaml beside its URDF.
 
 The YAML states the effects that were found in the words of diagnosis.json, with their standard
-deviations, behind those that the nominal robot states; the URDF has the bodies of the final model,
-and no dry friction, which a diagnosis takes for an effect.
+deviations, behind those that the nominal robot states; the URDF has the bodies of the final model.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +14,12 @@ import numpy as np
 import yaml
 
 from sgp_ros.diagnosis.result import Diagnosis, Finding, Parameter
-from sgp_ros.errors import ConfigError
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.report.files import write_text
-from sgp_ros.rigid.pseudo_inertia import is_consistent
-from sgp_ros.rigid.tree import read_urdf
-from sgp_ros.rigid.urdf_text import parse_urdf
-from sgp_ros.rigid.urdf_writer import write_urdf
 from sgp_ros.robots.robot import Robot
-from sgp_ros.robots.urdf_robot import nominal_tree, urdf_text
+from sgp_ros.robots.stated_effects import dry_friction
+from sgp_ros.robots.stated_values import stated_urdf
+from sgp_ros.robots.urdf_robot import DEFAULT_TERMS, nominal_tree, urdf_text
 
 YAML_NAME, URDF_NAME = 'robot_diagnosed.yaml', 'robot_diagnosed.urdf'
 SPREAD = 0.05
@@ -43,10 +38,13 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis) -> None:
     Raises:
         ConfigError: the URDF is no longer what it was.
     """
-    text = _without_friction(urdf_text(robot))
-    path = out / URDF_NAME
-    if found.bodies is None or not _holds_bodies(path, text, robot, found.bodies):
-        write_text(path, text)
+    text = None if found.bodies is None else stated_urdf(robot, found.bodies, {})
+    write_text(out / URDF_NAME, text or urdf_text(robot))
+    stated = robot.source.get('parameters') or {}
+    assert isinstance(stated, dict)
+    if text is not None:  # its bodies are those of the diagnosis
+        links = nominal_tree(robot).link_names
+        stated = {k: x for k, x in stated.items() if k.rpartition('.')[0] not in links}
     known = robot.source.get('effects') or []
     assert isinstance(known, list)
     document = {
@@ -56,6 +54,7 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis) -> None:
         **robot.source,
         'urdf': URDF_NAME,
         'effects': [*known, *stated_findings(found.findings)],
+        'parameters': stated,
     }
     write_text(out / YAML_NAME, yaml.safe_dump(document, sort_keys=False))
 
@@ -96,35 +95,16 @@ def _side(finding: Finding) -> dict[str, Any]:
 
 
 def _physics(robot: Robot) -> dict[str, Any]:
-    """Return what a diagnosis takes for known: bodies and damping of the URDF."""
-    terms = ('inertial', 'viscous')
+    """Return what a diagnosis takes for known: bodies, damping and friction of the URDF."""
     if 'terms' in robot.source:
         return {}
+    terms: dict[str, object] = dict.fromkeys(('inertial', 'viscous'), 'all')
     prior = {'prior': {name: {'spread': SPREAD} for name in terms}}
-    return {'terms': dict.fromkeys(terms, 'all'), **prior}
-
-
-def _without_friction(text: str) -> str:
-    joints = parse_urdf(text).joints.values()
-    return write_urdf(text, {}, {j.name: (j.damping, 0.0) for j in joints if j.friction})
-
-
-def _holds_bodies(path: Path, text: str, robot: Robot, bodies: np.ndarray) -> bool:
-    """Write the URDF with these bodies; return whether the robot read from it has them.
-
-    A moving body is its link, what is fixed to it, what hangs on locked joints behind it, and
-    the payload that the robot states. Its link takes what is left beside those two.
-    """
-    nominal, free = nominal_tree(robot), read_urdf(text)
-    own = [free.parameters[free.link_names.index(link)] for link in nominal.link_names]
-    beside = nominal.parameters - np.array(own)
-    left = bodies - beside
-    if not np.all(is_consistent(left) | ~beside.any(axis=1)):
-        return False
-    try:
-        write_text(path, write_urdf(text, dict(zip(nominal.link_names, left, strict=True)), {}))
-        again = nominal_tree(replace(robot, source={**robot.source, 'urdf': str(path)}))
-    except ConfigError:
-        return False
-    floor = 1e-9 * float(np.abs(bodies).max())
-    return np.allclose(again.parameters, bodies, rtol=1e-6, atol=floor)
+    tree = nominal_tree(robot)
+    rubbing = [e.joint for e in dry_friction(tree)]
+    if 'parameters' in robot.source:
+        return {'terms': dict(DEFAULT_TERMS), **prior}
+    if rubbing:
+        terms['coulomb'] = rubbing
+        prior['prior']['coulomb'] = {'spread': SPREAD}
+    return {'terms': terms, **prior}

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import yaml
 
-from sgp_ros.errors import ConfigError
 from sgp_ros.report.files import write_text
 from sgp_ros.robots.robot import Robot
+
+URDF_NAME = 'robot_identified.urdf'
 
 
 def nominal_coefficients(robot: Robot) -> np.ndarray | None:
@@ -34,21 +37,31 @@ def write_identified(
         std: (p,) standard deviations, infinite for what is not determined.
         has_bodies: the values are those of real bodies; no URDF can hold others.
     """
-    write_text(out / 'robot_identified.yaml', robot_yaml(robot, values, std))
-    (out / 'robot_identified.urdf').unlink(missing_ok=True)  # of an earlier run
-    if has_bodies and 'urdf' in robot.source and len(values):
-        try:
-            text = robot_urdf(robot, values)
-        except ConfigError:  # no body of positive mass, so no URDF can hold it
-            return
-        write_text(out / 'robot_identified.urdf', text)
+    text = robot_urdf(robot, values) if has_bodies and len(values) else None
+    (out / URDF_NAME).unlink(missing_ok=True)  # of an earlier run
+    if text is not None:
+        write_text(out / URDF_NAME, text)
+    urdf = str(robot.source.get('urdf', ''))
+    if text is not None:
+        urdf = URDF_NAME
+    elif urdf and not urdf.lstrip().startswith('<'):
+        urdf = os.path.relpath(urdf, out)
+    write_text(out / 'robot_identified.yaml', robot_yaml(robot, values, std, urdf))
 
 
-def robot_yaml(robot: Robot, values: np.ndarray, std: np.ndarray) -> str:
-    """Return the identified robot as a robot YAML, the prior for the next run."""
+def robot_yaml(robot: Robot, values: np.ndarray, std: np.ndarray, urdf: str = '') -> str:
+    """Return the identified robot as a robot YAML, the prior for the next run.
+
+    Args:
+        robot: that was identified.
+        values: (p,) coefficients; none where nothing was learned.
+        std: (p,) standard deviations.
+        urdf: the file that it names, relative to its own place; empty for that of the robot.
+    """
     document = {
         'schema': 1,
         **(robot.source or {'robot': robot.name, 'joints': list(robot.joint_names)}),
+        **({'urdf': urdf} if urdf else {}),
         'parameters': {
             c.name: {
                 'value': float(w),
@@ -61,25 +74,22 @@ def robot_yaml(robot: Robot, values: np.ndarray, std: np.ndarray) -> str:
     return yaml.safe_dump(document, sort_keys=False)
 
 
-def robot_urdf(robot: Robot, values: np.ndarray) -> str:
-    """Return the robot's URDF with identified bodies and friction.
+def robot_urdf(robot: Robot, values: np.ndarray) -> str | None:
+    """Return the robot's URDF with identified bodies, damping and dry friction.
 
-    Raises:
-        ConfigError: a mass is not positive, or the URDF is no longer what it was.
+    None where the robot has no URDF, or none can hold the bodies. What no term models stays.
     """
-    from sgp_ros.rigid.urdf_writer import write_urdf  # noqa: PLC0415 - as above
-    from sgp_ros.robots.urdf_robot import urdf_text  # noqa: PLC0415 - loads Pinocchio
+    if 'urdf' not in robot.source:
+        return None
+    from sgp_ros.robots.nominal import nominal_model  # noqa: PLC0415 - loads Pinocchio
+    from sgp_ros.robots.stated_values import stated_urdf  # noqa: PLC0415 - as above
 
-    names = [c.name for c in robot.coefficients]
-    named = dict(zip(names, values.tolist(), strict=True))
-    bodies = {
-        name.removesuffix('.mass'): values[i : i + 10]
-        for i, name in enumerate(names)
-        if name.endswith('.mass')
-    }
-    dynamics = {
-        joint: (named.get(f'{joint}.viscous', 0.0), named.get(f'{joint}.coulomb', 0.0))
-        for joint in robot.joint_names
-    }
-    text = urdf_text(robot)
-    return write_urdf(text, bodies, dynamics)
+    found = dict(zip((c.name for c in robot.coefficients), values.tolist(), strict=True))
+    stated = {name: {'value': value} for name, value in found.items()}
+    known = nominal_model(replace(robot, source={**robot.source, 'parameters': stated}))
+    tree = known.tree
+    if known.lacks_bodies:
+        return None
+    sizes = zip(tree.joint_names, tree.damping, tree.friction, strict=True)
+    dynamics = {joint: (float(b), float(c)) for joint, b, c in sizes}
+    return stated_urdf(robot, known.without_stated(tree.parameters), dynamics)

@@ -11,6 +11,7 @@ from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Value
 from sgp_ros.robots.nominal import Nominal, nominal_model
 from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.stated_values import stated_urdf, values_of
 from sgp_ros.robots.urdf_robot import stated_part, urdf_text
 from sgp_ros.simulation.effects import ChosenEffect
 from sgp_ros.simulation.registry import SIMULATORS
@@ -61,9 +62,29 @@ def _of_urdf(path: Path) -> Simulator:
 def _of_nominal(nominal: Nominal, name: str) -> SimulatedRobot:
     last = {e.name: e for e in nominal.effects if e.effect.is_on_tree}
     before = [e for e in nominal.effects if last.get(e.name, e) is not e]
-    simulator = tree_simulator(urdf_text(nominal.robot), _part(nominal, before))
+    simulator = tree_simulator(_urdf(nominal), _part(nominal, before))
     effects = tuple(_chosen(e, nominal) for e in nominal.effects if e not in before)
     return SimulatedRobot(simulator, name, effects)
+
+
+def _urdf(nominal: Nominal) -> str:
+    """Return the URDF with the bodies, damping and friction that the robot YAML states by value.
+
+    Raises:
+        ConfigError: no URDF can hold them.
+    """
+    if not values_of(nominal.robot):
+        return urdf_text(nominal.robot)
+    tree = nominal.tree
+    sizes = zip(tree.joint_names, tree.damping, tree.friction, strict=True)
+    bodies = nominal.without_stated(tree.parameters)
+    text = stated_urdf(nominal.robot, bodies, {j: (float(b), float(c)) for j, b, c in sizes})
+    if text is None:
+        raise ConfigError(
+            f'robot {nominal.robot.name} states bodies that no URDF can hold',
+            'bodies under `parameters` that leave something for each link',
+        )
+    return text
 
 
 def _part(nominal: Nominal, before: Iterable[EffectAt]) -> TreePart:

@@ -10,7 +10,7 @@ one that acts, `tau + tau_x(tau)`. Tilt and payload belong to the tree.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -51,20 +51,35 @@ def effect_terms(
         effects: stated ones.
         coulomb_width: velocity over which dry friction changes its sign [rad/s or m/s].
     """
-    seen: Counter[tuple[str, str]] = Counter()
     terms = []
+    for stated, names in zip(effects, coefficient_names(effects), strict=True):
+        if names:
+            terms.append(_term(tree, stated, names, coulomb_width))
+    return tuple(terms)
+
+
+def coefficient_names(effects: Sequence[EffectAt]) -> list[dict[int, str]]:
+    """Return names by index of the coefficients that become terms, for each effect.
+
+    A second effect of the same name on a joint is called `NAME_2`.
+    """
+    seen: Counter[tuple[str, str]] = Counter()
+    found: list[dict[int, str]] = []
     for stated in effects:
         law = stated.effect
         if not law.is_online or law.is_on_tree:
+            found.append({})
             continue
-        key = law.name, stated.joint
-        seen[key] += 1
-        name = law.name if seen[key] == 1 else f'{law.name}_{seen[key]}'
-        others = law.effort_columns(stated.kind)
-        kept = [i for i in range(len(stated.coefficients)) if i not in others]
-        if kept:
-            terms.append(_term(tree, stated, name, kept, coulomb_width))
-    return tuple(terms)
+        seen[law.name, stated.joint] += 1
+        count = seen[law.name, stated.joint]
+        lead = f'{stated.joint}.{law.name}' + (f'_{count}' if count > 1 else '')
+        of_effort = law.effort_columns(stated.kind)
+        quantities = law.coefficient_quantities(stated.kind)
+        found.append({
+            i: f'{lead}.{quantities[i].name}'
+            for i in range(len(stated.coefficients)) if i not in of_effort
+        })  # fmt: skip
+    return found
 
 
 def effort_map(tree: Tree, effects: Sequence[EffectAt], coulomb_width: float) -> EffortMap | None:
@@ -148,22 +163,22 @@ def _forces(tree: Tree, stated: EffectAt, motion: Motion, width: float) -> np.nd
     return forces
 
 
-def _term(tree: Tree, stated: EffectAt, name: str, kept: list[int], coulomb_width: float) -> Term:
+def _term(tree: Tree, stated: EffectAt, names: Mapping[int, str], coulomb_width: float) -> Term:
     def columns(motion: Motion) -> np.ndarray:
-        return -_forces(tree, stated, motion, coulomb_width)[:, :, kept]
+        return -_forces(tree, stated, motion, coulomb_width)[:, :, list(names)]
 
     joint = stated.place.joint
     prismatic = joint >= 0 and bool(tree.is_prismatic[joint])
     quantities = stated.effect.coefficient_quantities(stated.kind)
     coefficients = tuple(
         Coefficient(
-            f'{stated.joint}.{name}.{quantities[i].name}',
+            name,
             quantities[i].unit_on(is_prismatic=prismatic),
             stated.joint if joint >= 0 else None,
             float(stated.coefficients[i]),
             float(stated.std[i]),
             quantities[i].low,
         )
-        for i in kept
+        for i, name in names.items()
     )
     return Term(coefficients, columns, _SOURCE)

@@ -12,8 +12,15 @@ from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.effect_terms import changed_tree
 from sgp_ros.robots.robot import Robot
-from sgp_ros.robots.stated_effects import read_effects
-from sgp_ros.robots.urdf_robot import build_urdf_robot, nominal_tree
+from sgp_ros.robots.stated_effects import dry_friction, read_effects
+from sgp_ros.robots.stated_values import (
+    NO_BODY,
+    term_effects,
+    values_of,
+    with_coefficients,
+    with_values,
+)
+from sgp_ros.robots.urdf_robot import build_urdf_robot, nominal_tree, term_shape
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,21 +30,26 @@ class Nominal:
     Attributes:
         robot: from a URDF.
         plain: the tree of the URDF.
-        tree: the same with stated tilt of the base and payload.
-        effects: all that it states.
+        loaded: the same with stated tilt of the base and payload.
+        tree: the same with the bodies, damping and friction that are stated by value.
+        effects: all others that it states.
+        impossible: remarks on values that nothing can have.
         is_lumped: whether it is known by its coefficients alone.
     """
 
     robot: Robot
     plain: Tree
+    loaded: Tree
     tree: Tree
     effects: tuple[EffectAt, ...]
+    impossible: tuple[str, ...] = ()
     is_lumped: bool = False
 
     @property
     def stated(self) -> tuple[EffectAt, ...]:
-        """The effects that are not part of the tree."""
-        return tuple(e for e in self.effects if e.is_complete and not e.effect.is_on_tree)
+        """The effects that are not part of the tree, dry friction of joints among them."""
+        known = (*self.effects, *dry_friction(self.tree))
+        return tuple(e for e in known if e.is_complete and not e.effect.is_on_tree)
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -46,16 +58,25 @@ class Nominal:
             f'The bodies of {self.robot.name} are the simplest that have its coefficients: '
             'mass and centre of a link are no measurement.'
         )
-        return ((lumped,) if self.is_lumped else ()) + tuple(
+        unclear = tuple(
             f'{e.name} of {e.joint} is stated by too few numbers and so not part of the nominal '
             'robot.'
             for e in self.effects
             if not e.is_complete
         )
+        return (*((lumped,) if self.is_lumped else ()), *self.impossible, *unclear)
+
+    @property
+    def lacks_bodies(self) -> bool:
+        """Whether bodies are stated that cannot exist."""
+        links = self.plain.link_names
+        return any(NO_BODY.format(link=link) in self.impossible for link in links)
 
     def without_stated(self, bodies: np.ndarray | None) -> np.ndarray | None:
         """Return bodies (b, 10) of a diagnosis less the payload that the robot states."""
-        return None if bodies is None else bodies - (self.tree.parameters - self.plain.parameters)
+        return (
+            None if bodies is None else bodies - (self.loaded.parameters - self.plain.parameters)
+        )
 
 
 def nominal_model(robot: Robot) -> Nominal:
@@ -76,4 +97,11 @@ def nominal_model(robot: Robot) -> Nominal:
     effects = read_effects(robot.source.get('effects'), plain, problems)
     if problems:
         raise ConfigError(f'robot {robot.name}: ' + ' | '.join(problems), 'as it was before')
-    return Nominal(robot, plain, changed_tree(plain, effects), effects, bodies is not None)
+    values, remarks = values_of(robot), list[str]()
+    loaded = changed_tree(plain, effects)
+    effects = (
+        *with_coefficients(effects, values, plain),
+        *term_effects(plain, values, term_shape(robot), remarks),
+    )
+    tree = with_values(loaded, values, remarks)
+    return Nominal(robot, plain, loaded, tree, effects, tuple(remarks), bodies is not None)

@@ -72,14 +72,25 @@ def joint_prior(
     _, form = term_laws()[kind]
     names = iter(term.coefficients)
     for joint in chosen:
-        group, gains = tree.follows == joint, np.abs(tree.multipliers)
-        nominal = 0.0
-        if form.dynamics == 'damping':
-            nominal = float(np.sum((tree.damping * gains**2)[group]))
-        elif form.dynamics:
-            nominal = float(np.sum((tree.friction * gains)[group]))
+        nominal = stated_dynamics(tree, form.dynamics, joint) if form.dynamics else 0.0
         limit = float(tree.effort_limit[joint])
         floor = LIMIT_SHARE * limit if 0.0 < limit < math.inf else LEAST_EFFORT
         for _ in form.names:
             prior[next(names).name] = (nominal, spread * max(nominal, floor))
     return prior
+
+
+def stated_dynamics(tree: Tree, attribute: str, joint: int) -> float:
+    """Return damping [N m s/rad or N s/m] or friction [N m or N] of `<dynamics>`.
+
+    That of joints that follow counts with its gain.
+
+    Args:
+        tree: with nominal friction.
+        attribute: `damping` or `friction`.
+        joint: that moves on its own.
+    """
+    group, gains = tree.follows == joint, np.abs(tree.multipliers)
+    if attribute == 'damping':
+        return float(np.sum((tree.damping * gains**2)[group]))
+    return float(np.sum((tree.friction * gains)[group]))

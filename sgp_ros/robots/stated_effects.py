@@ -14,12 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.catalogue import COULOMB_FRICTION, EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import BASE, LAST, SIDES, TOOL, Quantity, Value
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.entries import Entries, is_finite
+from sgp_ros.robots.nominal_prior import stated_dynamics
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 
@@ -70,7 +71,7 @@ def _read(item: object, where: str, tree: Tree, problems: list[str]) -> EffectAt
         return None
     parameters: dict[str, Value] = {**values, **words}
     stated = EffectAt.stated(effect, joint, parameters, tree, std)
-    if effect.is_force and not stated.is_possible(_typical(tree)):
+    if effect.is_force and not stated.is_possible(typical_motion(tree)):
         problems.append(f'{where}: no such effect exists with the values {values}')
     return stated
 
@@ -151,10 +152,21 @@ def _numbers(
     return values, std
 
 
-def _typical(tree: Tree) -> ObservedMotion:
+def typical_motion(tree: Tree) -> ObservedMotion:
     """Return one row at rest with the largest efforts."""
     k = tree.size
     still = np.zeros((1, k))
     limit = tree.effort_limit[:k]
     effort = np.where(np.isfinite(limit) & (limit > 0.0), limit, 1.0)[None]
     return ObservedMotion(tree, np.zeros(1), 0.0, still, still, still, effort, None)
+
+
+def dry_friction(tree: Tree) -> tuple[EffectAt, ...]:
+    """Return the dry friction of `<dynamics>` as effects; damping is a part of the tree."""
+    (quantity,) = COULOMB_FRICTION.quantities
+    sizes = {j: stated_dynamics(tree, 'friction', i) for i, j in enumerate(tree.moving_names)}
+    return tuple(
+        EffectAt.stated(COULOMB_FRICTION, joint, {quantity.name: size}, tree)
+        for joint, size in sizes.items()
+        if size > 0.0
+    )

@@ -19,6 +19,13 @@ A robot YAML with the key `urdf` says which joints move and which physics is ass
       - {effect: spring, joint: j1, parameters: {stiffness: {value: 2.9, std: 0.1},
                                                  rest: {value: 0.4, std: 0.01}}}
 
+    parameters:                 # values of coefficients, as `sgp identify` writes them
+      elbow.coulomb: {value: 0.4, std: 0.01, unit: N m}
+
+What `parameters` say of a body or of damping or friction of a joint takes the place of what the
+URDF says; `effects` come on top of both. Diagnosis, replay, simulation and the node read it so.
+`terms` are what is learned: what is not among them stays as the URDF has it, or is not modelled.
+
 Only `schema` and `urdf` must be there. The model predicts efforts; where accelerations are wanted,
 as on joints without effort, the engine solves the same equation of motion for them.
 """
@@ -52,7 +59,7 @@ DEFAULT_TERMS: Mapping[str, str] = dict.fromkeys(
 def build_urdf_robot(
     document: Mapping[str, Any], folder: Path, problems: list[str]
 ) -> Robot | None:
-    """Return the robot of a robot YAML with the key `urdf`, without its `parameters`.
+    """Return the robot of a robot YAML with the key `urdf`, `parameters` not yet in its prior.
 
     Args:
         document: the content of the file.
@@ -70,10 +77,8 @@ def build_urdf_robot(
     joints = _joints(tree, entries.numbers('effort_gain'), problems)
     effects = read_effects(document.get('effects'), tree, problems)
     width = entries.positive('coulomb_width', Shape().coulomb_width)
-    terms = (
-        *_terms(changed_tree(tree, effects), joints, entries),
-        *effect_terms(tree, effects, width),
-    )
+    own = _terms(changed_tree(tree, effects), joints, entries)
+    terms = (*own, *effect_terms(tree, effects, width))
     names = tree.moving_names
     robot = Robot(
         name=entries.text('name', tree.name),
@@ -82,7 +87,7 @@ def build_urdf_robot(
         terms=terms,
         residual_inputs=tuple((f'position:{name}', f'velocity:{name}') for name in names),
         description=_description(tree, place, effects),
-        source={k: v for k, v in document.items() if k not in {'schema', 'urdf', 'parameters'}}
+        source={k: v for k, v in document.items() if k not in {'schema', 'urdf'}}
         | {'urdf': str(place.resolve()) if isinstance(place, Path) else place},
         effort_map=effort_map(tree, effects, width),
     )
@@ -133,6 +138,18 @@ def stated_part(robot: Robot) -> tuple[Plan, Payload | None]:
     entries = Entries(robot.source, [])
     plan = plan_joints(parse_urdf(urdf_text(robot)), **_joint_entries(entries))
     return plan, _payload(entries)
+
+
+def term_shape(robot: Robot) -> Shape:
+    """Return the settings of the terms of a robot from a URDF."""
+    return _shape(Entries(robot.source, []))
+
+
+def _shape(entries: Entries) -> Shape:
+    return Shape(
+        entries.positive('coulomb_width', Shape().coulomb_width),
+        entries.positive('stribeck_velocity', Shape().stribeck_velocity),
+    )
 
 
 def urdf_text(robot: Robot) -> str:
@@ -209,10 +226,7 @@ def _joints(tree: Tree, gains: Mapping[str, float], problems: list[str]) -> tupl
 def _terms(tree: Tree, joints: tuple[Joint, ...], entries: Entries) -> list[Term]:
     wanted = entries.mapping('terms') or DEFAULT_TERMS
     spreads = _spreads(entries, wanted)
-    shape = Shape(
-        entries.positive('coulomb_width', Shape().coulomb_width),
-        entries.positive('stribeck_velocity', Shape().stribeck_velocity),
-    )
+    shape = _shape(entries)
     terms = []
     for kind, who in wanted.items():
         chosen = _chosen(kind, who, tree, entries.problems)

@@ -187,9 +187,12 @@ def test_a_urdf_that_cannot_hold_the_bodies_keeps_its_own(tmp_path, text):
     load_robot(str(out / YAML_NAME))
 
 
-def test_the_urdf_has_no_dry_friction_for_that_is_an_effect(tmp_path):
-    """A diagnosis finds all of it: with that of the URDF it would count twice in a simulation."""
-    assert read_urdf(URDF).friction.any()
-    again = read_urdf(_written(tmp_path, URDF) / URDF_NAME)
-    assert not again.friction.any()
+def test_dry_friction_of_the_urdf_stays_and_is_a_term(tmp_path):
+    """The nominal robot has it, so that a finding is what comes on top."""
+    out = _written(tmp_path, URDF)
+    again = read_urdf(out / URDF_NAME)
+    assert again.friction.tolist() == read_urdf(URDF).friction.tolist()
     assert again.damping.tolist() == read_urdf(URDF).damping.tolist()
+    robot = load_robot(str(out / YAML_NAME))
+    rubbing = [c for c in robot.coefficients if c.name.endswith('.coulomb')]
+    assert [(c.joint, c.prior_mean) for c in rubbing] == [('elbow', 0.2)]
