@@ -2,9 +2,10 @@
 
 One worker serves one request at a time. It starts when the node does, because its imports take
 longer than most fits; it is killed when the node ends, and ends by itself when the node vanishes.
-It computes only where nothing else wants to run, so on a computer without a free core a fit takes
-as long as that lasts. It stands still while the node has a message in hand, because cores share
-caches and memory. This module imports nothing of ROS: the worker loads it.
+It has a low weight: where another process wants the same core, it gets about a tenth of it, so a
+fit takes longer on a busy computer, and still comes. It stands still while the node has a message
+in hand, because cores share caches and memory. This module imports nothing of ROS: the worker
+loads it.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from multiprocessing.context import SpawnProcess
 from sgp_ros.engine.fitting import FitRequest, FitResult, fit
 
 _NICENESS = 10
+"""On Linux a weight of 110, where a process of niceness 0 has 1024."""
 _SET_PARENT_DEATH_SIGNAL = 1
 _READY = 'ready'
 _STOP = getattr(signal, 'SIGSTOP', None)
@@ -147,17 +149,17 @@ def _send(connection: Connection, request: FitRequest) -> None:
         connection.send(request)
 
 
-def _leave_the_processor() -> None:
-    """Run only where nothing else wants to run.
+def _yield_to_others() -> None:
+    """Take a low weight, and never the place of one that runs.
 
-    Under `SCHED_IDLE` (Linux) whoever wakes up takes the processor at once; from a nice process it
-    would wait for the end of a slice, some milliseconds. Elsewhere, or where a container
-    forbids it, niceness alone.
+    Not `SCHED_IDLE` (Linux): on a computer that is always busy, as that of a robot, no fit would
+    ever come. A process of `SCHED_BATCH` gives way to one that wakes up, as the node does for a
+    message. Elsewhere, or where a container forbids it, niceness alone.
     """
     os.nice(_NICENESS)
-    if hasattr(os, 'SCHED_IDLE'):
+    if hasattr(os, 'SCHED_BATCH'):
         with contextlib.suppress(OSError):
-            os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+            os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
 def _end_with_parent() -> None:
@@ -168,7 +170,7 @@ def _end_with_parent() -> None:
 
 def _serve(connection: Connection) -> None:
     _end_with_parent()
-    _leave_the_processor()
+    _yield_to_others()
     try:
         connection.send(_READY)
         while True:

@@ -1,4 +1,4 @@
-"""Runs one node until it is told to stop.
+"""Running of one node until it is told to stop.
 
 The exit status is 0 after SIGINT or SIGTERM, and 2 with one line on stderr when the node cannot
 start. Bit-for-bit equality of a run and its replay needs one thread in the linear algebra, which
@@ -7,6 +7,7 @@ is chosen by environment variables before NumPy is imported; so nodes are import
 
 from __future__ import annotations
 
+import argparse
 import gc
 import os
 import signal
@@ -25,12 +26,15 @@ _TURN_S = 0.2
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
-def run(load: Callable[[], Callable[[], Node]]) -> int:
+def run(name: str, summary: str, load: Callable[[], Callable[[], Node]]) -> int:
     """Run a node in this process and return the exit status.
 
     Args:
+        name: of the executable.
+        summary: one sentence, for `--help`.
         load: imports what makes the node and returns it; called once the threads are limited.
     """
+    _answer_help(name, summary)
     os.environ.update(dict.fromkeys(THREAD_LIMITS, '1'))
     try:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -41,6 +45,20 @@ def run(load: Callable[[], Callable[[], Node]]) -> int:
         remedy = "source a ROS 2 workspace or pip install 'sgp_ros[wheels]'"
         print(f'cannot import {error.name}; {remedy}', file=sys.stderr)
         return 2
+
+
+def _answer_help(name: str, summary: str) -> None:
+    """End with the help where it is asked for; what follows --ros-args is for ROS."""
+    own = sys.argv[1:]
+    if '--ros-args' in own:
+        own = own[: own.index('--ros-args')]
+    argparse.ArgumentParser(
+        prog=name,
+        usage='%(prog)s [-h] [--ros-args [-p NAME:=VALUE] [--params-file YAML] [-r FROM:=TO] ...]',
+        description=summary,
+        epilog=f'`ros2 param describe` tells what a parameter of a running {name} means.',
+        allow_abbrev=False,
+    ).parse_known_args(own)
 
 
 def _start(load: Callable[[], Callable[[], Node]]) -> int:

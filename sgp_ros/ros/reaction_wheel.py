@@ -12,7 +12,8 @@ from sgp_ros.ros.node_main import run
 
 def main() -> None:
     """Run the node until SIGINT or SIGTERM."""
-    sys.exit(run(_load))
+    summary = 'Simulate a reaction wheel that publishes joint_states and command.'
+    sys.exit(run('reaction_wheel', summary, _load))
 
 
 def _load() -> Callable[[], Node]:

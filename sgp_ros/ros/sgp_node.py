@@ -12,7 +12,8 @@ from sgp_ros.ros.node_main import run
 
 def main() -> None:
     """Run the node until SIGINT or SIGTERM."""
-    sys.exit(run(_load))
+    summary = 'Identify a robot online from joint_states and command; see docs/settings.md.'
+    sys.exit(run('sgp_node', summary, _load))
 
 
 def _load() -> Callable[[], Node]:

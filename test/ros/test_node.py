@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import os
 import signal
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +46,17 @@ def _start(graph: Graph, **settings: Any) -> NodeProcess:
 def _ready(graph: Graph, stream: Stream) -> None:
     while graph.status('model').get('ready') != '1':
         stream.publish_until_read(50)
+
+
+@pytest.mark.parametrize('name', ['sgp_node', 'reaction_wheel'])
+def test_help_is_printed_and_no_node_started(name: str, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, '-m', f'sgp_ros.ros.{name}', '--help'],
+        capture_output=True, text=True, check=False, timeout=60.0,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert f'usage: {name}' in done.stdout
+    assert '--ros-args' in done.stdout
 
 
 def test_every_topic_and_service_of_the_contract_exists(graph: Graph) -> None:
