@@ -226,9 +226,21 @@ def test_strange_states_are_counted_and_survived(tmp_path):
 
 
 def test_results_replace_older_ones_and_leave_no_parts(wheel, tmp_path):
-    """A second run into the same folder is fine."""
+    """A second run takes away what only the first one drew, and nothing that is not its own."""
     arguments = [str(a) for a in _replay(wheel / 'reaction_wheel.mcap', tmp_path)]
+    out = tmp_path / 'out'
+    out.mkdir()
+    for name in ('stale.png', 'edited.png', 'mine.png'):
+        (out / name).write_text(name)
+    stale = {}
+    for name in ('stale.png', 'edited.png'):
+        stat = (out / name).stat()
+        stale[name] = [stat.st_mtime_ns, stat.st_size]
+    (out / '.sgp_replay.json').write_text(json.dumps(stale))
+    (out / 'edited.png').write_text('by the user since')
     assert main(arguments) == 0
+    assert {path.name for path in out.glob('*.png')} >= {'edited.png', 'mine.png'}
+    assert not (out / 'stale.png').exists()
     first = (tmp_path / 'out' / 'robot_identified.yaml').read_text()
     assert main(arguments) == 0
     assert (tmp_path / 'out' / 'robot_identified.yaml').read_text() == first

@@ -30,7 +30,7 @@ from sgp_ros.report.diagnosis_text import (
     verdict_sentence,
     why_it_lost,
 )
-from sgp_ros.report.files import write_text
+from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.nominal import Nominal, nominal_model
@@ -146,13 +146,13 @@ def _held_out(
 
 def _written(out: Path, nominal: Nominal, found: Diagnosis) -> dict[str, Any]:
     """Write all files, print the findings and return the content of diagnosis.json."""
-    out.mkdir(parents=True, exist_ok=True)
-    write_predictions(out, found)
-    content = diagnosis_mapping(found)
-    write_text(out / 'diagnosis.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
-    bodies = nominal.without_stated(found.bodies)
-    write_diagnosed(out, nominal.robot, replace(found, bodies=bodies))
-    write_diagnosis(out, found)
+    with replacing_results(out, 'diagnose'):
+        write_predictions(out, found)
+        content = diagnosis_mapping(found)
+        write_text(out / 'diagnosis.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
+        bodies = nominal.without_stated(found.bodies)
+        write_diagnosed(out, nominal.robot, replace(found, bodies=bodies))
+        write_diagnosis(out, found)
     print_diagnosis(found)
     print(f'report: {out / "report.html"}')
     return content

@@ -23,7 +23,7 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.recordings.reader import open_recording
-from sgp_ros.report.files import write_text
+from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.report.findings import collect_findings
 from sgp_ros.report.identification import write_identification
 from sgp_ros.robots.registry import load_robot
@@ -112,13 +112,15 @@ def run_identify(
     if signals.left_out:
         counts['states of stretches too short to be filtered'] = signals.left_out
     findings = collect_findings(found, Path(bag).name, rollouts, counts)
-    out.mkdir(parents=True, exist_ok=True)
-    write_text(out / 'identification.json', json.dumps(findings, indent=1, allow_nan=False) + '\n')
-    known = found.physics.coefficients
-    std = np.where(known.is_identifiable, known.std, np.inf)
-    values, has_bodies = best_coefficients(found), found.consistent is not None
-    write_identified(out, model, values, std, has_bodies=has_bodies)
-    write_identification(out, found, findings, remarks)
+    with replacing_results(out, 'identify'):
+        write_text(
+            out / 'identification.json', json.dumps(findings, indent=1, allow_nan=False) + '\n'
+        )
+        known = found.physics.coefficients
+        std = np.where(known.is_identifiable, known.std, np.inf)
+        values, has_bodies = best_coefficients(found), found.consistent is not None
+        write_identified(out, model, values, std, has_bodies=has_bodies)
+        write_identification(out, found, findings, remarks)
     progress(1.0)
     print_findings(findings)
     print(f'report: {out / "report.html"}')

@@ -6,7 +6,6 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,7 @@ from sgp_ros.recordings.model_files import (
 from sgp_ros.recordings.predictions import PredictionTopics, outputs, write_outputs
 from sgp_ros.recordings.reader import Recording, open_recording
 from sgp_ros.recordings.writer import RecordingWriter
-from sgp_ros.report.files import write_text
+from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.report.history import History
 from sgp_ros.report.html import write_report
 from sgp_ros.report.metrics import Timing, collect_metrics, model_remarks
@@ -82,11 +81,25 @@ def run_replay(
     truth = load_truth(chosen.truth) if chosen.truth else None
     recording = open_recording(bag)
     engine = _make_engine(load_robot(robot), chosen)
+    with replacing_results(out, 'replay'):
+        metrics = _replay_into(out, engine, recording, chosen, truth, progress)
+    print_summary(metrics, truth)
+    print(f'report: {out / "report.html"}')
+    return metrics
+
+
+def _replay_into(
+    out: Path,
+    engine: Engine,
+    recording: Recording,
+    options: ReplayOptions,
+    truth: Mapping[str, float] | None,
+    progress: Callable[[float], None],
+) -> dict[str, Any]:
+    """Write all files of a replay and return the content of metrics.json."""
     remarks, asked = list(recording.remarks), engine.config
     history, timing = History(), Timing()
-    out.mkdir(parents=True, exist_ok=True)
-    with ExitStack() as stack:
-        writer = stack.enter_context(RecordingWriter(out / 'predictions.mcap'))
+    with RecordingWriter(out / 'predictions.mcap') as writer:
 
         def keep(step: Step) -> None:
             history.take(engine, step)
@@ -95,19 +108,17 @@ def run_replay(
                 if found is not None:
                     write_outputs(writer, PredictionTopics(), found)
 
-        run_events(engine, recording, chosen, keep, timing, progress)
-        _check_use(engine, recording, chosen)
+        run_events(engine, recording, options, keep, timing, progress)
+        _check_use(engine, recording, options)
     remarks += [f'{count} messages could not be read: {reason}'
                 for reason, count in recording.unreadable.items()]  # fmt: skip
     remark = write_identified_robot(out, engine)
     remarks += [remark] if remark else []
     remarks += model_remarks(engine, asked=asked)
-    metrics = collect_metrics(engine, Path(bag).name, timing=timing, remarks=remarks)
+    metrics = collect_metrics(engine, recording.path.name, timing=timing, remarks=remarks)
     write_text(out / 'metrics.json', json.dumps(metrics, indent=1, allow_nan=False) + '\n')
     save_model(out / 'model.npz', engine.snapshot())
     write_report(out, engine, history, metrics, truth=truth)
-    print_summary(metrics, truth)
-    print(f'report: {out / "report.html"}')
     return metrics
 
 

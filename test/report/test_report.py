@@ -10,7 +10,7 @@ import pytest
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
-from sgp_ros.report.files import write_bytes, write_text
+from sgp_ros.report.files import replacing_results, write_bytes, write_text
 from sgp_ros.report.history import History
 from sgp_ros.report.html import verdict, write_report
 from sgp_ros.report.metrics import Timing, collect_metrics
@@ -117,3 +117,35 @@ def test_refused_samples_are_explained(tmp_path):
     page = (tmp_path / 'report.html').read_text()
     assert 'unknown_joint' in page
     assert 'a joint of the robot is not in the message' in page
+
+
+def _write_results(out, *names):
+    with replacing_results(out, 'diagnose'):
+        for name in names:
+            write_text(out / name, name)
+
+
+def test_results_of_an_earlier_run_do_not_outlive_the_next(tmp_path):
+    """A picture of the last verdict beside the report of this one would mislead."""
+    _write_results(tmp_path, 'report.html', 'friction.png')
+    write_text(tmp_path / 'notes.txt', 'of the user')
+    _write_results(tmp_path, 'report.html')
+    left = {path.name for path in tmp_path.iterdir()}
+    assert left == {'report.html', 'notes.txt', '.sgp_diagnose.json'}
+
+
+def test_results_of_another_command_stay(tmp_path):
+    with replacing_results(tmp_path, 'replay'):
+        write_text(tmp_path / 'friction.png', 'of a replay')
+    _write_results(tmp_path, 'report.html')
+    _write_results(tmp_path, 'report.html')
+    assert (tmp_path / 'friction.png').exists()
+
+
+def test_a_run_that_fails_removes_nothing(tmp_path):
+    _write_results(tmp_path, 'report.html', 'friction.png')
+    with pytest.raises(OSError, match='full'), replacing_results(tmp_path, 'diagnose'):
+        raise OSError('the disk is full')
+    assert (tmp_path / 'friction.png').exists()
+    _write_results(tmp_path, 'report.html')
+    assert not (tmp_path / 'friction.png').exists()
