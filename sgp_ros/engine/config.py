@@ -112,7 +112,7 @@ class EngineConfig:
     )  # fmt: skip
     buffer_remember: bool = _setting(
         'buffer.remember', 'bool', default=True,
-        description='Keep what dropped samples told about W.',
+        description='Keep the information of dropped samples on W.',
     )  # fmt: skip
     buffer_policy: str = _setting(
         'buffer.policy', 'str', 'oldest',

@@ -156,7 +156,7 @@ class FactoredBuffer:
 
     @property
     def rows(self) -> np.ndarray:
-        """What the samples tell of W: rows of unit noise and their values, (n k, p + 1)."""
+        """Information of the samples on W: rows of unit noise and their values, (n k, p + 1)."""
         width = self.samples.data.shape[2]
         weights = self.samples.weights[:, None, None]
         return np.vstack([(weights * factor.white).reshape(-1, width) for factor in self.factors])

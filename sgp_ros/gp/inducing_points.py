@@ -166,7 +166,7 @@ class InducingPoints:
             weight: by which the equations of unit noise count; less than one for an old sample.
 
         Returns:
-            What they tell of W alone: rows of unit noise and their values, (k, p + 1).
+            Their information on W alone: rows of unit noise and their values, (k, p + 1).
         """
         found = self.join(u, features)
         remainder, noise = remainder_of(found), self.group.noise

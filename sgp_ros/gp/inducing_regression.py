@@ -45,7 +45,7 @@ class InducingPointRegression(Regression):
 
     @property
     def information(self) -> Information:
-        """What is known of W."""
+        """Information on W."""
         return self._basis.total
 
     @property
@@ -75,7 +75,7 @@ class InducingPointRegression(Regression):
 
     @property
     def base(self) -> Information:
-        """What the prior tells of W, and those that are gone beside the kept samples. O(n m^2)."""
+        """Information on W of the prior, and of the samples that are gone. O(n m^2)."""
         if not (self._memory.remember and self._gone):
             return self._prior.copy()
         kept = InducingInformation.of_samples(

@@ -1,4 +1,4 @@
-"""What is known of W: a triangular system `R w = z` with unit noise, which grows by rows.
+"""Square-root information on W: a triangular system `R w = z` of unit noise that grows by rows.
 
 The posterior is N(R^-1 z, (R^T R)^-1). A row of zeros in R is a direction nothing has determined
 yet; until there is none, an orthogonal decomposition with scaled columns takes the place of the

@@ -201,8 +201,3 @@ class CoefficientPrior:
             raise ValueError('the prior covariance is not positive definite') from error
         root = linalg.solve_triangular(lower, np.eye(len(mean)), lower=True)
         return cls(root, root @ mean, float(-2.0 * np.log(np.diag(lower)).sum()))
-
-    def scaled(self, factor: float) -> CoefficientPrior:
-        """Return this prior with every standard deviation times `factor`, about the same mean."""
-        log_det = self.log_det - 2.0 * len(self.target) * float(np.log(factor))
-        return CoefficientPrior(self.root / factor, self.target / factor, log_det)

@@ -3,8 +3,8 @@
 Until the first sample leaves the buffer, everything is exact. From then on the posterior is the
 product `p(W | all samples) p(Z | W, buffer)`: the first from a basis that absorbs each sample once
 (`gp.inducing_information`), the second from the factored buffer (`gp.buffer`). What this
-neglects: Z given W is told by the buffer alone, and for W, Z is what the features of the basis
-can express.
+neglects: Z given W is known from the buffer alone, and for W, Z is what the features of the
+inducing points can express.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class OnlineRegression(Regression):
 
     @property
     def information(self) -> Information:
-        """What is known of W."""
+        """Information on W."""
         return self._total if self._basis is None else self._basis.total
 
     @property
@@ -75,7 +75,7 @@ class OnlineRegression(Regression):
 
     @property
     def base(self) -> Information:
-        """What the prior tells of W, and the dropped samples beside the buffer. O(n p^2)."""
+        """Information on W of the prior, and of the dropped samples. O(n p^2)."""
         if self._basis is None:
             return self._prior.copy()
         dropped = self._basis.total.less(self._with_buffer())

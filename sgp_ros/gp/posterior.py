@@ -171,15 +171,6 @@ class Posterior:
         gradients = [part for part in parts if part is not None]
         return np.concatenate([*gradients, noise * np.array(self.model.noise)])
 
-    def prior_scale_gradient(self) -> float:
-        """Return the derivative of `log_evidence` by the log of a factor on the prior's std."""
-        rows = len(self.prior.target)
-        if not rows:
-            return 0.0
-        residual = self._solution.residual[-rows:]
-        left = self._solution.left[-rows:]
-        return float(residual @ residual + (left * left).sum() - rows)
-
     def predict(self, U: np.ndarray, F: np.ndarray) -> Prediction:
         """Predict X at inputs U (q, d) with regressors F (q, k, p).
 

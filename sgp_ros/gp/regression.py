@@ -22,10 +22,9 @@ class OnlinePrediction:
         covariance: (k, k) of X, without noise; infinite on the diagonal where an undetermined
             direction of W enters.
         u, f: the input (d,) and regressor (k, p) it was made for.
-        whitenings: the input against the samples, one per factor; in a basis against the inducing
-            inputs, one per component.
+        whitenings: the input against the samples, one per factor, or against the inducing points.
         version: state of the model it was made with.
-        gains: of a basis, by which data enter the features, (m,) per component; else none.
+        gains: of inducing points, by which data enter the features, (m,) per set; else none.
     """
 
     mean: np.ndarray
@@ -74,7 +73,7 @@ class Regression(ABC):
 
     @property
     def memory(self) -> Memory:
-        """What is kept of the stream."""
+        """How much of the stream is kept."""
         return self._memory
 
     @property
@@ -85,7 +84,7 @@ class Regression(ABC):
     @property
     @abstractmethod
     def information(self) -> Information:
-        """What is known of W."""
+        """Information on W."""
 
     @property
     @abstractmethod
@@ -100,12 +99,12 @@ class Regression(ABC):
     @property
     @abstractmethod
     def base(self) -> Information:
-        """What the prior tells of W, and the samples that are gone beside those kept."""
+        """Information on W of the prior, and of the samples that are gone beside those kept."""
 
     @property
     @abstractmethod
     def unresolved(self) -> int:
-        """Samples at which the basis of Z had no room; 0 while there is no basis."""
+        """Samples for which inducing points lacked room; 0 while there are no inducing points."""
 
     @abstractmethod
     def predict(self, u: np.ndarray, f: np.ndarray) -> OnlinePrediction:

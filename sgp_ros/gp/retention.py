@@ -1,4 +1,4 @@
-"""Which sample leaves a full buffer: the oldest, the least informative, or one of a close pair.
+"""Policies by which a sample leaves a full buffer: oldest, least informative, of a close pair.
 
 No policy looks at an observation: what Z is conditioned on is chosen by inputs alone, so the
 choice does not bias it.
@@ -18,7 +18,7 @@ from sgp_ros.gp.model import Model
 
 
 class Retention(Protocol):
-    """What the buffer asks of a policy."""
+    """Policy by which a sample leaves."""
 
     def rebuild(self, model: Model, factors: Sequence[GrowingFactor], U: np.ndarray) -> None:
         """Start over with the buffered inputs U (n, d), factored under `model`."""

@@ -1,4 +1,4 @@
-"""Which inputs the process Z should see and how it varies with them, decided by evidence.
+"""Selection of the inputs that the process Z sees, smooth or linear in them, by evidence.
 
 A stationary Z extrapolates badly along every input that it uses: far from the data it falls back
 to zero, or carries on a trend that the length scale allowed. An input that does not raise the

@@ -246,7 +246,7 @@ def _tail(data):
 
 @pytest.mark.parametrize('way', WAYS)
 def test_outputs_that_come_to_share_a_kernel_are_restored_apart(way):
-    """What was told of each stays in a points of its own, also in a state that is restored."""
+    """Each keeps inducing points of its own, also in a state that is restored."""
     model = _model((1.0, 2.0), (0.8, 0.7), (0.1, 0.3))
     shared = _model((1.0, 3.0), (0.6, 0.6), (0.1, 0.3))
     data = _spread_out()

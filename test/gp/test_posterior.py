@@ -76,17 +76,6 @@ def test_gradient_holds_with_undetermined_directions():
         assert gradient[i] == pytest.approx((high - low) / 2e-5, abs=1e-5)
 
 
-def test_prior_scale_gradient_equals_central_differences():
-    """The slope by the logarithm of the prior's standard deviation is right."""
-    model, data = random_problem(7)
-    prior = CoefficientPrior.from_std(np.array([1.0, -1.0, 0.5]), np.array([0.3, 2.0, 1.0]))
-    high, low = (
-        Posterior(model, data, prior.scaled(np.exp(step))).log_evidence for step in (1e-5, -1e-5)
-    )
-    slope = Posterior(model, data, prior).prior_scale_gradient()
-    assert slope == pytest.approx((high - low) / 2e-5, abs=1e-6)
-
-
 def test_posterior_agrees_with_scikit_learn_for_a_plain_process():
     """Without physics, SGP is an ordinary Gaussian process."""
     rng = np.random.default_rng(0)

@@ -193,11 +193,13 @@ def test_a_valid_parameter_takes_effect(graph: Graph) -> None:
     graph.wait_until(lambda: graph.count('buffer', 'model') == 10, 'a smaller buffer')
 
 
-def test_a_dump_of_the_parameters_loads_again(graph: Graph, tmp_path: Path) -> None:
-    node = _start(graph)
+@pytest.mark.parametrize('kernel', ['squared_exponential', 'additive_squared_exponential'])
+def test_a_dump_of_the_parameters_loads_again(graph: Graph, tmp_path: Path, kernel: str) -> None:
+    node = _start(graph, model__kernel=kernel)
     _ready(graph, Stream(graph))
     dumped = _dump(graph)
     assert min(dumped['hyper.pole.lengthscales']) > 0.0  # what is in force, not 'automatic'
+    assert ('hyper.pole.signal_variances' in dumped) == kernel.startswith('additive')
     assert node.stop() == 0
     path = tmp_path / 'dump.yaml'
     path.write_text(yaml.safe_dump({'/sgp_node': {'ros__parameters': dumped}}))
