@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.rigid.urdf_text import MOVING, Urdf
+from sgp_ros.rigid.urdf_model import MOVING, Urdf
 
 
 @dataclass(frozen=True, slots=True)

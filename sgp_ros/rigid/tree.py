@@ -17,7 +17,8 @@ import pinocchio  # type: ignore[import-untyped]  # comes without types
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.rigid.locking import Plan, plan_joints
-from sgp_ros.rigid.urdf_text import Urdf, parse_urdf
+from sgp_ros.rigid.urdf_model import Urdf
+from sgp_ros.rigid.urdf_text import parse_urdf
 
 GRAVITY = (0.0, 0.0, -9.81)
 """Acceleration of free fall in the frame of the root link [m/s^2]; its z axis points up (REP 103).

@@ -14,71 +14,17 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.rigid.urdf_control import commanded_joints, mimic_parameters
+from sgp_ros.rigid.urdf_model import (
+    MOVING,
+    Urdf,
+    UrdfJoint,
+    commanded_joints,
+    mimic_parameters,
+)
 
-MOVING = ('revolute', 'continuous', 'prismatic')
 _KNOWN = (*MOVING, 'fixed')
 _INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
 _SHORTEST_AXIS = 1e-6
-
-
-@dataclass(frozen=True, slots=True)
-class UrdfJoint:
-    """A `<joint>` as it stands in the file.
-
-    Attributes:
-        name: of the joint.
-        kind: `revolute`, `continuous`, `prismatic` or `fixed`.
-        parent: link it starts from.
-        child: link it carries.
-        axis: unit vector in the frame of the joint.
-        lower: least position [rad or m], -inf where none is stated.
-        upper: greatest position [rad or m], inf where none is stated.
-        velocity: limit [rad/s or m/s], inf where none is stated.
-        effort: limit [N m or N], inf where none is stated.
-        damping: viscous coefficient of `<dynamics>` [N m s/rad or N s/m].
-        friction: Coulomb friction of `<dynamics>` [N m or N].
-        follows: joint that it mimics; None where it moves on its own.
-        multiplier: position per position of that joint.
-        offset: position where that joint is at 0 [rad or m].
-    """
-
-    name: str
-    kind: str
-    parent: str
-    child: str
-    axis: tuple[float, float, float]
-    lower: float
-    upper: float
-    velocity: float
-    effort: float
-    damping: float
-    friction: float
-    follows: str | None
-    multiplier: float
-    offset: float
-
-
-@dataclass(frozen=True, slots=True)
-class Urdf:
-    """What a URDF says of dynamics.
-
-    Attributes:
-        name: of the robot.
-        place: file it was read from, for messages.
-        joints: all joints by name, in the order of the file.
-        links: names of all links.
-        commanded: joints that `ros2_control` drives; None where it names none.
-        plain: the same tree as XML of links, inertias and joints alone. Every moving joint is
-            revolute or prismatic there, and none follows another.
-    """
-
-    name: str
-    place: str
-    joints: dict[str, UrdfJoint]
-    links: tuple[str, ...]
-    commanded: frozenset[str] | None
-    plain: str
 
 
 def parse_urdf(path_or_text: str | Path) -> Urdf:

@@ -1,15 +1,12 @@
-"""Kinds of friction that are the same everywhere and at all times."""
+"""Laws of friction: of speed and load, then of position, time and the path travelled."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
-from sgp_ros.simulation.effects import (
-    Action,
-    Moment,
-    ParameterValue,
-)
+from sgp_ros.errors import ConfigError
+from sgp_ros.simulation.effects import Action, Moment, ParameterValue, side_of
 from sgp_ros.simulation.mechanism import SimulatedJoint
 
 
@@ -71,4 +68,95 @@ def load(
     level, mu = float(values['level']), float(values['mu'])
     return (
         Action(joint, dry_level=lambda m, _direction: level + mu * abs(float(m.drive[joint]))),
+    )
+
+
+_STIFF_S = 1e-3
+_MOST_DECAY = 2.0
+"""Of a memory within a step: Runge and Kutta are stable up to 2.7."""
+
+
+def _of_kind(
+    joint: int, kind: ParameterValue, strength: Callable[[Moment], float]
+) -> tuple[Action, ...]:
+    """Return viscous or Coulomb friction of a strength that changes."""
+    if kind == 'viscous':
+        return (Action(joint, force=lambda m: -strength(m) * float(m.velocity[joint])),)
+    return (Action(joint, dry_level=lambda moment, _direction: strength(moment)),)
+
+
+def position(
+    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    """Return friction where `lo <= q <= hi`, on every turn, rising over the length `edge`."""
+    amplitude, lo, hi = (float(values[name]) for name in ('amplitude', 'lo', 'hi'))
+    is_continuous, edge = joints[joint].is_continuous, float(values['edge'])
+    centre = 0.5 * (lo + hi)
+
+    def strength(moment: Moment) -> float:
+        q = float(moment.position[joint])
+        if is_continuous:  # the turn about the interval, which may cross the wrap
+            q = (q - centre + math.pi) % (2.0 * math.pi) - math.pi + centre
+        if edge == 0.0:
+            return amplitude if lo <= q <= hi else 0.0
+        inside = min(q - lo, hi - q) / edge + 0.5
+        return amplitude * min(max(inside, 0.0), 1.0)
+
+    return _of_kind(joint, values['kind'], strength)
+
+
+def limit(
+    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    """Return dry friction that rises from 0 at `onset` to `amplitude` at the limit `side`."""
+    amplitude, onset = float(values['amplitude']), float(values['onset'])
+    description = joints[joint]
+    side = side_of(description, onset, values['side'])
+    limit = description.upper if side > 0 else description.lower
+    if not math.isfinite(limit) or side * (limit - onset) <= 0.0:
+        raise ConfigError(
+            f'limit_friction with onset {onset:g} on joint {description.name!r}',
+            f'a joint with limits and an onset between them, here {description.lower:g} and '
+            f'{description.upper:g}',
+        )
+
+    def level(moment: Moment, _direction: int) -> float:
+        return amplitude * max((float(moment.position[joint]) - onset) / (limit - onset), 0.0)
+
+    return (Action(joint, dry_level=level),)
+
+
+def drift(
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    """Return friction of the strength `end + (start - end) exp(-t / time_constant)`."""
+    start, end = float(values['start']), float(values['end'])
+    time_constant = float(values['time_constant'])
+
+    def strength(moment: Moment) -> float:
+        return end + (start - end) * math.exp(-moment.time_s / time_constant)
+
+    return _of_kind(joint, values['kind'], strength)
+
+
+def hysteresis(
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+) -> tuple[Action, ...]:
+    """Return `tau_x = -level z` with `dz/dt = (v - |v| z) / presliding` (Dahl 1968)."""
+    level, presliding = float(values['level']), float(values['presliding'])
+    fastest = _MOST_DECAY * presliding / _STIFF_S
+
+    def rate(moment: Moment) -> tuple[float]:
+        v, z = float(moment.velocity[joint]), float(moment.state[0])
+        v = min(max(v, -fastest), fastest)
+        return ((v - abs(v) * z) / presliding,)
+
+    return (
+        Action(
+            joint,
+            force=lambda moment: -level * float(moment.state[0]),
+            start=lambda _q, _v: (0.0,),
+            state_rate=rate,
+            substep_s=_STIFF_S,
+        ),
     )

@@ -6,7 +6,7 @@ A law is one entry here. Names, parameters, units, kinds and places are those of
 
 from __future__ import annotations
 
-from sgp_ros.simulation import actuation, friction, loads, measurement, varying_friction
+from sgp_ros.simulation import actuation, friction, loads
 from sgp_ros.simulation.effects import EffectParameter, Law
 from sgp_ros.simulation.linear_axis import LINEAR_AXIS
 from sgp_ros.simulation.reaction_wheel import REACTION_WHEEL
@@ -27,10 +27,10 @@ LAWS: dict[str, Law] = {
     'quadratic_drag': Law(friction.quadratic),
     'asymmetric_coulomb': Law(friction.asymmetric),
     'load_friction': Law(friction.load),
-    'position_friction': Law(varying_friction.position, ordered=('lo', 'hi'), own=(_EDGE,)),
-    'limit_friction': Law(varying_friction.limit),
-    'friction_drift': Law(varying_friction.drift),
-    'hysteresis': Law(varying_friction.hysteresis),
+    'position_friction': Law(friction.position, ordered=('lo', 'hi'), own=(_EDGE,)),
+    'limit_friction': Law(friction.limit),
+    'friction_drift': Law(friction.drift),
+    'hysteresis': Law(friction.hysteresis),
     'spring': Law(loads.spring),
     'constant_load': Law(loads.constant),
     'cogging': Law(loads.cogging),
@@ -48,7 +48,7 @@ LAWS: dict[str, Law] = {
     'saturation': Law(actuation.saturation),
     'torque_gain': Law(actuation.gain),
     'backlash': Law(actuation.backlash, own=(_CONTACT_HZ,)),
-    'encoder_eccentricity': Law(measurement.eccentricity),
-    'velocity_filter_lag': Law(measurement.velocity_lag),
+    'encoder_eccentricity': Law(actuation.eccentricity),
+    'velocity_filter_lag': Law(actuation.velocity_lag),
 }
 """Several effects in a motor act in this order, from the command to the joint."""

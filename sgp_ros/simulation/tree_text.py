@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sgp_ros.rigid.locking import leader_of
-from sgp_ros.rigid.urdf_text import MOVING, Urdf, parse_urdf
+from sgp_ros.rigid.urdf_model import MOVING, Urdf
+from sgp_ros.rigid.urdf_text import parse_urdf
 from sgp_ros.simulation.mechanism import SimulatedJoint
 
 

@@ -12,7 +12,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sgp_ros.rigid.urdf_text import Urdf
+from sgp_ros.rigid.urdf_model import Urdf
 from sgp_ros.simulation.tree_text import TreePart, TreeText
 
 _PREFIX = 'link:'

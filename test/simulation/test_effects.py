@@ -11,12 +11,12 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.effects import Moment
+from sgp_ros.simulation.friction import position
 from sgp_ros.simulation.mechanism import SimulatedJoint
 from sgp_ros.simulation.recording import simulate
 from sgp_ros.simulation.registry import LAWS, SIMULATORS
 from sgp_ros.simulation.scenario import places
 from sgp_ros.simulation.sensors import Sensors
-from sgp_ros.simulation.varying_friction import position
 
 FREE = {'viscosity': 0.0, 'coulomb': 0.0, 'offset': 0.0, 'mass': 1.0}
 AXIS = {

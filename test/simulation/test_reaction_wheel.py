@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sgp_ros.simulation.assembly import make_simulation
+from sgp_ros.simulation.reaction_wheel import discrete_regulator
 from sgp_ros.simulation.recording import simulate
 from sgp_ros.simulation.sensors import Sensors
 
@@ -128,3 +129,23 @@ def test_sinusoids_swing_the_pole_below_the_horizontal(seed):
     swing = np.abs(recording.true_position[:, 0] - math.pi)
     assert 0.1 < swing.max() < 0.5 * math.pi
     assert np.abs(recording.true_velocity[:, 1]).max() < 200.0
+
+
+def test_double_integrator_regulator_has_no_cheaper_neighbour():
+    """Of all linear gains the Riccati gain costs least from any start: perturb and compare."""
+    A, B = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]])
+    Q, R, period = np.diag([1.0, 0.1]), np.array([[0.5]]), 0.1
+    Ad = np.array([[1.0, period], [0.0, 1.0]])
+    Bd = np.array([[0.5 * period**2], [period]])
+
+    def cost(gain):
+        x, total = np.array([1.0, -0.5]), 0.0
+        for _ in range(600):
+            u = -gain @ x
+            total += x @ Q @ x + u @ R @ u
+            x = Ad @ x + Bd @ u
+        return total
+
+    best = discrete_regulator(A, B, Q, R, period)
+    for change in np.random.default_rng(0).normal(size=(20, 1, 2)):
+        assert cost(best) < cost(best + 0.01 * change)

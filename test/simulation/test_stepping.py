@@ -10,6 +10,7 @@ from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.recording import simulate
 from sgp_ros.simulation.registry import SIMULATORS
 from sgp_ros.simulation.sensors import Sensors
+from sgp_ros.simulation.stepping import HeldCommands
 
 ARRAYS = (
     'stamps_ns', 'position', 'velocity', 'command_stamps_ns', 'command', 'true_position',
@@ -163,3 +164,23 @@ def test_recording_without_a_sample_is_refused(duration):
     """A duration must hold at least one period."""
     with pytest.raises(ConfigError, match='duration'):
         simulate(make_simulation('reaction_wheel'), duration)
+
+
+def test_before_the_first_command_there_is_nothing():
+    assert HeldCommands([0, 0]).arrived(5).tolist() == [0.0, 0.0]
+
+
+def test_a_command_given_ahead_of_its_time_leaves_the_one_before_in_force():
+    commands = HeldCommands([0])
+    commands.hold(0, np.array([1.0]))
+    commands.hold(10, np.array([2.0]))
+    assert commands.arrived(9).tolist() == [1.0]
+    assert commands.switches(5, 20) == [10]
+    assert commands.arrived(10).tolist() == [2.0]
+
+
+def test_each_channel_waits_for_its_own_delay():
+    commands = HeldCommands([0, 30])
+    for time_ns in range(0, 100, 10):
+        commands.hold(time_ns, np.array([time_ns, time_ns], dtype=float))
+        assert commands.arrived(time_ns).tolist() == [time_ns, max(time_ns - 30, 0)]

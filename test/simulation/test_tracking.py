@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sgp_ros.simulation.multisine import random_multisine
+from sgp_ros.simulation.tracking import random_multisine
 from test.simulation.trees import arm
 
 
