@@ -1,1 +1,1 @@
-"""Speed and memory beside rivals and the limits of the machine."""
+"""Speed and memory, compared with other packages and the limits of the machine."""

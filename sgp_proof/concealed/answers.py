@@ -1,4 +1,4 @@
-"""What counts as a right answer, with the look-alikes of each effect."""
+"""Right answers to a concealed effect, effects that cannot be told from it included."""
 
 from __future__ import annotations
 

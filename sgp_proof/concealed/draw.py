@@ -1,4 +1,4 @@
-"""Draw worlds with concealed physics: recordings of each and the right answers.
+"""Worlds with concealed physics: recordings of each and the right answers.
 
     python -m sgp_proof.concealed.draw --seeds 0:40 --tier B --out DIR [--only EFFECT]
 

@@ -1,4 +1,4 @@
-"""What the statistics of the verdict look like where their null hypothesis holds.
+"""Statistics of the verdict where their null hypotheses hold.
 
     python -m sgp_proof.concealed.nulls --tier B --seeds 1000:1100
 

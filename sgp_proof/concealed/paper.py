@@ -1,4 +1,4 @@
-"""The paper's own three concealments: draw worlds of them, diagnose, unseal, and score.
+"""The paper's own three concealments: worlds drawn, diagnosed and scored.
 
     python -m sgp_proof.concealed.paper [--seeds 0:10] [--worlds DIR]
 

@@ -1,4 +1,4 @@
-"""Draw worlds with concealed physics, diagnose them by the command line, unseal, and score.
+"""Worlds with concealed physics, drawn, diagnosed by the command line and scored.
 
     python -m sgp_proof.concealed.run --tier B --seeds 100:137 [--only pair] [--worlds DIR]
         [--outputs DIR]

@@ -1,1 +1,1 @@
-"""Numerics beside exact answers: filters, regressors, identifiable parameters."""
+"""Numerics compared with exact answers: filters, regressors, identifiable parameters."""

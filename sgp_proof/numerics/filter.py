@@ -1,4 +1,4 @@
-"""How much the signal path matters: parameters of the reaction wheel from encoder positions.
+"""Influence of the signal path: parameters of the reaction wheel from encoder positions.
 
 Parametric regression with the complete ten-coefficient model, so that every error is one of the
 filter. Compared on the same recordings: backward differences paired by index (the paper's finite

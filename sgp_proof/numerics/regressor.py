@@ -1,4 +1,4 @@
-"""Speed of the torque regressor of a seven-joint arm, beside Pinocchio and the speed of memory.
+"""Speed of the torque regressor of a seven-joint arm, compared with Pinocchio and memory.
 
 A chain of seven revolute joints with arbitrary axes and offsets; random positions, velocities and
 accelerations. Ours fills all samples of a batch in one call, into memory used before (`out`) or

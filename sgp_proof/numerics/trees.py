@@ -1,4 +1,4 @@
-"""Random trees of joints: are intervals calibrated, are unidentifiable directions all flagged?
+"""Random trees of joints: calibration of intervals, and flags of unidentifiable directions.
 
 python -m sgp_proof.numerics.trees [--trees 210]
 """

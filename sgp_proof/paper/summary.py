@@ -1,4 +1,4 @@
-"""Many outcomes as one table: mean, median, spread over seeds, and seeds that went wrong."""
+"""Tables of many outcomes: mean, median and spread over seeds, and outlying seeds."""
 
 from __future__ import annotations
 

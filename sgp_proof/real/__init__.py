@@ -1,1 +1,1 @@
-"""Real machines, with what is known of them."""
+"""Recordings of real machines, and what is known of the machines."""

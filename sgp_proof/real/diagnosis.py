@@ -1,4 +1,4 @@
-"""What `sgp diagnose` finds on real machines whose friction, or load, is withheld from the model.
+"""Diagnoses of real machines whose friction, or load, is withheld from the model.
 
     python -m sgp_proof.real.diagnosis [NAME ...]
 

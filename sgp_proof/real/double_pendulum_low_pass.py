@@ -1,4 +1,4 @@
-"""What would let `sgp diagnose` name the friction of the double pendulum.
+"""Diagnoses of the double pendulum with other low-passes, runs and nominal models.
 
     python -m sgp_proof.real.double_pendulum_low_pass
 

@@ -1,4 +1,4 @@
-"""Real recordings through `sgp replay` and through the node over DDS, number by number.
+"""Real recordings through `sgp replay` and through the node over DDS, compared number by number.
 
     python -m sgp_proof.real.live [NAME ...]
 

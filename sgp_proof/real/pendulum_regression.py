@@ -1,4 +1,4 @@
-"""What regression on accelerations finds of real pendulums, beside the roll-outs that know better.
+"""Regression on accelerations of real pendulums, compared with roll-outs.
 
     python -m sgp_proof.real.pendulum_regression
 

@@ -1,4 +1,4 @@
-"""What the physics of real arms leaves, and who could still learn it.
+"""Residuals of the physics of real arms: noise, structure, and what Z can learn of them.
 
     python -m sgp_proof.real.residuals
 

@@ -1,1 +1,1 @@
-"""Streams that never end: rates, intervals, memory."""
+"""Endless streams: rates, intervals, memory."""

@@ -1,4 +1,4 @@
-"""One-step predictions along streams, beside what people use for it.
+"""One-step predictions along streams, compared with other methods.
 
     python -m sgp_proof.streams.accuracy [NAME ...]
 

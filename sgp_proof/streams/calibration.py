@@ -1,4 +1,4 @@
-"""Are 95 % intervals 95 % intervals? One-step predictions and parameters, over hundreds of worlds.
+"""Coverage of 95 % intervals of one-step predictions and parameters, over hundreds of worlds.
 
     python -m sgp_proof.streams.calibration [worlds|wheels|recordings ...]
 

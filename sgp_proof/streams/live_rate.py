@@ -1,4 +1,4 @@
-"""A node at 1000 messages a second, seven joints, a buffer of 500: what is lost, what it takes.
+"""A node at 1000 messages a second, seven joints, a buffer of 500: losses, load and latency.
 
     python -m sgp_proof.streams.live_rate
 
