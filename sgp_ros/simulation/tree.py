@@ -209,10 +209,18 @@ def _impossible(robot: str, problem: str) -> ConfigError:
 
 def _library() -> Any:
     try:
-        return import_module('mujoco')
+        library = import_module('mujoco')
     except ImportError as error:
         raise ConfigError(
             f'MuJoCo, which simulates URDF robots, is missing ({error})',
             'the package mujoco',
             "pip install 'sgp_ros[simulate]'",
         ) from error
+    # It would write warnings to MUJOCO_LOG.TXT where the user is; a motion that is not finite is
+    # refused by `stepping`.
+    library.set_mju_user_warning(_ignore)
+    return library
+
+
+def _ignore(_warning: str) -> None:
+    pass

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 
+import mujoco
 import numpy as np
 import pinocchio
 import pytest
@@ -152,3 +153,16 @@ def test_missing_library_is_said_with_its_remedy(monkeypatch):
     monkeypatch.setitem(sys.modules, 'mujoco', None)
     with pytest.raises(ConfigError, match=r'sgp_ros\[simulate\]'):
         Tree(pendulum())
+
+
+def test_the_library_leaves_no_log_where_the_user_is(tmp_path, monkeypatch):
+    """MuJoCo's own handler of warnings writes MUJOCO_LOG.TXT into the current folder."""
+    monkeypatch.chdir(tmp_path)
+    Tree(pendulum())
+    body = '<body><joint type="slide"/><geom size="0.1"/></body>'
+    model = mujoco.MjModel.from_xml_string(f'<mujoco><worldbody>{body}</worldbody></mujoco>')
+    state = mujoco.MjData(model)
+    state.qpos[0] = np.nan
+    mujoco.mj_step(model, state)
+    assert [warning.number for warning in state.warning if warning.number]
+    assert not list(tmp_path.iterdir())
