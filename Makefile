@@ -13,7 +13,7 @@ unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 endif
 
-.PHONY: demo test lint format coverage oldest bench reproduce docs venv clean
+.PHONY: demo test busy lint format coverage oldest bench reproduce docs venv clean
 
 demo: venv
 	$(BIN)/sgp demo
@@ -29,6 +29,11 @@ lint: $(VENV)/.lint
 format: $(VENV)/.lint
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+
+# A robot's computer is never idle: the tests of the graph once more, beside two busy loops.
+busy: $(VENV)/.test
+	@while :; do :; done & one=$$!; while :; do :; done & two=$$!; \
+	    trap 'kill $$one $$two' EXIT; $(BIN)/python -m pytest -q test/ros; exit $$?
 
 # Layers whose branches the tests must enter; the pattern keeps those that exist.
 MEASURED := $(patsubst sgp_ros/%/__init__.py,--cov=sgp_ros.%,\
