@@ -18,11 +18,10 @@ import yaml
 from scipy import signal
 
 from sgp_proof.real.recordings import DATA, SIMPLE, UNDISTURBED_S
+from sgp_proof.real.rollout_fit import RolloutFitOptions, fit_rollouts
 from sgp_proof.result_files import RESULTS, make_parser, write_result
-from sgp_ros.batch.rollout import roll_out
-from sgp_ros.batch.rollout_fit import RolloutFitOptions, fit_rollouts
+from sgp_ros.batch.rollout import cut_windows, joined, roll_out
 from sgp_ros.batch.rollout_scores import score_windows
-from sgp_ros.batch.rollout_windows import cut_windows, joined
 from sgp_ros.gp.methods import FitOptions, fit_gp
 from sgp_ros.gp.model import CoefficientPrior, Observations
 from sgp_ros.physics.term import Motion

@@ -27,8 +27,7 @@ from sgp_proof.result_files import make_parser, write_result
 from sgp_ros.apps.identify import IdentifyOptions, read_signals
 from sgp_ros.batch.blocks import holdout
 from sgp_ros.batch.fit import OfflineOptions, fit_offline
-from sgp_ros.batch.plan import FilterPlan
-from sgp_ros.batch.regression_data import filtered_data
+from sgp_ros.batch.regression_data import FilterPlan, filtered_data
 from sgp_ros.robots.registry import load_robot
 
 SPACINGS = {'white': 0.55, 'dense': 0.25}

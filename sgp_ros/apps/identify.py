@@ -15,8 +15,8 @@ from sgp_ros.apps.identified_robot import nominal_coefficients, write_identified
 from sgp_ros.apps.identify_summary import print_findings
 from sgp_ros.batch.identification import HELD_OUT, Identification, IdentificationOptions, identify
 from sgp_ros.batch.regression_data import FilteredData, smoothed_motion
+from sgp_ros.batch.rollout import cut_windows, joined
 from sgp_ros.batch.rollout_scores import RolloutScore, score_windows
-from sgp_ros.batch.rollout_windows import cut_windows, joined
 from sgp_ros.batch.signals import Signals, collect_signals
 from sgp_ros.batch.zero_phase import ZeroPhase
 from sgp_ros.engine.config import EngineConfig

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sgp_ros.batch.physics import autocorrelation
+from sgp_ros.batch.least_squares import autocorrelation
 from sgp_ros.batch.posterior import BatchPosterior
 from sgp_ros.batch.regression_data import FilteredData
 from sgp_ros.errors import ConfigError, RecordingError

@@ -14,13 +14,12 @@ import numpy as np
 
 from sgp_ros.batch.blocks import holdout
 from sgp_ros.batch.bodies import nearest_bodies
-from sgp_ros.batch.excitation import Excitation, judge_excitation, structural_base
+from sgp_ros.batch.excitation import Excitation, judge_excitation, require_motion, structural_base
 from sgp_ros.batch.fit import OfflineFit, fit_offline
 from sgp_ros.batch.inputs import CANDIDATES, InputChoice, choose_inputs
-from sgp_ros.batch.motion import require_motion
 from sgp_ros.batch.passive import require_balance
-from sgp_ros.batch.plan import CUTOFFS, FilterPlan, PlanChoice, choose_plan
-from sgp_ros.batch.regression_data import FilteredData, filtered_data
+from sgp_ros.batch.plan import CUTOFFS, PlanChoice, choose_plan
+from sgp_ros.batch.regression_data import FilteredData, FilterPlan, filtered_data
 from sgp_ros.batch.signals import Signals
 from sgp_ros.batch.suggestions import Suggestion, suggest_motions
 from sgp_ros.errors import ConfigError, NumericalError, RecordingError

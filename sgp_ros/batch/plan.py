@@ -22,8 +22,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sgp_ros.batch.physics import autocorrelation, least_squares, solved, triangular
-from sgp_ros.batch.regression_data import FilteredData, filtered_data
+from sgp_ros.batch.least_squares import autocorrelation, least_squares, solved, triangular
+from sgp_ros.batch.regression_data import FilteredData, FilterPlan, filtered_data
 from sgp_ros.batch.signals import Signals
 from sgp_ros.errors import RecordingError
 from sgp_ros.robots.robot import Robot
@@ -42,23 +42,6 @@ _WHITE_SPACING = 0.55  # periods of the cut-off after which filtered white noise
 _BLOCK_S = 6.0
 _FEWEST_BLOCKS, _MOST_BLOCKS = 4, 10
 _MOST_SAMPLES, _MOST_NUMBERS = 40_000, 12_000_000
-
-
-@dataclass(frozen=True, slots=True)
-class FilterPlan:
-    """How a recording is filtered.
-
-    Attributes:
-        cutoff: of the low-pass that every column and the target pass [Hz].
-        state_cutoff: of the light smoothing of the states, well above `cutoff` [Hz].
-        decimation: every how many samples a row is kept.
-        velocity_source: `measured`, or `position` to differentiate.
-    """
-
-    cutoff: float
-    state_cutoff: float
-    decimation: int
-    velocity_source: str = 'position'
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,11 +20,25 @@ from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.physics.term import CHANNELS, INPUT_CHANNELS, Motion
 from sgp_ros.robots.robot import Robot
 
-if TYPE_CHECKING:
-    from sgp_ros.batch.plan import FilterPlan
-
 CHUNK_BYTES = 40_000_000
 """Most that the columns of f at the full rate take at once; the filter holds a few copies."""
+
+
+@dataclass(frozen=True, slots=True)
+class FilterPlan:
+    """How a recording is filtered.
+
+    Attributes:
+        cutoff: of the low-pass that every column and the target pass [Hz].
+        state_cutoff: of the light smoothing of the states, well above `cutoff` [Hz].
+        decimation: every how many samples a row is kept.
+        velocity_source: `measured`, or `position` to differentiate.
+    """
+
+    cutoff: float
+    state_cutoff: float
+    decimation: int
+    velocity_source: str = 'position'
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sgp_ros.batch.forward import Residual
-from sgp_ros.batch.rollout import roll_out
-from sgp_ros.batch.rollout_windows import Windows, cut_windows
+from sgp_ros.batch.rollout import Windows, cut_windows, roll_out
 from sgp_ros.robots.robot import Robot
 
 

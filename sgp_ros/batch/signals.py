@@ -5,7 +5,7 @@ a cubic spline, measured velocities and efforts by straight lines. (A monotone c
 every extremum, which costs several tenths of a per cent of the acceleration.) A command holds
 until the next one; its effort at a grid point is the exact average with the hat that reaches one
 step to either side, sharpened, which is what the second derivative of the position does to the
-acceleration (see `stencils.sharpened`). So no side of the equation of motion lags behind the
+acceleration (see `zero_phase.sharpened`). So no side of the equation of motion lags behind the
 other.
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 from scipy import interpolate
 
 from sgp_ros.batch.acceptance import USUAL, Accepted, accept
-from sgp_ros.batch.stencils import sharpened
+from sgp_ros.batch.zero_phase import sharpened
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import RecordingError

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from sgp_ros.batch.blocks import distance_to, holdout
-from sgp_ros.batch.plan import FilterPlan
-from sgp_ros.batch.regression_data import filtered_data
+from sgp_ros.batch.regression_data import FilterPlan, filtered_data
 from sgp_ros.errors import ConfigError
 from sgp_ros.robots.registry import load_robot
 from test.batch.worlds import moved_axis

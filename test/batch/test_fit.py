@@ -7,8 +7,8 @@ import pytest
 
 from sgp_ros.batch.blocks import distance_to, holdout
 from sgp_ros.batch.fit import OfflineOptions, fit_offline, prior_of
-from sgp_ros.batch.plan import FilterPlan, choose_plan
-from sgp_ros.batch.regression_data import filtered_data
+from sgp_ros.batch.plan import choose_plan
+from sgp_ros.batch.regression_data import FilterPlan, filtered_data
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.gp.scores import INTERVAL_95, coverage95, nmse
 from sgp_ros.robots.registry import load_robot

@@ -9,8 +9,7 @@ import pytest
 
 from sgp_ros.batch.fit import fit_offline
 from sgp_ros.batch.inputs import CANDIDATES, choose_inputs
-from sgp_ros.batch.plan import FilterPlan
-from sgp_ros.batch.regression_data import FilteredData, filtered_data
+from sgp_ros.batch.regression_data import FilteredData, FilterPlan, filtered_data
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.term import Coefficient, Joint, Motion
 from sgp_ros.robots.registry import load_robot

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sgp_ros.batch.motion import require_motion
+from sgp_ros.batch.excitation import require_motion
 from sgp_ros.errors import RecordingError
 from sgp_ros.physics.term import Joint
 from sgp_ros.robots.registry import load_robot

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sgp_ros.batch.pivoted import pivoted_basis
+from sgp_ros.batch.posterior import pivoted_basis
 from sgp_ros.gp.kernels import AdditiveSquaredExponential, SquaredExponential
 
 KERNELS = [

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sgp_ros.batch import plan
-from sgp_ros.batch.physics import autocorrelation, least_squares, solved, triangular
+from sgp_ros.batch.least_squares import autocorrelation, least_squares, solved, triangular
 from sgp_ros.batch.plan import WHITE, choose_plan
 from sgp_ros.batch.regression_data import filtered_data
 from sgp_ros.batch.signals import collect_signals

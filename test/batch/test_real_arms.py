@@ -17,8 +17,7 @@ import pytest
 
 from sgp_ros.batch.blocks import distance_to, holdout
 from sgp_ros.batch.fit import fit_offline
-from sgp_ros.batch.plan import FilterPlan
-from sgp_ros.batch.regression_data import filtered_data
+from sgp_ros.batch.regression_data import FilterPlan, filtered_data
 from sgp_ros.batch.signals import collect_signals
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.recordings.reader import open_recording

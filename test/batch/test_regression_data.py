@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from sgp_ros.batch import regression_data
-from sgp_ros.batch.plan import FilterPlan
-from sgp_ros.batch.regression_data import filtered_data
+from sgp_ros.batch.regression_data import FilterPlan, filtered_data
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.robots.registry import load_robot
 from test.batch.worlds import AXIS_TRUTH, axis_signals, emps_signals

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sgp_ros.batch.rollout import roll_out
+from sgp_ros.batch.rollout import cut_windows, joined, roll_out
 from sgp_ros.batch.rollout_scores import rollout_scores, score_windows
-from sgp_ros.batch.rollout_windows import cut_windows, joined
 from sgp_ros.errors import RecordingError
 from sgp_ros.robots.registry import load_robot
 

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from sgp_ros.batch.acceptance import HeldCommands
 from sgp_ros.batch.signals import collect_signals
-from sgp_ros.batch.stencils import second_derivative
-from sgp_ros.batch.zero_phase import ZeroPhase
+from sgp_ros.batch.zero_phase import ZeroPhase, second_derivative
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.errors import ConfigError, RecordingError

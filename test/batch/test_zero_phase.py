@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sgp_ros.batch.stencils import (
+from sgp_ros.batch.zero_phase import (
     REACH,
+    ZeroPhase,
     first_derivative,
     second_derivative,
     sharpened,
 )
-from sgp_ros.batch.zero_phase import ZeroPhase
 from sgp_ros.errors import ConfigError
 
 RATE = 100.0

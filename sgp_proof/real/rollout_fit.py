@@ -15,8 +15,7 @@ import numpy as np
 from scipy import optimize
 
 from sgp_ros.batch.forward import Residual
-from sgp_ros.batch.rollout import roll_out
-from sgp_ros.batch.rollout_windows import Windows
+from sgp_ros.batch.rollout import Windows, roll_out
 from sgp_ros.errors import ConfigError, NumericalError
 from sgp_ros.gp.linear_algebra import svd
 from sgp_ros.physics.term import Motion

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sgp_ros.batch.rollout import roll_out
-from sgp_ros.batch.rollout_fit import RolloutFitOptions, fit_rollouts
-from sgp_ros.batch.rollout_windows import Windows, cut_windows, joined
+from sgp_proof.real.rollout_fit import RolloutFitOptions, fit_rollouts
+from sgp_ros.batch.rollout import Windows, cut_windows, joined, roll_out
 from sgp_ros.errors import ConfigError, NumericalError
 from sgp_ros.robots.registry import load_robot
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import linalg, signal
 
-from sgp_ros.batch.colour import autoregression, coloured_products, inflation
+from sgp_ros.batch.least_squares import autoregression, coloured_products, inflation
 
 WEIGHTS = np.array([0.6, 0.2])
 
