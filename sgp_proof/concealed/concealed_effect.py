@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sgp_proof.concealed.unknown import UNKNOWN
-from sgp_ros.simulation.effects import ChosenEffect
+from sgp_ros.simulation.mechanism import ChosenEffect
 
 SCORED = {
     'viscous_friction': ['b'], 'coulomb_friction': ['level'],

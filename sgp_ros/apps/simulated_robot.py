@@ -13,7 +13,7 @@ from sgp_ros.robots.nominal import Nominal, nominal_model
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.stated_values import stated_urdf, values_of
 from sgp_ros.robots.urdf_robot import stated_part, urdf_text
-from sgp_ros.simulation.effects import ChosenEffect
+from sgp_ros.simulation.mechanism import ChosenEffect
 from sgp_ros.simulation.registry import SIMULATORS
 from sgp_ros.simulation.simulator import Simulator
 from sgp_ros.simulation.tree_simulator import tree_simulator

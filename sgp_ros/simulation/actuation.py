@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from sgp_ros.simulation.effects import Action, Moment, ParameterValue
-from sgp_ros.simulation.mechanism import SimulatedJoint
+from sgp_ros.simulation.effects import Action, Moment
+from sgp_ros.simulation.mechanism import ParameterValue, SimulatedJoint
 
 _CONTACT_DAMPING = 0.7
 

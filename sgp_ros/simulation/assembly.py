@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.simulation.effect_text import parse_effect
-from sgp_ros.simulation.effects import Action, ChosenEffect
-from sgp_ros.simulation.mechanism import with_physical
+from sgp_ros.simulation.effects import Action
+from sgp_ros.simulation.mechanism import ChosenEffect, with_physical
 from sgp_ros.simulation.registry import SIMULATORS
 from sgp_ros.simulation.scenario import Scenario, effect_actions, with_effects
 from sgp_ros.simulation.sensors import Sensors

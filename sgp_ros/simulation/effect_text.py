@@ -12,12 +12,8 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.parts import BASE, TOOL
-from sgp_ros.simulation.effects import (
-    ChosenEffect,
-    EffectParameter,
-    Law,
-    ParameterValue,
-)
+from sgp_ros.simulation.effects import EffectParameter, Law
+from sgp_ros.simulation.mechanism import ChosenEffect, ParameterValue
 from sgp_ros.simulation.registry import LAWS
 
 _EXAMPLE = 'write for example coulomb_friction:joint=pole,level=0.01'

@@ -15,9 +15,7 @@ import numpy as np
 
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.parts import SIDES, Quantity
-from sgp_ros.simulation.mechanism import SimulatedJoint
-
-ParameterValue = float | str
+from sgp_ros.simulation.mechanism import ParameterValue, SimulatedJoint
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -161,18 +159,3 @@ class Law:
             EffectParameter(q.name, q.unit, q.low, kinds=q.kinds) for q in effect.quantities
         )
         return *words, *numbers, *side, *self.own
-
-
-@dataclass(frozen=True, slots=True)
-class ChosenEffect:
-    """An effect on a joint with its values.
-
-    Attributes:
-        name: in the catalogue.
-        joint: name of the joint, or the word for a place that is none.
-        parameters: values by name [unit of the parameter].
-    """
-
-    name: str
-    joint: str
-    parameters: Mapping[str, ParameterValue]

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Mapping
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.simulation.effects import Action, Moment, ParameterValue, side_of
-from sgp_ros.simulation.mechanism import SimulatedJoint
+from sgp_ros.simulation.effects import Action, Moment, side_of
+from sgp_ros.simulation.mechanism import ParameterValue, SimulatedJoint
 
 
 def viscous(

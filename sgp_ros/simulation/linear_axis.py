@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sgp_ros.simulation.controllers import ControllerChoice, external, sinusoids, zero
-from sgp_ros.simulation.effects import ChosenEffect
-from sgp_ros.simulation.mechanism import SimulatedJoint, TrueCoefficient, quantity
+from sgp_ros.simulation.mechanism import ChosenEffect, SimulatedJoint, TrueCoefficient, quantity
 from sgp_ros.simulation.sensors import Sensors
 from sgp_ros.simulation.simulator import Simulator
 from sgp_ros.simulation.tracking import pd_reference

@@ -10,14 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import Field, dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from sgp_ros.errors import ConfigError
-
-if TYPE_CHECKING:
-    from sgp_ros.simulation.effects import ChosenEffect
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +56,24 @@ class TrueCoefficient:
     name: str
     value: float
     unit: str
+
+
+ParameterValue = float | str
+
+
+@dataclass(frozen=True, slots=True)
+class ChosenEffect:
+    """An effect on a joint with its values.
+
+    Attributes:
+        name: in the catalogue.
+        joint: name of the joint, or the word for a place that is none.
+        parameters: values by name [unit of the parameter].
+    """
+
+    name: str
+    joint: str
+    parameters: Mapping[str, ParameterValue]
 
 
 class Mechanism(Protocol):

@@ -24,9 +24,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
+from sgp_ros.errors import NumericalError
 from sgp_ros.simulation.controllers import Controller, ControllerChoice, external, sinusoids, zero
-from sgp_ros.simulation.effects import ChosenEffect
-from sgp_ros.simulation.mechanism import Mechanism, SimulatedJoint, TrueCoefficient, quantity
+from sgp_ros.simulation.mechanism import (
+    ChosenEffect,
+    Mechanism,
+    SimulatedJoint,
+    TrueCoefficient,
+    quantity,
+)
 from sgp_ros.simulation.sensors import Sensors, encoder_resolution
 from sgp_ros.simulation.simulator import Simulator
 
@@ -47,14 +53,23 @@ def discrete_regulator(
         Q: (n, n) cost of the state.
         R: (m, m) cost of the command.
         period_s: sampling period [s].
+
+    Raises:
+        NumericalError: no gain exists, or it is beyond the range of numbers.
     """
     n, m = B.shape
     joint = np.zeros((n + m, n + m))
     joint[:n] = np.hstack([A, B])
-    held = linalg.expm(joint * period_s)
-    Ad, Bd = held[:n, :n], held[:n, n:]
-    S = linalg.solve_discrete_are(Ad, Bd, Q, R)
-    gain: np.ndarray = np.linalg.solve(R + Bd.T @ S @ Bd, Bd.T @ S @ Ad)
+    try:
+        held = linalg.expm(joint * period_s)
+        Ad, Bd = held[:n, :n], held[:n, n:]
+        S = linalg.solve_discrete_are(Ad, Bd, Q, R)
+        gain: np.ndarray = np.linalg.solve(R + Bd.T @ S @ Bd, Bd.T @ S @ Ad)
+    except (np.linalg.LinAlgError, ValueError) as error:
+        raise NumericalError(
+            f'no regulator balances the robot ({error})', 'a robot that its command can balance',
+            'take more usual physical parameters, or another controller',
+        ) from error  # fmt: skip
     return gain
 
 

@@ -9,8 +9,13 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.parts import BASE, JOINT, LAST, MOTOR, TOOL
 from sgp_ros.simulation.effect_text import checked_law, with_defaults
-from sgp_ros.simulation.effects import EVERY_MOTOR, Action, ChosenEffect
-from sgp_ros.simulation.mechanism import Mechanism, SimulatedJoint, physical_parameters
+from sgp_ros.simulation.effects import EVERY_MOTOR, Action
+from sgp_ros.simulation.mechanism import (
+    ChosenEffect,
+    Mechanism,
+    SimulatedJoint,
+    physical_parameters,
+)
 from sgp_ros.simulation.registry import LAWS
 from sgp_ros.simulation.sensors import Sensors
 from sgp_ros.simulation.simulator import Simulator

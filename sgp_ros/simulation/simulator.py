@@ -6,8 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from sgp_ros.simulation.controllers import ControllerChoice
-from sgp_ros.simulation.effects import ChosenEffect
-from sgp_ros.simulation.mechanism import Mechanism, SimulatedJoint
+from sgp_ros.simulation.mechanism import ChosenEffect, Mechanism, SimulatedJoint
 from sgp_ros.simulation.sensors import Sensors
 
 

@@ -11,8 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from sgp_ros.simulation.controllers import ControllerChoice, zero
-from sgp_ros.simulation.effects import ChosenEffect, ParameterValue
-from sgp_ros.simulation.mechanism import SimulatedJoint, TrueCoefficient, quantity
+from sgp_ros.simulation.mechanism import (
+    ChosenEffect,
+    ParameterValue,
+    SimulatedJoint,
+    TrueCoefficient,
+    quantity,
+)
 from sgp_ros.simulation.sensors import Sensors, encoder_resolution
 from sgp_ros.simulation.simulator import Simulator
 

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.simulation.effects import ChosenEffect
-from sgp_ros.simulation.mechanism import TrueCoefficient, quantity
+from sgp_ros.simulation.mechanism import ChosenEffect, TrueCoefficient, quantity
 from sgp_ros.simulation.tree_text import TreePart, TreeText, read_tree
 from sgp_ros.simulation.tree_xml import plain_tree, tree_link
 

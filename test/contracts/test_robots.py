@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import doctest
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -9,7 +10,9 @@ import numpy as np
 import pytest
 
 from sgp_ros.engine.config import EngineConfig, describe_settings
+from sgp_ros.physics import formula
 from sgp_ros.physics.term import Motion
+from sgp_ros.robots import robot as robot_module
 from sgp_ros.robots.registry import load_robot, robot_names
 from test.rigid.random_urdf import random_urdf
 
@@ -155,3 +158,11 @@ def test_settings_of_every_robot_round_trip(name):
     described = {setting.name for setting in describe_settings(robot)}
     assert described == set(config.to_mapping())
     assert all(setting.description for setting in describe_settings(robot))
+
+
+@pytest.mark.parametrize('module', [robot_module, formula], ids=lambda module: module.__name__)
+def test_the_examples_in_docstrings_run(module):
+    """What people copy works."""
+    found = doctest.testmod(module)
+    assert found.attempted
+    assert not found.failed

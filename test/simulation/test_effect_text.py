@@ -7,7 +7,7 @@ import pytest
 from sgp_ros.errors import ConfigError
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.effect_text import parse_effect, parse_physical
-from sgp_ros.simulation.effects import ChosenEffect
+from sgp_ros.simulation.mechanism import ChosenEffect
 
 
 def test_text_is_read_as_written():

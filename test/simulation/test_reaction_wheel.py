@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from sgp_ros.errors import NumericalError
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.reaction_wheel import discrete_regulator
 from sgp_ros.simulation.recording import simulate
@@ -149,3 +150,11 @@ def test_double_integrator_regulator_has_no_cheaper_neighbour():
     best = discrete_regulator(A, B, Q, R, period)
     for change in np.random.default_rng(0).normal(size=(20, 1, 2)):
         assert cost(best) < cost(best + 0.01 * change)
+
+
+@pytest.mark.parametrize('physical', [{'wheel_inertia': 1e-300}, {'gravity': 1e200}])
+def test_a_wheel_that_no_regulator_balances_is_refused_in_one_line(physical):
+    """The library would end in an error of its own."""
+    with pytest.raises(NumericalError, match='no regulator balances') as caught:
+        make_simulation('reaction_wheel', controller='balance', physical=physical)
+    assert '\n' not in str(caught.value)
