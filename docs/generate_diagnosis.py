@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from sgp_proof.concealed.scoring import rate
-from sgp_ros.diagnosis.decide.decision import (
+from sgp_ros.diagnosis.criteria import (
     ADEQUATE_REST,
+    INDEPENDENT_ROWS,
     LEAST_SHARE,
     PER_EFFECT,
     PER_PARAMETER,
-    ROWS,
     SHAPE_ERROR,
 )
 
@@ -218,7 +218,7 @@ def _effects(worlds):
         'table, because the right model was not among those fitted.\n\n'
         f'Because of the errors of filters and signals, models are compared as if a right column left '
         f'{100 * SHAPE_ERROR:g} % of the discrepancy; {_percent(nearly)} of the right models leave less structure. '
-        f'At most {ROWS:g} rows count. Only the ratio of this number to the penalties matters, and the '
+        f'At most {INDEPENDENT_ROWS:g} rows count. Only the ratio of this number to the penalties matters, and the '
         'table shows the gains under the null hypothesis.'
     )
     return lines

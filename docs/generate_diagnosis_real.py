@@ -11,7 +11,7 @@ from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from sgp_ros.diagnosis.decide.decision import LEAST_SHARE
+from sgp_ros.diagnosis.criteria import LEAST_SHARE
 from sgp_ros.diagnosis.result import Equivalent
 from sgp_ros.report.diagnosis_text import equivalence_sentence, percent, plain_name
 

@@ -65,6 +65,14 @@ PROOF_ROOMS = {
 }
 """Room of the proof to the other ones that it may import, beside every layer of the product."""
 
+SUB_ROOMS = {
+    'diagnosis': (
+        'criteria', 'result', 'places', 'compare', 'explain', 'locate', 'decide', 'findings',
+        'prove', 'mapping', 'pipeline',
+    ),
+}  # fmt: skip
+"""Layer to its sub-rooms in their order: each imports itself and those that stand before it."""
+
 PURE = ('gp', 'physics', 'rigid', 'engine', 'robots', 'simulation', 'batch')
 SILENT = ('errors', *PURE, 'recordings', 'diagnosis')
 IMPURE_MODULES = {
@@ -126,6 +134,20 @@ def test_rooms_of_the_proof_follow_their_table(path):
         parts = name.split('.')
         if parts[0] == PROOF.name:
             assert parts[1] in {room, *PROOF_ROOMS[room]}, f'{name} in line {node.lineno}'
+
+
+@pytest.mark.parametrize('path', MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_sub_rooms_look_back_only(path):
+    """The stages of a diagnosis follow each other; none needs what comes after it."""
+    layer, *within = path.relative_to(PACKAGE).with_suffix('').parts
+    order = SUB_ROOMS.get(layer, ())
+    if not order or within == ['__init__']:
+        return
+    before = order[: order.index(within[0]) + 1]
+    for name, node in _imports(_tree(path)):
+        parts = name.split('.')
+        if parts[:2] == ['sgp_ros', layer]:
+            assert parts[2] in before, f'{within[0]} imports {name} in line {node.lineno}'
 
 
 @pytest.mark.parametrize(

@@ -30,8 +30,8 @@ from sgp_proof.result_files import RESULTS, seed_range, write_result
 from sgp_ros.apps.simulated_files import write_simulated
 from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.decide.cross_validation import structure
 from sgp_ros.diagnosis.decide.decision import Scale, decide
-from sgp_ros.diagnosis.decide.referee import structure
 from sgp_ros.diagnosis.explain.hypotheses import compete
 from sgp_ros.diagnosis.places import joint_name
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG

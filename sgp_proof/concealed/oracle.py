@@ -30,7 +30,7 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.suspects import Columns
 from sgp_ros.diagnosis.places import joint_name
-from sgp_ros.diagnosis.prove.final_model import FinalModel
+from sgp_ros.diagnosis.prove.prediction import FinalModel
 from sgp_ros.physics.catalogue import BACKLASH, EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from sgp_ros.apps.diagnosed_robot import write_diagnosed
-from sgp_ros.diagnosis.compare.simulation_check import disagreement, nominal_shares
+from sgp_ros.diagnosis.compare.equations import disagreement, nominal_shares
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.result import Diagnosis, Proof

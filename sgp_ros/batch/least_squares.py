@@ -75,6 +75,9 @@ def autocorrelation(residual: np.ndarray, block: np.ndarray, lag: int) -> np.nda
 
 _HIGHEST_ORDER = 12
 _ROWS_PER_LAG = 20
+_LONGEST_LAG = 60
+_LEAST_CORRELATION = 0.05
+"""The sum over lags ends where the correlation falls below this."""
 
 
 def autoregression(residual: np.ndarray, block: np.ndarray) -> tuple[np.ndarray, float]:
@@ -140,3 +143,22 @@ def _at_lag(residual: np.ndarray, block: np.ndarray, lag: int) -> float:
     pairs = int((block[:-lag] == block[lag:]).sum())
     found = float(autocorrelation(residual[:, None], block, lag)[0])
     return found * pairs / len(residual)
+
+
+def correlation_factor(residual: np.ndarray) -> float:
+    """Return `1 + 2 sum of rho(lag)` of one joint's residual (N,), at least 1.
+
+    The variance of a mean of correlated samples is this much larger than that of independent ones
+    (Bartlett 1946).
+    """
+    r = residual - residual.mean()
+    power = float(r @ r)
+    if power <= 0.0:
+        return 1.0
+    total = 1.0
+    for lag in range(1, min(_LONGEST_LAG, len(r) // 4)):
+        rho = float(r[lag:] @ r[:-lag]) / power
+        if rho < _LEAST_CORRELATION:
+            break
+        total += 2.0 * rho
+    return total

@@ -8,21 +8,19 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.compare.velocity_sensor import SensorLag
+from sgp_ros.diagnosis.criteria import NUMBER_ERROR, REGION_ENERGY
 from sgp_ros.diagnosis.decide.certainty import Probabilities
 from sgp_ros.diagnosis.decide.decision import Decision
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.suspects import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
-from sgp_ros.diagnosis.locate.confinement import ENERGY, region
-from sgp_ros.diagnosis.locate.remainder import Remainder
+from sgp_ros.diagnosis.locate.remainder import Remainder, region
 from sgp_ros.diagnosis.places import joint_name
 from sgp_ros.diagnosis.result import Dependence, Finding, Location, Parameter, ParameterError
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.robots.observed_motion import ObservedMotion
 
-MODEL_ERROR = 0.003
-"""Relative standard deviation that approximations of the signals add to every number."""
 MOST_ALTERNATIVES = 8
 
 
@@ -47,7 +45,7 @@ def asserted(
         findings.append(_unknown(equations, decision, remainders, chances, depends))
     names = equations.motion.tree.joint_names
     for lag in lags:
-        unit = Parameter(lag.time_constant, max(lag.std, MODEL_ERROR * lag.time_constant), 's')
+        unit = Parameter(lag.time_constant, max(lag.std, NUMBER_ERROR * lag.time_constant), 's')
         findings.append(
             Finding(
                 names[lag.joint], VELOCITY_FILTER_LAG.name, {'time_constant': unit}, Location(),
@@ -106,7 +104,7 @@ def _parameters(
             found[name] = Parameter(value)
             continue
         if spread is not None:
-            spread = float(np.hypot(spread, MODEL_ERROR * abs(value)))
+            spread = float(np.hypot(spread, NUMBER_ERROR * abs(value)))
         found[name] = Parameter(value, spread, units[name])
     return found
 
@@ -129,7 +127,8 @@ def _unknown(
     if where.variables:
         (name,) = where.variables
         ((lo, hi),) = where.intervals.get(name, where.time)
-        on += f'; {100 * ENERGY:.0f} % of it lies where {name} is between {lo:.3g} and {hi:.3g}'
+        on += f'; {100 * REGION_ENERGY:.0f} % of it lies where {name} is '
+        on += f'between {lo:.3g} and {hi:.3g}'
     return Finding(
         names[decision.worst], 'unknown', {}, where, 0.0, chances.unknown, share, '', on
     )
@@ -159,7 +158,7 @@ def parameter_errors(equations: Equations, model: Model) -> tuple[ParameterError
         }
         for name, (now, then, unit) in values.items():
             std = float(np.sqrt(max(float(slopes[name] @ C @ slopes[name]), 0.0)))
-            std = float(np.hypot(std, MODEL_ERROR * abs(now - then)))
+            std = float(np.hypot(std, NUMBER_ERROR * abs(now - then)))
             if abs(now - then) > 2.0 * std and abs(now - then) > 1e-9:
                 found.append(ParameterError(link, name, float(now), std, float(then), unit))
     return tuple(found)

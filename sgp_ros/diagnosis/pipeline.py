@@ -10,6 +10,7 @@ from sgp_ros.batch.acceptance import USUAL
 from sgp_ros.diagnosis.compare.equations import Equations, make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.compare.velocity_sensor import sensor_lags
+from sgp_ros.diagnosis.criteria import REMAINDER_SHARE
 from sgp_ros.diagnosis.decide.certainty import certainty_of, probabilities
 from sgp_ros.diagnosis.decide.decision import Decision, decide
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, equivalents
@@ -19,9 +20,8 @@ from sgp_ros.diagnosis.findings import alternatives, asserted, parameter_errors
 from sgp_ros.diagnosis.locate.bands import bands
 from sgp_ros.diagnosis.locate.dependence import dependences
 from sgp_ros.diagnosis.locate.remainder import Remainder, learn_remainder
-from sgp_ros.diagnosis.prove.bodies import diagnosed_bodies
-from sgp_ros.diagnosis.prove.final_model import FinalModel
 from sgp_ros.diagnosis.prove.held_out import keep_back
+from sgp_ros.diagnosis.prove.prediction import FinalModel, diagnosed_bodies
 from sgp_ros.diagnosis.prove.proof import prove
 from sgp_ros.diagnosis.result import Band, Dependence, Diagnosis, Traces
 from sgp_ros.engine.config import EngineConfig
@@ -112,7 +112,7 @@ def _remainders(equations: Equations, decision: Decision) -> tuple[Remainder, ..
     if decision.verdict != 'unexplained':
         return ()
     left = decision.model.mean_square / equations.power
-    joints = [j for j in np.argsort(-left) if left[j] > 0.2 * left.max()]
+    joints = [j for j in np.argsort(-left) if left[j] > REMAINDER_SHARE * left.max()]
     found = [learn_remainder(equations, decision.model.residual, int(j)) for j in joints[:2]]
     return tuple(r for r in found if r is not None)
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-SIGNIFICANT = 0.05
-"""Chance that anything is called significant where the motion has no part in what is left."""
+from sgp_ros.diagnosis.criteria import SIGNIFICANT
+
 VERDICTS = ('no_mismatch', 'parameters_only', 'missing_physics', 'unexplained')
 
 

@@ -15,12 +15,7 @@ from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.report.diagnosis_bands import band_sentences
 from sgp_ros.report.diagnosis_figures import draw_diagnosis
 from sgp_ros.report.diagnosis_maps import important_joints
-from sgp_ros.report.diagnosis_proof import (
-    densities,
-    near_and_far,
-    proof_rows,
-    rollouts_sentences,
-)
+from sgp_ros.report.diagnosis_proof import densities, near_and_far, proof_rows, rollouts_sentences
 from sgp_ros.report.diagnosis_text import (
     effect_name,
     equivalence_sentence,

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
-from sgp_ros.diagnosis.decide.decision import LEAST_SHARE
+from sgp_ros.diagnosis.criteria import LEAST_SHARE
 from sgp_ros.diagnosis.result import Diagnosis
 from sgp_ros.report.diagnosis_text import scored_joints, worst_joint
 

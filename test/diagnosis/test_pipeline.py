@@ -11,14 +11,7 @@ import pytest
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.result import VERDICTS
-from test.diagnosis.worlds import (
-    CHAINS,
-    World,
-    delayed,
-    events_of,
-    robot_of,
-    simulate,
-)
+from test.diagnosis.worlds import CHAINS, World, delayed, events_of, robot_of, simulate
 
 SECONDS = 8.0
 PLANTED = {

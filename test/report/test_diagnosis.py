@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.colors import to_hex
 
-from sgp_ros.diagnosis.decide.decision import LEAST_SHARE
+from sgp_ros.diagnosis.criteria import LEAST_SHARE
 from sgp_ros.diagnosis.result import Equivalent, Parameter
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.report.diagnosis import render, write_diagnosis

@@ -14,7 +14,7 @@ from scipy import optimize, signal
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
-from sgp_ros.diagnosis.decide.decision import LEAST_SHARE, NATS
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, EVIDENCE, SENSOR_REST
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -42,7 +42,7 @@ class SensorLag:
     @property
     def is_physics(self) -> bool:
         """Return whether it is large enough, significant, and explains the difference."""
-        return self.share > 0.6 * LEAST_SHARE and self.nats > NATS and self.rest < 0.2
+        return self.share > COUNTED_SHARE and self.nats > EVIDENCE and self.rest < SENSOR_REST
 
 
 def lagged(v: np.ndarray, time_constant: float, step: float) -> np.ndarray:

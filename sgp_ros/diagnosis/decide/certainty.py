@@ -14,14 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.decide.decision import TEMPER, Decision, Scale
+from sgp_ros.diagnosis.criteria import CALM_SHARE, LEAST_ODDS, MOST_CERTAIN, TEMPER
+from sgp_ros.diagnosis.decide.decision import Decision, Scale
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.hypotheses import Competition
 from sgp_ros.diagnosis.result import Finding
-
-LEAST_ODDS = 0.01
-"""A rival below this, relative to the asserted model, is not looked at closely."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +69,7 @@ def probabilities(
             by_key[s.key] = by_key.get(s.key, 0.0) + float(p) * adequate
     unknown = float(np.clip(decision.excess / (decision.excess + 1.0), 0.05, 0.97))
     return Probabilities(
-        {key: min(p, 0.99) for key, p in by_key.items()},
+        {key: min(p, MOST_CERTAIN) for key, p in by_key.items()},
         unknown,
         decision.model,
         equations.power,
@@ -89,4 +87,4 @@ def certainty_of(
         return max(f.probability for f in findings)
     del decision
     left = float((competition.parameters.mean_square / equations.power).max())
-    return float(np.clip(1.0 / (1.0 + (left / 0.002) ** 2), 0.5, 0.99))
+    return float(np.clip(1.0 / (1.0 + (left / CALM_SHARE) ** 2), 0.5, MOST_CERTAIN))

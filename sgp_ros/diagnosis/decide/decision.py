@@ -14,41 +14,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.decide.referee import structure
-from sgp_ros.diagnosis.decide.second_opinion import support
-from sgp_ros.diagnosis.explain.fitted_model import FLOOR_SHARE, Model
+from sgp_ros.diagnosis.criteria import (
+    ADEQUATE_REST,
+    COUNTED_SHARE,
+    EVIDENCE,
+    FLOOR_SHARE,
+    INDEPENDENT_ROWS,
+    LEAST_SHARE,
+    MOST_OPPOSED,
+    NOTHING_EXPLAINED,
+    PER_EFFECT,
+    PER_PARAMETER,
+    SHAPE_ERROR,
+    SLIGHT_REST,
+)
+from sgp_ros.diagnosis.decide.cross_validation import structure, support
+from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.hypotheses import Competition
 from sgp_ros.diagnosis.explain.suspects import Columns
-
-LEAST_SHARE = 0.004
-"""Share of the mean squared effort below which nothing counts as physics (schema)."""
-SHARE_TOLERANCE = 0.6
-"""An estimated share may be this much smaller than the least one."""
-NATS = 10.0
-"""Evidence that an effect must have beside practical weight, and on parts left out."""
-ADEQUATE_REST = 0.025
-"""Greatest structured rest of an adequate model, relative to what it explains."""
-SLIGHT_REST = 0.1 * LEAST_SHARE
-"""A rest below this share of the mean squared effort is adequate in any case."""
-ROWS = 100.0
-"""Most rows that count as independent when rests are compared.
-
-The shape of a column is only nearly right, and what is wrong with it repeats in every row.
-"""
-SHAPE_ERROR = 0.001
-"""Part of the discrepancy that the right column may leave for the same reason."""
-PER_EFFECT, PER_PARAMETER = 10.0, 3.0
-"""What an effect, and each number that the data determine, must be worth [nats]."""
-TEMPER = 0.3
-"""Weight of a nat of `Scale.worth` in the odds of rivals."""
-MOST_OPPOSED = 5.0
-"""Greatest ratio of the effects' mean squares, added up, to that of their sum, or of all there is
-to explain.
-"""
-_NOTHING = 1.0 / ADEQUATE_REST
-"""Excess of a model that explains nothing."""
-FILTER_ERRORS = 1.0
-"""Multiple of the measured errors of smoothing that a perfect model may leave."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,10 +78,10 @@ class Scale:
     @classmethod
     def of(cls, equations: Equations, competition: Competition) -> Scale:
         """Return the scale of a recording."""
-        power, error = equations.power, FILTER_ERRORS * equations.model_error
+        power, error = equations.power, equations.model_error
         base = np.maximum(competition.base.mean_square - error, 0.0) / power
         nominal = competition.nominal.mean_square / power
-        return cls(power, error, base, nominal, min(ROWS, len(equations.d)))
+        return cls(power, error, base, nominal, min(INDEPENDENT_ROWS, len(equations.d)))
 
     @property
     def floor(self) -> np.ndarray:
@@ -134,7 +117,7 @@ class Scale:
 
     def counts(self, model: Model) -> bool:
         """Return whether effects are large enough and do not cancel each other, or the bodies."""
-        return self.is_sound(model) and min(model.shares) > SHARE_TOLERANCE * LEAST_SHARE
+        return self.is_sound(model) and min(model.shares) > COUNTED_SHARE
 
     def is_sound(self, model: Model) -> bool:
         """Return whether effects do not merely cancel each other, or the bodies."""
@@ -164,10 +147,10 @@ def _ranked(competition: Competition, scale: Scale) -> list[Model]:
     is larger, because bodies undo most of it, is not to be preferred for that.
     """
     models = (*competition.singles, *competition.pairs, *competition.more)
-    least = competition.base.score + NATS
+    least = competition.base.score + EVIDENCE
     sound = [m for m in models if m.score > least and scale.is_sound(m)]
     ranked = sorted(sound, key=scale.worth, reverse=True)
-    if ranked and max(ranked[0].shares) < SHARE_TOLERANCE * LEAST_SHARE:
+    if ranked and max(ranked[0].shares) < COUNTED_SHARE:
         return []
     return [m for m in ranked if scale.counts(m)]
 
@@ -184,21 +167,23 @@ def decide(equations: Equations, competition: Competition) -> Decision:
         excess = scale.excess(best, structure(equations, best.residual))
         if excess < 1.0:
             return Decision('missing_physics', best, rivals, excess, worst, against=base.score)
-        if left.max() > SHARE_TOLERANCE * LEAST_SHARE:
+        if left.max() > COUNTED_SHARE:
             found = (best, *rivals)
             return Decision('unexplained', base, found, excess, worst, best, base.score)
     elif left.max() > LEAST_SHARE:
         left = left * structure(equations, competition.parameters.residual)
         if left.max() > LEAST_SHARE:
-            return Decision('unexplained', base, rivals, _NOTHING, worst, against=base.score)
+            return Decision(
+                'unexplained', base, rivals, NOTHING_EXPLAINED, worst, against=base.score
+            )
     verdict = 'parameters_only' if base.is_free else 'no_mismatch'
-    return Decision(verdict, base, rivals, _NOTHING, worst, against=base.score)
+    return Decision(verdict, base, rivals, NOTHING_EXPLAINED, worst, against=base.score)
 
 
 def _supported(equations: Equations, scale: Scale, ranked: list[Model]) -> Model | None:
     """Return the first model whose effects all predict parts of the recording left out."""
     columns, floor = Columns(equations), scale.floor * scale.power
     for model in ranked:
-        if scale.rows * min(support(columns, model, floor)) > NATS:
+        if scale.rows * min(support(columns, model, floor)) > EVIDENCE:
             return model
     return None

@@ -7,7 +7,6 @@ to other motions, and the one on which their efforts differ most is the excitati
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
@@ -15,20 +14,16 @@ from functools import cached_property
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.decide.decision import LEAST_SHARE, TEMPER, Decision, Scale
-from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.criteria import ALIKE, CLEARER, LEAST_SHARE
+from sgp_ros.diagnosis.decide.decision import Decision, Scale
+from sgp_ros.diagnosis.explain.fitted_model import Model, imbalance
 from sgp_ros.diagnosis.explain.hypotheses import Competition
 from sgp_ros.diagnosis.places import joint_name
-from sgp_ros.diagnosis.prove.prediction import imbalance
 from sgp_ros.diagnosis.result import Equivalent
 from sgp_ros.physics.drive import Drive
 from sgp_ros.robots.observed_motion import ObservedMotion
 
-ALIKE = math.log(20.0) / TEMPER
-"""Difference of the fits below which a recording prefers neither model [nats]."""
 MOST = 3
-CLEARER = 2.0
-"""A motion separates models if their efforts differ this many times more, as mean squares."""
 LONGEST = 4000
 """Rows of the recording that are carried over to other motions."""
 RECORDED = 'the motion of the recording'

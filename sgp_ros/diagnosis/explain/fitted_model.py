@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.criteria import FLOOR_SHARE
 from sgp_ros.diagnosis.explain.regression import Frame
+from sgp_ros.diagnosis.explain.suspects import dry_joints
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
-
-FLOOR_SHARE = 1e-5
-"""Errors of signals and filters that no model explains, as a share of the mean square."""
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,3 +120,38 @@ def floors(equations: Equations) -> np.ndarray:
 def price_of(frame: Frame, size: int) -> float:
     """Return what the freedom of a model costs [nats]."""
     return 0.5 * size * float(np.log(len(frame.equations.d))) + frame.occam
+
+
+def extra_force(model: Model, motion: ObservedMotion) -> np.ndarray:
+    """Return the force of all effects at the full rate, (n, k) [N m or N]."""
+    force = motion.stated_force.copy()
+    for suspect in model.suspects:
+        x = suspect.columns(motion) @ suspect.coefficients
+        if x.ndim == 2:
+            force += x
+        else:
+            force[:, suspect.place.joint] += x
+    return force
+
+
+def held_joints(model: Model, motion: ObservedMotion) -> frozenset[int]:
+    """Return the joints that dry friction may hold, of the model or of the nominal robot."""
+    return motion.dry_joints | dry_joints(model.suspects)
+
+
+def imbalance(model: Model, equations: Equations, motion: ObservedMotion) -> np.ndarray:
+    """Return what the motion takes beyond the efforts and effects of a model, (n, k) [N m or N].
+
+    `e(a) = tau_nominal(q, v, a) - tau - tau_x - base w` at the full rate, without any filter.
+
+    Args:
+        model: fitted on `equations`.
+        equations: of the training recording.
+        motion: n rows of any recording.
+    """
+    change = (model.w @ equations.directions).reshape(motion.tree.parameters.shape)
+    changed = replace(
+        motion, tree=replace(motion.tree, parameters=motion.tree.parameters + change)
+    )
+    needed = changed.effort_for(motion.position, motion.velocity, motion.acceleration)
+    return np.asarray(needed - motion.effort - extra_force(model, changed))

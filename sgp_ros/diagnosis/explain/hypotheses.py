@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sgp_ros.batch.least_squares import correlation_factor
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.decide.colour import correlation_factor
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, EVIDENCE
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
 from sgp_ros.diagnosis.explain.screening import screen
@@ -22,12 +23,8 @@ FIRST, SECOND, PARENTS = 12, 5, 6
 
 THIRD = 3
 """Suspects that are fitted as a third, fourth, ... effect."""
-LEFT_SHARE = 0.0024
-"""Share of the mean squared effort that calls for one more effect."""
 EXCHANGES = 2
 """Times that an effect of the best pair is exchanged for another."""
-GAIN = 10.0
-"""Evidence that it must have [nats]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +93,7 @@ def _exchanged(columns: Columns, ranked: list[Model]) -> list[Model]:
     power = columns.equations(frozenset()).power
     best = ranked[0] if ranked else None
     for _ in range(EXCHANGES):
-        if best is None or (best.mean_square / power).max() < LEFT_SHARE:
+        if best is None or (best.mean_square / power).max() < COUNTED_SHARE:
             break
         trials: list[Model] = []
         for kept in best.suspects:
@@ -126,7 +123,7 @@ def _extended(columns: Columns, model: Model) -> list[Model]:
     while len(model.suspects) < 2 * k:
         held = [sum(s.place.joint == j for s in model.suspects) for j in range(k)]
         left = model.mean_square / power
-        open_ = [j for j in range(k) if left[j] > LEFT_SHARE and held[j] < 2]
+        open_ = [j for j in range(k) if left[j] > COUNTED_SHARE and held[j] < 2]
         if not open_:
             break
         second = [s for _, s in screen(columns, model, EFFECTS.values()) if s.place.joint in open_]
@@ -136,7 +133,7 @@ def _extended(columns: Columns, model: Model) -> list[Model]:
             for s in second[:THIRD]
         ]  # fmt: skip
         gains = _gains(model, _ranked(trials))
-        if not gains or max(gains.values()) < GAIN:
+        if not gains or max(gains.values()) < EVIDENCE:
             break
         best = max(gains, key=lambda m: gains[m])
         model = best

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sgp_ros.diagnosis.decide.colour import correlation_factor
+from sgp_ros.batch.least_squares import correlation_factor
 from sgp_ros.diagnosis.explain.candidates import UNSEEN
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Frame

@@ -14,14 +14,46 @@ disturbance is explained too, and only what is left tells one law from another.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.locate.surrogates import surrogates
-from sgp_ros.diagnosis.locate.variables import own_variables
 from sgp_ros.diagnosis.result import Dependence
+
+
+def surrogates(residual: np.ndarray, count: int) -> Iterator[np.ndarray]:
+    """Yield `count` disturbances like a residual (N, k), (N, k) each; always the same ones.
+
+    Cost O(N k log N) each.
+    """
+    rng = np.random.default_rng(0)
+    n = len(residual)
+    spectrum = np.fft.rfft(residual, axis=0)
+    for _ in range(count):
+        turns = np.exp(2j * np.pi * rng.random(len(spectrum)))
+        turns[0] = 1.0
+        if n % 2 == 0:
+            turns[-1] = rng.choice([-1.0, 1.0])
+        yield np.fft.irfft(spectrum * turns[:, None], n, axis=0)
+
+
+def own_variables(equations: Equations, joint: int) -> dict[str, np.ndarray]:
+    """Return position, velocity, effort and time of a joint, (N,) each.
+
+    Positions of continuous joints are wrapped [rad or m]; velocity [rad/s or m/s]; the commanded
+    effort, of actuated joints [N m or N]; time since the first state [s].
+    """
+    motion, low = equations.motion, equations.filter
+    variables = {
+        'position': motion.wrapped[low.rows, joint],
+        'velocity': low(motion.velocity[:, joint]),
+    }
+    if motion.tree.is_actuated[joint]:
+        variables['effort'] = low(motion.effort[:, joint])
+    return variables | {'time': equations.time}
+
 
 BINS, STRETCHES, PARTS = 16, 24, 6
 LEAST_COUNT = 3

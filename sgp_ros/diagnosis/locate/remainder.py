@@ -1,7 +1,13 @@
-"""The Gaussian process Z for what no named effect describes, per joint.
+"""The discrepancy that no effect describes: the region it is confined to, and its process Z.
+
+A discrepancy that acts everywhere has its energy wherever the robot was: an interval that holds
+nearly all of it holds nearly all of the rows. Of all intervals of all variables the one with
+the fewest rows is taken, so chance must be kept out for the best of many: with half of the rows
+it is far from reach for a homogeneous rest, white or correlated (a test simulates both).
 
 Z is given the position, velocity, direction and effort of its joint and the motion of the others,
-and evidence decides which of these it needs: that is also what the discrepancy depends on.
+and evidence decides which of these it needs. It is checked by cross-validation in blocks, for rows
+that are correlated in time (Burman, Chow and Nolan 1994).
 """
 
 from __future__ import annotations
@@ -11,12 +17,62 @@ from dataclasses import dataclass
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.parts import PARTS, parts_of
+from sgp_ros.diagnosis.criteria import REGION_ENERGY, REGION_LEAST_ROWS, REGION_ROWS
+from sgp_ros.diagnosis.locate.dependence import own_variables
+from sgp_ros.diagnosis.result import Location
 from sgp_ros.gp.model import CoefficientPrior, Observations
 from sgp_ros.gp.model import Model as Hyperparameters
 from sgp_ros.gp.posterior import Posterior
 from sgp_ros.gp.selection import select_inputs
 from sgp_ros.robots.observed_motion import ObservedMotion
+
+PARTS = 6
+"""Parts that are left out in turn."""
+PIECES = 4
+"""Stretches of each part."""
+
+
+def parts_of(rows: int, pieces: int = PIECES) -> np.ndarray:
+    """Return the part that each row belongs to, (rows,); each has so many stretches."""
+    return np.asarray(np.arange(rows) * PARTS * pieces // rows % PARTS)
+
+
+def region(equations: Equations, r: np.ndarray, joint: int) -> Location:
+    """Return where the discrepancy r (N,) of a joint is [N m or N]; empty where it is everywhere.
+
+    Intervals of position are of the wrapped one [rad or m], of velocity [rad/s or m/s], of time
+    since the first state [s].
+    """
+    variables = own_variables(equations, joint)
+    found = {name: confined(variables[name], r) for name in ('position', 'velocity', 'time')}
+    name = min(found, key=lambda n: found[n][2])
+    lo, hi, rows = found[name]
+    if len(r) < REGION_LEAST_ROWS or rows > REGION_ROWS:
+        return Location()
+    if name == 'time':
+        return Location(('time',), {}, ((lo, hi),))
+    return Location((name,), {name: [[lo, hi]]})
+
+
+def confined(x: np.ndarray, r: np.ndarray) -> tuple[float, float, float]:
+    """Return the interval of x (N,) with the fewest rows that holds most of r (N,), and these.
+
+    That is `REGION_ENERGY` of its energy.
+
+    Returns:
+        Least and largest x, share of the rows.
+    """
+    order = np.argsort(x, kind='stable')
+    energy = np.concatenate([[0.0], np.cumsum(r[order] ** 2)])
+    wanted = REGION_ENERGY * energy[-1]
+    last = np.searchsorted(energy, energy[:-1] + wanted)  # rows [i, last) hold enough
+    enough = np.flatnonzero(last < len(energy))
+    if not len(enough) or not wanted:
+        return float(x[order[0]]), float(x[order[-1]]), 1.0
+    start = enough[int(np.argmin(last[enough] - enough))]
+    stop = int(last[start])
+    return float(x[order[start]]), float(x[order[stop - 1]]), (stop - start) / len(x)
+
 
 SIZE = 400
 CONDITIONED = 500

@@ -1,54 +1,37 @@
-"""Accelerations that a model predicts at every time of a recording, and its efforts.
+"""The model that a diagnosis ends with, its bodies, and what it predicts on a recording.
 
 The equation of motion is affine in the acceleration: `e(a) = tau_nominal(q, v, a) - tau - tau_x -
-base w`, so `a - (de/da)^-1 e(a)` is the prediction, and does not depend on the a it starts from.
-A joint that dry friction holds does not accelerate.
+base w`, so `a - (de/da)^-1 e(a)` is the predicted acceleration, and does not depend on the a it
+starts from. A joint that dry friction holds does not accelerate.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.suspects import dry_joints
+from sgp_ros.diagnosis.compare.equations import Equations, resting
+from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, observe
+from sgp_ros.diagnosis.explain.fitted_model import Model, extra_force, held_joints, imbalance
 from sgp_ros.diagnosis.locate.remainder import Remainder
+from sgp_ros.diagnosis.result import Predictions
+from sgp_ros.errors import NumericalError
+from sgp_ros.rigid.consistent import project_information
+from sgp_ros.rigid.pseudo_inertia import is_consistent
+from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 
-def extra_force(model: Model, motion: ObservedMotion) -> np.ndarray:
-    """Return the force of all effects at the full rate, (n, k) [N m or N]."""
-    force = motion.stated_force.copy()
-    for suspect in model.suspects:
-        x = suspect.columns(motion) @ suspect.coefficients
-        if x.ndim == 2:
-            force += x
-        else:
-            force[:, suspect.place.joint] += x
-    return force
-
-
-def held_joints(model: Model, motion: ObservedMotion) -> frozenset[int]:
-    """Return the joints that dry friction may hold, of the model or of the nominal robot."""
-    return motion.dry_joints | dry_joints(model.suspects)
-
-
-def imbalance(
+def _left(
     model: Model,
     equations: Equations,
     motion: ObservedMotion,
-    remainders: Sequence[Remainder] = (),
+    remainders: Sequence[Remainder],
 ) -> np.ndarray:
-    """Return e at the full rate, (n, k) [N m or N]."""
-    change = (model.w @ equations.directions).reshape(motion.tree.parameters.shape)
-    changed = replace(
-        motion, tree=replace(motion.tree, parameters=motion.tree.parameters + change)
-    )
-    needed = changed.effort_for(motion.position, motion.velocity, motion.acceleration)
-    e = needed - motion.effort - extra_force(model, changed)
+    """Return the imbalance that processes leave, (n, k) [N m or N]."""
+    e = imbalance(model, equations, motion)
     for remainder in remainders:
         e[:, remainder.joint] -= remainder.force(motion)
     return e
@@ -77,7 +60,7 @@ def accelerations(
         moved = motion.acceleration.copy()
         moved[:, j] += 1.0
         slope[:, :, j] = imbalance(model, equations, replace(motion, acceleration=moved)) - plain
-    e = imbalance(model, equations, motion, remainders) if remainders else plain
+    e = _left(model, equations, motion, remainders) if remainders else plain
     a = motion.acceleration - np.linalg.solve(slope, e[:, :, None])[:, :, 0]
     for j in sorted(held_joints(model, motion)):
         rows = np.flatnonzero(rests[:, j])
@@ -104,3 +87,68 @@ def _held(
     wanted = now - a[:, j] / response[:, j]
     force = np.clip(wanted, np.minimum(up, down), np.maximum(up, down))
     return a + response * (force - now)[:, None]
+
+
+_SHARP = 4.0
+"""States are smoothed at this multiple of the cut-off where accelerations are predicted."""
+
+
+@dataclass(frozen=True, eq=False)
+class FinalModel:
+    """Effects, bodies and processes, fitted on the training recording."""
+
+    model: Model
+    nominal: Model
+    equations: Equations
+    remainders: tuple[Remainder, ...]
+
+    def predict(self, raw: RawTrajectory, tree: Tree) -> Predictions:
+        """Return the accelerations at every time of a recording."""
+        cutoff = self.equations.filter.cutoff
+        rate = 1.0 / raw.step
+        motion = observe(raw, tree, Bandwidth(cutoff, min(_SHARP * cutoff, 0.4 * rate)))
+        rests = resting(raw, motion, Bandwidth(cutoff, min(_SHARP * cutoff, 0.4 * rate)))
+        a = accelerations(self.model, self.equations, motion, rests, self.remainders)
+        return Predictions(motion.time, a)
+
+    def imbalance(
+        self,
+        model: Model,
+        motion: ObservedMotion,
+        rests: np.ndarray,
+        remainders: tuple[Remainder, ...],
+    ) -> np.ndarray:
+        """Return e of one of the models, (n, k); 0 where dry friction holds a joint [N m or N]."""
+        e = _left(model, self.equations, motion, remainders)
+        for j in held_joints(model, motion):
+            e[rests[:, j], j] = 0.0
+        return e
+
+
+def diagnosed_bodies(equations: Equations, model: Model) -> np.ndarray | None:
+    """Return the inertial parameters of the bodies, (b, 10), in the order of the tree.
+
+    The model's change w of the parameters has the information `R^T R`, its prior included. Where
+    it leads to bodies that cannot exist, those that the data contradict least take their place.
+
+    Args:
+        equations: of the recording.
+        model: that was asserted.
+
+    Returns:
+        None where the bodies are the nominal ones, or none that can exist were found.
+    """
+    if not model.is_free:
+        return None
+    nominal = equations.motion.tree.parameters
+    D = equations.directions  # (p, 10 b), parameters change by w @ D
+    changed = (nominal.ravel() + model.w @ D).reshape(nominal.shape)
+    if np.all(is_consistent(changed)):
+        return changed
+    root = np.linalg.solve(D, model.frame.R.T).T  # R w = root @ change
+    blocks = [range(10 * i, 10 * i + 10) for i in range(len(nominal))]
+    try:
+        found = project_information(changed.ravel(), root, blocks, reference=nominal.ravel())
+    except NumericalError:
+        return None
+    return found.coefficients.reshape(nominal.shape)

@@ -21,11 +21,7 @@ from sgp_ros.batch.rollout import advance
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.locate.remainder import Remainder
-from sgp_ros.diagnosis.prove.diagnosed_dynamics import (
-    DiagnosedDynamics,
-    dynamics_of,
-    remembered_force,
-)
+from sgp_ros.diagnosis.prove.dynamics import DiagnosedDynamics, dynamics_of, remembered_force
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 HORIZON_S = 0.3

@@ -18,15 +18,7 @@ from sgp_ros.diagnosis.compare.trajectory import (
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import JointSample, frozen_array
 from sgp_ros.errors import RecordingError
-from test.diagnosis.worlds import (
-    CHAINS,
-    PERIOD,
-    START_NS,
-    World,
-    events_of,
-    robot_of,
-    shown,
-)
+from test.diagnosis.worlds import CHAINS, PERIOD, START_NS, World, events_of, robot_of, shown
 
 
 def _states(events):

@@ -10,7 +10,8 @@ import pytest
 
 from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
-from sgp_ros.diagnosis.decide.decision import LEAST_SHARE, NATS, SHARE_TOLERANCE, Scale, decide
+from sgp_ros.diagnosis.criteria import EVIDENCE, LEAST_SHARE, SHARE_TOLERANCE
+from sgp_ros.diagnosis.decide.decision import Scale, decide
 from sgp_ros.diagnosis.explain.candidates import added_inertia, fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.hypotheses import Competition, compete
@@ -62,7 +63,7 @@ def test_an_effect_too_small_to_be_physics_is_not_asserted(equations_for):
     _, equations = equations_for(world)
     small = fitted(equations, 'viscous_friction')
     competition = _competition(equations, small)
-    assert small.score > competition.base.score + NATS
+    assert small.score > competition.base.score + EVIDENCE
     assert small.shares[0] < SHARE_TOLERANCE * LEAST_SHARE
     decision = decide(equations, competition)
     assert decision.verdict in {'no_mismatch', 'parameters_only'}

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis.criteria import CLEARER
 from sgp_ros.diagnosis.decide.decision import Decision, decide
-from sgp_ros.diagnosis.decide.equivalence import CLEARER, MOTIONS, Contrasts, equivalents, moved
+from sgp_ros.diagnosis.decide.equivalence import MOTIONS, Contrasts, equivalents, moved
 from sgp_ros.diagnosis.explain.hypotheses import Competition, compete
 from sgp_ros.diagnosis.pipeline import diagnose
 from test.diagnosis.fitted_models import fitted

@@ -9,12 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from sgp_ros.diagnosis.decide.decision import (
-    ADEQUATE_REST,
-    PER_EFFECT,
-    PER_PARAMETER,
-    SHAPE_ERROR,
-)
+from sgp_ros.diagnosis.criteria import ADEQUATE_REST, PER_EFFECT, PER_PARAMETER, SHAPE_ERROR
 
 RESULTS = Path(__file__).parents[3] / 'sgp_proof' / 'results'
 FALSE_ALARMS, UNKNOWN_CALLED = 0.05, 0.7

@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.locate.dependence import DISTURBANCES, dependences
-from sgp_ros.diagnosis.locate.surrogates import surrogates
-from sgp_ros.diagnosis.locate.variables import own_variables
+from sgp_ros.diagnosis.locate.dependence import (
+    DISTURBANCES,
+    dependences,
+    own_variables,
+    surrogates,
+)
 from sgp_ros.diagnosis.result import Dependence
 from test.diagnosis.locate.nulls import disturbance
 from test.diagnosis.worlds import CHAINS, simulate

@@ -1,19 +1,21 @@
-"""Accelerations that a model predicts."""
+"""What the final model predicts, and its bodies."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.explain.candidates import fit
-from sgp_ros.diagnosis.explain.fitted_model import floors
+from sgp_ros.diagnosis.explain.fitted_model import extra_force, floors, imbalance
 from sgp_ros.diagnosis.explain.suspects import Columns
-from sgp_ros.diagnosis.prove.final_model import FinalModel
-from sgp_ros.diagnosis.prove.prediction import accelerations, extra_force, imbalance
+from sgp_ros.diagnosis.prove.prediction import FinalModel, accelerations, diagnosed_bodies
 from sgp_ros.diagnosis.prove.proof import prove
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
+from sgp_ros.rigid.pseudo_inertia import is_consistent
 from test.diagnosis.fitted_models import with_coefficients
 from test.diagnosis.worlds import CHAINS, simulate
 
@@ -55,8 +57,6 @@ def test_the_true_model_predicts_the_true_acceleration(robots, equations_for, pe
 
 def test_the_prediction_does_not_depend_on_the_measured_acceleration(equations_for, heavy):
     """The equation of motion is affine in it, also with other bodies."""
-    from dataclasses import replace
-
     _, equations = equations_for(heavy[2])
     model = _fitted(equations, _suspect('armature', 1), is_free=True)
     motion = equations.motion
@@ -136,7 +136,6 @@ def test_roll_outs_show_what_an_effect_takes_away(robots, equations_for, viscous
 
 def test_both_models_are_judged_on_the_roll_outs_that_both_finish(robots, equations_for, viscous):
     """Where one runs away the other gains nothing: counted, and in neither mean."""
-
     raw, equations = equations_for(viscous)
     model = _fitted(equations, _suspect('quadratic_drag', 0))
     mad = with_coefficients(model, np.array([-1e5]))
@@ -157,3 +156,38 @@ def test_states_beyond_those_learned_from_are_far(robots, equations_for, perfect
     assert prove(final, raw, robots[1][1]).distance < 0.01
     wide, _ = equations_for(simulate(CHAINS[1], 5, 5.0, reach=6.0))
     assert prove(final, wide, robots[1][1]).distance > 0.3
+
+
+@pytest.fixture(scope='module')
+def equations(equations_for, perfect):
+    return equations_for(perfect[2])[1]
+
+
+def _model(equations, *, is_free):
+    start = np.sqrt((equations.d**2).mean(axis=0)) + 1e-9
+    return fit(Columns(equations), (), start, is_free=is_free, rounds=1)
+
+
+def test_bodies_that_were_not_free_are_the_nominal_ones(equations):
+    assert diagnosed_bodies(equations, _model(equations, is_free=False)) is None
+
+
+def test_bodies_that_can_exist_are_those_of_the_model(equations):
+    model = _model(equations, is_free=True)
+    small = replace(model, w=np.full(len(model.w), 0.01))
+    nominal = equations.motion.tree.parameters
+    expected = nominal + (small.w @ equations.directions).reshape(nominal.shape)
+    np.testing.assert_allclose(diagnosed_bodies(equations, small), expected, atol=1e-12)
+
+
+def test_bodies_that_cannot_exist_are_replaced_by_such_as_can(equations):
+    """Near in what the data show: the projection costs less than nominal bodies would."""
+    model = _model(equations, is_free=True)
+    wild = replace(model, w=model.w + 0.0)
+    wild.w[0] = -6.0  # a negative mass: six times a quarter less
+    found = diagnosed_bodies(equations, wild)
+    assert np.all(is_consistent(found))
+    change = (found - equations.motion.tree.parameters).ravel()
+    w = np.linalg.solve(equations.directions.T, change)
+    R = model.frame.R
+    assert np.linalg.norm(R @ (w - wild.w)) < np.linalg.norm(R @ wild.w)

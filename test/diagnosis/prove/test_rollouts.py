@@ -12,7 +12,7 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.suspects import Columns
 from sgp_ros.diagnosis.prove import rollouts
-from sgp_ros.diagnosis.prove.diagnosed_dynamics import dynamics_of
+from sgp_ros.diagnosis.prove.dynamics import dynamics_of
 from sgp_ros.diagnosis.prove.rollouts import cut, roll_out
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt

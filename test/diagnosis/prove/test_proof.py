@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from sgp_ros.diagnosis.prove.intervals import correlation_time, mean_interval, ratio_interval
+from sgp_ros.diagnosis.prove.proof import correlation_time, mean_interval, ratio_interval
 
 SEEDS = 200
 

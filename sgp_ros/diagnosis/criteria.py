@@ -1,0 +1,91 @@
+"""Criteria of a diagnosis: every threshold that its answers depend on, in the order of the stages.
+
+Each says what it means, its unit in brackets, and what holds it: the schema of diagnosis.json,
+statistics of null worlds, drawn worlds or guards (`nulls_*.json`, `concealed_*.json` and
+`diagnosis_guards.json` of `sgp_proof/results/`), the practice cases, a test by simulation, or
+convention.
+"""
+
+from __future__ import annotations
+
+import math
+
+LEAST_SHARE = 0.004
+"""Share of the mean squared effort below which nothing counts as physics [1]. The schema."""
+SHARE_TOLERANCE = 0.6
+"""Part of `LEAST_SHARE` that an estimated share must reach, for it has errors [1]. Nulls."""
+COUNTED_SHARE = SHARE_TOLERANCE * LEAST_SHARE
+"""Estimated share from which something counts as physics [1]. Both of the above."""
+EVIDENCE = 10.0
+"""Evidence that an effect must have, on the recording and on parts left out [nats]. Nulls."""
+
+LEAST_MOTION = 50.0
+"""Range of a joint's positions, in units of their noise, from which it moves [1]. Guards.
+
+Encoders at rest show at most 18 units, heavy tails included; the first second of a drawn world
+shows 342 and more, the recordings of real machines 1900 and more.
+"""
+LEAST_ROWS = 20
+"""Independent rows that a recording must leave: twice the parameters of a body [rows]. Guards.
+
+Of drawn worlds with fewer rows 11 in 28 get a wrong verdict, from here on one in fifteen.
+"""
+
+SENSOR_REST = 0.2
+"""Greatest part of the velocity's error that a lag of the sensor may leave [1]. Convention."""
+
+FLOOR_SHARE = 1e-5
+"""Errors of signals and filters that no model explains, of the mean square [1]. Practice cases."""
+
+SIGNIFICANT = 0.05
+"""Chance that anything is called significant where the motion has no part [1]. Convention."""
+REGION_ENERGY = 0.95
+"""Share of the energy of a discrepancy that the region it is confined to holds [1]. Simulation."""
+REGION_ROWS = 0.5
+"""Greatest share of the rows that a region may hold; larger ones are none [1]. Simulation."""
+REGION_LEAST_ROWS = 100
+"""Rows below which nothing is said of regions [rows]. Simulation."""
+REMAINDER_SHARE = 0.2
+"""A joint has its own Z where it leaves this part of what the worst one leaves [1]. Convention."""
+
+ADEQUATE_REST = 0.025
+"""Greatest structured rest of an adequate model, relative to what it explains [1]. Nulls."""
+SLIGHT_REST = 0.1 * LEAST_SHARE
+"""Rest that is adequate in any case, as a share of the mean squared effort [1]. Nulls."""
+INDEPENDENT_ROWS = 100.0
+"""Most rows that count as independent when rests are compared [rows]. Nulls.
+
+The shape of a column is only nearly right, and what is wrong with it repeats in every row.
+"""
+SHAPE_ERROR = 0.001
+"""Part of the discrepancy that the right column may leave for the same reason [1]. Nulls."""
+PER_EFFECT, PER_PARAMETER = 10.0, 3.0
+"""What an effect, and each number that the data determine, must be worth [nats]. Nulls."""
+MOST_OPPOSED = 5.0
+"""Greatest ratio of the effects' mean squares, added up, to that of their sum [1]. Nulls.
+
+Or to that of all there is to explain, where this is more.
+"""
+NOTHING_EXPLAINED = 1.0 / ADEQUATE_REST
+"""Excess of a model that explains nothing [1]. Follows."""
+STRUCTURE_LEAST_SHARE = 0.1
+"""Joints that leave less, relative to the worst one, are not looked at for structure [1]."""
+
+TEMPER = 0.3
+"""Weight of a nat of the worth of a model in the odds of rivals [1]. Drawn worlds."""
+LEAST_ODDS = 0.01
+"""A rival below this, relative to the asserted model, is not looked at closely [1]. Convention."""
+ALIKE = math.log(20.0) / TEMPER
+"""Difference of the fits below which a recording prefers neither model [nats]. Convention."""
+CLEARER = 2.0
+"""Ratio of mean squared differences from which another motion separates models [1]. Convention."""
+CALM_SHARE = 0.002
+"""Share left at which "no mismatch" is as likely wrong as right [1]. Half of `LEAST_SHARE`."""
+MOST_CERTAIN = 0.99
+"""Greatest probability that is ever stated [1]. Drawn worlds."""
+
+DOUBTED = 0.4
+"""Greatest probability where the final model is worse than a constant [1]. Convention."""
+
+NUMBER_ERROR = 0.003
+"""Relative standard deviation that approximations of the signals add to numbers [1]. Practice."""

@@ -1,0 +1,153 @@
+"""Held-out evidence of effects, and the cross-validated R^2 of what a model leaves.
+
+What the motion of the robot predicts of a residual on stretches left out, or what the residual
+predicts of itself, is structure that an adequate model would have. What neither predicts is noise,
+however large. Both are measured as R^2 on parts left out. The first is that of a Gaussian process
+Z of the motion; it does not see the efforts: where friction takes all of an effort, that effort
+would explain itself. The second tests whether the residual is white: linear prediction from rows
+before; white noise behind the filter is predicted too, by as much as its correlations say (Makhoul
+1975), and that is taken off.
+
+The held-out evidence of an effect is how much better the model with it predicts parts left out of
+the fit than the model without it. Shapes stay as they were found; coefficients and bodies are
+fitted anew without each part. An effect whose numbers only follow chance, or one stretch, predicts
+the others worse.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.criteria import STRUCTURE_LEAST_SHARE
+from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.suspects import Columns
+from sgp_ros.diagnosis.locate.remainder import (
+    PARTS,
+    foretold,
+    observations,
+    parts_of,
+    process_inputs,
+    spread,
+)
+from sgp_ros.gp.learning import initial_model, learn, screened
+from sgp_ros.gp.model import CoefficientPrior
+from sgp_ros.physics.effect_at import EffectAt
+
+LEAST_ROWS = 5 * PARTS
+"""Rows below which nothing can be said of structure."""
+ORDER = 8
+"""Rows before that may foretell one."""
+LEARNED = 200
+"""Rows for the hyper-parameters."""
+
+
+def structure(equations: Equations, residual: np.ndarray) -> np.ndarray:
+    """Return the share of each joint's rest that is not noise, (k,), with its uncertainty.
+
+    The greater of what Z and what earlier rows explain on parts left out, plus `1/sqrt(N)` for
+    N rows; 1 where no opinion was asked or can be had.
+
+    Args:
+        equations: of the recording.
+        residual: of a model, (N, k) [N m or N].
+    """
+    N, k = residual.shape
+    share = (residual**2).mean(axis=0) / equations.power
+    found = np.ones(k)
+    if N < LEAST_ROWS:
+        return found
+    for j in np.flatnonzero(share > max(STRUCTURE_LEAST_SHARE * float(share.max()), 1e-300)):
+        r = residual[:, j]
+        told = max(_by_motion(equations, r, int(j)), _by_past(equations, r), 0.0)
+        found[j] = min(1.0, told + 1.0 / np.sqrt(N))
+    return found
+
+
+def _by_past(equations: Equations, r: np.ndarray) -> float:
+    """Return the share of r (N,) that rows before explain, beyond what they do of white noise."""
+    order = min(ORDER, len(r) // 10)
+    rows = len(r) - order
+    past = np.column_stack([r[order - i - 1 : order - i - 1 + rows] for i in range(order)])
+    now, part = r[order:], parts_of(rows)
+    error = 0.0
+    for i in range(PARTS):
+        out = part == i
+        c = np.linalg.lstsq(past[~out], now[~out], rcond=1e-6)[0]
+        error += float(((now[out] - past[out] @ c) ** 2).sum())
+    white = equations.filter.correlations(order)
+    gram = white[np.abs(np.subtract.outer(np.arange(order), np.arange(order)))]
+    least = 1.0 - float(white[1:] @ np.linalg.lstsq(gram, white[1:], rcond=1e-6)[0])
+    return 1.0 - error / float(now @ now) / max(least, 1e-6)
+
+
+def _by_motion(equations: Equations, r: np.ndarray, joint: int) -> float:
+    """Return the share of r (N,) that Z of the motion explains on parts left out."""
+    inputs, names = process_inputs(equations.motion, joint)
+    seen = [i for i, name in enumerate(names) if not name.startswith('effort')]
+    U = equations.filter(inputs[:, seen])
+    U = U / (U.std(axis=0) + 1e-12)
+    part = parts_of(len(r))
+    rows = spread(np.flatnonzero(part > 0), LEARNED)
+    prior, data = CoefficientPrior.flat(0), observations(U, r, rows)
+    start = screened(data, prior, initial_model(data, (tuple(range(U.shape[1])),)))
+    return foretold(learn(data, prior, start).model, U, r, part)
+
+
+def left_out(columns: Columns, model: Model, suspects: tuple[EffectAt, ...]) -> np.ndarray:
+    """Return what a model with some of its suspects leaves of parts left out in turn.
+
+    Args:
+        columns: of the recording.
+        model: whose shapes, freedom of the bodies and scale are used.
+        suspects: of the model, those that are kept.
+
+    Returns:
+        Mean squares of the residual, (PARTS, k) [N^2 m^2 or N^2].
+    """
+    equations, sigma = model.frame.equations, model.sigma
+    N, k = equations.d.shape
+    p = equations.base.shape[2] if model.is_free else 0
+    y, X = equations.d / sigma, [equations.base[:, :, :p] / sigma[:, None]]
+    for suspect in suspects:
+        x = columns.of(suspect, equations, model.w) / sigma[:, None]
+        if suspect.effect.is_given:
+            y = y - x[:, :, 0]
+        else:
+            X.append(x)
+    A = np.concatenate(X, axis=2)
+    scale = np.sqrt((A**2).sum(axis=(0, 1))) + 1e-300
+    scale[:p] = 1.0
+    A = A / scale
+    part = parts_of(N)
+    grams = [np.tensordot(A[part == i], A[part == i], ((0, 1), (0, 1))) for i in range(PARTS)]
+    sides = [np.tensordot(A[part == i], y[part == i], ((0, 1), (0, 1))) for i in range(PARTS)]
+    prior = np.diag(np.concatenate([np.ones(p), np.zeros(A.shape[2] - p)]))
+    found = np.empty((PARTS, k))
+    for i in range(PARTS):
+        G = sum(grams[:i] + grams[i + 1 :], prior)
+        c = np.linalg.lstsq(G, sum(sides[:i] + sides[i + 1 :], np.zeros(len(G))), rcond=1e-12)[0]
+        r = (y[part == i] - A[part == i] @ c) * sigma
+        found[i] = (r**2).mean(axis=0)
+    return found
+
+
+def support(columns: Columns, model: Model, floor: np.ndarray) -> list[float]:
+    """Return how much better parts left out are predicted with each effect than without it.
+
+    Args:
+        columns: of the recording.
+        model: fitted.
+        floor: (k,) mean squares below which residuals do not count [N^2 m^2 or N^2].
+
+    Returns:
+        Half the sum over joints of the log ratio of mean squares, averaged over the parts, by
+        effect [nats per independent row].
+    """
+    whole = left_out(columns, model, model.suspects) + floor
+    found = []
+    for suspect in model.suspects:
+        rest = tuple(s for s in model.suspects if s is not suspect)
+        without = left_out(columns, model, rest) + floor
+        found.append(float(0.5 * np.log(without / whole).sum(axis=1).mean()))
+    return found
