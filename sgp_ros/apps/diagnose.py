@@ -8,17 +8,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from sgp_ros.apps.diagnosed_robot import write_diagnosed
 from sgp_ros.diagnosis.compare.equations import disagreement, nominal_shares
+from sgp_ros.diagnosis.compare.sufficiency import require_inertia
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.result import Diagnosis, Proof
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event, JointSample
 from sgp_ros.engine.setting import EFFORT_SOURCES
-from sgp_ros.errors import ConfigError, NumericalError, RecordingError
+from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.report.diagnosis import write_diagnosis
 from sgp_ros.report.diagnosis_predictions import write_predictions
@@ -31,17 +30,11 @@ from sgp_ros.report.diagnosis_text import (
     why_it_lost,
 )
 from sgp_ros.report.files import replacing_results, write_text
-from sgp_ros.rigid.rigid_body import mass_matrix
-from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.nominal import Nominal, nominal_model
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
 
-LEAST_POSITIONS = 8
-"""A joint that shows fewer different positions did not move: an encoder at rest flickers."""
 _RIVALS = 3
-_SINGULAR = 1e-12
-"""Least eigenvalue of the mass matrix with a unit diagonal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,36 +76,15 @@ def run_diagnose(
     chosen = DiagnoseOptions(**options)
     nominal = nominal_model(load_robot(robot))
     model, tree = nominal.robot, nominal.tree
-    if not has_inertia(tree):
-        raise ConfigError(
-            f'the mass matrix of the nominal robot {model.name} is singular',
-            'a mass and inertias for every moving link of the URDF',
-            'identify it first and give the robot_identified.urdf of sgp identify',
-        )
+    require_inertia(model.name, tree)  # before a long recording is read
     remarks = list(nominal.remarks)
     events = _events(bag, model, chosen, remarks)
-    still = still_joints(events, tree.moving_names)
-    if len(still) == tree.size:
-        raise RecordingError(
-            f'no joint of {model.name} moves in {Path(bag).name}',
-            f'at least {LEAST_POSITIONS} positions of one of {", ".join(still)}',
-            'take a recording in which the robot moves',
-        )
-    if still:
-        remarks.append(f'Nothing can be said of joints that do not move: {", ".join(still)}.')
     tests = _held_out(model, chosen, remarks)
     simulation = _simulation(nominal, chosen, remarks)
-    try:
-        found = diagnose(
-            events, model, tree, tests, stated=nominal.stated, holds_out=not chosen.tests,
-            config=EngineConfig(effort_source=EFFORT_SOURCES[chosen.effort]), progress=progress,
-        )  # fmt: skip
-    except np.linalg.LinAlgError as error:
-        raise NumericalError(
-            f'the equations of {Path(bag).name} have no solution ({error})',
-            'motion of every joint',
-            f'joints that do not move: {", ".join(still) or "none"}',
-        ) from error
+    found = diagnose(
+        events, model, tree, tests, stated=nominal.stated, holds_out=not chosen.tests,
+        config=EngineConfig(effort_source=EFFORT_SOURCES[chosen.effort]), progress=progress,
+    )  # fmt: skip
     remarks = [*found.remarks, *remarks]
     return _written(out, nominal, replace(found, simulation=simulation, remarks=tuple(remarks)))
 
@@ -156,25 +128,6 @@ def _written(out: Path, nominal: Nominal, found: Diagnosis) -> dict[str, Any]:
     print_diagnosis(found)
     print(f'report: {out / "report.html"}')
     return content
-
-
-def has_inertia(tree: Tree) -> bool:
-    """Return whether every joint of a robot at its zero position resists acceleration."""
-    (M,) = mass_matrix(tree, tree.parameters, np.zeros((1, tree.size)))
-    size = np.sqrt(np.maximum(np.diag(M), 0.0))
-    return bool(size.min() > 0.0 and np.linalg.eigvalsh(M / np.outer(size, size))[0] > _SINGULAR)
-
-
-def still_joints(events: Sequence[Event], names: Sequence[str]) -> list[str]:
-    """Return the joints that are seen but do not move."""
-    seen: dict[str, set[float]] = {name: set() for name in names}
-    for event in events:
-        if not isinstance(event, JointSample):
-            continue
-        for name, position in zip(event.names, event.position, strict=True):
-            if name in seen and len(seen[name]) < LEAST_POSITIONS:
-                seen[name].add(float(position))
-    return [name for name, positions in seen.items() if 0 < len(positions) < LEAST_POSITIONS]
 
 
 def print_diagnosis(found: Diagnosis) -> None:

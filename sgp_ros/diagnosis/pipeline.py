@@ -1,16 +1,23 @@
-"""The whole chain: compare, locate, explain, decide, model, prove."""
+"""The stages of a diagnosis one after the other: compare, explain, locate, decide, prove."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sgp_ros.batch.acceptance import USUAL
 from sgp_ros.diagnosis.compare.equations import Equations, make_equations
-from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.compare.sufficiency import (
+    at_rest,
+    require_inertia,
+    require_motion,
+    require_rows,
+)
+from sgp_ros.diagnosis.compare.trajectory import RawTrajectory, choose_bandwidth, collect
 from sgp_ros.diagnosis.compare.velocity_sensor import sensor_lags
-from sgp_ros.diagnosis.criteria import REMAINDER_SHARE
+from sgp_ros.diagnosis.criteria import DOUBTED, REMAINDER_SHARE
 from sgp_ros.diagnosis.decide.certainty import certainty_of, probabilities
 from sgp_ros.diagnosis.decide.decision import Decision, decide
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, equivalents
@@ -22,10 +29,11 @@ from sgp_ros.diagnosis.locate.dependence import dependences
 from sgp_ros.diagnosis.locate.remainder import Remainder, learn_remainder
 from sgp_ros.diagnosis.prove.held_out import keep_back
 from sgp_ros.diagnosis.prove.prediction import FinalModel, diagnosed_bodies
-from sgp_ros.diagnosis.prove.proof import prove
-from sgp_ros.diagnosis.result import Band, Dependence, Diagnosis, Traces
+from sgp_ros.diagnosis.prove.proof import prove, reasons_to_doubt
+from sgp_ros.diagnosis.result import Diagnosis, Traces
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
+from sgp_ros.errors import NumericalError
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.robot import Robot
@@ -56,56 +64,93 @@ def diagnose(
         progress: called with the share that is done.
 
     Raises:
-        RecordingError: too little motion, or none of the joints.
+        ConfigError: a nominal robot of which a joint has no inertia.
+        RecordingError: nothing can be used, nothing moves, or too little is left to decide.
+        NumericalError: the motion leaves the equations without a solution.
     """
-    raw = collect(events, robot, stated, config)
+    require_inertia(robot.name, tree)
+    known = list(events)
+    still = require_motion(known, robot.name, tree.moving_names)
+    raw = at_rest(collect(known, robot, stated, config), np.isin(tree.moving_names, still))
     held = {stem: collect(test, robot, stated, config) for stem, test in tests.items()}
-    raw, kept, remarks = keep_back(raw) if holds_out else (raw, {}, ())
-    equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
-    competition = compete(equations, lambda share: progress(0.05 + 0.85 * share))
-    decision = decide(equations, competition)
+    learned, kept, remarks = keep_back(raw) if holds_out else (raw, {}, ())
+    if still:
+        remarks += (f'Nothing can be said of joints that do not move: {", ".join(still)}.',)
+    recordings = _Recordings(learned, kept, held, still, remarks)
+    bandwidth = choose_bandwidth(learned, tree)
+    require_rows(learned, bandwidth)
+    try:
+        return _diagnosed(recordings, make_equations(learned, tree, bandwidth),
+                          robot.name, progress)  # fmt: skip
+    except np.linalg.LinAlgError as error:
+        raise NumericalError(
+            f'the equations of the recording have no solution ({error})',
+            'motion of every joint',
+            f'joints that do not move: {", ".join(still) or "none"}',
+        ) from error
+
+
+@dataclass(frozen=True, eq=False)
+class _Recordings:
+    """What is learned from, kept back and held out, with still joints and remarks."""
+
+    learned: RawTrajectory
+    kept: Mapping[str, RawTrajectory]
+    held: Mapping[str, RawTrajectory]
+    still: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+
+def _diagnosed(
+    recordings: _Recordings,
+    equations: Equations,
+    robot: str,
+    progress: Callable[[float], None],
+) -> Diagnosis:
+    raw, tree = recordings.learned, equations.motion.tree
+    comparison = compete(equations, lambda share: progress(0.05 + 0.85 * share))
+    decision = decide(equations, comparison)
     lags = [lag for lag in sensor_lags(raw, equations) if lag.is_physics]
     remainders = _remainders(equations, decision)
-    final = FinalModel(decision.model, competition.nominal, equations, remainders)
+    final = FinalModel(decision.model, comparison.nominal, equations, remainders)
     contrasts = Contrasts(equations, decision.model)
-    recordings = {'train': raw, **kept, **held}
-    proofs = {stem: prove(final, part, tree) for stem, part in recordings.items()}
-    chances = probabilities(equations, competition, decision, contrasts)
-    depends, seen = _located(equations, competition.base.residual)
+    parts = {'train': raw, **recordings.kept, **recordings.held}
+    proofs = {stem: prove(final, part, tree, stem) for stem, part in parts.items()}
+    doubts = reasons_to_doubt(proofs, recordings.still)
+    chances = probabilities(equations, comparison, decision, contrasts)
+    depends = dependences(equations, comparison.base.residual)
     findings, forces = asserted(equations, decision, lags, remainders, chances, depends)
+    certainty = certainty_of(findings, equations, comparison)
+    if doubts:
+        certainty = min(certainty, DOUBTED)
+    if reasons_to_doubt({'train': proofs['train']}, recordings.still):
+        findings = tuple(replace(f, probability=min(f.probability, DOUBTED)) for f in findings)
     progress(1.0)
     return Diagnosis(
-        robot=robot.name,
+        robot=robot,
         joints=tree.moving_names,
         units=tuple('N' if p else 'N m' for p in tree.is_prismatic[: tree.size]),
         verdict='missing_physics' if lags and decision.verdict in _CALM else decision.verdict,
-        certainty=certainty_of(findings, decision, equations, competition),
+        certainty=certainty,
         findings=findings,
         alternatives=alternatives(decision, chances),
         parameter_errors=parameter_errors(equations, decision.model),
         proofs=proofs,
-        predictions={stem: final.predict(part, tree) for stem, part in held.items()},
+        predictions={stem: final.predict(part, tree) for stem, part in recordings.held.items()},
         dependences=depends,
-        bands=seen,
-        traces=_traces(equations, competition, decision.model, remainders, forces),
+        bands=bands(equations, comparison.base.residual, depends),
+        traces=_traces(equations, comparison, decision.model, remainders, forces),
         cutoff_hz=equations.filter.cutoff,
         rate_hz=1.0 / (raw.step * equations.filter.decimation),
         rows=len(equations.d),
         refused={reason: count for reason, count in raw.refused.items() if count},
-        remarks=(*raw.remarks, *remarks),
+        remarks=(*raw.remarks, *recordings.remarks, *doubts),
         bodies=diagnosed_bodies(equations, decision.model),
-        equivalents=equivalents(equations, competition, decision, contrasts),
+        equivalents=equivalents(equations, comparison, decision, contrasts),
     )
 
 
 _CALM = ('no_mismatch', 'parameters_only')
-
-
-def _located(
-    equations: Equations, residual: np.ndarray
-) -> tuple[tuple[Dependence, ...], tuple[Band, ...]]:
-    depends = dependences(equations, residual)
-    return depends, bands(equations, residual, depends)
 
 
 def _remainders(equations: Equations, decision: Decision) -> tuple[Remainder, ...]:
@@ -119,7 +164,7 @@ def _remainders(equations: Equations, decision: Decision) -> tuple[Remainder, ..
 
 def _traces(
     equations: Equations,
-    competition: Competition,
+    comparison: Competition,
     model: Model,
     remainders: tuple[Remainder, ...],
     forces: tuple[np.ndarray, ...],
@@ -130,5 +175,5 @@ def _traces(
         after[:, r.joint] -= low(r.force(motion))
     return Traces(
         equations.time, low(motion.position), low(motion.velocity), low(motion.effort),
-        equations.d, competition.parameters.residual, after, equations.noise, forces,
+        equations.d, comparison.parameters.residual, after, equations.noise, forces,
     )  # fmt: skip

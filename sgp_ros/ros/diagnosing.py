@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.sufficiency import require_inertia, require_motion
 from sgp_ros.diagnosis.compare.trajectory import SHORTEST_ROWS
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import CommandSample, Event, JointSample
-from sgp_ros.errors import ConfigError
+from sgp_ros.errors import SgpError
 from sgp_ros.recordings.messages import Status
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.robot import Robot
@@ -86,12 +87,15 @@ class Diagnosing:
         if self._process is not None:
             return False, 'a diagnosis is already running; /diagnostics tells its outcome'
         try:
-            nominal_model(self._robot)
-        except ConfigError as error:
+            nominal = nominal_model(self._robot)
+            require_inertia(self._robot.name, nominal.tree)
+            if states < SHORTEST_ROWS:
+                return False, f'too few states: {states}, at least {SHORTEST_ROWS} are needed'
+            events = self.events
+            require_motion(events, self._robot.name, nominal.tree.moving_names)
+        except SgpError as error:
             return False, ' '.join(str(error).split())
-        if states < SHORTEST_ROWS:
-            return False, f'too few states: {states}, at least {SHORTEST_ROWS} are needed'
-        self._process = DiagnosisProcess(DiagnosisRequest(self._path, self.events, config))
+        self._process = DiagnosisProcess(DiagnosisRequest(self._path, events, config))
         return True, f'started on {states} states'
 
     def poll(self) -> DiagnosisDone | DiagnosisFailed | None:

@@ -16,8 +16,6 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from typing import Any
 
-import numpy as np
-
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import SgpError
@@ -131,5 +129,3 @@ def _outcome(request: DiagnosisRequest) -> DiagnosisDone | DiagnosisFailed:
         return DiagnosisDone(diagnosis_mapping(found))
     except SgpError as error:
         return DiagnosisFailed(' '.join(str(error).split()))
-    except np.linalg.LinAlgError as error:
-        return DiagnosisFailed(f'the equations have no solution ({error}): let every joint move')

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sgp_ros.apps.diagnose import LEAST_POSITIONS, still_joints
 from sgp_ros.cli import main
 from sgp_ros.diagnosis.result import VERDICTS
 from sgp_ros.engine.samples import JointSample, frozen_array
@@ -220,13 +219,3 @@ def test_without_a_test_a_part_is_held_out_and_a_wrong_simulation_is_told(tmp_pa
     assert f'{100.0 * share:.2g} % of the mean squared effort of elbow' in remarks
     assert 'was held out (8.25 of 33 s)' in remarks
     assert all(line in printed for line in content['settings']['remarks'])
-
-
-def test_an_encoder_that_flickers_does_not_move():
-    """A few neighbouring counts are rest, more positions motion, joints not seen neither."""
-    counts = np.arange(LEAST_POSITIONS) * 1e-4
-    events = [
-        JointSample(i, ('rests', 'moves'), frozen_array([counts[i % 2], counts[i]]))
-        for i in range(LEAST_POSITIONS)
-    ]
-    assert still_joints(events, ('rests', 'moves', 'unseen')) == ['rests']

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gc
 
+import numpy as np
+
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import CommandSample, JointSample, Reset, frozen_array
 from sgp_ros.robots.registry import load_robot
@@ -70,3 +72,16 @@ def test_a_robot_without_nominal_bodies_is_refused_with_the_reason() -> None:
     started, message = _diagnosing(1.0, 'simple_pendulum').start(EngineConfig())
     assert not started
     assert 'simple_pendulum has no nominal values of J' in message
+
+
+def test_a_robot_that_never_moved_is_refused_with_the_reason() -> None:
+    """The service answers so at once; no process is started to find that out."""
+    kept = _diagnosing(60.0)
+    rng = np.random.default_rng(0)
+    for i in range(500):
+        shown = frozen_array(1e-4 * np.round(rng.normal(size=2)))
+        kept.take(JointSample(i * 10**7, ('pole', 'wheel'), shown))
+    started, message = kept.start(EngineConfig())
+    assert not started
+    assert 'no joint of reaction_wheel moves' in message
+    assert kept.statuses('node') == []

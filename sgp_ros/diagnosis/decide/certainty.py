@@ -78,13 +78,11 @@ def probabilities(
 
 def certainty_of(
     findings: Sequence[Finding],
-    decision: Decision,
     equations: Equations,
     competition: Competition,
 ) -> float:
     """Return the probability that the verdict is right."""
     if findings:
         return max(f.probability for f in findings)
-    del decision
     left = float((competition.parameters.mean_square / equations.power).max())
     return float(np.clip(1.0 / (1.0 + (left / CALM_SHARE) ** 2), 0.5, MOST_CERTAIN))

@@ -10,6 +10,7 @@ of autocovariances (Geyer 1992, Practical Markov chain Monte Carlo).
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,6 +23,7 @@ from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, obser
 from sgp_ros.diagnosis.prove.prediction import FinalModel, accelerations
 from sgp_ros.diagnosis.prove.rollouts import cut, roll_out
 from sgp_ros.diagnosis.result import Proof
+from sgp_ros.errors import RecordingError
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -94,23 +96,65 @@ class _Scores:
         self.values[name], self.intervals[name] = {}, {}
         for j, joint in enumerate(self.joints):
             x, y = squared[:, j], yardstick[:, j]
-            self.values[name][joint] = float(x.mean() / (y.mean() + 1e-300))
+            self.values[name][joint] = _ratio(float(x.mean()), float(y.mean()))
             interval = ratio_interval(x, y)
             if interval is not None:
                 self.intervals[name][joint] = interval
 
 
-def prove(final: FinalModel, raw: RawTrajectory, tree: Tree) -> Proof:
+def _ratio(error: float, yardstick: float) -> float:
+    """Return the quotient of two mean squares; infinite for an error beside nothing."""
+    if yardstick > 0.0:
+        return error / yardstick
+    return math.inf if error > 0.0 else 0.0
+
+
+def reasons_to_doubt(proofs: Mapping[str, Proof], still: Collection[str]) -> tuple[str, ...]:
+    """Return why a diagnosis is not certain: joints of which the model knows less than a constant.
+
+    Args:
+        proofs: by stem of the recording; `train` is what was learned from.
+        still: joints that do not move, of which nothing is claimed.
+    """
+    found = []
+    for stem, proof in proofs.items():
+        for joint, error in proof.nmse_after.items():
+            if joint in still or error <= 1.0:
+                continue
+            if math.isfinite(error):
+                found.append(
+                    f'The final model explains the effort of {joint} in {stem} worse than a '
+                    f'constant does (nMSE {error:.2g}): no verdict is certain.'
+                )
+            elif stem == 'train':
+                found.append(
+                    f'The effort of {joint} in {stem} is constant, so no model explains more than '
+                    'a constant does: no verdict is certain.'
+                )
+    return tuple(found)
+
+
+def prove(final: FinalModel, raw: RawTrajectory, tree: Tree, name: str) -> Proof:
     """Return the errors on a recording, before and after, with their intervals.
 
     Args:
         final: nominal and final model, fitted on the training recording.
         raw: any recording of the robot.
         tree: nominal robot.
+        name: of the recording.
+
+    Raises:
+        RecordingError: too short for a row behind the filters.
     """
     cutoff, rate = final.equations.filter.cutoff, 1.0 / raw.step
     bandwidth = Bandwidth(min(cutoff, 0.3 * rate), min(2.5 * cutoff, 0.4 * rate))
     motion, low = observe(raw, tree, bandwidth), parallel_filter(raw, bandwidth)
+    if not len(low.rows):
+        raise RecordingError(
+            f'{len(raw.time) * raw.step:.3g} s of {name} give no row below {low.cutoff:.2g} Hz',
+            'a longer recording',
+            'leave it out, or record longer',
+        )
     scores = _Scores(tree.moving_names)
     densities = _one_step(final, motion, low, resting(raw, motion, bandwidth), scores)
     counts = _rolled_out(final, motion, ZeroPhase(rate, bandwidth.state_cutoff).trim, scores)

@@ -94,7 +94,7 @@ def test_the_proof_measures_what_an_effect_takes_away(robots, equations_for, vis
     raw, equations = equations_for(viscous)
     nominal = _fitted(equations)
     model = _fitted(equations, _suspect('viscous_friction', 0))
-    proof = prove(FinalModel(model, nominal, equations, ()), raw, robots[1][1])
+    proof = prove(FinalModel(model, nominal, equations, ()), raw, robots[1][1], 'train')
     before, after = proof.nmse_before['joint0'], proof.nmse_after['joint0']
     direct = (equations.d**2).mean() / equations.filter(equations.motion.effort).var()
     assert before == pytest.approx(direct, rel=0.02)
@@ -107,7 +107,7 @@ def test_every_number_of_a_proof_comes_with_its_interval(robots, equations_for, 
     """Which holds it, and is narrow where the recording is long."""
     raw, equations = equations_for(viscous)
     model = _fitted(equations, _suspect('viscous_friction', 0))
-    proof = prove(FinalModel(model, _fitted(equations), equations, ()), raw, robots[1][1])
+    proof = prove(FinalModel(model, _fitted(equations), equations, ()), raw, robots[1][1], 'train')
     numbers = {
         'nmse_before': proof.nmse_before, 'nmse_after': proof.nmse_after,
         'acceleration_nmse_before': proof.acceleration_before,
@@ -128,7 +128,7 @@ def test_roll_outs_show_what_an_effect_takes_away(robots, equations_for, viscous
     """Of ten seconds, about thirty; all end."""
     raw, equations = equations_for(viscous)
     model = _fitted(equations, _suspect('viscous_friction', 0))
-    proof = prove(FinalModel(model, _fitted(equations), equations, ()), raw, robots[1][1])
+    proof = prove(FinalModel(model, _fitted(equations), equations, ()), raw, robots[1][1], 'train')
     assert 25 < proof.rollouts <= 33
     assert proof.failed == 0
     assert proof.rollout_after['joint0'] < 1e-3 * proof.rollout_before['joint0']
@@ -139,9 +139,9 @@ def test_both_models_are_judged_on_the_roll_outs_that_both_finish(robots, equati
     raw, equations = equations_for(viscous)
     model = _fitted(equations, _suspect('quadratic_drag', 0))
     mad = with_coefficients(model, np.array([-1e5]))
-    proof = prove(FinalModel(model, mad, equations, ()), raw, robots[1][1])
+    proof = prove(FinalModel(model, mad, equations, ()), raw, robots[1][1], 'train')
     assert proof.failed > 0
-    turned = prove(FinalModel(mad, model, equations, ()), raw, robots[1][1])
+    turned = prove(FinalModel(mad, model, equations, ()), raw, robots[1][1], 'train')
     assert turned.failed == proof.failed
     assert turned.rollout_before == proof.rollout_after
     assert all(map(np.isfinite, proof.rollout_before.values()))
@@ -153,9 +153,9 @@ def test_states_beyond_those_learned_from_are_far(robots, equations_for, perfect
     raw, equations = equations_for(perfect[1])
     model = _fitted(equations)
     final = FinalModel(model, model, equations, ())
-    assert prove(final, raw, robots[1][1]).distance < 0.01
+    assert prove(final, raw, robots[1][1], 'train').distance < 0.01
     wide, _ = equations_for(simulate(CHAINS[1], 5, 5.0, reach=6.0))
-    assert prove(final, wide, robots[1][1]).distance > 0.3
+    assert prove(final, wide, robots[1][1], 'wide').distance > 0.3
 
 
 @pytest.fixture(scope='module')

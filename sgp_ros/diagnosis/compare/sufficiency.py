@@ -1,0 +1,147 @@
+"""Sufficiency of a recording and of a robot: what must be there before anything can be decided.
+
+An encoder at rest still shows positions: white noise, or a count that flickers. A joint moves
+where its positions range over many units of that noise; the unit is the standard deviation of it,
+read off the upper third of the spectrum where no robot moves, or the count of the encoder,
+whichever is larger.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sgp_ros.diagnosis.compare.trajectory import (
+    Bandwidth,
+    RawTrajectory,
+    noise_density,
+    parallel_filter,
+)
+from sgp_ros.diagnosis.criteria import LEAST_MOTION, LEAST_ROWS
+from sgp_ros.engine.samples import Event, JointSample
+from sgp_ros.errors import ConfigError, RecordingError
+from sgp_ros.rigid.rigid_body import mass_matrix
+from sgp_ros.rigid.tree import Tree
+
+_FEW = 16
+"""Positions below which no spectrum is taken."""
+_ROUNDING = 1e-9
+"""Steps that are smaller, relative to the range, are no counts of an encoder."""
+_SINGULAR = 1e-12
+"""Least eigenvalue of the mass matrix with a unit diagonal."""
+
+
+def require_inertia(robot: str, tree: Tree) -> None:
+    """Refuse a nominal robot of which a joint does not resist acceleration.
+
+    Args:
+        robot: its name.
+        tree: nominal robot; its zero position is looked at.
+
+    Raises:
+        ConfigError: its mass matrix is singular.
+    """
+    (M,) = mass_matrix(tree, tree.parameters, np.zeros((1, tree.size)))
+    size = np.sqrt(np.maximum(np.diag(M), 0.0))
+    if size.min() > 0.0 and np.linalg.eigvalsh(M / np.outer(size, size))[0] > _SINGULAR:
+        return
+    raise ConfigError(
+        f'the mass matrix of the nominal robot {robot} is singular',
+        'a mass and inertias for every moving link of the URDF',
+        'identify it first and give the robot_identified.urdf of sgp identify',
+    )
+
+
+def motion_to_noise(position: np.ndarray) -> float:
+    """Return the range of positions in units of their noise; 0 where all are the same.
+
+    Args:
+        position: (n,) of one joint as the encoder shows it [rad or m].
+    """
+    extent = float(np.ptp(position))
+    if not extent > 0.0:
+        return 0.0
+    steps = np.abs(np.diff(position))
+    count = float(steps[steps > _ROUNDING * extent].min(initial=extent))
+    if len(position) < _FEW:
+        return extent / count
+    (density,) = noise_density(position[:, None], [slice(0, len(position))], 1.0)
+    return extent / max(count, float(np.sqrt(0.5 * density)))
+
+
+def still_joints(events: Iterable[Event], names: Sequence[str]) -> tuple[str, ...]:
+    """Return the joints that are seen but do not move more than the noise of their encoders.
+
+    Args:
+        events: of a recording; states are taken in the order in which they come.
+        names: of the joints.
+    """
+    columns: dict[tuple[str, ...], list[int]] = {}
+    rows = []
+    for event in events:
+        if isinstance(event, JointSample):
+            own = event.names
+            if own not in columns:
+                columns[own] = [own.index(name) if name in own else -1 for name in names]
+            at = columns[own]
+            rows.append((np.append(event.position, np.nan) if -1 in at else event.position)[at])
+    found = []
+    for name, shown in zip(names, np.array(rows).reshape(-1, len(names)).T, strict=True):
+        known = shown[np.isfinite(shown)]
+        if len(known) and motion_to_noise(known) < LEAST_MOTION:
+            found.append(name)
+    return tuple(found)
+
+
+def require_motion(events: Iterable[Event], robot: str, names: Sequence[str]) -> tuple[str, ...]:
+    """Return the joints that do not move, of a recording in which another one does.
+
+    Args:
+        events: of the recording.
+        robot: its name.
+        names: of the joints.
+
+    Raises:
+        RecordingError: no joint moves.
+    """
+    still = still_joints(events, names)
+    if len(still) == len(names):
+        raise RecordingError(
+            f'no joint of {robot} moves',
+            f'a range of positions of {LEAST_MOTION:g} times the noise of the encoder, of one of '
+            f'{", ".join(still)}',
+            'take a recording in which the robot moves',
+        )
+    return still
+
+
+def at_rest(raw: RawTrajectory, is_still: np.ndarray) -> RawTrajectory:
+    """Return a trajectory in which still joints (k,) of bool rest at the median position.
+
+    What their encoders show is noise, and nothing is to be explained by it.
+    """
+    rest = np.median(raw.position, axis=0)
+    return replace(raw, position=np.where(is_still, rest, raw.position))
+
+
+def require_rows(raw: RawTrajectory, bandwidth: Bandwidth) -> None:
+    """Refuse a trajectory that is too short to say anything.
+
+    Args:
+        raw: that is to be learned from.
+        bandwidth: of its filters.
+
+    Raises:
+        RecordingError: the filters leave fewer than `LEAST_ROWS` independent rows.
+    """
+    rows = len(parallel_filter(raw, bandwidth).rows)
+    if rows < LEAST_ROWS:
+        seconds = len(raw.time) * raw.step
+        raise RecordingError(
+            f'{seconds:.3g} s give {rows} independent rows below {bandwidth.cutoff:.2g} Hz, where '
+            'motion and noise put the cut-off',
+            f'{LEAST_ROWS} rows',
+            'take a longer recording',
+        )
