@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+from dataclasses import replace
 
 import numpy as np
 
@@ -69,7 +70,10 @@ def test_the_garbage_collector_does_not_search_what_is_remembered() -> None:
 
 
 def test_a_robot_without_nominal_bodies_is_refused_with_the_reason() -> None:
-    started, message = _diagnosing(1.0, 'simple_pendulum').start(EngineConfig())
+    robot = load_robot('simple_pendulum')
+    bodies = replace(robot.bodies, values=dict.fromkeys(robot.bodies.values))
+    unknown = Diagnosing(replace(robot, bodies=bodies), 'simple_pendulum', 1.0)
+    started, message = unknown.start(EngineConfig())
     assert not started
     assert 'simple_pendulum has no nominal values of J' in message
 
