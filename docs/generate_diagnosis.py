@@ -16,6 +16,7 @@ from sgp_ros.diagnosis.criteria import (
     PER_PARAMETER,
     SHAPE_ERROR,
 )
+from sgp_ros.physics.catalogue import PAYLOAD
 
 ROOT = Path(__file__).parents[1]
 TARGET = Path(__file__).parent / 'diagnosis.md'
@@ -184,7 +185,7 @@ def _nulls(worlds):
 
 def _effects(worlds):
     """Return lines of the table on worlds with one effect, of the list or not."""
-    of_list = [w for w in worlds if w['kind'] == LISTED and w['extra'] != 'payload']
+    of_list = [w for w in worlds if w['kind'] == LISTED and w['extra'] != PAYLOAD.name]
     listed = [w for w in of_list if 'right' in w]
     unlisted = [w for w in worlds if w['kind'] == UNLISTED]
     rests = [w['right_structured_rest'] for w in listed]

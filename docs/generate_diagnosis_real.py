@@ -13,6 +13,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from sgp_ros.diagnosis.criteria import LEAST_SHARE
 from sgp_ros.diagnosis.result import Equivalent
+from sgp_ros.physics.catalogue import ASYMMETRIC_COULOMB, COULOMB_FRICTION, HYSTERESIS
 from sgp_ros.report.diagnosis_text import equivalence_sentence, percent, plain_name
 
 ROOT = Path(__file__).parents[1]
@@ -151,9 +152,9 @@ def dry_level(machine, joint):
     """Return dry friction of a joint [N m], mean of both directions; None where none was found."""
     for f in machine['findings']:
         values = {k: p['value'] for k, p in f['parameters'].items()}
-        if f['joint'] == joint and f['effect'] == 'asymmetric_coulomb':
+        if f['joint'] == joint and f['effect'] == ASYMMETRIC_COULOMB.name:
             return 0.5 * (values['level_pos'] + values['level_neg'])
-        if f['joint'] == joint and f['effect'] in {'coulomb_friction', 'hysteresis'}:
+        if f['joint'] == joint and f['effect'] in {COULOMB_FRICTION.name, HYSTERESIS.name}:
             return values['level']
     return None
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from sgp_ros.physics.catalogue import EFFECTS
+
 PACKAGE = Path(__file__).parents[1] / 'sgp_ros'
 MODULES = sorted(PACKAGE.rglob('*.py'))
 PROOF = PACKAGE.parent / 'sgp_proof'
@@ -227,3 +229,25 @@ def test_every_module_says_what_it_is_for(path):
     docstring = ast.get_docstring(_tree(path))
     assert docstring, path
     assert docstring.split('\n\n')[0].rstrip().endswith(('.', '?')), docstring
+
+
+def test_no_effect_is_named_outside_physics_and_simulation():
+    """What follows from a law follows from its value, so that a new one is one value.
+
+    `payload` is also a key of a robot YAML.
+    """
+    scanned = [p for p in MODULES if _layer(p) not in {'physics', 'simulation'}]
+    scanned += [
+        *(PACKAGE.parent / 'sgp_proof').rglob('*.py'),
+        *(PACKAGE.parent / 'docs').glob('*.py'),
+    ]
+    keys = {'payload'}
+    found = {
+        (path.name, node.value)
+        for path in scanned
+        for node in ast.walk(_tree(path))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        and node.value in EFFECTS
+        and not (node.value in keys and path.parent.name == 'robots')
+    }  # fmt: skip
+    assert not found

@@ -2,7 +2,21 @@
 
 from __future__ import annotations
 
-from sgp_proof.concealed.concealed_effect import SCORED
+from sgp_proof.concealed.unknown import NAME
+from sgp_ros.physics.catalogue import (
+    ARMATURE,
+    ASYMMETRIC_COULOMB,
+    COMMAND_DELAY,
+    CONSTANT_LOAD,
+    COULOMB_FRICTION,
+    EFFECTS,
+    GRAVITY_TILT,
+    JOINT_COUPLING,
+    LIMIT_FRICTION,
+    PAYLOAD,
+    POSITION_FRICTION,
+    TORQUE_GAIN,
+)
 
 
 def effects_entry(concealed, bodies):
@@ -11,10 +25,11 @@ def effects_entry(concealed, bodies):
         name: value if isinstance(value, str) else float(value)
         for name, value in concealed.parameters.items()
     }
-    scored = list(SCORED.get(concealed.name, []))
-    if concealed.name == 'joint_coupling':
-        scored = ['coefficient' if parameters['kind'] == 'torque' else 'stiffness']
-    if concealed.name == 'unknown' and parameters['source'] >= 0:
+    scored = []
+    if concealed.name in EFFECTS:
+        known = EFFECTS[concealed.name].stated_quantities(parameters.get('kind', ''))
+        scored = [q.name for q in known if q.is_scored]
+    if concealed.name == NAME and parameters['source'] >= 0:
         parameters['source'] = bodies[int(parameters['source'])].joint
     return {
         'effect': concealed.name, 'joint': concealed.joint, 'parameters': parameters,
@@ -27,28 +42,28 @@ def accepted(concealed, bodies, motion):
     name, joint = concealed.name, concealed.joint
     body = bodies[concealed.index]
     is_fixed_axis = body.parent < 0 and joint == body.joint
-    verdict = 'unexplained' if name == 'unknown' else 'missing_physics'
+    verdict = 'unexplained' if name == NAME else 'missing_physics'
     answers = [_answer(verdict, name, joint, 'true')]
     same = 'same motion'
-    if name == 'asymmetric_coulomb':
-        both = ('coulomb_friction', 'constant_load')
+    if name == ASYMMETRIC_COULOMB.name:
+        both = (COULOMB_FRICTION.name, CONSTANT_LOAD.name)
         for one, other in (both, both[::-1]):
             answers.append(_answer(verdict, one, joint, 'identical away from rest', [other]))
     if (
-        name == 'payload'
-        or (name == 'armature' and is_fixed_axis)
-        or (name in {'torque_gain', 'gravity_tilt'} and len(bodies) == 1)
+        name == PAYLOAD.name
+        or (name == ARMATURE.name and is_fixed_axis)
+        or (name in {TORQUE_GAIN.name, GRAVITY_TILT.name} and len(bodies) == 1)
     ):
         answers.append(_answer('parameters_only', None, '*', same))
-    if name == 'constant_load' and is_fixed_axis and body.is_prismatic:
-        answers.append(_answer(verdict, 'gravity_tilt', 'base', same))
-    if name == 'limit_friction':
-        answers.append(_answer(verdict, 'position_friction', joint, same))
-    if name == 'position_friction' and body.kind != 'continuous':
+    if name == CONSTANT_LOAD.name and is_fixed_axis and body.is_prismatic:
+        answers.append(_answer(verdict, GRAVITY_TILT.name, 'base', same))
+    if name == LIMIT_FRICTION.name:
+        answers.append(_answer(verdict, POSITION_FRICTION.name, joint, same))
+    if name == POSITION_FRICTION.name and body.kind != 'continuous':
         lo, hi = concealed.parameters['lo'], concealed.parameters['hi']
         low, high = motion.low[concealed.index], motion.high[concealed.index]
         if lo < low + 0.05 * (high - low) or hi > high - 0.05 * (high - low):
-            answers.append(_answer(verdict, 'limit_friction', joint, same))
+            answers.append(_answer(verdict, LIMIT_FRICTION.name, joint, same))
     answers += [_answer(verdict, name, other, same) for other in _other_joints(concealed, bodies)]
     return answers
 
@@ -57,11 +72,11 @@ def _other_joints(concealed, bodies):
     """Return the joints at which the same effect would give the same motion."""
     name, joint = concealed.name, concealed.joint
     driven = [b.joint for b in bodies if b.is_driven]
-    if name == 'joint_coupling' and concealed.parameters['kind'] == 'spring':
+    if name == JOINT_COUPLING.name and 'stiffness' in concealed.parameters:
         return [concealed.parameters['source_joint']]
     if joint == 'all':
         return driven
-    return ['all'] if name == 'command_delay' and len(driven) == 1 else []
+    return ['all'] if name == COMMAND_DELAY.name and len(driven) == 1 else []
 
 
 def without_effect(errors, bodies):
@@ -70,7 +85,9 @@ def without_effect(errors, bodies):
         return 'no_mismatch', [_answer('no_mismatch', None, '*', 'true')]
     answers = [_answer('parameters_only', None, '*', 'true')]
     if [error['link'] for error in errors] == [bodies[-1].link] and errors[0]['mass'] > 1.0:
-        answers.append(_answer('missing_physics', 'payload', '*', 'mass error of the last link'))
+        answers.append(
+            _answer('missing_physics', PAYLOAD.name, '*', 'mass error of the last link')
+        )
     return 'parameters_only', answers
 
 

@@ -7,27 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sgp_proof.concealed.unknown import UNKNOWN
+from sgp_proof.concealed.unknown import NAME, UNKNOWN
 from sgp_ros.simulation.mechanism import ChosenEffect
-
-SCORED = {
-    'viscous_friction': ['b'], 'coulomb_friction': ['level'],
-    'stribeck_friction': ['coulomb', 'static'], 'quadratic_drag': ['c'],
-    'position_friction': ['amplitude'], 'limit_friction': ['amplitude', 'onset'],
-    'asymmetric_coulomb': ['level_pos', 'level_neg'], 'spring': ['stiffness', 'rest'],
-    'gravity_tilt': ['roll', 'pitch'], 'payload': ['mass'], 'cogging': ['amplitude', 'periods'],
-    'torque_gain': ['gain'], 'dead_zone': ['width'], 'saturation': ['limit'],
-    'actuator_lag': ['time_constant'], 'command_delay': ['delay'], 'backlash': ['gap'],
-    'hysteresis': ['level', 'presliding'], 'armature': ['inertia'],
-    'encoder_eccentricity': ['amplitude', 'periods'], 'velocity_filter_lag': ['time_constant'],
-    'friction_drift': ['start', 'end', 'time_constant'], 'constant_load': ['force'],
-    'tip_force': ['fx', 'fy', 'fz'], 'load_friction': ['mu'], 'end_stop': ['position'],
-}  # fmt: skip
-"""Parameters whose estimates are scored."""
-
-
-class UnsuitableError(Exception):
-    """The robot or its motion cannot show this effect."""
 
 
 @dataclass
@@ -52,12 +33,12 @@ class Concealed:
 
     def chosen(self):
         """Return the effect for the simulation; None where it has no name."""
-        if self.name == 'unknown':
+        if self.name == NAME:
             return None
         return ChosenEffect(self.name, self.joint, self.parameters)
 
     def unlisted(self, joints):
-        if self.name != 'unknown':
+        if self.name != NAME:
             return ()
         return UNKNOWN[self.parameters['kind']](self.index, self.parameters, joints)
 

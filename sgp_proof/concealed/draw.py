@@ -5,7 +5,7 @@
 writes `DIR/cases/case_NNN/{robot.urdf,sim.mcap,real.mcap,real_test.mcap,real_far.mcap}`,
 `DIR/answers/case_NNN.json` and `DIR/answers/case_NNN_truth.npz`. Tier A is clean, tier B has
 smaller effects, worse sensors, wrong parameters and pairs. Without `--only` the seed says what
-is concealed: 26 effects in turn, and in between unknown ones, wrong parameters, nothing, pairs.
+is concealed: every effect in turn, and in between unknown ones, wrong parameters, nothing, pairs.
 """
 
 from __future__ import annotations
@@ -22,10 +22,11 @@ import numpy as np
 
 from sgp_proof.concealed import answers, balance, sizes
 from sgp_proof.concealed import world as worlds
-from sgp_proof.concealed.concealed_effect import UnsuitableError
 from sgp_proof.concealed.kinds import draw_effect
 from sgp_proof.concealed.robots import urdf
 from sgp_ros.apps.simulated_files import write_simulated
+from sgp_ros.physics.catalogue import PAYLOAD, VELOCITY_FILTER_LAG
+from sgp_ros.physics.drawing import UnsuitableError
 from sgp_ros.simulation.registry import LAWS
 from sgp_ros.simulation.sensors import Sensors
 from sgp_ros.simulation.transport import Transport
@@ -76,7 +77,7 @@ def _attempt(seed, rng, tier, wanted, out):
     names = _names(rng, wanted)
     world = worlds.draw_world(seed, rng, tier, _largest_error(rng, tier, wanted, names))
     world, motion, relative = observed(
-        rng, world, tier, needs_velocity='velocity_filter_lag' in names
+        rng, world, tier, needs_velocity=VELOCITY_FILTER_LAG.name in names
     )
     concealed = [draw_effect(rng, name, world.bodies, motion, tier == 'B') for name in names]
     for effect in concealed:
@@ -119,7 +120,7 @@ def _names(rng, wanted):
 def _largest_error(rng, tier, wanted, names):
     if wanted == PARAMETERS:
         return 0.3
-    if not names or 'payload' in names or tier == 'A' or rng.random() < 0.4:
+    if not names or PAYLOAD.name in names or tier == 'A' or rng.random() < 0.4:
         return 0.0
     return 0.3 if rng.random() < 0.5 else 0.1
 

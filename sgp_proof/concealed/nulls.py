@@ -23,9 +23,9 @@ import numpy as np
 
 from sgp_proof.concealed import balance, draw, sizes
 from sgp_proof.concealed import world as worlds
-from sgp_proof.concealed.concealed_effect import UnsuitableError
 from sgp_proof.concealed.kinds import draw_effect
 from sgp_proof.concealed.robots import urdf
+from sgp_proof.concealed.unknown import NAME as OUTSIDE
 from sgp_proof.result_files import RESULTS, seed_range, write_result
 from sgp_ros.apps.simulated_files import write_simulated
 from sgp_ros.diagnosis.compare.equations import make_equations
@@ -35,6 +35,7 @@ from sgp_ros.diagnosis.decide.decision import Scale, decide
 from sgp_ros.diagnosis.explain.hypotheses import compete
 from sgp_ros.diagnosis.places import joint_name
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
+from sgp_ros.physics.drawing import UnsuitableError
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import nominal_tree
@@ -88,7 +89,7 @@ def _attempt(seed, rng, tier, kind):
     world, motion, _ = draw.observed(rng, world, tier)
     concealed = []
     if kind in _CONCEALED:
-        name = str(rng.choice(NAMES)) if kind == LISTED else 'unknown'
+        name = str(rng.choice(NAMES)) if kind == LISTED else OUTSIDE
         concealed = [draw_effect(rng, name, world.bodies, motion, tier == 'B')]
         low, high = _CONCEALED[kind]
         sizes.sized(world, concealed[0], math.exp(rng.uniform(math.log(low), math.log(high))))
@@ -101,7 +102,7 @@ def _attempt(seed, rng, tier, kind):
         raise UnsuitableError(f'wrong parameters make {error:.2e}')
     what = concealed[0].name if concealed else ''
     joint = concealed[0].joint if concealed else ''
-    if what == 'unknown':
+    if what == OUTSIDE:
         what = concealed[0].parameters['kind']
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder)

@@ -23,7 +23,7 @@ import numpy as np
 
 from sgp_proof.concealed.balance import RATE_HZ, WIDTH_S, low_passed
 from sgp_proof.concealed.scoring import HELD_OUT, parameter_scores
-from sgp_proof.concealed.unknown import UNKNOWN
+from sgp_proof.concealed.unknown import NAME, UNKNOWN
 from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.explain.candidates import fit
@@ -164,7 +164,7 @@ def suspects(answer, motion):
 
 def _suspect(effect, motion):
     name, numbers, tree = effect['effect'], effect['parameters'], motion.tree
-    if name == 'unknown':
+    if name == NAME:
         joint = tree.moving_names.index(effect['joint'])
         return EffectAt(Unlisted(joint, numbers, tree.moving_names), Place(joint))
     stated = {k: x for k, x in numbers.items() if k in _WORDS or not isinstance(x, str)}
@@ -192,7 +192,7 @@ def _reaching(effect, shape):
 class Unlisted(Effect):
     """An effect outside the catalogue as one whose only coefficient is its size."""
 
-    name = 'unknown'
+    name = NAME
     quantities = (Quantity('a', '1'),)
     linear = ('a',)
 

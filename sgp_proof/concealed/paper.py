@@ -24,13 +24,15 @@ import numpy as np
 
 from sgp_proof.concealed import draw, sizes
 from sgp_proof.concealed import world as worlds
-from sgp_proof.concealed.concealed_effect import Concealed, UnsuitableError
+from sgp_proof.concealed.concealed_effect import Concealed
 from sgp_proof.concealed.robots import DOWN, UP, Body, Y, Z
 from sgp_proof.concealed.run import scored_case
 from sgp_proof.concealed.scoring import summary
 from sgp_proof.paper import toy
 from sgp_proof.paper.figure_eight import ARM
 from sgp_proof.result_files import make_parser, seed_range, write_result
+from sgp_ros.physics.catalogue import LIMIT_FRICTION, POSITION_FRICTION, VISCOUS_FRICTION
+from sgp_ros.physics.drawing import UnsuitableError
 from sgp_ros.simulation.reaction_wheel import ReactionWheel
 from sgp_ros.simulation.toy_pendulum import ToyPendulum
 
@@ -129,7 +131,7 @@ def pendulum(scale):
 
     size = scale * truth.friction_amplitude
     return 'pendulum', [body], [
-        Concealed('position_friction', 'hinge', 0, values, size, location=place)
+        Concealed(POSITION_FRICTION.name, 'hinge', 0, values, size, location=place)
     ]  # fmt: skip
 
 
@@ -148,7 +150,9 @@ def wheel(scale):
     motor = truth.torque_constant * truth.back_emf_constant / truth.resistance
     levels = (truth.pole_viscosity, truth.wheel_viscosity + motor)
     return 'rwp', [pole, rotor], [
-        Concealed('viscous_friction', body.joint, i, lambda size: {'b': size}, scale * levels[i])
+        Concealed(
+            VISCOUS_FRICTION.name, body.joint, i, lambda size: {'b': size}, scale * levels[i]
+        )
         for i, body in enumerate((pole, rotor))
     ]  # fmt: skip
 
@@ -170,7 +174,7 @@ def arm(scale):
     onset = limit - friction.onset
     return 'arm3', bodies, [
         Concealed(
-            'limit_friction', 'joint3', 2, lambda size, x=side * onset: {'amplitude': size,
+            LIMIT_FRICTION.name, 'joint3', 2, lambda size, x=side * onset: {'amplitude': size,
                                                                         'onset': x},
             scale * friction.growth,
         )

@@ -11,6 +11,9 @@ import math
 
 from sgp_ros.simulation.effects import Action
 
+NAME = 'unknown'
+"""Name of all of them."""
+
 
 def _force(law):
     """Return an effect whose force is `a law(q, v, moment, parameters)`."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sgp_proof.concealed import robots
-from sgp_proof.concealed.concealed_effect import UnsuitableError
 from sgp_ros.errors import NumericalError
+from sgp_ros.physics.drawing import UnsuitableError
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.controllers import ControllerChoice
 from sgp_ros.simulation.recording import simulate

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from sgp_ros.physics.joint_terms import term_laws
 from sgp_ros.rigid.consistent import ConsistentEstimate, project_information
 from sgp_ros.robots.robot import Robot
 
-DISSIPATIVE = ('viscous', 'coulomb', 'coulomb_positive', 'coulomb_negative', 'armature')
+DISSIPATIVE = tuple(
+    name for _, form in term_laws().values() if form.is_dissipative for name in form.names
+)
 """Endings of names of coefficients that are not negative in a real machine."""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sgp_ros.physics.drawing import Drawn, JointScene, Scene
 from sgp_ros.physics.effect import EMPTY, Effect, Numbers
 from sgp_ros.physics.motion import Commands, SeenMotion
 from sgp_ros.physics.parts import MOTOR, PLACES, Place, Placed, Quantity, Value
@@ -62,6 +63,9 @@ class TorqueGain(Effect):
     def effort_columns(self, kind: str) -> tuple[int, ...]:
         return (0,)
 
+    def sized(self, x: JointScene) -> Drawn:
+        return Drawn(0.25, lambda s: {'gain': 1.0 + x.sign * s}, 0.6)
+
 
 class DeadZone(_Drive):
     """A motor that does not answer to small commands."""
@@ -89,6 +93,9 @@ class DeadZone(_Drive):
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(1), np.array([np.quantile(_sizes(motion, place), 0.9)])
+
+    def sized(self, x: JointScene) -> Drawn:
+        return Drawn(0.3 * x.force, lambda s: {'width': s})
 
 
 class Saturation(_Drive):
@@ -119,6 +126,10 @@ class Saturation(_Drive):
         size = _sizes(motion, place)
         return np.array([np.quantile(size, 0.2)]), np.array([size.max()])
 
+    def draw(self, scene: Scene) -> Drawn:
+        force = scene.motion.effort[scene.joint]
+        return Drawn(0.7, lambda s: {'limit': force / s}, 2.0, 5.0)
+
 
 class _Late(_Drive):
     """A drive whose torque comes late; the shape is a time [s]."""
@@ -146,6 +157,9 @@ class ActuatorLag(_Late):
         given = _commands(motion).effort(place.joint, time_constant=max(shape[0], 0.0))
         return _instead(motion, place.joint, given)[:, None]
 
+    def sized(self, x: JointScene) -> Drawn:
+        return Drawn(0.02, lambda s: {'time_constant': max(s, 1e-3)}, 0.08)
+
 
 class CommandDelay(_Late):
     """A pure delay of the command, of one motor or of all."""
@@ -172,3 +186,8 @@ class CommandDelay(_Late):
         """Return each motor, and all of them together."""
         motors = super().places(motion)
         return [*motors, Place(_ALL)] if len(motors) > 1 else motors
+
+    def draw(self, scene: Scene) -> Drawn:
+        """Return a delay of one motor, or of all."""
+        is_all = len(scene.motors) > 1 and scene.rng.random() < 0.3
+        return Drawn(0.015, lambda s: {'delay': round(s, 4)}, 0.06, place='all' if is_all else '')

@@ -7,7 +7,7 @@ this folder, one line here, and one law in `simulation`.
 
 from __future__ import annotations
 
-from sgp_ros.physics import actuation, confined, friction, loads, memory, sensing
+from sgp_ros.physics import actuation, carried, confined, friction, loads, memory, sensing
 from sgp_ros.physics.effect import Effect
 
 VISCOUS_FRICTION = friction.ViscousFriction()
@@ -19,10 +19,11 @@ LIMIT_FRICTION = confined.LimitFriction()
 SPRING = loads.Spring()
 CONSTANT_LOAD = loads.ConstantLoad()
 ARMATURE = loads.Armature()
-GRAVITY_TILT = loads.GravityTilt()
-PAYLOAD = loads.Payload()
+GRAVITY_TILT = carried.GravityTilt()
+PAYLOAD = carried.Payload()
 TORQUE_GAIN = actuation.TorqueGain()
 COMMAND_DELAY = actuation.CommandDelay()
+HYSTERESIS = memory.Hysteresis()
 BACKLASH = memory.Backlash()
 JOINT_COUPLING = loads.JointCoupling()
 VELOCITY_FILTER_LAG = sensing.VelocityFilterLag()
@@ -45,7 +46,7 @@ EFFECTS: dict[str, Effect] = {
         ARMATURE,
         JOINT_COUPLING,
         CONSTANT_LOAD,
-        loads.TipForce(),
+        carried.TipForce(),
         PAYLOAD,
         confined.EndStop(),
         TORQUE_GAIN,
@@ -54,7 +55,7 @@ EFFECTS: dict[str, Effect] = {
         actuation.ActuatorLag(),
         COMMAND_DELAY,
         BACKLASH,
-        memory.Hysteresis(),
+        HYSTERESIS,
         sensing.EncoderEccentricity(),
         VELOCITY_FILTER_LAG,
     )

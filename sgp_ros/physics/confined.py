@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from sgp_ros.physics.drawing import Drawn, Scene, UnsuitableError
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.friction import KINDS, rubbing
 from sgp_ros.physics.motion import SeenMotion
@@ -85,6 +86,29 @@ class PositionFriction(Effect):
         columns = [-inside(motion, place.joint, a, b) * rub for a, b in pairwise(edges)]
         return np.column_stack(columns), edges
 
+    def draw(self, scene: Scene) -> Drawn:
+        """Return an interval that the motion passes through."""
+        rng, motion, j = scene.rng, scene.motion, scene.joint
+        kind = str(rng.choice(list(self.kinds)))
+        low, high = motion.low[j], motion.high[j]
+        if scene.bodies[j].kind == 'continuous' and max(-low, high) > math.pi:
+            low, high = -3.0, 3.0
+        width = rng.uniform(0.08, 0.2) * (high - low)
+        wanted = (0.02, 0.08) if scene.is_hard and rng.random() < 0.5 else (0.06, 0.4)
+        q = motion.positions[:, j]
+        for _ in range(50):
+            lo = rng.uniform(low, high - width)
+            if wanted[0] <= float(np.mean((q > lo) & (q < lo + width))) <= wanted[1]:
+                break
+        else:
+            raise UnsuitableError(self.name)
+        size = motion.effort[j] * 0.6 / (1.0 if kind == 'coulomb' else motion.velocity[j])
+
+        def values(s: float) -> dict[str, Value]:
+            return {'amplitude': s, 'lo': lo, 'hi': lo + width, 'kind': kind, 'edge': 0.05 * width}
+
+        return Drawn(size, values, interval=(lo, lo + width))
+
 
 class LimitFriction(Effect):
     """Dry friction that rises linearly from its onset to the limit of the joint."""
@@ -129,6 +153,20 @@ class LimitFriction(Effect):
         if place.side > 0:
             return np.array([q.min()]), np.array([limit - 0.02 * span])
         return np.array([limit + 0.02 * span]), np.array([q.max()])
+
+    def draw(self, scene: Scene) -> Drawn:
+        """Return an onset on one side of a joint with limits."""
+        rng, motion = scene.rng, scene.motion
+        able = [i for i, b in enumerate(scene.bodies) if b.kind != 'continuous']
+        if not able:
+            raise UnsuitableError(self.name)
+        j = scene.choice(able)
+        side, limit = rng.choice([-1.0, 1.0]), scene.bodies[j].limit
+        end = motion.high[j] if side > 0 else -motion.low[j]
+        onset = side * rng.uniform(0.2, 0.6) * min(end, limit)
+        if end <= 0.1 * limit:
+            raise UnsuitableError(self.name)
+        return Drawn(2.0 * motion.effort[j], lambda s: {'amplitude': s, 'onset': onset}, index=j)
 
 
 class EndStop(Effect):
@@ -177,3 +215,19 @@ class EndStop(Effect):
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
         q = motion.position[:, place.joint]
         return np.array([q.min()]), np.array([q.max()])
+
+    def draw(self, scene: Scene) -> Drawn:
+        """Return a stop within the motion."""
+        rng, motion, j = scene.rng, scene.motion, scene.joint
+        side = rng.choice([-1.0, 1.0])
+        end = motion.high[j] if side > 0 else -motion.low[j]
+        is_free = scene.bodies[j].kind == 'continuous'
+        if end <= 0.3 * motion.spread[j] or (is_free and end > 6.0):
+            raise UnsuitableError(self.name)
+        position = side * rng.uniform(0.5, 0.85) * end
+        share = rng.uniform(0.005, 0.03)
+        return Drawn(
+            8.0 * motion.effort[j] / scene.reach(j),
+            lambda s: {'position': position, 'stiffness': s, 'damping': share * s},
+            400.0 * motion.effort[j] / scene.reach(j), 1.0,
+        )  # fmt: skip

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from sgp_ros.physics.drawing import Drawn, JointScene, Scene
 from sgp_ros.physics.motion import SeenMotion, Structure
 from sgp_ros.physics.parts import (
     BASE,
@@ -130,8 +131,6 @@ class Effect:
         """Return whether it can hold the joint at rest."""
         return self.is_dry and place.kind != 'viscous'
 
-    # -- names and numbers ------------------------------------------------------------------
-
     def stated_quantities(self, kind: str = '') -> tuple[Quantity, ...]:
         """Return the numbers that state the effect, with their units on a revolute joint."""
         return tuple(q.of_kind(kind) for q in self.quantities if q.kinds in {(), (kind,)})
@@ -212,8 +211,6 @@ class Effect:
         """Return variable and intervals of the region it is confined to; None for everywhere."""
         return None
 
-    # -- force ------------------------------------------------------------------------------
-
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return the force per coefficient where it follows from one joint's own motion.
 
@@ -254,8 +251,6 @@ class Effect:
         """Return the inertial parameters that it adds to the last link, (10,)."""
         return np.zeros(10)
 
-    # -- search -----------------------------------------------------------------------------
-
     def places(self, motion: SeenMotion) -> list[Place]:
         """Return where it could act on a robot, in which variants."""
         if self.site is BASE:
@@ -284,6 +279,14 @@ class Effect:
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
         """Return the bounds of the shape, (s,) each."""
         return np.zeros(0), np.zeros(0)
+
+    def sized(self, x: JointScene) -> Drawn:
+        """Return its parameters in a drawn world, as a function of one size."""
+        raise NotImplementedError
+
+    def draw(self, scene: Scene) -> Drawn:
+        """Return it as drawn on a robot; UnsuitableError where that cannot show it."""
+        return self.sized(JointScene(scene))
 
     def bins(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray] | None:
         """Return columns of narrow bins (n, b) and their edges (b + 1,); None for most laws.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sgp_ros.physics.drawing import Drawn, JointScene
 from sgp_ros.physics.effect import Effect, Numbers
 from sgp_ros.physics.motion import SeenMotion
 from sgp_ros.physics.parts import MOTOR, OwnMotion, Place, Placed, Quantity, TermForm, Value
@@ -30,11 +31,14 @@ class ViscousFriction(Effect):
     appearance = 'the effort that is left grows in proportion to the velocity'
     quantities = (Quantity('b', 'N m s/rad', low=0.0),)
     linear = ('b',)
-    term = TermForm('viscous', ('viscous',), dynamics='damping')
+    term = TermForm('viscous', ('viscous',), dynamics='damping', is_dissipative=True)
     drawn_over = 'velocity'
 
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (-x.v,)
+
+    def sized(self, x: JointScene) -> Drawn:
+        return Drawn(x.small / x.velocity, lambda s: {'b': s})
 
 
 class CoulombFriction(Effect):
@@ -47,12 +51,15 @@ class CoulombFriction(Effect):
     appearance = 'a step of the effort at each reversal; the joint sticks at rest'
     quantities = (Quantity('level', 'N m', low=0.0),)
     linear = ('level',)
-    term = TermForm('coulomb', ('coulomb',), dynamics='friction')
+    term = TermForm('coulomb', ('coulomb',), dynamics='friction', is_dissipative=True)
     drawn_over = 'velocity'
     is_dry = True
 
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (-x.s,)
+
+    def sized(self, x: JointScene) -> Drawn:
+        return Drawn(x.small, lambda s: {'level': s})
 
 
 class StribeckFriction(Effect):
@@ -111,6 +118,12 @@ class StribeckFriction(Effect):
         starts = self.starts(motion, place)
         return starts[0], 2.0 * starts[-1]
 
+    def sized(self, x: JointScene) -> Drawn:
+        return Drawn(
+            x.small,
+            lambda s: {'coulomb': s, 'static': s * x.mean, 'stribeck_velocity': x.slow},
+        )
+
 
 class QuadraticDrag(Effect):
     """`tau_x = -c |v| v`."""
@@ -128,6 +141,9 @@ class QuadraticDrag(Effect):
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (-(np.abs(x.v) * x.v),)
 
+    def sized(self, x: JointScene) -> Drawn:
+        return Drawn(x.small / x.velocity**2, lambda s: {'c': s})
+
 
 class AsymmetricCoulomb(Effect):
     """Coulomb friction whose level depends on the direction."""
@@ -141,7 +157,7 @@ class AsymmetricCoulomb(Effect):
     linear = ('level_pos', 'level_neg')
     term = TermForm(
         'asymmetric_coulomb', ('coulomb_positive', 'coulomb_negative'), (0, 1),
-        dynamics='friction',
+        dynamics='friction', is_dissipative=True,
     )  # fmt: skip
     drawn_over = 'velocity'
     is_dry = True
@@ -156,6 +172,9 @@ class AsymmetricCoulomb(Effect):
     def term_columns(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return the two directions; a smooth s near rest has neither."""
         return np.maximum(x.s, 0.0), np.minimum(x.s, 0.0)
+
+    def sized(self, x: JointScene) -> Drawn:
+        return Drawn(x.small, lambda s: dict(zip(self.linear, x.levels(s), strict=True)))
 
 
 class LoadFriction(Effect):
@@ -192,6 +211,9 @@ class LoadFriction(Effect):
         level, mu = at.coefficients
         usual = float(np.mean(np.abs(motion.effort[:, at.place.joint])))
         return bool(0.0 < mu < SELF_LOCKING and level > -0.1 * mu * usual)
+
+    def sized(self, x: JointScene) -> Drawn:
+        return Drawn(0.2, lambda s: {'level': 0.05 * s * x.force, 'mu': s})
 
 
 class FrictionDrift(Effect):
@@ -231,3 +253,10 @@ class FrictionDrift(Effect):
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
         """Return a hundredth of the duration, and twice it."""
         return np.array([0.01 * motion.time[-1]]), np.array([2.0 * motion.time[-1]])
+
+    def sized(self, x: JointScene) -> Drawn:
+        def values(s: float) -> dict[str, Value]:
+            start, end = x.levels(s)
+            return {'start': start, 'end': end, 'time_constant': x.seconds, 'kind': x.kind}
+
+        return Drawn(x.small / x.unit, values)

@@ -1,4 +1,4 @@
-"""Loads and forces on the robot: springs, tilt, payload, cogging, constant and tip forces."""
+"""Loads on joints: springs, constant loads, rotors, cogging, couplings."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ import math
 
 import numpy as np
 
+from sgp_ros.physics.drawing import Drawn, JointScene, Scene, UnsuitableError
 from sgp_ros.physics.effect import EMPTY, Effect, Numbers
 from sgp_ros.physics.motion import SeenMotion
 from sgp_ros.physics.parts import (
-    BASE,
-    LAST,
-    TOOL,
     OwnMotion,
     Place,
     Placed,
@@ -20,7 +18,6 @@ from sgp_ros.physics.parts import (
     Value,
 )
 
-GRAVITY = 9.81
 _MECHANICS = 'Khalil and Dombre 2002, Modeling, Identification and Control of Robots, chapter 9'
 
 
@@ -64,6 +61,9 @@ class Spring(Effect):
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return -x.q, np.ones_like(x.q)
 
+    def sized(self, x: JointScene) -> Drawn:
+        return Drawn(x.small / x.spread, lambda s: {'stiffness': s, 'rest': x.rest})
+
 
 class ConstantLoad(Effect):
     """`tau_x = force`."""
@@ -80,6 +80,9 @@ class ConstantLoad(Effect):
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (np.ones_like(x.q),)
 
+    def sized(self, x: JointScene) -> Drawn:
+        return Drawn(x.small, lambda s: {'force': x.sign * s})
+
 
 class Armature(Effect):
     """`tau_x = -inertia a`: the rotor of the motor."""
@@ -91,7 +94,7 @@ class Armature(Effect):
     appearance = 'the effort that is left is proportional to the acceleration'
     quantities = (Quantity('inertia', 'kg m2', low=0.0),)
     linear = ('inertia',)
-    term = TermForm('armature', ('armature',))
+    term = TermForm('armature', ('armature',), is_dissipative=True)
     drawn_over = 'acceleration'
     is_inertial = True
     sees_acceleration = True
@@ -99,105 +102,8 @@ class Armature(Effect):
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (-x.a,)
 
-
-class GravityTilt(Effect):
-    """A base that is not level: its orientation in the world is `Ry(pitch) Rx(roll)`."""
-
-    name = 'gravity_tilt'
-    words = 'a base that is not level'
-    formula = 'gravity in base axes = (Ry(pitch) Rx(roll))^T (0, 0, -9.81)'
-    source = _MECHANICS
-    appearance = 'efforts that hold the arm differ as if gravity came from another direction'
-    quantities = (Quantity('roll', 'rad'), Quantity('pitch', 'rad'))
-    site = BASE
-    uses_bodies = True
-    is_on_tree = True
-
-    def gravity(self, shape: np.ndarray, magnitude: float) -> np.ndarray:
-        roll, pitch = shape
-        return -magnitude * np.array([
-            -math.sin(pitch), math.cos(pitch) * math.sin(roll), math.cos(pitch) * math.cos(roll),
-        ])  # fmt: skip
-
-    def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
-        return bool(np.hypot(*at.shape) < 0.7)
-
-    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
-        """Return the force of the change of gravity, (n, k, 1)."""
-        change = self.gravity(shape, GRAVITY) - motion.tree.gravity
-        return -(motion.gravity_columns @ change)[:, :, None]
-
-    def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
-        ways = [[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [1, -1], [-1, 1], [-1, -1]]
-        return 0.03 * np.array(ways)
-
-    def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        return np.full(2, -0.7), np.full(2, 0.7)
-
-
-class Payload(Effect):
-    """A point mass that is fixed to the last link, in the frame of that link."""
-
-    name = 'payload'
-    words = 'a payload'
-    formula = 'a point mass that is fixed to the last link'
-    source = _MECHANICS
-    appearance = 'all joints below carry and accelerate more than the bodies of the file'
-    quantities = (
-        Quantity('mass', 'kg', low=0.0, is_positive=True),
-        Quantity('x', 'm', is_scored=False), Quantity('y', 'm', is_scored=False),
-        Quantity('z', 'm', is_scored=False),
-    )  # fmt: skip
-    site = LAST
-    drawn_over = 'seconds'
-    sees_acceleration = True
-    is_body = True
-    is_on_tree = True
-
-    def added_body(self, shape: np.ndarray) -> np.ndarray:
-        mass, x, y, z = shape
-        return mass * np.array(
-            [1.0, x, y, z, y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y]
-        )
-
-    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
-        return -(motion.last_body_columns @ self.added_body(shape))[:, :, None]
-
-    def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
-        tree, body = motion.tree, motion.tree.parameters[place.joint]
-        tools = [f.translation for f in tree.frames if f.name == 'tool0' and f.body == place.joint]
-        centres = [body[1:4] / max(float(body[0]), 1e-9), *tools]
-        return np.array([[0.3 * float(body[0]), *centre] for centre in centres])
-
-    def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        reach = _reach(motion, place.joint)
-        heavy = 3.0 * float(motion.tree.parameters[place.joint, 0])
-        return np.array([0.0, -reach, -reach, -reach]), np.array([heavy, reach, reach, reach])
-
-
-def _reach(motion: SeenMotion, joint: int) -> float:
-    """Return how far from its joint a load may sit on a link [m]."""
-    tree = motion.tree
-    values = tree.parameters[joint]
-    radius = math.sqrt(max(0.5 * (values[4] + values[6] + values[9]) / max(values[0], 1e-9), 1e-4))
-    frames = [np.linalg.norm(f.translation) for f in tree.frames if f.body == joint]
-    return float(max([2.0 * radius, *(1.2 * length for length in frames)]))
-
-
-class TipForce(Effect):
-    """A constant force in the axes of the root at the origin of `tool0`."""
-
-    name = 'tip_force'
-    words = 'a constant force on the tool'
-    formula = 'tau_x = J_tool(q)^T (fx, fy, fz)'
-    source = _MECHANICS
-    appearance = 'efforts that change with the pose as the lever arms of one force do'
-    quantities = (Quantity('fx', 'N'), Quantity('fy', 'N'), Quantity('fz', 'N'))
-    linear = ('fx', 'fy', 'fz')
-    site = TOOL
-
-    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
-        return motion.tool_columns
+    def sized(self, x: JointScene) -> Drawn:
+        return Drawn(x.small / x.acceleration, lambda s: {'inertia': s})
 
 
 class Cogging(Effect):
@@ -251,6 +157,9 @@ class Cogging(Effect):
         periods = self.starts(motion, place)
         return 0.9 * periods[0], 1.1 * periods[-1]
 
+    def sized(self, x: JointScene) -> Drawn:
+        return Drawn(x.small, lambda s: {'amplitude': s, 'periods': x.periods, 'phase': x.phase})
+
 
 class JointCoupling(Effect):
     """Torque of another motor, or a cable of energy `stiffness/2 (q - ratio q_source)^2`."""
@@ -298,3 +207,27 @@ class JointCoupling(Effect):
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
         shapes = 1 if place.kind == 'spring' else 0
         return np.full(shapes, -5.0), np.full(shapes, 5.0)
+
+    def draw(self, scene: Scene) -> Drawn:
+        """Return a coupling of two joints, of motors where it is one of torques."""
+        rng, motion, motors, count = scene.rng, scene.motion, scene.motors, len(scene.bodies)
+        if count < 2:
+            raise UnsuitableError(self.name)
+        kind = 'torque' if len(motors) > 1 and rng.random() < 0.5 else 'spring'
+        j = scene.choice(motors if kind == 'torque' else count)
+        source = scene.choice(
+            [i for i in (motors if kind == 'torque' else range(count)) if i != j]
+        )
+        words = {'source_joint': scene.bodies[source].joint, 'kind': kind}
+        size = 0.3 * motion.effort[j]
+        if kind == 'torque':
+            sign = rng.choice([-1.0, 1.0])
+            return Drawn(
+                size / motion.effort[source], lambda s: {**words, 'coefficient': sign * s},
+                1.0, index=j,
+            )  # fmt: skip
+        ratio = rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 1.5)
+        ratio *= motion.spread[j] / motion.spread[source]
+        return Drawn(
+            size / motion.spread[j], lambda s: {**words, 'stiffness': s, 'ratio': ratio}, index=j
+        )

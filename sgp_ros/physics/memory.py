@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
+from sgp_ros.physics.drawing import Drawn, JointScene, Scene, UnsuitableError
 from sgp_ros.physics.effect import Effect, Numbers
 from sgp_ros.physics.motion import SeenMotion
 from sgp_ros.physics.parts import MOTOR, Place, Placed, Quantity, Value
@@ -53,6 +54,9 @@ class Hysteresis(Effect):
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
         ways = self.starts(motion, place)
         return ways[0] / 5.0, ways[-1] * 3.0
+
+    def sized(self, x: JointScene) -> Drawn:
+        return Drawn(x.small, lambda s: {'level': s, 'presliding': x.presliding})
 
 
 @njit(cache=True)
@@ -148,3 +152,17 @@ class Backlash(Effect):
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
         most = float(np.ptp(motion.position[:, place.joint]))
         return np.array([0.01, 1e-9]), np.array([0.95, most])
+
+    def draw(self, scene: Scene) -> Drawn:
+        """Return play of a motor whose link carries no other."""
+        bodies, motors = scene.bodies, scene.motors
+        leaves = [i for i in motors if not any(b.parent == i for b in bodies)]
+        if not leaves:
+            raise UnsuitableError(self.name)
+        j = scene.choice(leaves)
+        body, axis = bodies[j], np.array(bodies[j].axis)
+        own = body.mass if body.is_prismatic else axis @ body.inertia @ axis
+        motor, reach = scene.rng.uniform(0.2, 0.5) * own, scene.reach(j)
+        return Drawn(
+            0.01 * reach, lambda s: {'gap': s, 'motor_inertia': motor}, 0.05 * reach, 1.0, index=j
+        )

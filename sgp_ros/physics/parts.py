@@ -189,6 +189,7 @@ class TermForm:
         names: of its coefficients, each after the name of the joint.
         columns: indices of the law's own coefficients.
         sign: of the term's coefficients over the law's: 1 for what takes effort from the motor.
+        is_dissipative: no coefficient of it is negative in a real machine.
         dynamics: attribute of `<dynamics>` in a URDF that states it; empty for none.
     """
 
@@ -197,3 +198,4 @@ class TermForm:
     columns: tuple[int, ...] = (0,)
     sign: float = 1.0
     dynamics: str = ''
+    is_dissipative: bool = False

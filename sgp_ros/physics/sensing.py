@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from sgp_ros.physics.drawing import Drawn, JointScene
 from sgp_ros.physics.effect import Effect, Numbers
 from sgp_ros.physics.loads import per_turn, wave_coefficients
 from sgp_ros.physics.motion import SeenMotion
@@ -38,6 +39,10 @@ def _slightly_eccentric(motion: SeenMotion, place: Place, start: np.ndarray) -> 
         change = by_v * (slope * v)[:, None] + by_a * (slope * a + bend * v**2)[:, None]
         columns.append(by_q * e[:, None] + change)
     return np.stack(columns, axis=2)
+
+
+_STEEPEST_DRAWN = 0.8
+"""Greatest slope of an encoder that is drawn."""
 
 
 class EncoderEccentricity(Effect):
@@ -106,6 +111,14 @@ class EncoderEccentricity(Effect):
         most = _STEEPEST / (low * per_turn(motion, place.joint))
         return np.array([low, -most, -most]), np.array([high, most, most])
 
+    def sized(self, x: JointScene) -> Drawn:
+        turns, slope = x.turns, 2.0 * math.pi * x.turns if x.is_prismatic else x.turns
+        return Drawn(
+            0.01 * x.reach / turns,
+            lambda s: {'amplitude': s, 'periods': turns, 'phase': x.phase},
+            _STEEPEST_DRAWN / slope,
+        )
+
 
 class VelocityFilterLag(Effect):
     """A velocity field behind a first-order low-pass; the position is right."""
@@ -118,3 +131,6 @@ class VelocityFilterLag(Effect):
     quantities = (Quantity('time_constant', 's', low=1e-4, is_positive=True),)
     is_force = False
     is_online = False
+
+    def sized(self, x: JointScene) -> Drawn:
+        return Drawn(0.02, lambda s: {'time_constant': max(s, 1e-3)}, 0.06)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from sgp_proof.concealed import draw, paper, robots, run, scoring, sizes
-from sgp_proof.concealed.concealed_effect import SCORED
 from sgp_proof.concealed.oracle import Oracle, Unlisted, error, nominal_error, share, suspects
 from sgp_proof.concealed.unknown import UNKNOWN
 from sgp_proof.paper.figure_eight import ARM
+from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -28,9 +28,9 @@ KEYS = {
 
 
 def test_plan_has_every_effect():
-    """The 26 effects of the contract and `gravity_tilt` among them, in turn."""
+    """Those of the catalogue, in turn."""
     assert set(LAWS) <= set(draw.PLAN)
-    assert set(SCORED) | {'joint_coupling'} == set(LAWS)
+    assert set(EFFECTS) == set(LAWS)
 
 
 @pytest.mark.parametrize('family', robots.FAMILIES)
