@@ -11,6 +11,7 @@ from sgp_proof.concealed import draw, paper, robots, run, scoring, sizes
 from sgp_proof.concealed.oracle import Oracle, Unlisted, error, nominal_error, share, suspects
 from sgp_proof.concealed.unknown import UNKNOWN
 from sgp_proof.paper.figure_eight import ARM
+from sgp_proof.result_files import RESULTS
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.robots.nominal import nominal_model
@@ -31,6 +32,15 @@ def test_plan_has_every_effect():
     """Those of the catalogue, in turn."""
     assert set(LAWS) <= set(draw.PLAN)
     assert set(EFFECTS) == set(LAWS)
+
+
+@pytest.mark.parametrize('tier', ['a', 'b'])
+def test_a_seed_conceals_what_it_concealed_in_the_committed_results(tier):
+    """The order of the plan is part of every seed: a new effect goes to its end."""
+    found = json.loads((RESULTS / f'concealed_{tier}.json').read_text(encoding='utf-8'))
+    for case in found['cases']:
+        wanted = draw.PLAN[int(case['case'].removeprefix('case_')) % len(draw.PLAN)]
+        assert case['key'].startswith(f'{tier.upper()}_{wanted}_'), case['case']
 
 
 @pytest.mark.parametrize('family', robots.FAMILIES)
