@@ -3,7 +3,7 @@
 Parametric regression with the complete ten-coefficient model, so that every error is one of the
 filter. Compared on the same recordings: backward differences paired by index (the paper's finite
 differences), central differences with the command averaged over two steps, and the weak form of
-`sgp_ros.engine.weak_form`.
+`sgp_ros.engine.windows`.
 
     python -m sgp_proof.numerics.filter --seeds 10
 """

@@ -20,6 +20,7 @@ from sgp_ros.engine.replay import is_record, replay
 from sgp_ros.engine.results import Step
 from sgp_ros.engine.samples import CommandSample, Event, JointSample
 from sgp_ros.engine.setting import EFFORT_SOURCES
+from sgp_ros.engine.snapshots import restored, take_snapshot
 from sgp_ros.errors import ConfigError, NumericalError, RecordingError
 from sgp_ros.recordings.model_files import (
     load_model,
@@ -117,7 +118,7 @@ def _replay_into(
     remarks += model_remarks(engine, asked=asked)
     metrics = collect_metrics(engine, recording.path.name, timing=timing, remarks=remarks)
     write_text(out / 'metrics.json', json.dumps(metrics, indent=1, allow_nan=False) + '\n')
-    save_model(out / 'model.npz', engine.snapshot())
+    save_model(out / 'model.npz', take_snapshot(engine))
     write_report(out, engine, history, metrics, truth=truth)
     return metrics
 
@@ -240,7 +241,7 @@ def _make_engine(robot: Robot, options: ReplayOptions) -> Engine:
     config = EngineConfig.from_mapping(settings, robot)
     engine = Engine(robot, config)
     if options.model:
-        engine.restore(load_model(Path(options.model)))
+        engine = restored(robot, load_model(Path(options.model)))
         engine.begin_stream()
     if options.effort != 'auto':
         engine.change({'effort.source': EFFORT_SOURCES[options.effort]})

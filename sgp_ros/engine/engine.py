@@ -13,8 +13,15 @@ from sgp_ros.engine.fitting import FitRequest
 from sgp_ros.engine.hyperparameters import settings_of
 from sgp_ros.engine.intake import Intake
 from sgp_ros.engine.ordering import ReorderBuffer
-from sgp_ros.engine.readout import read_parameters, read_scores
-from sgp_ros.engine.results import Counts, Estimate, ParameterEstimate, Score, Step
+from sgp_ros.engine.results import (
+    Counts,
+    Estimate,
+    ParameterEstimate,
+    Score,
+    Step,
+    read_parameters,
+    read_scores,
+)
 from sgp_ros.engine.samples import (
     CommandSample,
     Event,
@@ -23,7 +30,6 @@ from sgp_ros.engine.samples import (
     SettingsChange,
     SettingValue,
 )
-from sgp_ros.engine.snapshots import fill_from_snapshot, snapshot_config, take_snapshot
 from sgp_ros.engine.windows import Equation
 from sgp_ros.gp.scores import DriftTest
 from sgp_ros.robots.robot import Robot
@@ -185,21 +191,6 @@ class Engine:
     def baseline_scores(self) -> dict[str, dict[str, Score]]:
         """Return the scores of the physics alone on the same samples, target channel only."""
         return read_scores(self.robot, {self.robot.target: self.estimator.baseline_scores})
-
-    def snapshot(self) -> dict[str, np.ndarray]:
-        """Return the whole state as arrays without objects, for `numpy.savez`."""
-        return take_snapshot(self)
-
-    def restore(self, snapshot: Mapping[str, np.ndarray]) -> None:
-        """Continue exactly where `snapshot` was taken, with its settings.
-
-        Raises:
-            ConfigError: the snapshot is of another robot or another version.
-        """
-        config = snapshot_config(snapshot, self.robot)
-        fresh = Engine(self.robot, config)
-        fill_from_snapshot(fresh, snapshot)
-        self.__dict__.update(fresh.__dict__)
 
     def begin_stream(self) -> None:
         """Keep what was learned; forget stream, counts and scores: another recording follows."""

@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 
-from sgp_ros.engine.complement import solve_complement
 from sgp_ros.engine.config import EngineConfig
-from sgp_ros.engine.factor_safety import check_factor, predict_soundly
 from sgp_ros.engine.hyperparameters import kernel_named
+from sgp_ros.engine.prediction import check_factor, predict_soundly, solve_complement
 from sgp_ros.engine.prior_knowledge import (
     complement_columns,
     empty_regression,

@@ -1,14 +1,90 @@
-"""Runs a whole stream through an engine, with the hyper-parameter fits that are due."""
+"""A whole stream through an engine, with the hyper-parameter fits that are due put in force.
+
+All factors at once would be one callback as long as those of many samples. Outputs that share no
+factor are independent given W, so a model in which some have new hyper-parameters and others
+still the old ones is a model like any other; every step is a change of settings that a record
+holds and a replay repeats.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
 from sgp_ros.engine.engine import Engine
-from sgp_ros.engine.fitting import fit
+from sgp_ros.engine.fitting import FitResult, fit
+from sgp_ros.engine.hyperparameters import prefix_of, settings_of
 from sgp_ros.engine.results import Step
-from sgp_ros.engine.samples import Event, SettingsChange
-from sgp_ros.engine.swap import Swap
+from sgp_ros.engine.samples import Event, SettingsChange, SettingValue
+from sgp_ros.errors import NumericalError
+from sgp_ros.gp.model import separable
+
+
+class Swap:
+    """The way of one fit into an engine; the engine counts what became of it.
+
+    Attributes:
+        fit: that is put in force.
+        refusal: why the fit, or a part of it, is not in force, one of `results.REFIT_REFUSALS`;
+            empty while nothing was refused.
+
+    Args:
+        engine: has a model.
+        fit: for it.
+    """
+
+    def __init__(self, engine: Engine, fit: FitResult) -> None:
+        self.fit = fit
+        self._engine = engine
+        self._parts: list[dict[str, SettingValue]] = []
+        self.refusal = fit.refusal
+        if self.refusal:
+            engine.counts.refits_refused_for[self.refusal] += 1
+            return
+        assert fit.model is not None
+        regression = engine.estimator.regression
+        assert regression is not None
+        settings = settings_of(engine.robot.joint_names, fit.model)
+        for outputs in separable(regression.model, fit.model):
+            names = tuple(prefix_of(engine.robot.joint_names[j]) for j in outputs)
+            self._parts.append({n: v for n, v in settings.items() if n.startswith(names)})
+
+    @property
+    def is_done(self) -> bool:
+        """Whether nothing is left to do."""
+        return not self._parts
+
+    def step(self) -> SettingsChange | None:
+        """Put the next part in force.
+
+        Returns:
+            The event to record; None where the buffer has no factor under that part, which then
+            keeps the hyper-parameters it has.
+        """
+        part = self._parts.pop(0)
+        change = None
+        try:
+            change = self._engine.change(part)
+        except NumericalError:
+            self.refusal = 'no_factor'
+        if self.is_done:
+            self._count()
+        return change
+
+    def finish(self) -> list[SettingsChange]:
+        """Put all that is left in force; return the events to record."""
+        changes = []
+        while not self.is_done:
+            change = self.step()
+            if change is not None:
+                changes.append(change)
+        return changes
+
+    def _count(self) -> None:
+        counts = self._engine.counts
+        if self.refusal:
+            counts.refits_refused_for[self.refusal] += 1
+        else:
+            counts.refits += 1
 
 
 def replay(

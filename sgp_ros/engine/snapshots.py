@@ -9,11 +9,12 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.estimator import Estimator
 from sgp_ros.engine.hyperparameters import kernel_named
 from sgp_ros.engine.intake import State
@@ -32,14 +33,11 @@ from sgp_ros.gp.regression import Regression
 from sgp_ros.gp.scores import DriftTest, RunningScore
 from sgp_ros.robots.robot import Robot
 
-if TYPE_CHECKING:
-    from sgp_ros.engine.engine import Engine
-
 VERSION = 5
 
 
 def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
-    """Return the state of an engine, arrays without objects."""
+    """Return the whole state of an engine as arrays without objects, for `numpy.savez`."""
     estimator, intake, order = engine.estimator, engine.intake, engine.order
     text = {
         'version': VERSION,
@@ -104,7 +102,18 @@ def snapshot_config(snapshot: Mapping[str, np.ndarray], robot: Robot) -> EngineC
     return EngineConfig.from_mapping(text['settings'], robot)
 
 
-def fill_from_snapshot(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
+def restored(robot: Robot, snapshot: Mapping[str, np.ndarray]) -> Engine:
+    """Return an engine that continues exactly where `snapshot` was taken, with its settings.
+
+    Raises:
+        ConfigError: no snapshot, or one of another version or robot.
+    """
+    engine = Engine(robot, snapshot_config(snapshot, robot))
+    _fill(engine, snapshot)
+    return engine
+
+
+def _fill(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
     """Bring a fresh engine, built with the settings of `snapshot`, to its state."""
     text = _text(snapshot)
     for name, value in text['counts'].items():

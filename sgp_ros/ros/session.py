@@ -15,9 +15,10 @@ from pathlib import Path
 from sgp_ros.engine.config import describe_settings
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitResult
+from sgp_ros.engine.replay import Swap
 from sgp_ros.engine.results import Step
 from sgp_ros.engine.samples import Event, JointSample, Reset, SettingsChange, SettingValue
-from sgp_ros.engine.swap import Swap
+from sgp_ros.engine.snapshots import take_snapshot
 from sgp_ros.recordings.command_types import FLOAT64_ARRAY, NO_COMMAND
 from sgp_ros.recordings.model_files import save_model
 from sgp_ros.recordings.predictions import Outputs, PredictionTopics, outputs, write_outputs
@@ -161,7 +162,7 @@ class Session:
         Raises:
             OSError: the files cannot be written.
         """
-        save_model(path, self.engine.snapshot(), settings)
+        save_model(path, take_snapshot(self.engine), settings)
 
     def flush_record(self) -> None:
         """Make the record so far survive a crash."""

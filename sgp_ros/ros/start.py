@@ -17,7 +17,7 @@ from sgp_ros.engine.config import EngineConfig, describe_settings
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.samples import JointSample, SettingValue, frozen_array
 from sgp_ros.engine.setting import Setting
-from sgp_ros.engine.snapshots import snapshot_config
+from sgp_ros.engine.snapshots import restored, snapshot_config
 from sgp_ros.recordings.command_types import COMMAND_TYPES, FLOAT64_ARRAY, NO_COMMAND
 from sgp_ros.recordings.model_files import load_model
 from sgp_ros.robots.registry import load_robot
@@ -95,9 +95,8 @@ def build_engine(node: Node) -> tuple[Engine, dict[str, SettingValue]]:
     names = {setting.name for setting in settings}
     config = EngineConfig.from_mapping({n: v for n, v in given.items() if n in names}, robot)
     warm_up(robot)
-    engine = Engine(robot, config)
+    engine = Engine(robot, config) if snapshot is None else restored(robot, snapshot)
     if snapshot is not None:
-        engine.restore(snapshot)
         present = engine.config.to_mapping()
         wanted = {n: v for n, v in config.to_mapping().items() if v != present.get(n)}
         if wanted:

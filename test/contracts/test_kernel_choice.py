@@ -11,6 +11,7 @@ import pytest
 from sgp_ros.engine.config import EngineConfig, describe_settings
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
+from sgp_ros.engine.snapshots import restored, take_snapshot
 from sgp_ros.errors import ConfigError
 from sgp_ros.gp import kernel as kernel_module
 from sgp_ros.gp.kernel import HyperParameter, Stationary
@@ -61,12 +62,10 @@ def _kinds(engine):
 
 def _restored(engine):
     file = io.BytesIO()
-    np.savez(file, **engine.snapshot())
+    np.savez(file, **take_snapshot(engine))
     file.seek(0)
-    again = Engine(PENDULUM, config())
     with np.load(file, allow_pickle=False) as snapshot:
-        again.restore(snapshot)
-    return again
+        return restored(PENDULUM, snapshot)
 
 
 def _check_a_life(name, mode):

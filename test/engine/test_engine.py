@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitResult, fit
-from sgp_ros.engine.replay import is_record, replay
+from sgp_ros.engine.replay import Swap, is_record, replay
 from sgp_ros.engine.samples import (
     CommandSample,
     JointSample,
@@ -21,7 +21,7 @@ from sgp_ros.engine.samples import (
     SettingsChange,
     frozen_array,
 )
-from sgp_ros.engine.swap import Swap
+from sgp_ros.engine.snapshots import restored, take_snapshot
 from sgp_ros.errors import ConfigError
 from test.engine.worlds import (
     INVERSE_PENDULUM,
@@ -159,11 +159,10 @@ def test_stop_save_restore_continue_equals_never_stopped():
         expected = [e for event in events for e in whole.push(event).estimates]
         found = [e for event in events[:stop] for e in first.push(event).estimates]
         file = io.BytesIO()
-        np.savez(file, **first.snapshot())
+        np.savez(file, **take_snapshot(first))
         file.seek(0)
-        second = Engine(PENDULUM, config())
         with np.load(file, allow_pickle=False) as snapshot:
-            second.restore(snapshot)
+            second = restored(PENDULUM, snapshot)
         found += [e for event in events[stop:] for e in second.push(event).estimates]
         _same(expected, found)
         assert second.scores() == whole.scores()
@@ -174,9 +173,9 @@ def test_a_snapshot_of_another_robot_is_refused():
     """Coefficients must match, name by name."""
     engine, _ = _run(pendulum_events(100))
     with pytest.raises(ConfigError, match='robot pendulum'):
-        Engine(INVERSE_PENDULUM, config(INVERSE_PENDULUM)).restore(engine.snapshot())
+        restored(INVERSE_PENDULUM, take_snapshot(engine))
     with pytest.raises(ConfigError, match='a file with'):
-        engine.restore({})
+        restored(PENDULUM, {})
 
 
 def test_every_state_is_used_or_refused_for_one_reason():

@@ -13,6 +13,7 @@ from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.filter_choice import TRIALS_S, WINDOWS
 from sgp_ros.engine.replay import replay
 from sgp_ros.engine.samples import CommandSample, JointSample, SettingsChange, frozen_array
+from sgp_ros.engine.snapshots import restored, take_snapshot
 from test.engine.worlds import PENDULUM, START_NS, config, motion
 
 AUTO = {'filter__window': AUTOMATIC, 'refit__enabled': False}
@@ -98,11 +99,10 @@ def test_an_engine_that_stopped_before_the_choice_makes_it_all_the_same(stop):
     engine = Engine(PENDULUM, config(**AUTO))
     first = [e for event in events[:stop] for e in engine.push(event).estimates]
     file = io.BytesIO()
-    np.savez(file, **engine.snapshot())
+    np.savez(file, **take_snapshot(engine))
     file.seek(0)
-    again = Engine(PENDULUM, config())
     with np.load(file, allow_pickle=False) as snapshot:
-        again.restore(snapshot)
+        again = restored(PENDULUM, snapshot)
     np.testing.assert_array_equal(_run(again, events[stop:])[0], _run(engine, events[stop:])[0])
     assert (len(first) == 0) == (stop == 300)
     assert again.config == engine.config

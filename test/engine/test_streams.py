@@ -10,6 +10,7 @@ import pytest
 
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
+from sgp_ros.engine.snapshots import restored, take_snapshot
 from sgp_ros.errors import ConfigError
 from test.engine.worlds import PENDULUM, config, pendulum_events
 
@@ -31,12 +32,10 @@ def _estimates(engine, events):
 def _restored(engine):
     """Return an engine that took the other one's snapshot through a file."""
     file = io.BytesIO()
-    np.savez(file, **engine.snapshot())
+    np.savez(file, **take_snapshot(engine))
     file.seek(0)
-    again = Engine(PENDULUM, config())
     with np.load(file, allow_pickle=False) as snapshot:
-        again.restore(snapshot)
-    return again
+        return restored(PENDULUM, snapshot)
 
 
 @pytest.mark.parametrize('options', KEEPING)
@@ -103,11 +102,11 @@ def test_fits_go_on_however_long_the_stream(mode):
 def test_a_model_of_another_version_is_refused():
     """Arrays that mean something else must not be read."""
     engine = Engine(PENDULUM, config())
-    snapshot = engine.snapshot()
+    snapshot = take_snapshot(engine)
     text = json.loads(str(snapshot['json']))
     snapshot['json'] = np.array(json.dumps(text | {'version': 2}))
     with pytest.raises(ConfigError, match='version 2'):
-        engine.restore(snapshot)
+        restored(PENDULUM, snapshot)
 
 
 def test_a_basis_has_no_factor_to_check():

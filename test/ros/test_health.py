@@ -9,8 +9,8 @@ import pytest
 
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitResult
+from sgp_ros.engine.replay import Swap
 from sgp_ros.engine.samples import CommandSample
-from sgp_ros.engine.swap import Swap
 from sgp_ros.gp.model import Model
 from sgp_ros.ros.health import Health
 from sgp_ros.ros.verdict import OK, WARN

@@ -22,6 +22,7 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitRequest, FitResult, fit
 from sgp_ros.engine.samples import CommandSample, Event, JointSample, SettingsChange
+from sgp_ros.engine.snapshots import take_snapshot
 from sgp_ros.errors import ConfigError
 from sgp_ros.recordings.model_files import load_model, save_model
 from sgp_ros.recordings.predictions import PredictionTopics
@@ -299,9 +300,11 @@ def test_a_saved_model_loads_to_the_same_arrays(tmp_path: Path) -> None:
     for event in _events(60):
         engine.push(event)
     path = tmp_path / 'a' / 'model.npz'
-    save_model(path, engine.snapshot(), {'robot': 'reaction_wheel', **engine.config.to_mapping()})
+    save_model(
+        path, take_snapshot(engine), {'robot': 'reaction_wheel', **engine.config.to_mapping()}
+    )
     loaded = load_model(path)
-    for name, array in engine.snapshot().items():
+    for name, array in take_snapshot(engine).items():
         np.testing.assert_array_equal(loaded[name], array)
     document = yaml.safe_load(path.with_suffix('.yaml').read_text())
     parameters = document['/**']['ros__parameters']

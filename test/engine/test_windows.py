@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import integrate
 
 from sgp_ros.engine.intake import CommandHistory
-from sgp_ros.engine.weak_form import WeakForm, polynomial_smoother
+from sgp_ros.engine.windows import WeakForm, polynomial_smoother
 
 
 def _times(seed, m):
