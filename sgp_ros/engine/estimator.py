@@ -207,7 +207,8 @@ class Estimator:
         return Channel(measured, mean, variance)
 
     def _score(self, target: Channel, complement: Channel) -> bool:
-        if not np.all(np.isfinite(target.variance)):
+        is_known = np.isfinite(target.variance) & (target.variance > 0.0)
+        if not is_known.all():  # undetermined, or lost to rounding far outside all samples
             return False
         self._counts.scored += 1
         errors = (target.measured - target.mean) / np.sqrt(target.variance)

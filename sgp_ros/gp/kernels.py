@@ -17,6 +17,10 @@ from sgp_ros.gp.kernel import (
 )
 from sgp_ros.gp.linear_algebra import turn_into_exponents
 
+_FAR = 1e6
+"""Square of a distance at which a Matern kernel is zero in double precision. Without an end the
+product of a polynomial and an exponential would be infinity times zero."""
+
 
 class SquaredExponential(Stationary):
     """Squared exponential kernel: functions with derivatives of every order.
@@ -68,7 +72,7 @@ class Matern32(Stationary):
     @staticmethod
     def correlation(squares: np.ndarray) -> np.ndarray:
         """Return `(1 + sqrt(3) r) exp(-sqrt(3) r)`."""
-        r = np.sqrt(3.0 * squares)
+        r = np.sqrt(np.minimum(3.0 * squares, _FAR))
         return (1.0 + r) * np.exp(-r)
 
     @staticmethod
@@ -90,13 +94,13 @@ class Matern52(Stationary):
     @staticmethod
     def correlation(squares: np.ndarray) -> np.ndarray:
         """Return `(1 + sqrt(5) r + 5 r^2 / 3) exp(-sqrt(5) r)`."""
-        r = np.sqrt(5.0 * squares)
+        r = np.sqrt(np.minimum(5.0 * squares, _FAR))
         return (1.0 + r + r * r / 3.0) * np.exp(-r)
 
     @staticmethod
     def slope(squares: np.ndarray) -> np.ndarray:
         """Return its derivative by `r^2`."""
-        r = np.sqrt(5.0 * squares)
+        r = np.sqrt(np.minimum(5.0 * squares, _FAR))
         return -5.0 / 6.0 * (1.0 + r) * np.exp(-r)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from sgp_ros.engine.config import EngineConfig, describe_settings
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
+from sgp_ros.engine.samples import frozen_array
 from sgp_ros.engine.snapshots import restored, take_snapshot
 from sgp_ros.errors import ConfigError
 from sgp_ros.gp import kernel as kernel_module
@@ -114,6 +116,17 @@ def test_a_kernel_names_its_settings():
     given = EngineConfig.from_mapping({'model.kernel': 'bump', **values}, PENDULUM)
     (kernel,) = Engine(PENDULUM, given).estimator.regression.model.kernels
     assert kernel == engine.estimator.regression.model.kernels[0]
+
+
+@pytest.mark.parametrize('name', sorted(KERNELS))
+def test_a_sample_far_outside_all_others_is_survived(name):
+    """Its variance may be lost to rounding: no warning, and no score that is not a number."""
+    events = pendulum_events(200)
+    events[241] = replace(events[241], position=frozen_array(1e20 * events[241].position))
+    engine = Engine(PENDULUM, config(model__kernel=name))
+    _estimates(engine, events)
+    assert engine.counts.scored > 0
+    assert np.isfinite(engine.scores()['hinge']['acceleration'].nlpd)
 
 
 def test_an_unknown_kernel_is_refused_with_the_choices():

@@ -208,3 +208,13 @@ def test_linear_kernel_is_that_of_random_slopes():
     spread = np.sqrt(np.outer(kernel.diagonal(U), kernel.diagonal(U)))
     np.testing.assert_allclose((Z.T @ Z / 20_000 - kernel.matrix(U)) / spread, 0.0, atol=0.04)
     assert kernel.variance == kernel.diagonal(np.array([[kernel.lengthscales[0], 9.0, 0.0]]))[0]
+
+
+@pytest.mark.parametrize('name', [name for name in NAMES if name != 'linear'])
+def test_stationary_kernels_end_far_away(name):
+    """At any distance, also one whose square overflows, the covariance is a number: zero."""
+    kernel = _kernel(name, 13)
+    with np.errstate(over='ignore'):
+        for distance in (1e3, 1e9, 1e200):
+            s = np.array([[0.0, 0.0], [distance, distance]])
+            np.testing.assert_allclose(kernel.vector(s, s[0])[1], 0.0, atol=1e-300)
