@@ -3,45 +3,50 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from importlib.util import find_spec
+from typing import Any
 
 # As the commands do, before NumPy loads: the small matrices here are slower with more threads.
 for _name in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS'):
     os.environ.setdefault(_name, '1')
 
+import pytest  # noqa: E402 - the environment above comes first
 from hypothesis import settings  # noqa: E402 - the environment above comes first
 
 settings.register_profile('dev', deadline=None)
 settings.register_profile('ci', deadline=None, derandomize=True)
 settings.load_profile(os.environ.get('HYPOTHESIS_PROFILE', 'dev'))
 
-_NEEDED = {
-    'pinocchio': {
-        'contracts': ('robots',),
-        'batch': ('excitation', 'identification', 'real_arms', 'suggestions'),
-        'physics': ('effects', 'stated'),
-        'rigid': ('inertial', 'rigid_body', 'tree', 'urdf_writer'),
-        'robots': (
-            'effect_terms', 'pendulums', 'built_in_nominal', 'lumped', 'ready_robots',
-            'urdf_robot',
-        ),
-        'simulation': ('tree', 'tree_part'),
-        'proof/numerics': ('random_tree', 'trees'),
-        'proof/paper': ('serial_arm',),
-    },
-    'mujoco': {
-        'apps': ('built_in_diagnosis', 'shipped_robots', 'simulation', 'stated_simulation'),
-        'robots': ('lumped',),
-        'proof/concealed': ('concealed',),
-        'simulation': ('effect_laws', 'tree', 'tree_part'),
-    },
-}  # fmt: skip
+_MISSING = tuple(name for name in ('pinocchio', 'mujoco') if find_spec(name) is None)
 """No wheel of Pinocchio 3 goes with NumPy 1.26, the oldest that is tested; MuJoCo is optional."""
 
-collect_ignore = [
-    f'{folder}/{name}.py' if '/' in name else f'{folder}/test_{name}.py'
-    for library, folders in _NEEDED.items()
-    if not find_spec(library)
-    for folder, names in folders.items()
-    for name in names
-]
+
+def _missing(error: BaseException | None) -> str:
+    """Return the library that is not at hand and whose import raised `error`, or nothing."""
+    while error is not None:
+        if isinstance(error, ModuleNotFoundError) and error.name in _MISSING:
+            return f'no {error.name}'
+        error = error.__cause__ or error.__context__
+    return ''
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector: pytest.Collector) -> Iterator[Any]:
+    """Leave out a file that imports what is not at hand."""
+    report = yield
+    found = report.call.excinfo
+    reason = _missing(found.value) if found else ''
+    if reason:
+        report.outcome, report.longrepr = 'skipped', (str(collector.path), 0, reason)
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Iterator[Any]:
+    """Leave out a test that comes upon what is not at hand."""
+    report = yield
+    reason = _missing(call.excinfo.value) if call.excinfo else ''
+    if reason:
+        report.outcome, report.longrepr = 'skipped', (str(item.path), 0, reason)
+    return report
