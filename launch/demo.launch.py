@@ -3,7 +3,7 @@
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.parameter_descriptions import Value
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchDescription
@@ -13,7 +13,7 @@ def generate_launch_description() -> LaunchDescription:
     """Return both nodes under one parameter file."""
     robot = LaunchConfiguration('robot')
     params = PathJoinSubstitution([FindPackageShare('sgp_ros'), 'config', [robot, '.yaml']])
-    seed = ParameterValue(LaunchConfiguration('seed'), value_type=int)
+    seed = Value(LaunchConfiguration('seed'), value_type=int)
     return LaunchDescription(
         [
             DeclareLaunchArgument('robot', default_value='reaction_wheel_6'),

@@ -27,7 +27,8 @@ LAYERS = {
     'rigid': NUMERIC | {'numba', 'pinocchio', 'clarabel', 'gp', 'physics', 'errors'},
     'robots': {'numpy', 'yaml', 'physics', 'rigid', 'errors'},
     'simulation': NUMERIC | {
-        'mujoco', 'physics.catalogue', 'physics.effect', 'physics.parts', 'rigid', 'errors',
+        'mujoco', 'physics.catalogue', 'physics.effect', 'physics.effect_at', 'physics.parts',
+        'rigid', 'errors',
     },
     'engine': {'numpy', 'gp', 'physics', 'rigid', 'robots', 'errors'},
     'batch': NUMERIC | {

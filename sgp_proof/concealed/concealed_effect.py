@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sgp_proof.concealed.unknown import NAME, UNKNOWN
-from sgp_ros.simulation.mechanism import ChosenEffect
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect_at import EffectAt
 
 
 @dataclass
@@ -35,7 +36,7 @@ class Concealed:
         """Return the effect for the simulation; None where it has no name."""
         if self.name == NAME:
             return None
-        return ChosenEffect(self.name, self.joint, self.parameters)
+        return EffectAt.wanted(EFFECTS[self.name], self.joint, self.parameters)
 
     def unlisted(self, joints):
         if self.name != NAME:

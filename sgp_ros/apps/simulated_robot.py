@@ -13,7 +13,6 @@ from sgp_ros.robots.nominal import Nominal, nominal_model
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.stated_values import stated_urdf, values_of
 from sgp_ros.robots.urdf_robot import stated_part, urdf_text
-from sgp_ros.simulation.mechanism import ChosenEffect
 from sgp_ros.simulation.registry import SIMULATORS
 from sgp_ros.simulation.simulator import Simulator
 from sgp_ros.simulation.tree_simulator import tree_simulator
@@ -32,7 +31,7 @@ class SimulatedRobot:
 
     simulator: Simulator
     name: str
-    effects: tuple[ChosenEffect, ...] = ()
+    effects: tuple[EffectAt, ...] = ()
 
 
 def find_robot(robot: str) -> SimulatedRobot:
@@ -113,7 +112,7 @@ def _part(nominal: Nominal, before: Iterable[EffectAt]) -> TreePart:
     )
 
 
-def _chosen(stated: EffectAt, nominal: Nominal) -> ChosenEffect:
+def _chosen(stated: EffectAt, nominal: Nominal) -> EffectAt:
     """Return a stated effect in the words of the simulation.
 
     A diagnosis may leave one level just below zero, where it is none.
@@ -124,4 +123,4 @@ def _chosen(stated: EffectAt, nominal: Nominal) -> ChosenEffect:
         name: max(number, lowest[name]) for name, number in stated.numbers.items()
     }
     values |= stated.effect.stated_words(stated.place, nominal.tree)
-    return ChosenEffect(stated.name, stated.joint, values)
+    return EffectAt.wanted(stated.effect, stated.joint, values)

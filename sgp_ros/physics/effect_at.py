@@ -9,7 +9,7 @@ import numpy as np
 
 from sgp_ros.physics.effect import EMPTY, Effect, Numbers
 from sgp_ros.physics.motion import SeenMotion, Structure
-from sgp_ros.physics.parts import Place, Value
+from sgp_ros.physics.parts import NOWHERE, PLACES, Place, Value
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +62,14 @@ class EffectAt:
         shape, coefficients = effect.model(numbers, place.kind)
         spread = effect.coefficient_std(numbers, std or {}, place.kind)
         return cls(effect, place, shape, coefficients, joint, parameters, spread)
+
+    @classmethod
+    def wanted(cls, effect: Effect, joint: str, parameters: Mapping[str, Value]) -> EffectAt:
+        """Return the effect with stated parameters, of a robot that is not yet known.
+
+        Whoever knows the robot finds the place by the name of the joint.
+        """
+        return cls(effect, Place(PLACES.get(joint, NOWHERE)), joint=joint, parameters=parameters)
 
     @property
     def name(self) -> str:

@@ -16,6 +16,8 @@ Value = float | str
 
 PLACES = {'base': -1, 'tool': -2, 'all': -3}
 """Words for places that are no joint."""
+NOWHERE = -4
+"""Place of an effect whose robot is not known."""
 SIDES = {'lower': -1, 'upper': 1}
 
 

@@ -5,21 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from sgp_ros.physics.parts import Value
 from sgp_ros.simulation.effects import Action, Moment
-from sgp_ros.simulation.mechanism import ParameterValue, SimulatedJoint
+from sgp_ros.simulation.mechanism import SimulatedJoint
 
 _CONTACT_DAMPING = 0.7
 
 
 def delay(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return a command that arrives later by exactly `delay`, also between two samples."""
     return (Action(joint, delay_s=float(values['delay'])),)
 
 
 def dead_zone(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return a motor that gives `u - clip(u, -width, width)`."""
     width = float(values['width'])
@@ -32,7 +33,7 @@ def dead_zone(
 
 
 def lag(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return a first-order lag between the force wanted of a motor and the one it gives."""
     time_constant = float(values['time_constant'])
@@ -52,7 +53,7 @@ def lag(
 
 
 def saturation(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return a motor that gives `clip(u, -limit, limit)`."""
     limit = float(values['limit'])
@@ -60,7 +61,7 @@ def saturation(
 
 
 def gain(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return a motor that gives `gain u`; its current does not show that."""
     gain = float(values['gain'])
@@ -68,7 +69,7 @@ def gain(
 
 
 def backlash(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return play between motor and link, both with their own motion; the encoder is on the motor.
 
@@ -107,7 +108,7 @@ def backlash(
 
 
 def eccentricity(
-    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return an encoder that shows `q + amplitude sin(periods q + phase)`."""
     amplitude, phase = float(values['amplitude']), float(values['phase'])
@@ -122,7 +123,7 @@ def eccentricity(
 
 
 def velocity_lag(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return a measured velocity behind a first-order low-pass; the position is right."""
     time_constant = float(values['time_constant'])

@@ -6,9 +6,10 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.simulation.effect_text import parse_effect
 from sgp_ros.simulation.effects import Action
-from sgp_ros.simulation.mechanism import ChosenEffect, with_physical
+from sgp_ros.simulation.mechanism import with_physical
 from sgp_ros.simulation.registry import SIMULATORS
 from sgp_ros.simulation.scenario import Scenario, effect_actions, with_effects
 from sgp_ros.simulation.sensors import Sensors
@@ -24,7 +25,7 @@ def make_simulation(
     seed: int = 0,
     rate_hz: float | None = None,
     controller: str | None = None,
-    effects: Iterable[str | ChosenEffect] = (),
+    effects: Iterable[str | EffectAt] = (),
     sensors: Sensors | None = None,
     physical: Mapping[str, float] | None = None,
     torque_noise: Sequence[float] | None = None,

@@ -11,15 +11,15 @@ from collections.abc import Iterable, Mapping
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
-from sgp_ros.physics.parts import BASE, TOOL
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import BASE, TOOL, Value
 from sgp_ros.simulation.effects import EffectParameter, Law
-from sgp_ros.simulation.mechanism import ChosenEffect, ParameterValue
 from sgp_ros.simulation.registry import LAWS
 
 _EXAMPLE = 'write for example coulomb_friction:joint=pole,level=0.01'
 
 
-def parse_effect(text: str) -> ChosenEffect:
+def parse_effect(text: str) -> EffectAt:
     """Read `NAME:joint=J,parameter=value,...`.
 
     Raises:
@@ -45,10 +45,10 @@ def parse_effect(text: str) -> ChosenEffect:
     known = {parameter.name: parameter for parameter in parameters}
     values = {key: _value(known.get(key), word) for key, word in words.items()}
     _refuse(problems + _problems(law, parameters, values), text, effect.name, parameters)
-    return ChosenEffect(effect.name, str(joint), values)
+    return EffectAt.wanted(effect, str(joint), values)
 
 
-def checked_law(chosen: ChosenEffect) -> tuple[Effect, Law]:
+def checked_law(chosen: EffectAt) -> tuple[Effect, Law]:
     """Return the effect of the catalogue and its law, the values being complete and right.
 
     Raises:
@@ -94,21 +94,21 @@ def _number(word: str) -> float | None:
         return None
 
 
-def _value(parameter: EffectParameter | None, word: str) -> ParameterValue:
+def _value(parameter: EffectParameter | None, word: str) -> Value:
     number = _number(word)
     is_word = parameter is not None and (bool(parameter.choices) or parameter.is_joint)
     return word if number is None or is_word else number
 
 
 def with_defaults(
-    parameters: Iterable[EffectParameter], given: Mapping[str, ParameterValue]
-) -> dict[str, ParameterValue]:
+    parameters: Iterable[EffectParameter], given: Mapping[str, Value]
+) -> dict[str, Value]:
     """Return the given values and those of parameters that have a default."""
     return {p.name: p.default for p in parameters if p.default is not None} | dict(given)
 
 
 def _problems(
-    law: Law, parameters: Iterable[EffectParameter], given: Mapping[str, ParameterValue]
+    law: Law, parameters: Iterable[EffectParameter], given: Mapping[str, Value]
 ) -> list[str]:
     values = with_defaults(parameters, given)
     wanted = [p for p in parameters if not p.kinds or values.get('kind') in p.kinds]
@@ -126,7 +126,7 @@ def _problems(
     return problems
 
 
-def _suits(parameter: EffectParameter, value: ParameterValue) -> bool:
+def _suits(parameter: EffectParameter, value: Value) -> bool:
     if parameter.choices:
         return value in parameter.choices
     if parameter.is_joint:

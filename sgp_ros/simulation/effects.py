@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sgp_ros.physics.effect import Effect
-from sgp_ros.physics.parts import SIDES, Quantity
-from sgp_ros.simulation.mechanism import ParameterValue, SimulatedJoint
+from sgp_ros.physics.parts import SIDES, Quantity, Value
+from sgp_ros.simulation.mechanism import SimulatedJoint
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,11 +98,11 @@ class EffectParameter:
     unit: str = ''
     low: float = -math.inf
     choices: tuple[str, ...] = ()
-    default: ParameterValue | None = None
+    default: Value | None = None
     kinds: tuple[str, ...] = ()
     is_joint: bool = False
 
-    def unit_on(self, joint: SimulatedJoint, kind: ParameterValue) -> str:
+    def unit_on(self, joint: SimulatedJoint, kind: Value) -> str:
         """Return the unit on this joint for this kind of the effect."""
         return (
             Quantity(self.name, self.unit)
@@ -111,7 +111,7 @@ class EffectParameter:
         )
 
 
-def side_of(joint: SimulatedJoint, edge: float, side: ParameterValue) -> int:
+def side_of(joint: SimulatedJoint, edge: float, side: Value) -> int:
     """Return 1 for the upper end of a joint's range, -1 for the lower one.
 
     Args:
@@ -125,9 +125,7 @@ def side_of(joint: SimulatedJoint, edge: float, side: ParameterValue) -> int:
     return 1 if edge >= (middle if math.isfinite(middle) else 0.0) else -1
 
 
-Build = Callable[
-    [tuple['SimulatedJoint', ...], int, 'Mapping[str, ParameterValue]'], tuple[Action, ...]
-]
+Build = Callable[[tuple['SimulatedJoint', ...], int, 'Mapping[str, Value]'], tuple[Action, ...]]
 """From all joints, the index of one and the values to what the effect does."""
 
 

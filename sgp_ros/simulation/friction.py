@@ -6,12 +6,13 @@ import math
 from collections.abc import Callable, Mapping
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.physics.parts import Value
 from sgp_ros.simulation.effects import Action, Moment, side_of
-from sgp_ros.simulation.mechanism import ParameterValue, SimulatedJoint
+from sgp_ros.simulation.mechanism import SimulatedJoint
 
 
 def viscous(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return `tau_x = -b v`."""
     b = float(values['b'])
@@ -19,7 +20,7 @@ def viscous(
 
 
 def coulomb(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return `tau_x = -level sign(v)`, holding up to `level` at rest."""
     level = float(values['level'])
@@ -27,7 +28,7 @@ def coulomb(
 
 
 def stribeck(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return `tau_x = -(coulomb + (static - coulomb) exp(-(v / stribeck_velocity)^2)) sign(v)`."""
     coulomb, static = float(values['coulomb']), float(values['static'])
@@ -41,7 +42,7 @@ def stribeck(
 
 
 def quadratic(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return `tau_x = -c |v| v`."""
     c = float(values['c'])
@@ -54,7 +55,7 @@ def quadratic(
 
 
 def asymmetric(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return `-level_pos` for `v > 0`, `level_neg` for `v < 0`."""
     up, down = float(values['level_pos']), float(values['level_neg'])
@@ -62,7 +63,7 @@ def asymmetric(
 
 
 def load(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return `tau_x = -(level + mu |force of the motor|) sign(v)`."""
     level, mu = float(values['level']), float(values['mu'])
@@ -76,9 +77,7 @@ _MOST_DECAY = 2.0
 """Of a memory within a step: Runge and Kutta are stable up to 2.7."""
 
 
-def _of_kind(
-    joint: int, kind: ParameterValue, strength: Callable[[Moment], float]
-) -> tuple[Action, ...]:
+def _of_kind(joint: int, kind: Value, strength: Callable[[Moment], float]) -> tuple[Action, ...]:
     """Return viscous or Coulomb friction of a strength that changes."""
     if kind == 'viscous':
         return (Action(joint, force=lambda m: -strength(m) * float(m.velocity[joint])),)
@@ -86,7 +85,7 @@ def _of_kind(
 
 
 def position(
-    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return friction where `lo <= q <= hi`, on every turn, rising over the length `edge`."""
     amplitude, lo, hi = (float(values[name]) for name in ('amplitude', 'lo', 'hi'))
@@ -106,7 +105,7 @@ def position(
 
 
 def limit(
-    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return dry friction that rises from 0 at `onset` to `amplitude` at the limit `side`."""
     amplitude, onset = float(values['amplitude']), float(values['onset'])
@@ -127,7 +126,7 @@ def limit(
 
 
 def drift(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return friction of the strength `end + (start - end) exp(-t / time_constant)`."""
     start, end = float(values['start']), float(values['end'])
@@ -140,7 +139,7 @@ def drift(
 
 
 def hysteresis(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return `tau_x = -level z` with `dz/dt = (v - |v| z) / presliding` (Dahl 1968)."""
     level, presliding = float(values['level']), float(values['presliding'])

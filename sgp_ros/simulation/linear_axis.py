@@ -9,8 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sgp_ros.physics.catalogue import COULOMB_FRICTION
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.simulation.controllers import ControllerChoice, external, sinusoids, zero
-from sgp_ros.simulation.mechanism import ChosenEffect, SimulatedJoint, TrueCoefficient, quantity
+from sgp_ros.simulation.mechanism import SimulatedJoint, TrueCoefficient, quantity
 from sgp_ros.simulation.sensors import Sensors
 from sgp_ros.simulation.simulator import Simulator
 from sgp_ros.simulation.tracking import pd_reference
@@ -38,11 +40,11 @@ class LinearAxis:
         """Return the force `command` (1,) itself, (1,) [N]."""
         return command
 
-    def built_in(self) -> tuple[ChosenEffect, ...]:
+    def built_in(self) -> tuple[EffectAt, ...]:
         """Return the dry friction of the carriage, unless it is 0."""
         if self.coulomb == 0.0:
             return ()
-        return (ChosenEffect('coulomb_friction', 'axis', {'level': self.coulomb}),)
+        return (EffectAt.wanted(COULOMB_FRICTION, 'axis', {'level': self.coulomb}),)
 
     def coefficients(self) -> tuple[TrueCoefficient, ...]:
         """Return M, Fv, Fc and offset of `F = M a + Fv v + Fc sign(v) + offset`."""

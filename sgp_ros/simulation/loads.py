@@ -6,14 +6,15 @@ import math
 from collections.abc import Mapping
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.physics.parts import Value
 from sgp_ros.simulation.effects import Action, Moment, side_of
-from sgp_ros.simulation.mechanism import ParameterValue, SimulatedJoint
+from sgp_ros.simulation.mechanism import SimulatedJoint
 
 _STIFF_S = 1e-3
 
 
 def spring(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return `tau_x = -stiffness (q - rest)`."""
     stiffness, rest = float(values['stiffness']), float(values['rest'])
@@ -21,7 +22,7 @@ def spring(
 
 
 def constant(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return `tau_x = force`."""
     force = float(values['force'])
@@ -29,7 +30,7 @@ def constant(
 
 
 def cogging(
-    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return `amplitude sin(periods q + phase)`, `2 pi periods q` on a prismatic joint."""
     amplitude, phase = float(values['amplitude']), float(values['phase'])
@@ -42,7 +43,7 @@ def cogging(
 
 
 def end_stop(
-    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return a contact beyond `position` that pushes back, never pulls."""
     position = float(values['position'])
@@ -60,7 +61,7 @@ def end_stop(
 
 
 def coupling(
-    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return a share of the force of another motor, or a cable between two joints."""
     names = [description.name for description in joints]
@@ -86,7 +87,7 @@ def coupling(
 
 
 def armature(
-    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, ParameterValue]
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return `tau_x = -inertia a`: the rotor of the motor."""
     return (Action(joint, inertia=float(values['inertia'])),)

@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.physics.effect_at import EffectAt
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,24 +59,6 @@ class TrueCoefficient:
     unit: str
 
 
-ParameterValue = float | str
-
-
-@dataclass(frozen=True, slots=True)
-class ChosenEffect:
-    """An effect on a joint with its values.
-
-    Attributes:
-        name: in the catalogue.
-        joint: name of the joint, or the word for a place that is none.
-        parameters: values by name [unit of the parameter].
-    """
-
-    name: str
-    joint: str
-    parameters: Mapping[str, ParameterValue]
-
-
 class Mechanism(Protocol):
     """Equation of motion of k joints driven by m commands."""
 
@@ -92,7 +75,7 @@ class Mechanism(Protocol):
     def drive(self, command: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return the forces of the motors under `command` (m,), (k,) [N m or N]."""
 
-    def built_in(self) -> tuple[ChosenEffect, ...]:
+    def built_in(self) -> tuple[EffectAt, ...]:
         """Return the effects that belong to the robot itself, such as its dry friction."""
 
     def coefficients(self) -> tuple[TrueCoefficient, ...]:

@@ -25,14 +25,9 @@ import numpy as np
 from scipy import linalg
 
 from sgp_ros.errors import NumericalError
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.simulation.controllers import Controller, ControllerChoice, external, sinusoids, zero
-from sgp_ros.simulation.mechanism import (
-    ChosenEffect,
-    Mechanism,
-    SimulatedJoint,
-    TrueCoefficient,
-    quantity,
-)
+from sgp_ros.simulation.mechanism import Mechanism, SimulatedJoint, TrueCoefficient, quantity
 from sgp_ros.simulation.sensors import Sensors, encoder_resolution
 from sgp_ros.simulation.simulator import Simulator
 
@@ -129,7 +124,7 @@ class ReactionWheel:
         voltage = command[0] - self.back_emf_constant * velocity[1]
         return np.array([0.0, self.torque_constant / self.resistance * voltage])
 
-    def built_in(self) -> tuple[ChosenEffect, ...]:
+    def built_in(self) -> tuple[EffectAt, ...]:
         """Return no effects: all friction of the nominal robot is viscous."""
         return ()
 

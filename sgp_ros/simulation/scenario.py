@@ -7,15 +7,11 @@ from dataclasses import asdict, dataclass, replace
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.effect import Effect
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import BASE, JOINT, LAST, MOTOR, TOOL
 from sgp_ros.simulation.effect_text import checked_law, with_defaults
 from sgp_ros.simulation.effects import EVERY_MOTOR, Action
-from sgp_ros.simulation.mechanism import (
-    ChosenEffect,
-    Mechanism,
-    SimulatedJoint,
-    physical_parameters,
-)
+from sgp_ros.simulation.mechanism import Mechanism, SimulatedJoint, physical_parameters
 from sgp_ros.simulation.registry import LAWS
 from sgp_ros.simulation.sensors import Sensors
 from sgp_ros.simulation.simulator import Simulator
@@ -42,7 +38,7 @@ class Scenario:
 
     simulator: Simulator
     mechanism: Mechanism
-    effects: tuple[ChosenEffect, ...]
+    effects: tuple[EffectAt, ...]
     sensors: Sensors
     controller: str
     seed: int
@@ -67,7 +63,7 @@ class Scenario:
         )
 
 
-def effect_actions(simulator: Simulator, chosen: ChosenEffect) -> tuple[Action, ...]:
+def effect_actions(simulator: Simulator, chosen: EffectAt) -> tuple[Action, ...]:
     """Return what an effect does to a robot; nothing if it changes physical parameters.
 
     Raises:
@@ -105,7 +101,7 @@ def places(simulator: Simulator, effect: Effect) -> tuple[str, ...]:
     }[effect.site]
 
 
-def with_effects(mechanism: Mechanism, effects: Iterable[ChosenEffect]) -> Mechanism:
+def with_effects(mechanism: Mechanism, effects: Iterable[EffectAt]) -> Mechanism:
     """Return the mechanism with the physical parameters that effects add to."""
     for effect in effects:
         for name, physical in checked_law(effect)[1].physical.items():
@@ -165,7 +161,7 @@ def _coefficients(scenario: Scenario) -> dict[str, dict[str, float | str]]:
     }
 
 
-def _described(simulator: Simulator, effects: Iterable[ChosenEffect]) -> list[dict[str, object]]:
+def _described(simulator: Simulator, effects: Iterable[EffectAt]) -> list[dict[str, object]]:
     described: list[dict[str, object]] = []
     for effect in effects:
         joint = next(

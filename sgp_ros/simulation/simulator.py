@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.simulation.controllers import ControllerChoice
-from sgp_ros.simulation.mechanism import ChosenEffect, Mechanism, SimulatedJoint
+from sgp_ros.simulation.mechanism import Mechanism, SimulatedJoint
 from sgp_ros.simulation.sensors import Sensors
 
 
@@ -54,7 +55,7 @@ class Simulator:
         """Names of the joints, in order."""
         return tuple(joint.name for joint in self.joints)
 
-    def absorbed(self, mechanism: Mechanism, effects: Iterable[ChosenEffect]) -> Mechanism:
+    def absorbed(self, mechanism: Mechanism, effects: Iterable[EffectAt]) -> Mechanism:
         """Return the mechanism whose parameters hold those effects that are the same physics."""
         for effect in effects:
             names = self.same_physics.get((effect.name, effect.joint))

@@ -10,14 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sgp_ros.physics.catalogue import POSITION_FRICTION
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Value
 from sgp_ros.simulation.controllers import ControllerChoice, zero
-from sgp_ros.simulation.mechanism import (
-    ChosenEffect,
-    ParameterValue,
-    SimulatedJoint,
-    TrueCoefficient,
-    quantity,
-)
+from sgp_ros.simulation.mechanism import SimulatedJoint, TrueCoefficient, quantity
 from sgp_ros.simulation.sensors import Sensors, encoder_resolution
 from sgp_ros.simulation.simulator import Simulator
 
@@ -46,17 +43,17 @@ class ToyPendulum:
         """Return no torque, (1,) [N m]."""
         return np.zeros(1)
 
-    def built_in(self) -> tuple[ChosenEffect, ...]:
+    def built_in(self) -> tuple[EffectAt, ...]:
         """Return the friction irregularity, unless its amplitude is 0."""
         if self.friction_amplitude == 0.0:
             return ()
-        values: dict[str, ParameterValue] = {
+        values: dict[str, Value] = {
             'amplitude': self.friction_amplitude,
             'lo': self.friction_lo,
             'hi': self.friction_hi,
             'kind': 'coulomb',
         }
-        return (ChosenEffect('position_friction', 'hinge', values),)
+        return (EffectAt.wanted(POSITION_FRICTION, 'hinge', values),)
 
     def coefficients(self) -> tuple[TrueCoefficient, ...]:
         """Return w of `a = w sin(theta)`."""

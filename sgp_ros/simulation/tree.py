@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.simulation.mechanism import ChosenEffect, TrueCoefficient, quantity
+from sgp_ros.physics.catalogue import COULOMB_FRICTION
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.simulation.mechanism import TrueCoefficient, quantity
 from sgp_ros.simulation.tree_text import TreePart, TreeText, read_tree
 from sgp_ros.simulation.tree_xml import plain_tree, tree_link
 
@@ -159,10 +161,10 @@ class Tree:
         force: np.ndarray = self._motors @ command
         return force
 
-    def built_in(self) -> tuple[ChosenEffect, ...]:
+    def built_in(self) -> tuple[EffectAt, ...]:
         """Return the dry friction that the URDF states."""
         return tuple(
-            ChosenEffect('coulomb_friction', joint.name, {'level': level})
+            EffectAt.wanted(COULOMB_FRICTION, joint.name, {'level': level})
             for joint, level in zip(self.text.joints, self.text.friction, strict=True)
             if level > 0.0
         )

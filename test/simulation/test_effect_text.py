@@ -5,9 +5,10 @@ from __future__ import annotations
 import pytest
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.physics.catalogue import COULOMB_FRICTION
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.effect_text import parse_effect, parse_physical
-from sgp_ros.simulation.mechanism import ChosenEffect
 
 
 def test_text_is_read_as_written():
@@ -15,9 +16,8 @@ def test_text_is_read_as_written():
     effect = parse_effect(
         'position_friction: hi=2.5, joint=pole, kind=viscous, lo=2,amplitude=1e-2'
     )
-    assert effect == ChosenEffect(
-        'position_friction', 'pole', {'hi': 2.5, 'kind': 'viscous', 'lo': 2.0, 'amplitude': 0.01}
-    )
+    assert (effect.name, effect.joint) == ('position_friction', 'pole')
+    assert effect.parameters == {'hi': 2.5, 'kind': 'viscous', 'lo': 2.0, 'amplitude': 0.01}
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_joint_must_exist_and_have_a_motor_where_needed():
 def test_effects_that_were_not_read_from_text_are_checked_too():
     """A value built by a program has the same law as a text."""
     with pytest.raises(ConfigError, match='level is missing'):
-        make_simulation('reaction_wheel', effects=[ChosenEffect('coulomb_friction', 'pole', {})])
+        make_simulation('reaction_wheel', effects=[EffectAt.wanted(COULOMB_FRICTION, 'pole', {})])
 
 
 def test_physical_parameters_are_read_as_numbers():
