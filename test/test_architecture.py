@@ -70,7 +70,7 @@ PROOF_ROOMS = {
 
 SUB_ROOMS = {
     'diagnosis': (
-        'criteria', 'result', 'places', 'compare', 'explain', 'locate', 'decide', 'findings',
+        'criteria', 'result', 'compare', 'explain', 'locate', 'decide', 'findings',
         'prove', 'mapping', 'pipeline',
     ),
 }  # fmt: skip

@@ -25,7 +25,7 @@ from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.decide.certainty import certainty_of, probabilities
 from sgp_ros.diagnosis.decide.decision import decide
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
-from sgp_ros.diagnosis.explain.hypotheses import compete
+from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.diagnosis.findings import asserted
 from sgp_ros.diagnosis.locate.dependence import dependences
 from sgp_ros.engine.samples import JointSample
@@ -103,7 +103,7 @@ def diagnosed(seed, nominal, events, seconds, answer) -> dict:
     try:
         raw = collect(events, robot)
         equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
-        comparison = compete(equations, lambda _share: None)
+        comparison = compare_models(equations, lambda _share: None)
         decision = decide(equations, comparison)
         contrasts = Contrasts(equations, decision.model)
         chances = probabilities(equations, comparison, decision, contrasts)

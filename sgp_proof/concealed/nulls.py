@@ -5,7 +5,7 @@
 Draws robots without concealed physics: as the nominal one, with wrong inertial parameters, or with
 something unlisted that makes less of the squared effort than counts as physics. Then robots with
 one effect of the list, to which nothing is to be added, and robots with an unlisted one, for which
-nothing is adequate. Every model that competes is fitted; its statistics go to
+nothing is adequate. Every model that is compared is fitted; its statistics go to
 `sgp_proof/results/nulls_<tier>.json`. A test holds the thresholds of
 `sgp_ros.diagnosis.decide.decision` to these.
 """
@@ -28,12 +28,11 @@ from sgp_proof.concealed.robots import urdf
 from sgp_proof.concealed.unknown import NAME as OUTSIDE
 from sgp_proof.result_files import RESULTS, seed_range, write_result
 from sgp_ros.apps.simulated_files import write_simulated
-from sgp_ros.diagnosis.compare.equations import make_equations
+from sgp_ros.diagnosis.compare.equations import joint_name, make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.decide.cross_validation import structure
 from sgp_ros.diagnosis.decide.decision import Scale, decide
-from sgp_ros.diagnosis.explain.hypotheses import compete
-from sgp_ros.diagnosis.places import joint_name
+from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
 from sgp_ros.physics.drawing import UnsuitableError
 from sgp_ros.recordings.reader import open_recording
@@ -45,7 +44,7 @@ NOTHING, PARAMETERS, SLIGHT = 'nothing', 'wrong parameters', 'slight unlisted ef
 LISTED, UNLISTED = 'one effect of the list', 'unlisted effect'
 KINDS = (NOTHING, PARAMETERS, SLIGHT, LISTED, UNLISTED)
 NAMES = tuple(name for name in LAWS if name != VELOCITY_FILTER_LAG.name)
-"""What is concealed as one effect; the lag of a sensor's velocity does not compete."""
+"""What is concealed as one effect; the lag of a sensor's velocity is no force."""
 _CONCEALED = {SLIGHT: (2e-4, 3e-3), LISTED: (0.006, 0.2), UNLISTED: (0.006, 0.2)}
 """Range of the share of the squared effort that a concealed effect makes."""
 _TRIES = 40
@@ -117,7 +116,7 @@ def _attempt(seed, rng, tier, kind):
 
 
 def statistics(folder, truth=None):
-    """Return verdict and statistics of the models that compete on a recording.
+    """Return verdict and statistics of the models that are compared on a recording.
 
     Args:
         folder: with `robot.urdf` and `real.mcap`.
@@ -127,34 +126,34 @@ def statistics(folder, truth=None):
     tree = nominal_tree(robot)
     raw = collect(open_recording(str(folder / 'real.mcap')).events(None, None), robot)
     equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
-    competition = compete(equations, lambda _share: None)
-    scale, base = Scale.of(equations, competition), competition.base
-    decision = decide(equations, competition)
-    models = (*competition.singles, *competition.pairs, *competition.more)
+    comparison = compare_models(equations, lambda _share: None)
+    scale, base = Scale.of(equations, comparison), comparison.base
+    decision = decide(equations, comparison)
+    models = (*comparison.singles, *comparison.pairs, *comparison.more)
     ranked = sorted(models, key=scale.worth, reverse=True)
     best = next((m for m in ranked if scale.counts(m)), None)
     found = {
         'verdict': decision.verdict,
-        'said': [_key(equations, s) for s in decision.model.suspects],
+        'said': [_key(equations, s) for s in decision.model.effects],
         'cutoff_hz': equations.filter.cutoff,
-        'left': float(scale.shares(competition.parameters).max()),
+        'left': float(scale.shares(comparison.parameters).max()),
         'base': _terms(scale, base),
         'models': [_terms(scale, model) for model in ranked[:_KEPT]],
         'structured_rest': None if best is None else _structured(equations, scale, best),
     }
-    right = [m for m in ranked if [_key(equations, s) for s in m.suspects] == [list(truth or ())]]
+    right = [m for m in ranked if [_key(equations, s) for s in m.effects] == [list(truth or ())]]
     if right:
         found |= {
             'right': _terms(scale, right[0]),
             'right_structured_rest': _structured(equations, scale, right[0]),
             'superfluous': _superfluous(scale, right[0], ranked),
-            'richer': _richer(scale, right[0], competition.singles),
+            'richer': _richer(scale, right[0], comparison.singles),
         }
     return found
 
 
-def _key(equations, suspect):
-    return [suspect.effect.name, joint_name(equations.motion, suspect.place.joint)]
+def _key(equations, candidate):
+    return [candidate.effect.name, joint_name(equations.motion, candidate.place.joint)]
 
 
 def _structured(equations, scale, model):
@@ -166,7 +165,7 @@ def _superfluous(scale, right, models):
     more = [
         (scale.fit(m) - scale.fit(right), m.freedom - right.freedom)
         for m in models
-        if right.key < m.key and len(m.suspects) == 2 and m.is_free == right.is_free
+        if right.key < m.key and len(m.effects) == 2 and m.is_free == right.is_free
         and scale.counts(m)
     ]  # fmt: skip
     return _most(more)
@@ -192,13 +191,13 @@ def _most(gains):
 
 def _terms(scale, model):
     return {
-        'effects': [s.effect.name for s in model.suspects],
+        'effects': [s.effect.name for s in model.effects],
         'is_free': bool(model.is_free),
         'freedom': int(model.freedom),
         'fit': round(scale.fit(model), 2),
         'worth': round(scale.worth(model), 2),
         'shares': [round(share, 6) for share in model.shares],
-        'counts': bool(model.suspects) and scale.counts(model),
+        'counts': bool(model.effects) and scale.counts(model),
         'rest': round(scale.rest(model), 5),
     }
 

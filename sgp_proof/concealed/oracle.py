@@ -24,12 +24,11 @@ import numpy as np
 from sgp_proof.concealed.balance import RATE_HZ, WIDTH_S, low_passed
 from sgp_proof.concealed.scoring import HELD_OUT, parameter_scores
 from sgp_proof.concealed.unknown import NAME, UNKNOWN
-from sgp_ros.diagnosis.compare.equations import make_equations
+from sgp_ros.diagnosis.compare.equations import joint_name, make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
-from sgp_ros.diagnosis.explain.suspects import Columns
-from sgp_ros.diagnosis.places import joint_name
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.prove.prediction import FinalModel
 from sgp_ros.physics.catalogue import BACKLASH, EFFECTS
 from sgp_ros.physics.effect import Effect
@@ -64,7 +63,7 @@ class Oracle:
         equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
         start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
         model = fit(
-            Columns(equations), suspects(answer, equations.motion), start,
+            Columns(equations), candidates(answer, equations.motion), start,
             is_free=bool(answer['parameter_errors']), rounds=_ROUNDS,
         )  # fmt: skip
         return cls(robot, tree, FinalModel(model, model, equations, ()))
@@ -77,10 +76,10 @@ class Oracle:
         """Return its effects as `diagnosis.json` has them."""
         model, found = self.final.model, []
         motion = model.frame.equations.motion
-        for suspect in model.suspects:
-            numbers = suspect.report(motion)
+        for candidate in model.effects:
+            numbers = candidate.report(motion)
             found.append({
-                'effect': suspect.name, 'joint': joint_name(motion, suspect.place.joint),
+                'effect': candidate.name, 'joint': joint_name(motion, candidate.place.joint),
                 'parameters': {name: {'value': value} for name, value in numbers.items()},
             })  # fmt: skip
         return found
@@ -153,16 +152,16 @@ def read_prediction(path):
     return table[:, 0], table[:, 1:]
 
 
-def suspects(answer, motion):
+def candidates(answer, motion):
     """Return the effects of an answer where they act, with their true shapes."""
     return tuple(
-        _suspect(effect, motion)
+        _candidate(effect, motion)
         for effect in answer['effects']
         if effect['effect'] not in EFFECTS or EFFECTS[effect['effect']].is_force
     )  # fmt: skip
 
 
-def _suspect(effect, motion):
+def _candidate(effect, motion):
     name, numbers, tree = effect['effect'], effect['parameters'], motion.tree
     if name == NAME:
         joint = tree.moving_names.index(effect['joint'])

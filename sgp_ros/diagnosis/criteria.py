@@ -19,11 +19,12 @@ COUNTED_SHARE = SHARE_TOLERANCE * LEAST_SHARE
 EVIDENCE = 10.0
 """Evidence that an effect must have, on the recording and on parts left out [nats]. Nulls."""
 
-LEAST_MOTION = 50.0
+LEAST_MOTION = 25.0
 """Range of a joint's positions, in units of their noise, from which it moves [1]. Guards.
 
-Encoders at rest show at most 18 units, heavy tails included; the first second of a drawn world
-shows 342 and more, the recordings of real machines 1900 and more.
+Encoders at rest show at most 18 units, heavy tails included; a swing over 35 counts of a coarse
+encoder is diagnosed rightly. The first second of a drawn world shows 342 units and more, the
+recordings of real machines 1900 and more.
 """
 LEAST_ROWS = 20
 """Independent rows that a recording must leave: twice the parameters of a body [rows]. Guards.

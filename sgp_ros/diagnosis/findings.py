@@ -6,16 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.compare.equations import Equations, joint_name
 from sgp_ros.diagnosis.compare.velocity_sensor import SensorLag
 from sgp_ros.diagnosis.criteria import NUMBER_ERROR, REGION_ENERGY
 from sgp_ros.diagnosis.decide.certainty import Probabilities
 from sgp_ros.diagnosis.decide.decision import Decision
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.suspects import Columns
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.locate.remainder import Remainder, region
-from sgp_ros.diagnosis.places import joint_name
 from sgp_ros.diagnosis.result import Dependence, Finding, Location, Parameter, ParameterError
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
 from sgp_ros.physics.effect_at import EffectAt
@@ -39,7 +38,7 @@ def asserted(
         std = reported_std(decision.model, Columns(equations))
         findings = [
             _finding(decision, decision.model, i, std[i], chances)
-            for i in range(len(decision.model.suspects))
+            for i in range(len(decision.model.effects))
         ]
     if decision.verdict == 'unexplained':
         findings.append(_unknown(equations, decision, remainders, chances, depends))
@@ -59,13 +58,13 @@ def asserted(
 
 def alternatives(decision: Decision, chances: Probabilities) -> tuple[Finding, ...]:
     """Return the rivals of the asserted findings, best first."""
-    taken = {s.key for s in decision.model.suspects}
+    taken = {s.key for s in decision.model.effects}
     found: list[Finding] = []
     for model in decision.rivals:
-        for i, suspect in enumerate(model.suspects):
-            if suspect.key in taken or len(found) >= MOST_ALTERNATIVES:
+        for i, candidate in enumerate(model.effects):
+            if candidate.key in taken or len(found) >= MOST_ALTERNATIVES:
                 continue
-            taken.add(suspect.key)
+            taken.add(candidate.key)
             found.append(_finding(decision, model, i, {}, chances, why=chances.why(model)))
     return tuple(found)
 
@@ -78,14 +77,14 @@ def _finding(
     chances: Probabilities,
     why: str = '',
 ) -> Finding:
-    suspect = model.suspects[index]
+    candidate = model.effects[index]
     motion = model.frame.equations.motion
-    inside = suspect.effect.interval(suspect, motion)
+    inside = candidate.effect.interval(candidate, motion)
     location = Location((inside[0],), {inside[0]: inside[1]}) if inside else Location()
     return Finding(
-        joint_name(motion, suspect.place.joint), suspect.name,
-        _parameters(suspect, motion, std), location, float(model.score - decision.against),
-        chances.of(model, index), model.shares[index], suspect.effect.formula, why,
+        joint_name(motion, candidate.place.joint), candidate.name,
+        _parameters(candidate, motion, std), location, float(model.score - decision.against),
+        chances.of(model, index), model.shares[index], candidate.effect.formula, why,
     )  # fmt: skip
 
 

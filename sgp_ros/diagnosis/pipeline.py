@@ -21,8 +21,8 @@ from sgp_ros.diagnosis.criteria import DOUBTED, REMAINDER_SHARE
 from sgp_ros.diagnosis.decide.certainty import certainty_of, probabilities
 from sgp_ros.diagnosis.decide.decision import Decision, decide
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, equivalents
+from sgp_ros.diagnosis.explain.comparison import Comparison, compare_models
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.hypotheses import Competition, compete
 from sgp_ros.diagnosis.findings import alternatives, asserted, parameter_errors
 from sgp_ros.diagnosis.locate.bands import bands
 from sgp_ros.diagnosis.locate.dependence import dependences
@@ -108,7 +108,7 @@ def _diagnosed(
     progress: Callable[[float], None],
 ) -> Diagnosis:
     raw, tree = recordings.learned, equations.motion.tree
-    comparison = compete(equations, lambda share: progress(0.05 + 0.85 * share))
+    comparison = compare_models(equations, lambda share: progress(0.05 + 0.85 * share))
     decision = decide(equations, comparison)
     lags = [lag for lag in sensor_lags(raw, equations) if lag.is_physics]
     remainders = _remainders(equations, decision)
@@ -164,7 +164,7 @@ def _remainders(equations: Equations, decision: Decision) -> tuple[Remainder, ..
 
 def _traces(
     equations: Equations,
-    comparison: Competition,
+    comparison: Comparison,
     model: Model,
     remainders: tuple[Remainder, ...],
     forces: tuple[np.ndarray, ...],

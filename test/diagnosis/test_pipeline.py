@@ -181,7 +181,7 @@ def _with_still_joint(world):
                  wide(world.acceleration), wide(world.command))  # fmt: skip
 
 
-def test_a_locked_joint_gets_no_suspect_and_hides_none(robots):
+def test_a_locked_joint_gets_no_candidate_and_hides_none(robots):
     """The second link locked is part of the first; extra damping of joint 0 is still named."""
     one, two = CHAINS[2]
     mass, far = one.mass + two.mass, one.length + two.centre

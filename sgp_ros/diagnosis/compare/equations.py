@@ -30,6 +30,7 @@ from sgp_ros.diagnosis.compare.trajectory import (
 from sgp_ros.diagnosis.criteria import LEAST_SHARE
 from sgp_ros.engine.samples import Event
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import PLACES
 from sgp_ros.rigid.rigid_body import mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -38,6 +39,8 @@ from sgp_ros.robots.robot import Robot
 SPREAD = 0.25
 """Prior standard deviation of mass and inertia, relative; of the centre, to the radius."""
 
+
+_OTHER_PLACES = {index: name for name, index in PLACES.items()}
 
 POSES = 32
 """Positions over which the inertia of a robot is averaged."""
@@ -164,6 +167,11 @@ def resting(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) ->
             if np.sum(speed[start:stop, j] < threshold[j]) >= shortest:
                 rests[start:stop, j] = True
     return rests
+
+
+def joint_name(motion: ObservedMotion, joint: int) -> str:
+    """Return the name of a joint, or of another place, as in the schema."""
+    return _OTHER_PLACES.get(joint) or motion.tree.joint_names[joint]
 
 
 def body_directions(tree: Tree) -> np.ndarray:

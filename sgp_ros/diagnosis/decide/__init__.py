@@ -1,1 +1,1 @@
-"""What the competition lets us assert, with what certainty, and what it cannot tell apart."""
+"""What the comparison lets us assert, with what certainty, and what it cannot tell apart."""

@@ -17,8 +17,8 @@ from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import CALM_SHARE, LEAST_ODDS, MOST_CERTAIN, TEMPER
 from sgp_ros.diagnosis.decide.decision import Decision, Scale
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
+from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.hypotheses import Competition
 from sgp_ros.diagnosis.result import Finding
 
 
@@ -33,7 +33,7 @@ class Probabilities:
 
     def of(self, model: Model, index: int) -> float:
         """Return the probability of one effect of a model."""
-        return self.by_key.get(model.suspects[index].key, 0.0)
+        return self.by_key.get(model.effects[index].key, 0.0)
 
     def why(self, model: Model) -> str:
         """Return why a rival was not asserted."""
@@ -46,26 +46,26 @@ class Probabilities:
 
 
 def probabilities(
-    equations: Equations, competition: Competition, decision: Decision, contrasts: Contrasts
+    equations: Equations, comparison: Comparison, decision: Decision, contrasts: Contrasts
 ) -> Probabilities:
     """Return the tempered probabilities of all effects.
 
     A richer law whose numbers make it the asserted one is no rival to it.
     """
-    scale, asserted = Scale.of(equations, competition), decision.model
+    scale, asserted = Scale.of(equations, comparison), decision.model
     least = scale.worth(asserted) + math.log(LEAST_ODDS) / TEMPER
     models = [
         m
-        for m in (*competition.singles, *competition.pairs, *competition.more)
+        for m in (*comparison.singles, *comparison.pairs, *comparison.more)
         if scale.counts(m)
         and not (m.key != asserted.key and scale.worth(m) > least and contrasts.is_same_law(m))
     ]
     adequate = 1.0 / (1.0 + decision.excess**2)
     by_key: dict[object, float] = {}
-    worth = TEMPER * np.array([scale.worth(m) for m in (competition.base, *models)])
+    worth = TEMPER * np.array([scale.worth(m) for m in (comparison.base, *models)])
     odds = np.exp(worth - worth.max())
     for model, p in zip(models, odds[1:] / odds.sum(), strict=True):
-        for s in model.suspects:
+        for s in model.effects:
             by_key[s.key] = by_key.get(s.key, 0.0) + float(p) * adequate
     unknown = float(np.clip(decision.excess / (decision.excess + 1.0), 0.05, 0.97))
     return Probabilities(
@@ -79,10 +79,10 @@ def probabilities(
 def certainty_of(
     findings: Sequence[Finding],
     equations: Equations,
-    competition: Competition,
+    comparison: Comparison,
 ) -> float:
     """Return the probability that the verdict is right."""
     if findings:
         return max(f.probability for f in findings)
-    left = float((competition.parameters.mean_square / equations.power).max())
+    left = float((comparison.parameters.mean_square / equations.power).max())
     return float(np.clip(1.0 / (1.0 + (left / CALM_SHARE) ** 2), 0.5, MOST_CERTAIN))

@@ -21,10 +21,10 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import STRUCTURE_LEAST_SHARE
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.suspects import Columns
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.locate.remainder import (
     PARTS,
-    foretold,
+    explained_share,
     observations,
     parts_of,
     process_inputs,
@@ -37,7 +37,7 @@ from sgp_ros.physics.effect_at import EffectAt
 LEAST_ROWS = 5 * PARTS
 """Rows below which nothing can be said of structure."""
 ORDER = 8
-"""Rows before that may foretell one."""
+"""Rows before that may predict one."""
 LEARNED = 200
 """Rows for the hyper-parameters."""
 
@@ -91,16 +91,16 @@ def _by_motion(equations: Equations, r: np.ndarray, joint: int) -> float:
     rows = spread(np.flatnonzero(part > 0), LEARNED)
     prior, data = CoefficientPrior.flat(0), observations(U, r, rows)
     start = screened(data, prior, initial_model(data, (tuple(range(U.shape[1])),)))
-    return foretold(learn(data, prior, start).model, U, r, part)
+    return explained_share(learn(data, prior, start).model, U, r, part)
 
 
-def left_out(columns: Columns, model: Model, suspects: tuple[EffectAt, ...]) -> np.ndarray:
-    """Return what a model with some of its suspects leaves of parts left out in turn.
+def left_out(columns: Columns, model: Model, candidates: tuple[EffectAt, ...]) -> np.ndarray:
+    """Return what a model with some of its candidates leaves of parts left out in turn.
 
     Args:
         columns: of the recording.
         model: whose shapes, freedom of the bodies and scale are used.
-        suspects: of the model, those that are kept.
+        candidates: of the model, those that are kept.
 
     Returns:
         Mean squares of the residual, (PARTS, k) [N^2 m^2 or N^2].
@@ -109,9 +109,9 @@ def left_out(columns: Columns, model: Model, suspects: tuple[EffectAt, ...]) -> 
     N, k = equations.d.shape
     p = equations.base.shape[2] if model.is_free else 0
     y, X = equations.d / sigma, [equations.base[:, :, :p] / sigma[:, None]]
-    for suspect in suspects:
-        x = columns.of(suspect, equations, model.w) / sigma[:, None]
-        if suspect.effect.is_given:
+    for candidate in candidates:
+        x = columns.of(candidate, equations, model.w) / sigma[:, None]
+        if candidate.effect.is_given:
             y = y - x[:, :, 0]
         else:
             X.append(x)
@@ -144,10 +144,10 @@ def support(columns: Columns, model: Model, floor: np.ndarray) -> list[float]:
         Half the sum over joints of the log ratio of mean squares, averaged over the parts, by
         effect [nats per independent row].
     """
-    whole = left_out(columns, model, model.suspects) + floor
+    whole = left_out(columns, model, model.effects) + floor
     found = []
-    for suspect in model.suspects:
-        rest = tuple(s for s in model.suspects if s is not suspect)
+    for candidate in model.effects:
+        rest = tuple(s for s in model.effects if s is not candidate)
         without = left_out(columns, model, rest) + floor
         found.append(float(0.5 * np.log(without / whole).sum(axis=1).mean()))
     return found

@@ -1,9 +1,9 @@
-"""What the competition of models lets us assert.
+"""What the comparison of models lets us assert.
 
 Statistical significance is not enough: the schema calls physics what makes at least 0.4 % of the
 mean squared effort of some joint. Among models of nearly the same residual the one with the fewest
 parameters is asserted, if each of its effects predicts parts of the recording that were left out
-(`second_opinion`). It is adequate when what it leaves, as far as that is no noise (`referee`), is
+(`support`). It is adequate when what it leaves, as far as that is no noise (`structure`), is
 small against what it explains.
 """
 
@@ -29,9 +29,9 @@ from sgp_ros.diagnosis.criteria import (
     SLIGHT_REST,
 )
 from sgp_ros.diagnosis.decide.cross_validation import structure, support
+from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.hypotheses import Competition
-from sgp_ros.diagnosis.explain.suspects import Columns
+from sgp_ros.diagnosis.explain.regression import Columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,11 +76,11 @@ class Scale:
     rows: float
 
     @classmethod
-    def of(cls, equations: Equations, competition: Competition) -> Scale:
+    def of(cls, equations: Equations, comparison: Comparison) -> Scale:
         """Return the scale of a recording."""
         power, error = equations.power, equations.model_error
-        base = np.maximum(competition.base.mean_square - error, 0.0) / power
-        nominal = competition.nominal.mean_square / power
+        base = np.maximum(comparison.base.mean_square - error, 0.0) / power
+        nominal = comparison.nominal.mean_square / power
         return cls(power, error, base, nominal, min(INDEPENDENT_ROWS, len(equations.d)))
 
     @property
@@ -128,26 +128,26 @@ class Scale:
         """Return the tempered log likelihood, with the prior of the bodies' change [nats].
 
         It is one of the motion, which is what was measured: a residual of effort, and what a
-        perfect model would leave of it, is the larger the heavier the robot of a model is.
+        perfect model would leave of it, grows with the inertia of a model.
         """
-        floor = self.floor * np.exp(2.0 * max(model.heavier, -50.0) / len(self.power))
+        floor = self.floor * np.exp(2.0 * max(model.log_inertia, -50.0) / len(self.power))
         share = model.mean_square / self.power + floor
-        likelihood = self.rows * (model.heavier - 0.5 * float(np.log(share).sum()))
+        likelihood = self.rows * (model.log_inertia - 0.5 * float(np.log(share).sum()))
         return likelihood - 0.5 * float(model.w @ model.w)
 
     def worth(self, model: Model) -> float:
         """Return the fit of a model, less the price of its freedom [nats]."""
-        return self.fit(model) - PER_EFFECT * len(model.suspects) - PER_PARAMETER * model.freedom
+        return self.fit(model) - PER_EFFECT * len(model.effects) - PER_PARAMETER * model.freedom
 
 
-def _ranked(competition: Competition, scale: Scale) -> list[Model]:
+def _ranked(comparison: Comparison, scale: Scale) -> list[Model]:
     """Return the models that could be asserted, best first.
 
     There are none where the best explanation of all is too small to be physics: a worse one that
     is larger, because bodies undo most of it, is not to be preferred for that.
     """
-    models = (*competition.singles, *competition.pairs, *competition.more)
-    least = competition.base.score + EVIDENCE
+    models = (*comparison.singles, *comparison.pairs, *comparison.more)
+    least = comparison.base.score + EVIDENCE
     sound = [m for m in models if m.score > least and scale.is_sound(m)]
     ranked = sorted(sound, key=scale.worth, reverse=True)
     if ranked and max(ranked[0].shares) < COUNTED_SHARE:
@@ -155,14 +155,14 @@ def _ranked(competition: Competition, scale: Scale) -> list[Model]:
     return [m for m in ranked if scale.counts(m)]
 
 
-def decide(equations: Equations, competition: Competition) -> Decision:
+def decide(equations: Equations, comparison: Comparison) -> Decision:
     """Return the verdict on a recording."""
-    scale, base = Scale.of(equations, competition), competition.base
-    ranked = _ranked(competition, scale)
+    scale, base = Scale.of(equations, comparison), comparison.base
+    ranked = _ranked(comparison, scale)
     best = _supported(equations, scale, [m for m in ranked if scale.worth(m) > scale.worth(base)])
     rivals = tuple(m for m in ranked if m is not best)
     worst = int(np.argmax(scale.base))
-    left = scale.shares(competition.parameters)
+    left = scale.shares(comparison.parameters)
     if best is not None:
         excess = scale.excess(best, structure(equations, best.residual))
         if excess < 1.0:
@@ -171,7 +171,7 @@ def decide(equations: Equations, competition: Competition) -> Decision:
             found = (best, *rivals)
             return Decision('unexplained', base, found, excess, worst, best, base.score)
     elif left.max() > LEAST_SHARE:
-        left = left * structure(equations, competition.parameters.residual)
+        left = left * structure(equations, comparison.parameters.residual)
         if left.max() > LEAST_SHARE:
             return Decision(
                 'unexplained', base, rivals, NOTHING_EXPLAINED, worst, against=base.score

@@ -13,12 +13,11 @@ from functools import cached_property
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.compare.equations import Equations, joint_name
 from sgp_ros.diagnosis.criteria import ALIKE, CLEARER, LEAST_SHARE
 from sgp_ros.diagnosis.decide.decision import Decision, Scale
+from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model, imbalance
-from sgp_ros.diagnosis.explain.hypotheses import Competition
-from sgp_ros.diagnosis.places import joint_name
 from sgp_ros.diagnosis.result import Equivalent
 from sgp_ros.physics.drive import Drive
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -94,21 +93,21 @@ class Contrasts:
 
 
 def equivalents(
-    equations: Equations, competition: Competition, decision: Decision, contrasts: Contrasts
+    equations: Equations, comparison: Comparison, decision: Decision, contrasts: Contrasts
 ) -> tuple[Equivalent, ...]:
     """Return what the recording cannot tell from the asserted model, best first.
 
     Args:
         equations: of the recording.
-        competition: its models.
+        comparison: its models.
         decision: `unexplained` has no model to tell anything from.
         contrasts: of the rivals to the asserted model.
     """
     if decision.verdict == 'unexplained':
         return ()
-    scale, best = Scale.of(equations, competition), decision.model
-    unlikely = _without_prior(equations, competition.parameters)
-    others = {*decision.rivals, competition.nominal, competition.parameters} - {best}
+    scale, best = Scale.of(equations, comparison), decision.model
+    unlikely = _without_prior(equations, comparison.parameters)
+    others = {*decision.rivals, comparison.nominal, comparison.parameters} - {best}
     found: list[Equivalent] = []
     known: list[Model] = [best]
     least = scale.fit(best) - ALIKE
@@ -135,8 +134,10 @@ def _without_prior(equations: Equations, parameters: Model) -> Model:
     w = np.linalg.lstsq(
         base.reshape(N * k, p), (equations.d / parameters.sigma).ravel(), rcond=1e-6
     )[0]
-    heavier = equations.log_inertia(w, np.zeros((k, k)))
-    return replace(parameters, w=w, heavier=heavier, residual=equations.d - equations.base @ w)
+    log_inertia = equations.log_inertia(w, np.zeros((k, k)))
+    return replace(
+        parameters, w=w, log_inertia=log_inertia, residual=equations.d - equations.base @ w
+    )
 
 
 def _contains(rival: Model, model: Model) -> bool:
@@ -148,7 +149,7 @@ def _told(equations: Equations, rival: Model, contrasts: Mapping[str, float]) ->
     """Return a rival with the motion that would tell it from the asserted model."""
     name = max(MOTIONS, key=lambda n: contrasts[n])
     effects = tuple(
-        (joint_name(equations.motion, s.place.joint), s.effect.name) for s in rival.suspects
+        (joint_name(equations.motion, s.place.joint), s.effect.name) for s in rival.effects
     )
     if contrasts[name] < CLEARER * contrasts[RECORDED]:
         return Equivalent(effects, '', 1.0)

@@ -1,1 +1,1 @@
-"""Effects that could explain a discrepancy: suspects, fits, the models that compete."""
+"""Effects that could explain a discrepancy: candidates, fits, comparison of models."""

@@ -9,9 +9,9 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors, price_of
-from sgp_ros.diagnosis.explain.regression import Frame
-from sgp_ros.diagnosis.explain.suspects import (
+from sgp_ros.diagnosis.explain.regression import (
     Columns,
+    Frame,
     dry_joints,
     shape_bounds,
     with_shapes,
@@ -24,7 +24,7 @@ UNSEEN = 1e-12
 
 def fit(
     columns: Columns,
-    suspects: tuple[EffectAt, ...],
+    candidates: tuple[EffectAt, ...],
     sigma: np.ndarray,
     *,
     is_free: bool = True,
@@ -36,35 +36,35 @@ def fit(
 
     Args:
         columns: of the recording.
-        suspects: effects with the shapes to start from.
+        candidates: effects with the shapes to start from.
         sigma: (k,) scale to start from [N m or N].
         is_free: whether inertial parameters may differ.
         w: (p,) their change to start from; None for none.
         rounds: iterations.
         steps: of the search in the first.
     """
-    equations = columns.equations(dry_joints(suspects))
+    equations = columns.equations(dry_joints(candidates))
     frame = Frame.of(equations, sigma, is_free=is_free)
     model = None
     for _ in range(rounds):
-        suspects = _searched(frame, columns, suspects, steps, w)
-        model = _solved(frame, columns, suspects, w)
+        candidates = _searched(frame, columns, candidates, steps, w)
+        model = _solved(frame, columns, candidates, w)
         w = model.w if is_free else None
         frame = Frame.of(equations, model.sigma, is_free=is_free)
         steps = max(steps // 2, 4)
     assert model is not None
-    return _solved(frame, columns, suspects, w)
+    return _solved(frame, columns, candidates, w)
 
 
 def split(
-    frame: Frame, columns: Columns, suspects: tuple[EffectAt, ...], w: np.ndarray | None = None
+    frame: Frame, columns: Columns, candidates: tuple[EffectAt, ...], w: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, list[int]]:
     """Return target less given effects, free columns (projected), and their widths."""
     y = frame.y
     free, widths = [], []
-    for suspect in suspects:
-        x = frame.projected(columns.of(suspect, frame.equations, w))
-        if suspect.effect.is_given:
+    for candidate in candidates:
+        x = frame.projected(columns.of(candidate, frame.equations, w))
+        if candidate.effect.is_given:
             y = y - x[:, 0]
             widths.append(0)
         else:
@@ -84,27 +84,27 @@ def _least(A: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def residual_of(
-    frame: Frame, columns: Columns, suspects: tuple[EffectAt, ...], w: np.ndarray | None = None
+    frame: Frame, columns: Columns, candidates: tuple[EffectAt, ...], w: np.ndarray | None = None
 ) -> np.ndarray:
     """Return the scaled residual, (N k + p,)."""
-    y, A, _ = split(frame, columns, suspects, w)
+    y, A, _ = split(frame, columns, candidates, w)
     return y - A @ _least(A, y)
 
 
 def _searched(
     frame: Frame,
     columns: Columns,
-    suspects: tuple[EffectAt, ...],
+    candidates: tuple[EffectAt, ...],
     steps: int,
     w: np.ndarray | None,
 ) -> tuple[EffectAt, ...]:
     """Improve the shapes by Levenberg-Marquardt within bounds."""
-    low, high = shape_bounds(frame.equations, suspects)
+    low, high = shape_bounds(frame.equations, candidates)
     if not len(low):
-        return suspects
-    x = np.clip(np.concatenate([s.shape for s in suspects]), low, high)
+        return candidates
+    x = np.clip(np.concatenate([s.shape for s in candidates]), low, high)
     span = np.maximum(high - low, 1e-12)
-    r = residual_of(frame, columns, with_shapes(suspects, x), w)
+    r = residual_of(frame, columns, with_shapes(candidates, x), w)
     cost, damping = float(r @ r), 1e-2
     for _ in range(steps):
         J = np.empty((len(r), len(x)))
@@ -112,7 +112,7 @@ def _searched(
             h = 2e-4 * span[i] if x[i] + 2e-4 * span[i] <= high[i] else -2e-4 * span[i]
             moved = x.copy()
             moved[i] += h
-            J[:, i] = (residual_of(frame, columns, with_shapes(suspects, moved), w) - r) / (
+            J[:, i] = (residual_of(frame, columns, with_shapes(candidates, moved), w) - r) / (
                 h / span[i]
             )
         H, g = J.T @ J, J.T @ r
@@ -122,7 +122,7 @@ def _searched(
                 H + damping * (np.diag(np.diag(H)) + 1e-12 * np.eye(len(x))), g
             )
             trial = np.clip(x + np.clip(step, -0.2, 0.2) * span, low, high)
-            r1 = residual_of(frame, columns, with_shapes(suspects, trial), w)
+            r1 = residual_of(frame, columns, with_shapes(candidates, trial), w)
             c1 = float(r1 @ r1)
             if c1 < cost:
                 gain = (cost - c1) / cost
@@ -132,14 +132,14 @@ def _searched(
             damping *= 6.0
         if not improved or gain < 1e-6:
             break
-    return with_shapes(suspects, x)
+    return with_shapes(candidates, x)
 
 
-def added_inertia(suspects: Sequence[EffectAt], equations: Equations) -> np.ndarray:
+def added_inertia(candidates: Sequence[EffectAt], equations: Equations) -> np.ndarray:
     """Return what rotors and loads add to the mass matrix, (`POSES`, k, k) [kg m^2 or kg]."""
     still, *pushed = equations.poses
     added = np.zeros((*still.position.shape, len(pushed)))
-    for s in suspects:
+    for s in candidates:
         if not s.effect.sees_acceleration or s.effect.uses_bodies:
             continue
         before = s.columns(still) @ s.coefficients
@@ -150,13 +150,13 @@ def added_inertia(suspects: Sequence[EffectAt], equations: Equations) -> np.ndar
 
 
 def _solved(
-    frame: Frame, columns: Columns, suspects: tuple[EffectAt, ...], w_before: np.ndarray | None
+    frame: Frame, columns: Columns, candidates: tuple[EffectAt, ...], w_before: np.ndarray | None
 ) -> Model:
     equations = frame.equations
-    y, A, widths = split(frame, columns, suspects, w_before)
+    y, A, widths = split(frame, columns, candidates, w_before)
     c = _least(A, y)
     placed, forces, at = [], [], 0
-    for s, m in zip(suspects, widths, strict=True):
+    for s, m in zip(candidates, widths, strict=True):
         x = columns.of(s, equations, w_before)
         own = np.ones(1) if s.effect.is_given else c[at : at + m]
         at += m
@@ -166,18 +166,18 @@ def _solved(
     w = frame.parameters(left)
     residual = left - equations.base @ w
     mean = (residual**2).mean(axis=0)
-    heavier = equations.log_inertia(w, added_inertia(placed, equations))
+    log_inertia = equations.log_inertia(w, added_inertia(placed, equations))
     # what is measured is the motion: the floor is one of accelerations
-    variance = mean + floors(equations) * np.exp(2.0 * max(heavier, -50.0) / len(mean))
+    variance = mean + floors(equations) * np.exp(2.0 * max(log_inertia, -50.0) / len(mean))
     N = len(residual)
-    size = sum(len(s.shape) for s in suspects) + len(c)
+    size = sum(len(s.shape) for s in candidates) + len(c)
     score = (
         -0.5 * N * float(np.log(variance).sum())
-        + N * heavier
+        + N * log_inertia
         - 0.5 * float(w @ w)
         - price_of(frame, size)
     )
     return Model(
-        tuple(placed), w, np.sqrt(variance), heavier, score, residual,
+        tuple(placed), w, np.sqrt(variance), log_inertia, score, residual,
         tuple(forces), frame,
     )  # fmt: skip

@@ -9,8 +9,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import FLOOR_SHARE
-from sgp_ros.diagnosis.explain.regression import Frame
-from sgp_ros.diagnosis.explain.suspects import dry_joints
+from sgp_ros.diagnosis.explain.regression import Frame, dry_joints
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -21,19 +20,19 @@ class Model:
     """A fitted hypothesis.
 
     Attributes:
-        suspects: effects with their numbers.
+        effects: with their places, shapes and coefficients.
         w: (p,) inertial parameters' changes in standard deviations.
         sigma: (k,) root mean square of the residual with its floor.
-        heavier: mean of log det(M / M nominal) of its bodies and rotors.
+        log_inertia: mean of log det(M / M nominal) of its bodies and rotors.
         score: log likelihood less penalties [nats].
         residual: (N, k) [N m or N].
-        forces: filtered force of each suspect, (N, k).
+        forces: filtered force of each effect, (N, k).
     """
 
-    suspects: tuple[EffectAt, ...]
+    effects: tuple[EffectAt, ...]
     w: np.ndarray
     sigma: np.ndarray
-    heavier: float
+    log_inertia: float
     score: float
     residual: np.ndarray
     forces: tuple[np.ndarray, ...]
@@ -42,7 +41,7 @@ class Model:
     @property
     def key(self) -> frozenset[tuple[str, Place]]:
         """Effects and places, without their order."""
-        return frozenset(s.key for s in self.suspects)
+        return frozenset(s.key for s in self.effects)
 
     @property
     def is_free(self) -> bool:
@@ -56,9 +55,9 @@ class Model:
 
     @property
     def size(self) -> int:
-        """Number of fitted parameters of the suspects."""
+        """Number of fitted parameters of the effects."""
         return sum(
-            len(s.shape) + (0 if s.effect.is_given else len(s.coefficients)) for s in self.suspects
+            len(s.shape) + (0 if s.effect.is_given else len(s.coefficients)) for s in self.effects
         )
 
     @property
@@ -74,7 +73,7 @@ class Model:
     def is_possible(self) -> bool:
         """Return whether every effect has signs and sizes that it can have."""
         motion = self.frame.equations.motion
-        return all(s.is_possible(motion) for s in self.suspects)
+        return all(s.is_possible(motion) for s in self.effects)
 
     @property
     def freedom(self) -> int:
@@ -102,7 +101,7 @@ class Model:
         """
         equations = self.frame.equations
         found = []
-        for s, filtered in zip(self.suspects, self.filtered_shares, strict=True):
+        for s, filtered in zip(self.effects, self.filtered_shares, strict=True):
             if s.effect.sees_acceleration and not s.effect.has_memory:
                 found.append(filtered)
                 continue
@@ -125,18 +124,18 @@ def price_of(frame: Frame, size: int) -> float:
 def extra_force(model: Model, motion: ObservedMotion) -> np.ndarray:
     """Return the force of all effects at the full rate, (n, k) [N m or N]."""
     force = motion.stated_force.copy()
-    for suspect in model.suspects:
-        x = suspect.columns(motion) @ suspect.coefficients
+    for effect in model.effects:
+        x = effect.columns(motion) @ effect.coefficients
         if x.ndim == 2:
             force += x
         else:
-            force[:, suspect.place.joint] += x
+            force[:, effect.place.joint] += x
     return force
 
 
 def held_joints(model: Model, motion: ObservedMotion) -> frozenset[int]:
     """Return the joints that dry friction may hold, of the model or of the nominal robot."""
-    return motion.dry_joints | dry_joints(model.suspects)
+    return motion.dry_joints | dry_joints(model.effects)
 
 
 def imbalance(model: Model, equations: Equations, motion: ObservedMotion) -> np.ndarray:

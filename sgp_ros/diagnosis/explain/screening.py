@@ -10,8 +10,7 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.candidates import split
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
-from sgp_ros.diagnosis.explain.regression import Frame
-from sgp_ros.diagnosis.explain.suspects import Columns, dry_joints
+from sgp_ros.diagnosis.explain.regression import Columns, Frame, dry_joints
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place, SmallEffect
@@ -26,11 +25,11 @@ Trial = tuple[float, EffectAt]
 
 
 def screen(columns: Columns, model: Model, effects: Iterable[Effect]) -> list[Trial]:
-    """Return suspects with the gain in score they promise, best first."""
-    held = dry_joints(model.suspects)
+    """Return candidates with the gain in score they promise, best first."""
+    held = dry_joints(model.effects)
     rests = {held: _Rest.of(columns, model, held)}
     before = rests[held].frame.by_joint(rests[held].y)
-    known = {s.key for s in model.suspects}
+    known = {s.key for s in model.effects}
     found: list[Trial] = []
     for effect in effects:
         if effect.is_body and model.is_free:
@@ -58,7 +57,7 @@ class _Rest:
     @classmethod
     def of(cls, columns: Columns, model: Model, dry: frozenset[int]) -> _Rest:
         frame = Frame.of(columns.equations(dry), model.sigma, is_free=model.is_free)
-        y, A, _ = split(frame, columns, model.suspects, model.w)
+        y, A, _ = split(frame, columns, model.effects, model.w)
         if not A.shape[1]:
             return cls(frame, y, None)
         basis = np.linalg.qr(A / np.sqrt((A * A).sum(axis=0) + 1e-300))[0]
@@ -96,24 +95,24 @@ def _trials(
 
 
 def _trial(
-    rest: _Rest, suspect: EffectAt, motion: ObservedMotion, before: np.ndarray
+    rest: _Rest, candidate: EffectAt, motion: ObservedMotion, before: np.ndarray
 ) -> Trial | None:
-    effect = suspect.effect
+    effect = candidate.effect
     if effect.small is not None:
-        return _small_trial(rest, suspect, effect.small, motion, before)
-    raw = suspect.columns(motion)
+        return _small_trial(rest, candidate, effect.small, motion, before)
+    raw = candidate.columns(motion)
     if raw.shape[-1] == 0:
         return None
-    x = rest.apart(raw, suspect.place, is_inertial=effect.is_inertial)
+    x = rest.apart(raw, candidate.place, is_inertial=effect.is_inertial)
     scale = np.sqrt((x * x).sum(axis=0)) + 1e-300
     c = np.linalg.lstsq(x / scale, rest.y, rcond=1e-7)[0] / scale
     if effect.is_given:
         # a start may have the wrong size, not the wrong sign
         if c[0] <= 0.0:
             return None
-    elif not replace(suspect, coefficients=c).is_possible(motion):
+    elif not replace(candidate, coefficients=c).is_possible(motion):
         return None
-    return rest.gain(rest.y - x @ c, before, len(c) + len(suspect.shape)), suspect
+    return rest.gain(rest.y - x @ c, before, len(c) + len(candidate.shape)), candidate
 
 
 def _small_trial(
@@ -131,14 +130,14 @@ def _small_trial(
 
 
 def _intervals(
-    rest: _Rest, suspect: EffectAt, bins: tuple[np.ndarray, np.ndarray], before: np.ndarray
+    rest: _Rest, candidate: EffectAt, bins: tuple[np.ndarray, np.ndarray], before: np.ndarray
 ) -> Iterator[Trial]:
     """Yield the best interval, and the best that is not its neighbour.
 
     With the columns of narrow bins and their Gram matrix every interval costs a few sums.
     """
     columns, edges = bins
-    x = rest.apart(columns, suspect.place)
+    x = rest.apart(columns, candidate.place)
     i, j = np.triu_indices(len(edges), 1)
     area = np.zeros((len(edges), len(edges)))
     area[1:, 1:] = np.cumsum(np.cumsum(x.T @ x, axis=0), axis=1)
@@ -153,4 +152,4 @@ def _intervals(
         if gain[c] > 0.0:
             column = x[:, i[c] : j[c]].sum(axis=1) * (push[c] / size[c])
             shape = np.array([edges[i[c]], edges[j[c]]])
-            yield rest.gain(rest.y - column, before, 3), suspect.with_shape(shape)
+            yield rest.gain(rest.y - column, before, 3), candidate.with_shape(shape)

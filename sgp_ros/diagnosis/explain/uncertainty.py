@@ -14,8 +14,7 @@ import numpy as np
 from sgp_ros.batch.least_squares import correlation_factor
 from sgp_ros.diagnosis.explain.candidates import UNSEEN
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.regression import Frame
-from sgp_ros.diagnosis.explain.suspects import Columns, shape_bounds, with_shapes
+from sgp_ros.diagnosis.explain.regression import Columns, Frame, shape_bounds, with_shapes
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -23,11 +22,11 @@ from sgp_ros.robots.observed_motion import ObservedMotion
 def _force(
     columns: Columns,
     frame: Frame,
-    suspects: tuple[EffectAt, ...],
+    candidates: tuple[EffectAt, ...],
     w: np.ndarray,
 ) -> np.ndarray:
     total = np.zeros_like(frame.equations.d)
-    for s in suspects:
+    for s in candidates:
         total = total + columns.of(s, frame.equations, w) @ s.coefficients
     return total
 
@@ -40,12 +39,12 @@ def covariance(model: Model, columns: Columns) -> np.ndarray:
     frame = Frame.of(model.frame.equations, model.sigma, is_free=model.is_free)
     free = [
         frame.projected(columns.of(s, frame.equations, model.w))
-        for s in model.suspects if not s.effect.is_given
+        for s in model.effects if not s.effect.is_given
     ]  # fmt: skip
     parts = list(free)
-    low, high = shape_bounds(frame.equations, model.suspects)
+    low, high = shape_bounds(frame.equations, model.effects)
     if len(low):
-        x = np.concatenate([s.shape for s in model.suspects if len(s.shape)])
+        x = np.concatenate([s.shape for s in model.effects if len(s.shape)])
         slopes = []
         for i in range(len(x)):
             h = 1e-3 * (high[i] - low[i])
@@ -56,7 +55,7 @@ def covariance(model: Model, columns: Columns) -> np.ndarray:
                 moved.append(
                     (
                         y[i],
-                        _force(columns, frame, with_shapes(model.suspects, y), model.w),
+                        _force(columns, frame, with_shapes(model.effects, y), model.w),
                     )
                 )
             (a, fa), (b, fb) = moved
@@ -78,12 +77,12 @@ def _inflation(model: Model) -> float:
 
 
 def reported_std(model: Model, columns: Columns) -> list[dict[str, float]]:
-    """Return the standard deviation of each reported number of each suspect."""
+    """Return the standard deviation of each reported number of each candidate."""
     motion = model.frame.equations.motion
     C = covariance(model, columns)
-    free = sum(len(s.coefficients) for s in model.suspects if not s.effect.is_given)
+    free = sum(len(s.coefficients) for s in model.effects if not s.effect.is_given)
     result, at, shape_at = [], 0, free
-    for s in model.suspects:
+    for s in model.effects:
         m = 0 if s.effect.is_given else len(s.coefficients)
         rows = [*range(at, at + m), *range(shape_at, shape_at + len(s.shape))]
         at, shape_at = at + m, shape_at + len(s.shape)
@@ -91,20 +90,20 @@ def reported_std(model: Model, columns: Columns) -> list[dict[str, float]]:
     return result
 
 
-def _delta(suspect: EffectAt, motion: ObservedMotion, C: np.ndarray, m: int) -> dict[str, float]:
-    values = suspect.report(motion)
+def _delta(candidate: EffectAt, motion: ObservedMotion, C: np.ndarray, m: int) -> dict[str, float]:
+    values = candidate.report(motion)
     numbers = [name for name, value in values.items() if isinstance(value, float)]
     std = np.sqrt(np.maximum(np.diag(C), 0.0))
     slopes = np.zeros((len(numbers), len(std)))
     for i, step in enumerate(std):
         if step <= 0.0:
             continue
-        moved_c, moved_s = suspect.coefficients.copy(), suspect.shape.copy()
+        moved_c, moved_s = candidate.coefficients.copy(), candidate.shape.copy()
         if i < m:
             moved_c[i] += 0.1 * step
         else:
             moved_s[i - m] += 0.1 * step
-        after = replace(suspect, shape=moved_s, coefficients=moved_c).report(motion)
+        after = replace(candidate, shape=moved_s, coefficients=moved_c).report(motion)
         for row, name in enumerate(numbers):
             change = float(after[name]) - float(values[name])
             if name == 'phase':

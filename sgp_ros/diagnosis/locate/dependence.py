@@ -57,7 +57,7 @@ def own_variables(equations: Equations, joint: int) -> dict[str, np.ndarray]:
 
 BINS, STRETCHES, PARTS = 16, 24, 6
 LEAST_COUNT = 3
-"""A bin with no more rows than these foretells nothing."""
+"""A bin with no more rows than these predicts nothing."""
 LEAST_LEFT = 1e-6
 """Share left unexplained below which no difference is made."""
 DISTURBANCES = 199

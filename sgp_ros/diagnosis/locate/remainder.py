@@ -130,7 +130,7 @@ def process_inputs(motion: ObservedMotion, joint: int) -> tuple[np.ndarray, tupl
 def learn_remainder(equations: Equations, residual: np.ndarray, joint: int) -> Remainder | None:
     """Return Z of a joint learned from a residual (N, k).
 
-    None where there is none, or where it foretells nothing of parts left out: what happens once,
+    None where there is none, or where it predicts nothing of parts left out: what happens once,
     such as a burst, is no function of the motion, and predictions elsewhere are better without.
     """
     full, names = process_inputs(equations.motion, joint)
@@ -144,7 +144,7 @@ def learn_remainder(equations: Equations, residual: np.ndarray, joint: int) -> R
     if chosen.kernel is None or chosen.inputs is None:
         return None
     model = Hyperparameters((chosen.kernel,), (chosen.noise,))
-    if foretold(model, U, y[:, 0], parts_of(len(y), 1)) <= 0.0:
+    if explained_share(model, U, y[:, 0], parts_of(len(y), 1)) <= 0.0:
         return None
     rows = spread(np.arange(len(y)), SIZE)
     posterior = Posterior(model, observations(U, y[:, 0], rows), prior)
@@ -153,7 +153,9 @@ def learn_remainder(equations: Equations, residual: np.ndarray, joint: int) -> R
     )
 
 
-def foretold(model: Hyperparameters, U: np.ndarray, r: np.ndarray, part: np.ndarray) -> float:
+def explained_share(
+    model: Hyperparameters, U: np.ndarray, r: np.ndarray, part: np.ndarray
+) -> float:
     """Return the share of r (N,) that Z at inputs U (N, d) explains on parts left out.
 
     Negative where it makes things worse. `part` (N,) is the part of each row.

@@ -75,7 +75,7 @@ class DiagnosedDynamics:
     def level_of_dry_friction(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """Return half the jump of each joint's force as its velocity changes sign, (m, k)."""
         level = np.zeros_like(q)
-        dry = [x for x in (*self.model.suspects, *self.stated) if x.is_holding]
+        dry = [x for x in (*self.model.effects, *self.stated) if x.is_holding]
         if dry:
             still = np.zeros_like(q)
             motion = self._motion(q, still, still, loads)
@@ -166,4 +166,4 @@ def _chosen(stated: tuple[EffectAt, ...], is_in: Callable[[Effect], bool]) -> tu
 
 def _part(model: Model, is_in: Callable[[Effect], bool]) -> Model:
     """Return a model of some of the effects."""
-    return replace(model, suspects=tuple(s for s in model.suspects if is_in(s.effect)))
+    return replace(model, effects=tuple(s for s in model.effects if is_in(s.effect)))

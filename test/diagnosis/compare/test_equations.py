@@ -17,7 +17,7 @@ from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.criteria import LEAST_SHARE
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
-from sgp_ros.diagnosis.explain.suspects import Columns
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
@@ -120,7 +120,7 @@ def _beside_a_still_joint(world):
 
 
 def test_a_joint_that_does_not_move_is_asked_nothing(robots, viscous):
-    """Whatever holds it; no suspect has a place there."""
+    """Whatever holds it; no candidate has a place there."""
     robot, tree = robots[2]
     world = _beside_a_still_joint(viscous)
     raw = collect(events_of(world), robot)

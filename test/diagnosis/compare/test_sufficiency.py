@@ -9,11 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.compare.sufficiency import (
-    motion_to_noise,
-    require_inertia,
-    still_joints,
-)
+from sgp_ros.diagnosis.compare.sufficiency import motion_to_noise, require_inertia, still_joints
 from sgp_ros.diagnosis.criteria import LEAST_MOTION, LEAST_ROWS
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.engine.samples import JointSample, frozen_array
@@ -114,9 +110,9 @@ def guards():
 
 
 def test_no_encoder_at_rest_reaches_what_every_drawn_motion_has(guards):
-    """With a margin of two on either side."""
-    assert 2.0 * max(guards['at_rest'].values()) < LEAST_MOTION
-    assert min(world['motion'] for world in guards['worlds']) > 2.0 * LEAST_MOTION
+    """Not even noise of heavy tails over 200 000 rows; and far less than drawn worlds move."""
+    assert 1.3 * max(guards['at_rest'].values()) < LEAST_MOTION
+    assert min(world['motion'] for world in guards['worlds']) > 10.0 * LEAST_MOTION
 
 
 def test_verdicts_on_enough_rows_are_right(guards):

@@ -10,8 +10,8 @@ import pytest
 from sgp_ros.diagnosis.criteria import EVIDENCE, INDEPENDENT_ROWS
 from sgp_ros.diagnosis.decide.cross_validation import LEAST_ROWS, left_out, structure, support
 from sgp_ros.diagnosis.decide.decision import Scale, _supported, decide
-from sgp_ros.diagnosis.explain.hypotheses import Competition
-from sgp_ros.diagnosis.explain.suspects import Columns
+from sgp_ros.diagnosis.explain.comparison import Comparison
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.locate.remainder import PARTS, PIECES, parts_of
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
@@ -49,7 +49,7 @@ def test_noise_on_top_of_a_function_counts_as_noise(equations):
     assert np.all((found > 0.2) & (found < 0.7))
 
 
-def test_what_its_own_past_foretells_is_structure(equations):
+def test_what_its_own_past_predicts_is_structure(equations):
     """Though it has nothing to do with the motion."""
     rows = np.arange(len(equations.d))[:, None]
     for period in (31.0, 4.1):  # a quarter of a period on, a sine has no correlation
@@ -57,7 +57,7 @@ def test_what_its_own_past_foretells_is_structure(equations):
         assert np.all(structure(equations, rest) > 0.9)
 
 
-def test_filtered_white_noise_foretells_nothing_of_itself(equations):
+def test_filtered_white_noise_predicts_nothing_of_itself(equations):
     """Though rows behind a low-pass are correlated."""
     white = np.random.default_rng(5).normal(size=equations.motion.effort.shape)
     rest = equations.filter(white * np.sqrt(equations.power))
@@ -77,7 +77,7 @@ def _noise_at_full_rate(equations):
     return white * np.sqrt(equations.power)
 
 
-def test_few_rows_let_the_referee_say_nothing(equations):
+def test_of_few_rows_no_structure_is_known(equations):
     rows = LEAST_ROWS - 1
     assert np.all(structure(equations, _white(equations)[:rows]) == 1.0)
 
@@ -107,8 +107,8 @@ def test_parts_are_predicted_by_a_fit_to_the_others(damped, is_free):
     """As least squares on the rows that remain, written out."""
     model = fitted(damped, 'viscous_friction', 'spring', is_free=is_free)
     columns = Columns(damped)
-    found = left_out(columns, model, model.suspects)
-    x = [columns.of(s, damped, model.w)[:, 0] for s in model.suspects]
+    found = left_out(columns, model, model.effects)
+    x = [columns.of(s, damped, model.w)[:, 0] for s in model.effects]
     p = damped.base.shape[2] if is_free else 0
     A = np.concatenate([damped.base[:, 0, :p], *x], axis=1) / model.sigma[0]
     y, part = damped.d[:, 0] / model.sigma[0], parts_of(len(damped.d))
@@ -137,7 +137,7 @@ def test_a_model_with_an_effect_without_support_gives_way(damped):
         fitted(damped, *names)
         for names in (('viscous_friction', 'cogging'), ('viscous_friction',))
     )
-    scale = Scale.of(damped, Competition(*bases, (right,), (rich,)))
+    scale = Scale.of(damped, Comparison(*bases, (right,), (rich,)))
     assert _supported(damped, scale, [rich, right]) is right
     assert _supported(damped, scale, [rich]) is None
 
@@ -150,10 +150,10 @@ def test_an_effect_without_support_is_not_asserted(equations_for):
     _, equations = equations_for(world)
     bases = (fitted(equations, is_free=f) for f in (False, True))
     model = fitted(equations, 'constant_load')
-    competition = Competition(*bases, (model,), ())
-    scale = Scale.of(equations, competition)
+    comparison = Comparison(*bases, (model,), ())
+    scale = Scale.of(equations, comparison)
     gain = support(Columns(equations), model, scale.floor * scale.power)
     assert scale.rows * gain[0] < EVIDENCE
-    decision = decide(equations, competition)
+    decision = decide(equations, comparison)
     assert decision.verdict != 'missing_physics'
     assert decision.tentative is None

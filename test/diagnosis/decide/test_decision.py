@@ -13,9 +13,9 @@ from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.criteria import EVIDENCE, LEAST_SHARE, SHARE_TOLERANCE
 from sgp_ros.diagnosis.decide.decision import Scale, decide
 from sgp_ros.diagnosis.explain.candidates import added_inertia, fit
+from sgp_ros.diagnosis.explain.comparison import Comparison, compare_models
 from sgp_ros.diagnosis.explain.fitted_model import floors
-from sgp_ros.diagnosis.explain.hypotheses import Competition, compete
-from sgp_ros.diagnosis.explain.suspects import Columns
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
@@ -24,9 +24,9 @@ from test.diagnosis.fitted_models import fitted, with_coefficients
 from test.diagnosis.worlds import CHAINS, events_of, robot_of, simulate
 
 
-def _competition(equations, *models):
+def _comparison(equations, *models):
     bases = (fitted(equations, is_free=f) for f in (False, True))
-    return Competition(*bases, tuple(m for m in models if m), ())
+    return Comparison(*bases, tuple(m for m in models if m), ())
 
 
 @pytest.fixture(scope='module')
@@ -36,7 +36,7 @@ def damped(equations_for, viscous):
 
 def test_an_effect_that_explains_all_is_asserted(damped):
     right, wrong = fitted(damped, 'viscous_friction'), fitted(damped, 'spring')
-    decision = decide(damped, _competition(damped, wrong, right))
+    decision = decide(damped, _comparison(damped, wrong, right))
     assert decision.verdict == 'missing_physics'
     assert decision.model is right
     assert wrong not in decision.rivals[:1] or decision.excess < 0.5
@@ -47,12 +47,12 @@ def test_among_equal_fits_the_simpler_is_asserted(damped):
     simple = fitted(damped, 'viscous_friction')
     rich = fitted(damped, 'viscous_friction', 'quadratic_drag')
     assert rich.mean_square[0] <= simple.mean_square[0] * (1.0 + 1e-9)
-    assert decide(damped, _competition(damped, rich, simple)).model is simple
+    assert decide(damped, _comparison(damped, rich, simple)).model is simple
 
 
 def test_what_leaves_much_is_not_asserted(damped):
     """A spring where friction is missing: nothing adequate is there, on joint 0."""
-    decision = decide(damped, _competition(damped, fitted(damped, 'spring')))
+    decision = decide(damped, _comparison(damped, fitted(damped, 'spring')))
     assert decision.verdict == 'unexplained'
     assert decision.worst == 0
 
@@ -62,12 +62,12 @@ def test_an_effect_too_small_to_be_physics_is_not_asserted(equations_for):
     world = simulate(CHAINS[1], 3, 10.0, force=lambda t, q, v: (-0.02 * v[0],))
     _, equations = equations_for(world)
     small = fitted(equations, 'viscous_friction')
-    competition = _competition(equations, small)
-    assert small.score > competition.base.score + EVIDENCE
+    comparison = _comparison(equations, small)
+    assert small.score > comparison.base.score + EVIDENCE
     assert small.shares[0] < SHARE_TOLERANCE * LEAST_SHARE
-    decision = decide(equations, competition)
+    decision = decide(equations, comparison)
     assert decision.verdict in {'no_mismatch', 'parameters_only'}
-    assert decision.model is competition.base
+    assert decision.model is comparison.base
 
 
 def test_noise_of_the_effort_leaves_an_adequate_model(damped):
@@ -76,22 +76,22 @@ def test_noise_of_the_effort_leaves_an_adequate_model(damped):
     discrepancy = damped.d.std()
     noise = 0.3 * discrepancy * np.random.default_rng(0).normal(size=damped.d.shape)
     noisy = replace(damped, d=damped.d + noise)
-    decision = decide(noisy, _competition(noisy, fitted(noisy, 'viscous_friction')))
+    decision = decide(noisy, _comparison(noisy, fitted(noisy, 'viscous_friction')))
     assert decision.verdict == 'missing_physics'
     q = damped.motion.position[damped.filter.rows]
     wavy = replace(damped, d=damped.d + 0.4 * discrepancy * np.sin(5.0 * q))
-    decision = decide(wavy, _competition(wavy, fitted(wavy, 'viscous_friction')))
+    decision = decide(wavy, _comparison(wavy, fitted(wavy, 'viscous_friction')))
     assert decision.verdict == 'unexplained'
     assert right.mean_square[0] < 1e-3 * discrepancy**2
 
 
 def test_noise_alone_is_not_unexplained(equations_for, perfect):
-    """It leaves more than counts as physics, and nothing foretells it."""
+    """It leaves more than counts as physics, and nothing predicts it."""
     _, equations = equations_for(perfect[1])
     rng = np.random.default_rng(1)
     noise = 0.1 * np.sqrt(equations.power) * rng.normal(size=equations.d.shape)
     noisy = replace(equations, d=equations.d + noise)
-    assert decide(noisy, _competition(noisy)).verdict in {'no_mismatch', 'parameters_only'}
+    assert decide(noisy, _comparison(noisy)).verdict in {'no_mismatch', 'parameters_only'}
 
 
 def test_effects_that_cancel_each_other_do_not_count(damped):
@@ -99,7 +99,7 @@ def test_effects_that_cancel_each_other_do_not_count(damped):
     (net,) = [sum(model.forces)]
     opposed = replace(model, forces=(10.0 * net, -9.0 * net))
     agreeing = replace(model, forces=(0.5 * net, 0.5 * net))
-    scale = Scale.of(damped, _competition(damped))
+    scale = Scale.of(damped, _comparison(damped))
     opposed.__dict__['shares'] = agreeing.__dict__['shares'] = [1.0, 1.0]
     assert opposed.net_share == pytest.approx(agreeing.net_share)
     assert scale.counts(agreeing)
@@ -126,10 +126,10 @@ def test_more_than_two_effects_are_found_where_joints_lack_several(equations_for
         force=lambda t, q, v: (-4.0 * (q[0] - 0.3) - 1.5 * v[0], -0.8 * v[1]),
     )  # fmt: skip
     _, equations = equations_for(world)
-    competition = compete(equations, lambda _share: None)
-    found = {(s.effect.name, s.place.joint) for m in competition.more for s in m.suspects}
-    decision = decide(equations, competition)
-    asserted = {(s.effect.name, s.place.joint) for s in decision.model.suspects}
+    comparison = compare_models(equations, lambda _share: None)
+    found = {(s.effect.name, s.place.joint) for m in comparison.more for s in m.effects}
+    decision = decide(equations, comparison)
+    asserted = {(s.effect.name, s.place.joint) for s in decision.model.effects}
     truth = {('spring', 0), ('viscous_friction', 0), ('viscous_friction', 1)}
     assert truth <= found
     assert asserted == truth
@@ -137,8 +137,8 @@ def test_more_than_two_effects_are_found_where_joints_lack_several(equations_for
 
 def test_what_leaves_next_to_nothing_is_adequate_whatever_it_explained(damped):
     """A rest that is no physics condemns no model, though there was little to explain."""
-    competition = _competition(damped, fitted(damped, 'viscous_friction'))
-    scale, (model,) = Scale.of(damped, competition), competition.singles
+    comparison = _comparison(damped, fitted(damped, 'viscous_friction'))
+    scale, (model,) = Scale.of(damped, comparison), comparison.singles
     small = replace(scale, base=10.0 * scale.shares(model), nominal=10.0 * scale.shares(model))
     assert small.rest(model) > 0.05
     assert small.excess(model) < 0.1
@@ -146,11 +146,11 @@ def test_what_leaves_next_to_nothing_is_adequate_whatever_it_explained(damped):
 
 def test_few_rows_tell_less(damped):
     """A recording of fewer rows than count as independent weighs a fit by what it has."""
-    competition = _competition(damped, fitted(damped, 'viscous_friction'))
+    comparison = _comparison(damped, fitted(damped, 'viscous_friction'))
     few = replace(damped, d=damped.d[:40])
-    whole, part = (Scale.of(e, competition) for e in (damped, few))
-    (model,) = competition.singles
-    gains = [s.fit(model) - s.fit(competition.nominal) for s in (whole, part)]
+    whole, part = (Scale.of(e, comparison) for e in (damped, few))
+    (model,) = comparison.singles
+    gains = [s.fit(model) - s.fit(comparison.nominal) for s in (whole, part)]
     assert gains[1] == pytest.approx(gains[0] * 40.0 / whole.rows)
 
 
@@ -158,11 +158,11 @@ def test_no_larger_effect_takes_the_place_of_a_better_one_that_is_too_small(damp
     small = fitted(damped, 'viscous_friction')
     large = fitted(damped, 'viscous_friction', 'quadratic_drag')
     small.__dict__['shares'], large.__dict__['shares'] = [0.1 * LEAST_SHARE], [1.0, 1.0]
-    competition = _competition(damped, small, large)
-    scale = Scale.of(damped, competition)
+    comparison = _comparison(damped, small, large)
+    scale = Scale.of(damped, comparison)
     assert scale.worth(small) > scale.worth(large)
     assert scale.excess(large) < 1.0
-    assert decide(damped, competition).verdict != 'missing_physics'
+    assert decide(damped, comparison).verdict != 'missing_physics'
 
 
 def test_noise_of_the_acceleration_makes_no_rotor_large(equations_for):
@@ -170,8 +170,8 @@ def test_noise_of_the_acceleration_makes_no_rotor_large(equations_for):
     world = simulate(CHAINS[1], 3, 10.0)
     _, equations = equations_for(world, quantum=2e-3)
     model = fitted(equations, 'armature')
-    force = model.suspects[0].effect.columns(equations.motion, Place(0), np.zeros(0))
-    raw = float(np.mean((force @ model.suspects[0].coefficients) ** 2) / equations.power[0])
+    force = model.effects[0].effect.columns(equations.motion, Place(0), np.zeros(0))
+    raw = float(np.mean((force @ model.effects[0].coefficients) ** 2) / equations.power[0])
     assert model.shares[0] == pytest.approx(model.filtered_shares[0])
     assert raw > 2.0 * model.shares[0]
 
@@ -188,10 +188,10 @@ def test_a_weak_motor_and_heavy_bodies_fit_alike(tmp_path):
     raw = collect(events_of(world), robot)
     equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
     weak, heavy = fitted(equations, 'torque_gain'), fitted(equations, is_free=True)
-    scale = Scale.of(equations, _competition(equations, weak))
+    scale = Scale.of(equations, _comparison(equations, weak))
     prior = 0.5 * float(heavy.w @ heavy.w)
-    assert heavy.heavier == pytest.approx(math.log(2.0), abs=0.05)
-    assert weak.heavier == 0.0
+    assert heavy.log_inertia == pytest.approx(math.log(2.0), abs=0.05)
+    assert weak.log_inertia == 0.0
     assert heavy.mean_square[0] > 3.0 * weak.mean_square[0]
     assert scale.fit(heavy) + prior == pytest.approx(scale.fit(weak), abs=5.0)
 

@@ -10,7 +10,7 @@ import pytest
 from sgp_ros.diagnosis.criteria import CLEARER
 from sgp_ros.diagnosis.decide.decision import Decision, decide
 from sgp_ros.diagnosis.decide.equivalence import MOTIONS, Contrasts, equivalents, moved
-from sgp_ros.diagnosis.explain.hypotheses import Competition, compete
+from sgp_ros.diagnosis.explain.comparison import Comparison, compare_models
 from sgp_ros.diagnosis.pipeline import diagnose
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, events_of, robot_of, simulate
@@ -18,9 +18,9 @@ from test.diagnosis.worlds import CHAINS, events_of, robot_of, simulate
 
 def _told(equations, best, rivals):
     bases = fitted(equations), fitted(equations, is_free=True)
-    competition = Competition(*bases, (best, *rivals), ())
+    comparison = Comparison(*bases, (best, *rivals), ())
     decision = Decision('missing_physics', best, tuple(rivals), 0.0, 0)
-    return equivalents(equations, competition, decision, Contrasts(equations, best))
+    return equivalents(equations, comparison, decision, Contrasts(equations, best))
 
 
 @pytest.fixture(scope='module')
@@ -62,11 +62,11 @@ def test_the_diagnosis_says_what_it_cannot_tell(robots):
 
 
 def test_nothing_is_equivalent_to_what_is_unexplained(narrow):
-    competition = compete(narrow, lambda _share: None)
-    asserted = decide(narrow, competition)
-    unknown = Decision('unexplained', competition.base, asserted.rivals, 1.0, 0)
-    contrasts = Contrasts(narrow, competition.base)
-    assert equivalents(narrow, competition, unknown, contrasts) == ()
+    comparison = compare_models(narrow, lambda _share: None)
+    asserted = decide(narrow, comparison)
+    unknown = Decision('unexplained', comparison.base, asserted.rivals, 1.0, 0)
+    contrasts = Contrasts(narrow, comparison.base)
+    assert equivalents(narrow, comparison, unknown, contrasts) == ()
 
 
 @pytest.mark.parametrize('how', MOTIONS.values())
@@ -104,7 +104,7 @@ def test_a_richer_name_of_the_same_law_is_no_other_explanation(equations_for):
 
 
 def test_noise_does_not_hide_that_bodies_may_be_heavier(tmp_path):
-    """Their residual of effort is larger because they are heavier: the motion fits as well."""
+    """Their residual of effort is larger because their inertia is: the motion fits as well."""
     (link,) = CHAINS[1]
     chain = (replace(link, damping=0.0),)
     world = simulate(chain, 5, 10.0, motor=lambda commands, t: (0.35 * commands[-1][0],))

@@ -7,9 +7,8 @@ import pytest
 
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
-from sgp_ros.diagnosis.explain.regression import Frame
+from sgp_ros.diagnosis.explain.regression import Columns, Frame
 from sgp_ros.diagnosis.explain.screening import screen
-from sgp_ros.diagnosis.explain.suspects import Columns
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
@@ -22,7 +21,7 @@ def _start(equations):
     return np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
 
 
-def _suspect(name, joint, shape=()):
+def _candidate(name, joint, shape=()):
     return EffectAt(EFFECTS[name], Place(joint), np.array(shape, dtype=float))
 
 
@@ -33,7 +32,7 @@ def test_projection_equals_dense_ridge_regression(equations_for, heavy, k):
     sigma = _start(equations)
     frame = Frame.of(equations, sigma, is_free=True)
     N, _, p = equations.base.shape
-    x = Columns(equations).of(_suspect('viscous_friction', k - 1), equations)
+    x = Columns(equations).of(_candidate('viscous_friction', k - 1), equations)
     X = np.concatenate([x, equations.base], axis=2) / sigma[:, None]
     X = X.reshape(N * k, 1 + p)
     y = (equations.d / sigma).ravel()
@@ -63,9 +62,9 @@ def test_what_remains_is_told_apart_by_joint(equations_for, heavy):
 def test_viscous_friction_is_found_with_its_size(equations_for, viscous):
     """The linear coefficient and nothing else; the residual is that of a perfect model."""
     _, equations = equations_for(viscous)
-    model = fit(Columns(equations), (_suspect('viscous_friction', 0),), _start(equations),
+    model = fit(Columns(equations), (_candidate('viscous_friction', 0),), _start(equations),
                 is_free=False)  # fmt: skip
-    np.testing.assert_allclose(model.suspects[0].coefficients, [0.3], rtol=2e-3)
+    np.testing.assert_allclose(model.effects[0].coefficients, [0.3], rtol=2e-3)
     assert model.mean_square[0] < 2e-5 * equations.power[0]
     assert model.size == 1
     assert model.is_possible()
@@ -76,9 +75,9 @@ def test_viscous_friction_is_found_with_its_size(equations_for, viscous):
 def test_free_bodies_do_not_fit_worse_and_cost_evidence(equations_for, viscous):
     """The score is what remains less the price of freedom."""
     _, equations = equations_for(viscous)
-    suspects = (_suspect('viscous_friction', 0),)
-    tight = fit(Columns(equations), suspects, _start(equations), is_free=False)
-    free = fit(Columns(equations), suspects, _start(equations))
+    candidates = (_candidate('viscous_friction', 0),)
+    tight = fit(Columns(equations), candidates, _start(equations), is_free=False)
+    free = fit(Columns(equations), candidates, _start(equations))
     assert free.mean_square[0] <= tight.mean_square[0] * (1.0 + 1e-9)
     assert free.freedom > tight.freedom
     assert tight.score > free.score
@@ -90,9 +89,9 @@ def test_a_search_finds_the_shape_from_a_distant_start(equations_for):
 
     world = simulate(CHAINS[1], 5, 8.0, motor=delayed(0.012))
     _, equations = equations_for(world)
-    model = fit(Columns(equations), (_suspect('command_delay', 0, [0.03]),), _start(equations),
+    model = fit(Columns(equations), (_candidate('command_delay', 0, [0.03]),), _start(equations),
                 is_free=False)  # fmt: skip
-    assert model.suspects[0].shape[0] == pytest.approx(0.012, rel=0.02)
+    assert model.effects[0].shape[0] == pytest.approx(0.012, rel=0.02)
     assert model.size == 1
 
 

@@ -11,7 +11,7 @@ from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import Bandwidth, collect
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
-from sgp_ros.diagnosis.explain.suspects import Columns
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import covariance, reported_std
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
@@ -36,13 +36,13 @@ def test_the_std_is_the_spread_over_noises(robots, name, shape, force, what):
     raw = collect(events_of(simulate(CHAINS[1], 7, 8.0, force=force)), robot)
     equations = make_equations(raw, tree, Bandwidth(10.0, 25.0))
     rng = np.random.default_rng(0)
-    suspect = EffectAt(EFFECTS[name], Place(0), np.array(shape, dtype=float))
+    candidate = EffectAt(EFFECTS[name], Place(0), np.array(shape, dtype=float))
     values, stds = [], []
     for _ in range(RUNS):
         noisy = replace(equations, d=equations.d + rng.normal(0.0, 0.1, equations.d.shape))
         columns = Columns(noisy)
-        model = fit(columns, (suspect,), np.sqrt(floors(noisy) + 0.01), is_free=False, rounds=1)
-        values.append(model.suspects[0].report(equations.motion)[what])
+        model = fit(columns, (candidate,), np.sqrt(floors(noisy) + 0.01), is_free=False, rounds=1)
+        values.append(model.effects[0].report(equations.motion)[what])
         stds.append(reported_std(model, columns)[0][what])
     spread = np.std(values, ddof=1)
     assert 0.7 < np.median(stds) / spread < 1.4
@@ -53,7 +53,7 @@ def test_correlation_in_time_widens_it(equations_for, viscous):
     """The same noise in runs of eight rows counts for fewer rows."""
     _, equations = equations_for(viscous)
     rng = np.random.default_rng(1)
-    suspect = EffectAt(EFFECTS['viscous_friction'], Place(0), np.zeros(0))
+    candidate = EffectAt(EFFECTS['viscous_friction'], Place(0), np.zeros(0))
     N = len(equations.d)
     white = rng.normal(0.0, 0.1, (N, 1))
     slow = np.repeat(rng.normal(0.0, 0.1, (N // 8 + 1, 1)), 8, axis=0)[:N]
@@ -61,7 +61,7 @@ def test_correlation_in_time_widens_it(equations_for, viscous):
     for noise in (white, slow):
         noisy = replace(equations, d=equations.d + noise)
         columns = Columns(noisy)
-        model = fit(columns, (suspect,), np.full(1, 0.1), is_free=False)
+        model = fit(columns, (candidate,), np.full(1, 0.1), is_free=False)
         found.append(float(covariance(model, columns)[0, 0] / model.mean_square[0]))
     assert found[1] > 3.0 * found[0]
 
@@ -70,8 +70,8 @@ def test_shapes_have_a_std_and_a_covariance_is_symmetric(equations_for, dry):
     """Two coefficients and a shape of Stribeck friction."""
     _, equations = equations_for(dry)
     columns = Columns(equations)
-    suspect = EffectAt(EFFECTS['stribeck_friction'], Place(0), np.array([0.5]))
-    model = fit(columns, (suspect,), np.full(1, 0.1), is_free=False)
+    candidate = EffectAt(EFFECTS['stribeck_friction'], Place(0), np.array([0.5]))
+    model = fit(columns, (candidate,), np.full(1, 0.1), is_free=False)
     C = covariance(model, columns)
     assert C.shape == (3, 3)
     np.testing.assert_allclose(C, C.T, rtol=1e-6, atol=1e-12 * np.abs(C).max())

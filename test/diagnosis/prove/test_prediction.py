@@ -9,7 +9,7 @@ import pytest
 
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import extra_force, floors, imbalance
-from sgp_ros.diagnosis.explain.suspects import Columns
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.prove.prediction import FinalModel, accelerations, diagnosed_bodies
 from sgp_ros.diagnosis.prove.proof import prove
 from sgp_ros.physics.catalogue import EFFECTS
@@ -22,12 +22,12 @@ from test.diagnosis.worlds import CHAINS, simulate
 INNER = slice(80, -80)
 
 
-def _fitted(equations, *suspects, is_free=False):
+def _fitted(equations, *candidates, is_free=False):
     start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
-    return fit(Columns(equations), suspects, start, is_free=is_free)
+    return fit(Columns(equations), candidates, start, is_free=is_free)
 
 
-def _suspect(name, joint):
+def _candidate(name, joint):
     return EffectAt(EFFECTS[name], Place(joint), np.zeros(0))
 
 
@@ -58,7 +58,7 @@ def test_the_true_model_predicts_the_true_acceleration(robots, equations_for, pe
 def test_the_prediction_does_not_depend_on_the_measured_acceleration(equations_for, heavy):
     """The equation of motion is affine in it, also with other bodies."""
     _, equations = equations_for(heavy[2])
-    model = _fitted(equations, _suspect('armature', 1), is_free=True)
+    model = _fitted(equations, _candidate('armature', 1), is_free=True)
     motion = equations.motion
     rests = np.zeros(motion.position.shape, dtype=bool)
     plain = accelerations(model, equations, motion, rests)
@@ -74,8 +74,8 @@ def test_the_prediction_does_not_depend_on_the_measured_acceleration(equations_f
 def test_a_joint_that_friction_holds_does_not_accelerate(equations_for, dry):
     """In the middle of its rests; where it slides, friction brakes."""
     _, equations = equations_for(dry)
-    model = _fitted(equations, _suspect('coulomb_friction', 0))
-    assert model.suspects[0].coefficients[0] == pytest.approx(1.2, rel=0.02)
+    model = _fitted(equations, _candidate('coulomb_friction', 0))
+    assert model.effects[0].coefficients[0] == pytest.approx(1.2, rel=0.02)
     motion, rests = equations.motion, equations.rests
     a = accelerations(model, equations, motion, rests)
     still = rests[:, 0] & (dry.velocity[:, 0] == 0.0) & (dry.acceleration[:, 0] == 0.0)
@@ -85,7 +85,7 @@ def test_a_joint_that_friction_holds_does_not_accelerate(equations_for, dry):
     assert np.median(np.abs(free[still])) > 0.1
     sliding = np.abs(motion.velocity[:, 0]) > 0.3
     force = extra_force(model, motion)[sliding, 0]
-    np.testing.assert_allclose(force, -model.suspects[0].coefficients[0] * np.sign(
+    np.testing.assert_allclose(force, -model.effects[0].coefficients[0] * np.sign(
         motion.velocity[sliding, 0]))  # fmt: skip
 
 
@@ -93,7 +93,7 @@ def test_the_proof_measures_what_an_effect_takes_away(robots, equations_for, vis
     """Before: the nominal robot; after: a rest of a ten-thousandth."""
     raw, equations = equations_for(viscous)
     nominal = _fitted(equations)
-    model = _fitted(equations, _suspect('viscous_friction', 0))
+    model = _fitted(equations, _candidate('viscous_friction', 0))
     proof = prove(FinalModel(model, nominal, equations, ()), raw, robots[1][1], 'train')
     before, after = proof.nmse_before['joint0'], proof.nmse_after['joint0']
     direct = (equations.d**2).mean() / equations.filter(equations.motion.effort).var()
@@ -106,7 +106,7 @@ def test_the_proof_measures_what_an_effect_takes_away(robots, equations_for, vis
 def test_every_number_of_a_proof_comes_with_its_interval(robots, equations_for, viscous):
     """Which holds it, and is narrow where the recording is long."""
     raw, equations = equations_for(viscous)
-    model = _fitted(equations, _suspect('viscous_friction', 0))
+    model = _fitted(equations, _candidate('viscous_friction', 0))
     proof = prove(FinalModel(model, _fitted(equations), equations, ()), raw, robots[1][1], 'train')
     numbers = {
         'nmse_before': proof.nmse_before, 'nmse_after': proof.nmse_after,
@@ -127,7 +127,7 @@ def test_every_number_of_a_proof_comes_with_its_interval(robots, equations_for, 
 def test_roll_outs_show_what_an_effect_takes_away(robots, equations_for, viscous):
     """Of ten seconds, about thirty; all end."""
     raw, equations = equations_for(viscous)
-    model = _fitted(equations, _suspect('viscous_friction', 0))
+    model = _fitted(equations, _candidate('viscous_friction', 0))
     proof = prove(FinalModel(model, _fitted(equations), equations, ()), raw, robots[1][1], 'train')
     assert 25 < proof.rollouts <= 33
     assert proof.failed == 0
@@ -137,7 +137,7 @@ def test_roll_outs_show_what_an_effect_takes_away(robots, equations_for, viscous
 def test_both_models_are_judged_on_the_roll_outs_that_both_finish(robots, equations_for, viscous):
     """Where one runs away the other gains nothing: counted, and in neither mean."""
     raw, equations = equations_for(viscous)
-    model = _fitted(equations, _suspect('quadratic_drag', 0))
+    model = _fitted(equations, _candidate('quadratic_drag', 0))
     mad = with_coefficients(model, np.array([-1e5]))
     proof = prove(FinalModel(model, mad, equations, ()), raw, robots[1][1], 'train')
     assert proof.failed > 0

@@ -10,7 +10,7 @@ import pytest
 
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
-from sgp_ros.diagnosis.explain.suspects import Columns
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.prove import rollouts
 from sgp_ros.diagnosis.prove.dynamics import dynamics_of
 from sgp_ros.diagnosis.prove.rollouts import cut, roll_out
@@ -26,12 +26,12 @@ FINE = 100
 LEVEL, PRESLIDING = 0.6, 0.05
 
 
-def _model(equations, *suspects, is_free=False):
+def _model(equations, *candidates, is_free=False):
     start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
-    return fit(Columns(equations), suspects, start, is_free=is_free)
+    return fit(Columns(equations), candidates, start, is_free=is_free)
 
 
-def _suspect(name, joint, *shape):
+def _candidate(name, joint, *shape):
     return EffectAt(EFFECTS[name], Place(joint), np.array(shape))
 
 
@@ -86,7 +86,7 @@ def test_dry_friction_holds_and_releases_in_a_roll_out(equations_for, dry):
     _, equations = equations_for(dry)
     windows = cut(equations.motion, TRIM)
     nominal = _errors(windows, *roll_out(windows, _model(equations), equations))
-    model = _model(equations, _suspect('coulomb_friction', 0))
+    model = _model(equations, _candidate('coulomb_friction', 0))
     found = _errors(windows, *roll_out(windows, model, equations))
     assert found < 1e-3
     assert nominal > 0.1
@@ -95,12 +95,12 @@ def test_dry_friction_holds_and_releases_in_a_roll_out(equations_for, dry):
 def test_a_joint_that_friction_holds_does_not_creep(equations_for, dry):
     """Its level is the jump of the force; below it the joint stands, to the last digit."""
     _, equations = equations_for(dry)
-    model = _model(equations, _suspect('coulomb_friction', 0), _suspect('viscous_friction', 0))
+    model = _model(equations, _candidate('coulomb_friction', 0), _candidate('viscous_friction', 0))
     motion = equations.motion
     dynamics = dynamics_of(model, equations, motion)
     loads = np.column_stack([motion.effort, np.zeros_like(motion.effort), motion.time])
     level = dynamics.level_of_dry_friction(motion.position, loads)
-    np.testing.assert_allclose(level, model.suspects[0].coefficients[0])
+    np.testing.assert_allclose(level, model.effects[0].coefficients[0])
     windows = cut(motion, TRIM, horizon=0.05)
     q, _ = roll_out(windows, model, equations)
     steps = np.abs(np.diff(q[:, :, 0], axis=1))
@@ -114,7 +114,7 @@ def test_what_remembers_commands_needs_no_iteration(equations_for, monkeypatch):
     """A delay is a function of time: one round settles all windows."""
     world = simulate(CHAINS[1], 7, 10.0, motor=delayed(0.012))
     _, equations = equations_for(world)
-    model = _model(equations, _suspect('command_delay', 0, 0.01))
+    model = _model(equations, _candidate('command_delay', 0, 0.01))
     windows = cut(equations.motion, TRIM)
     monkeypatch.setattr(rollouts, 'MOST_ROUNDS', 1)
     assert _errors(windows, *roll_out(windows, model, equations)) < 1e-4
@@ -123,8 +123,8 @@ def test_what_remembers_commands_needs_no_iteration(equations_for, monkeypatch):
 def test_what_remembers_the_motion_is_iterated_to_a_fixed_point(equations_for, hysteretic):
     """The bristle along the roll-out, from the one measured before its window."""
     _, equations = equations_for(hysteretic)
-    model = _model(equations, _suspect('hysteresis', 0, 0.8 * PRESLIDING))
-    assert model.suspects[0].coefficients[0] == pytest.approx(LEVEL, rel=0.02)
+    model = _model(equations, _candidate('hysteresis', 0, 0.8 * PRESLIDING))
+    assert model.effects[0].coefficients[0] == pytest.approx(LEVEL, rel=0.02)
     windows = cut(equations.motion, TRIM)
     nominal = _errors(windows, *roll_out(windows, _model(equations), equations))
     found = _errors(windows, *roll_out(windows, model, equations))
@@ -135,7 +135,7 @@ def test_what_remembers_the_motion_is_iterated_to_a_fixed_point(equations_for, h
 def test_a_window_without_a_fixed_point_is_counted(equations_for, hysteretic, monkeypatch):
     """One round tells nothing of convergence."""
     _, equations = equations_for(hysteretic)
-    model = _model(equations, _suspect('hysteresis', 0, PRESLIDING))
+    model = _model(equations, _candidate('hysteresis', 0, PRESLIDING))
     monkeypatch.setattr(rollouts, 'MOST_ROUNDS', 1)
     _, ends = roll_out(cut(equations.motion, TRIM), model, equations)
     assert not ends.any()
@@ -144,7 +144,7 @@ def test_a_window_without_a_fixed_point_is_counted(equations_for, hysteretic, mo
 def test_a_roll_out_that_runs_away_is_counted(equations_for, viscous):
     """Friction that drives, beyond what numbers can hold."""
     _, equations = equations_for(viscous)
-    model = _model(equations, _suspect('quadratic_drag', 0))
+    model = _model(equations, _candidate('quadratic_drag', 0))
     mad = with_coefficients(model, np.array([-1e5]))
     _, ends = roll_out(cut(equations.motion, TRIM), mad, equations)
     assert not ends.all()
@@ -153,7 +153,7 @@ def test_a_roll_out_that_runs_away_is_counted(equations_for, viscous):
 def test_stiff_friction_is_integrated_in_smaller_steps(equations_for, perfect):
     """A time constant a tenth of the step: the joint creeps, it does not explode."""
     _, equations = equations_for(perfect[1])
-    model = _model(equations, _suspect('viscous_friction', 0))
+    model = _model(equations, _candidate('viscous_friction', 0))
     inertia = float(equations.motion.mass_diagonal.mean())
     stiff = with_coefficients(model, np.array([10.0 / PERIOD * inertia]))
     windows = cut(equations.motion, TRIM)

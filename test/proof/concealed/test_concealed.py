@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sgp_proof.concealed import draw, paper, robots, run, scoring, sizes
-from sgp_proof.concealed.oracle import Oracle, Unlisted, error, nominal_error, share, suspects
+from sgp_proof.concealed.oracle import Oracle, Unlisted, candidates, error, nominal_error, share
 from sgp_proof.concealed.unknown import UNKNOWN
 from sgp_proof.paper.figure_eight import ARM
 from sgp_proof.result_files import RESULTS
@@ -208,8 +208,8 @@ def test_the_true_shape_lies_within_the_bounds_of_its_fit(tmp_path):
     for ratio in (14.0, -7.0, 1.5):
         cable = {'effect': 'joint_coupling', 'joint': 'pole',
                  'parameters': numbers | {'ratio': ratio}}  # fmt: skip
-        (suspect,) = suspects({'effects': [cable]}, motion)
-        low, high = suspect.effect.bounds(motion, suspect.place)
+        (candidate,) = candidates({'effects': [cable]}, motion)
+        low, high = candidate.effect.bounds(motion, candidate.place)
         assert low[0] < ratio < high[0]
 
 

@@ -1,4 +1,4 @@
-"""The models that compete: inertial parameters alone, single effects, pairs of effects."""
+"""Comparison of models: inertial parameters alone, single effects, pairs of effects, more."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, EVIDENCE
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
-from sgp_ros.diagnosis.explain.suspects import Columns
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 
 FIRST, SECOND, PARENTS = 12, 5, 6
-"""Screened suspects that are fitted alone; as a second effect; first effects that get a second."""
+"""Screened candidates that are fitted alone, as a second effect; effects that get a second."""
 
 THIRD = 3
-"""Suspects that are fitted as a third, fourth, ... effect."""
+"""Candidates that are fitted as a third, fourth, ... effect."""
 EXCHANGES = 2
 """Times that an effect of the best pair is exchanged for another."""
 
 
 @dataclass(frozen=True, eq=False)
-class Competition:
+class Comparison:
     """All fitted models.
 
     Attributes:
@@ -50,7 +50,7 @@ class Competition:
         return self.nominal if self.nominal.score >= self.parameters.score else self.parameters
 
 
-def compete(equations: Equations, progress: Callable[[float], None]) -> Competition:
+def compare_models(equations: Equations, progress: Callable[[float], None]) -> Comparison:
     """Fit the models that could explain the discrepancy.
 
     Every model comes in two variants: with bodies as the nominal robot has them, and with bodies
@@ -72,7 +72,7 @@ def compete(equations: Equations, progress: Callable[[float], None]) -> Competit
     for number, single in enumerate(parents):
         second = _distinct(screen(columns, single, effects), SECOND)
         pairs += [
-            fit(columns, (*single.suspects, s), single.sigma, is_free=single.is_free, w=single.w,
+            fit(columns, (*single.effects, s), single.sigma, is_free=single.is_free, w=single.w,
                 rounds=2, steps=8)
             for s in second
         ]  # fmt: skip
@@ -80,7 +80,7 @@ def compete(equations: Equations, progress: Callable[[float], None]) -> Competit
     ranked = _ranked([*pairs, *_exchanged(columns, _ranked(pairs))])
     best = max([*singles, *ranked], key=lambda m: m.score, default=None)
     more = [] if best is None else _extended(columns, best)
-    return Competition(bases[0], bases[1], tuple(singles), tuple(ranked), tuple(more))
+    return Comparison(bases[0], bases[1], tuple(singles), tuple(ranked), tuple(more))
 
 
 def _exchanged(columns: Columns, ranked: list[Model]) -> list[Model]:
@@ -96,12 +96,12 @@ def _exchanged(columns: Columns, ranked: list[Model]) -> list[Model]:
         if best is None or (best.mean_square / power).max() < COUNTED_SHARE:
             break
         trials: list[Model] = []
-        for kept in best.suspects:
+        for kept in best.effects:
             parent = fit(columns, (kept,), best.sigma, is_free=best.is_free, w=best.w, rounds=2,
                          steps=4)  # fmt: skip
             second = _distinct(screen(columns, parent, EFFECTS.values()), SECOND)
             trials += [
-                fit(columns, (*parent.suspects, s), best.sigma, is_free=best.is_free, w=best.w,
+                fit(columns, (*parent.effects, s), best.sigma, is_free=best.is_free, w=best.w,
                     rounds=2, steps=8)
                 for s in second
             ]  # fmt: skip
@@ -120,15 +120,15 @@ def _extended(columns: Columns, model: Model) -> list[Model]:
     found: list[Model] = []
     power = columns.equations(frozenset()).power
     k = len(power)
-    while len(model.suspects) < 2 * k:
-        held = [sum(s.place.joint == j for s in model.suspects) for j in range(k)]
+    while len(model.effects) < 2 * k:
+        held = [sum(s.place.joint == j for s in model.effects) for j in range(k)]
         left = model.mean_square / power
         open_ = [j for j in range(k) if left[j] > COUNTED_SHARE and held[j] < 2]
         if not open_:
             break
         second = [s for _, s in screen(columns, model, EFFECTS.values()) if s.place.joint in open_]
         trials = [
-            fit(columns, (*model.suspects, s), model.sigma, is_free=model.is_free, w=model.w,
+            fit(columns, (*model.effects, s), model.sigma, is_free=model.is_free, w=model.w,
                 rounds=2, steps=4)
             for s in second[:THIRD]
         ]  # fmt: skip
@@ -138,7 +138,7 @@ def _extended(columns: Columns, model: Model) -> list[Model]:
         best = max(gains, key=lambda m: gains[m])
         model = best
         found.append(model)
-    found = [m for m in found if len(m.suspects) > 2]
+    found = [m for m in found if len(m.effects) > 2]
     return [*found, *_simpler(columns, found[-1])] if found else []
 
 
@@ -151,22 +151,24 @@ def _simpler(columns: Columns, model: Model) -> list[Model]:
     simple = [e for e in EFFECTS.values() if len(e.quantities) == 1 and not e.shape_names()]
     found: list[Model] = []
     whole = model
-    for i, suspect in enumerate(model.suspects):
-        if len(suspect.effect.quantities) == 1:
+    for i, candidate in enumerate(model.effects):
+        if len(candidate.effect.quantities) == 1:
             continue
-        place = Place(suspect.place.joint)
+        place = Place(candidate.place.joint)
         others = [EffectAt(e, place) for e in simple if place in e.places(motion)]
         trials = [_replaced(columns, model, i, s) for s in others if s.key not in model.key]
         best = _ranked(trials)
         if best:
             found.append(best[0])
-            whole = _replaced(columns, whole, i, best[0].suspects[i])
+            whole = _replaced(columns, whole, i, best[0].effects[i])
     return _ranked([*found, whole]) if found else []
 
 
-def _replaced(columns: Columns, model: Model, index: int, suspect: EffectAt) -> Model:
-    suspects = (*model.suspects[:index], suspect, *model.suspects[index + 1 :])
-    return fit(columns, suspects, model.sigma, is_free=model.is_free, w=model.w, rounds=2, steps=4)
+def _replaced(columns: Columns, model: Model, index: int, candidate: EffectAt) -> Model:
+    candidates = (*model.effects[:index], candidate, *model.effects[index + 1 :])
+    return fit(
+        columns, candidates, model.sigma, is_free=model.is_free, w=model.w, rounds=2, steps=4
+    )
 
 
 def _gains(model: Model, trials: list[Model]) -> dict[Model, float]:
@@ -177,11 +179,11 @@ def _gains(model: Model, trials: list[Model]) -> dict[Model, float]:
     """
     factors: dict[int, float] = {}
     for trial in trials:
-        j = max(trial.suspects[-1].place.joint, 0)
+        j = max(trial.effects[-1].place.joint, 0)
         factors[j] = min(factors.get(j, np.inf), correlation_factor(trial.residual[:, j]))
     return {
         trial: (trial.likelihood - model.likelihood)
-        / factors[max(trial.suspects[-1].place.joint, 0)]
+        / factors[max(trial.effects[-1].place.joint, 0)]
         - trial.cost + model.cost
         for trial in trials
     }  # fmt: skip
@@ -198,11 +200,11 @@ def _varied(singles: list[Model]) -> list[Model]:
 def _distinct(found: list[tuple[float, EffectAt]], count: int) -> list[EffectAt]:
     """Return the best `count` effects at places, with both of their shapes."""
     keys: list[object] = []
-    for _, suspect in found:
-        if suspect.key not in keys:
-            keys.append(suspect.key)
+    for _, candidate in found:
+        if candidate.key not in keys:
+            keys.append(candidate.key)
     kept = set(keys[:count])
-    return [suspect for _, suspect in found if suspect.key in kept]
+    return [candidate for _, candidate in found if candidate.key in kept]
 
 
 def _ranked(models: Iterable[Model]) -> list[Model]:

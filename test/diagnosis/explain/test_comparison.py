@@ -1,12 +1,12 @@
-"""Which models compete."""
+"""Which models are compared."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from sgp_ros.diagnosis.explain import hypotheses
+from sgp_ros.diagnosis.explain import comparison
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
-from sgp_ros.diagnosis.explain.suspects import Columns
 from sgp_ros.physics.catalogue import EFFECTS
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
@@ -18,10 +18,10 @@ def _falling_friction(t, q, v):
 
 
 def _names(model):
-    return {s.effect.name for s in model.suspects}
+    return {s.effect.name for s in model.effects}
 
 
-def test_a_load_does_not_compete_with_bodies_that_may_differ(equations_for, heavy):
+def test_a_load_is_not_compared_with_bodies_that_may_differ(equations_for, heavy):
     """It is one of their changes, with a freedom that has no price."""
     _, equations = equations_for(heavy[1])
     columns, load = Columns(equations), [EFFECTS['payload']]
@@ -34,7 +34,7 @@ def test_effects_that_show_only_together_are_found_by_exchange(equations_for):
     world = simulate(CHAINS[1], 4, 12.0, force=_falling_friction, dry=lambda t, q, s: 0.3)
     _, equations = equations_for(world)
     start = fitted(equations, 'coulomb_friction', 'viscous_friction')
-    found = hypotheses._exchanged(Columns(equations), [start])
+    found = comparison._exchanged(Columns(equations), [start])
     best = max(found, key=lambda m: m.score)
     assert _names(best) == {'stribeck_friction', 'quadratic_drag'}
     assert best.score > start.score + 100.0
@@ -43,8 +43,8 @@ def test_effects_that_show_only_together_are_found_by_exchange(equations_for):
 def test_a_pair_that_leaves_nothing_is_not_exchanged(equations_for, viscous):
     _, equations = equations_for(viscous)
     pair = fitted(equations, 'viscous_friction', 'spring')
-    assert hypotheses._exchanged(Columns(equations), [pair]) == []
-    assert hypotheses._exchanged(Columns(equations), []) == []
+    assert comparison._exchanged(Columns(equations), [pair]) == []
+    assert comparison._exchanged(Columns(equations), []) == []
 
 
 def test_a_law_of_one_number_is_tried_in_place_of_a_richer_one(equations_for):
@@ -54,8 +54,8 @@ def test_a_law_of_one_number_is_tried_in_place_of_a_richer_one(equations_for):
     )  # fmt: skip
     _, equations = equations_for(world)
     rich = fitted(equations, 'asymmetric_coulomb', 'viscous_friction')
-    found = hypotheses._simpler(Columns(equations), rich)
+    found = comparison._simpler(Columns(equations), rich)
     assert {'coulomb_friction', 'viscous_friction'} in [_names(m) for m in found]
     assert all(m.size < rich.size for m in found)
     plain = fitted(equations, 'coulomb_friction', 'viscous_friction')
-    assert hypotheses._simpler(Columns(equations), plain) == []
+    assert comparison._simpler(Columns(equations), plain) == []
