@@ -57,11 +57,12 @@ LAYERS = {
 
 PROOF_ROOMS = {
     'result_files': set(),
+    'columns': set(),
     'commands': set(),
     'unchanged': {'result_files'},
     'bench': {'result_files'},
-    'paper': set(),
-    'real': {'result_files'},
+    'paper': {'columns'},
+    'real': {'result_files', 'columns'},
     'streams': {'result_files', 'paper', 'real'},
     'numerics': {'result_files', 'bench', 'streams'},
     'concealed': {'result_files', 'paper'},

@@ -10,13 +10,13 @@ from functools import lru_cache
 
 import numpy as np
 
+from sgp_proof.columns import Signal, single_column, velocity
 from sgp_proof.paper.figure_eight import ARM, ArmRun, FigureEight, follow
 from sgp_proof.paper.protocol import Test, World
 from sgp_ros.gp.model import CoefficientPrior, Observations
 from sgp_ros.physics.term import Coefficient, Joint, Motion
 from sgp_ros.rigid.inertial import inertial_term, revolute_chain
 from sgp_ros.robots.robot import Robot
-from sgp_ros.robots.terms import Signal, single_column, velocity
 
 CHANNELS = ('joint1', 'joint2', 'joint3')
 SAMPLES, SIZE = 800, 400

@@ -15,6 +15,7 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
+from sgp_proof.columns import constant, direction, sine, single_column, velocity
 from sgp_proof.real.recordings import DOUBLE, SIMPLE, UNDISTURBED_S, cut_bag, imported
 from sgp_proof.result_files import make_parser, write_result
 from sgp_ros.apps.identify import IdentifyOptions, read_signals
@@ -28,7 +29,6 @@ from sgp_ros.report.findings import collect_findings
 from sgp_ros.report.metrics import Timing, collect_metrics
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
-from sgp_ros.robots.terms import constant, direction, sine, single_column, velocity
 
 SIMPLE_PENDULUM = load_robot('simple_pendulum')
 DOUBLE_PENDULUM = load_robot('double_pendulum')

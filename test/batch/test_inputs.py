@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sgp_proof.columns import acceleration, single_column
 from sgp_ros.batch.fit import fit_offline
 from sgp_ros.batch.inputs import CANDIDATES, choose_inputs
 from sgp_ros.batch.regression_data import FilteredData, FilterPlan, filtered_data
@@ -14,7 +15,6 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.physics.term import Coefficient, Joint, Motion
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
-from sgp_ros.robots.terms import acceleration, single_column
 from test.batch.worlds import moved_axis
 
 LINEAR_AXIS = load_robot('linear_axis')

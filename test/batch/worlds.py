@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy import signal
 
+from sgp_proof.columns import acceleration, single_column
 from sgp_ros.batch.signals import Signals, collect_signals
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
@@ -15,7 +16,6 @@ from sgp_ros.recordings.table_map import read_map
 from sgp_ros.recordings.tables import read_table
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
-from sgp_ros.robots.terms import acceleration, single_column
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.recording import simulate
 

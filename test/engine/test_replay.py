@@ -6,13 +6,13 @@ import dataclasses
 
 import numpy as np
 
+from sgp_proof.columns import acceleration, single_column
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitResult
 from sgp_ros.engine.replay import Swap
 from sgp_ros.engine.samples import JointSample, frozen_array
 from sgp_ros.physics.term import Coefficient, Joint
 from sgp_ros.robots.robot import Robot
-from sgp_ros.robots.terms import acceleration, single_column
 from test.engine.worlds import START_NS, config
 
 NAMES = ('left', 'right')

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from sgp_ros.engine.config import EngineConfig
-from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
-from sgp_ros.physics.term import Coefficient, Joint
-from sgp_ros.robots.robot import Robot
-from sgp_ros.robots.terms import (
+from sgp_proof.columns import (
     acceleration,
     effort,
     sine,
     single_column,
     velocity,
 )
+from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
+from sgp_ros.physics.term import Coefficient, Joint
+from sgp_ros.robots.robot import Robot
 
 START_NS = 1_700_000_000_000_000_000
 TRUTH = {'gravity': -20.0, 'damping': -0.8, 'gain': 5.0}

@@ -1,4 +1,4 @@
-"""Columns that the built-in robots are made of: one signal into the equation of one joint."""
+"""Columns of models that are written by hand: one signal into the equation of one joint."""
 
 from __future__ import annotations
 
