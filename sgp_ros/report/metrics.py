@@ -105,6 +105,12 @@ def model_remarks(engine: Engine, asked: EngineConfig) -> list[str]:
     if robot.source.get('effects'):
         effects = nominal_model(robot).effects
         left_out = [f'{e.name} of {e.joint}' for e in effects if not e.effect.is_online]
+        held = sorted({e.joint for e in effects if e.is_holding})
+        if held:
+            remarks.append(
+                f'dry friction can hold {", ".join(held)} at rest, where no effort follows '
+                'from the motion: a diagnosis leaves rest out of its scores, these scores have it'
+            )
         if left_out:
             remarks.append(
                 f'not modelled online, so the scores of these joints fall behind those of the '
