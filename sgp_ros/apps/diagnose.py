@@ -19,8 +19,7 @@ from sgp_ros.engine.samples import Event, JointSample
 from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.reader import open_recording
-from sgp_ros.report.diagnosis import write_diagnosis
-from sgp_ros.report.diagnosis_predictions import write_predictions
+from sgp_ros.report.diagnosis import write_diagnosis, write_predictions
 from sgp_ros.report.diagnosis_proof import interval_text, tables
 from sgp_ros.report.diagnosis_text import (
     equivalence_sentence,

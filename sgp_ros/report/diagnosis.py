@@ -9,7 +9,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from sgp_ros.diagnosis.prove.held_out import HELD_OUT
-from sgp_ros.diagnosis.result import Diagnosis, Finding, ParameterError
+from sgp_ros.diagnosis.result import Diagnosis, Finding, ParameterError, Predictions
 from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.report.diagnosis_bands import band_sentences
@@ -185,3 +185,16 @@ def _settings(found: Diagnosis) -> list[tuple[str, str]]:
 
 def _typeset(text: str) -> str:
     return text.replace('+-', '±')
+
+
+def write_predictions(folder: Path, found: Diagnosis) -> None:
+    """Write `pred_<stem>.csv` for each held-out recording."""
+    for stem, prediction in found.predictions.items():
+        write_text(folder / f'pred_{stem}.csv', _predictions_table(found.joints, prediction))
+
+
+def _predictions_table(joints: tuple[str, ...], prediction: Predictions) -> str:
+    lines = [','.join(['t', *(f'ddq_{name}' for name in joints)])]
+    for t, row in zip(prediction.time, prediction.acceleration, strict=True):
+        lines.append(','.join([f'{t:.6f}', *(f'{x:.7g}' for x in row)]))
+    return '\n'.join(lines) + '\n'
