@@ -24,7 +24,7 @@ from sgp_proof.concealed import answers, balance, sizes
 from sgp_proof.concealed import world as worlds
 from sgp_proof.concealed.kinds import draw_effect
 from sgp_proof.concealed.robots import urdf
-from sgp_ros.apps.simulated_files import write_simulated
+from sgp_ros.apps.simulation import write_simulated
 from sgp_ros.physics.catalogue import PAYLOAD, VELOCITY_FILTER_LAG
 from sgp_ros.physics.drawing import UnsuitableError
 from sgp_ros.simulation.registry import LAWS

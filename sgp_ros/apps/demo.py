@@ -21,8 +21,8 @@ from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.recordings.messages import Point
 from sgp_ros.recordings.predictions import PredictionTopics, outputs
 from sgp_ros.recordings.reader import open_recording
+from sgp_ros.report.figures import History
 from sgp_ros.report.files import write_text
-from sgp_ros.report.history import History
 from sgp_ros.report.html import write_report
 from sgp_ros.report.metrics import Timing, collect_metrics
 from sgp_ros.robots.registry import load_robot

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from sgp_ros.apps.identified_robot import nominal_coefficients, write_identified
-from sgp_ros.apps.identify_summary import print_findings
 from sgp_ros.batch.identification import HELD_OUT, Identification, IdentificationOptions, identify
 from sgp_ros.batch.regression_data import FilteredData, smoothed_motion
 from sgp_ros.batch.rollout import cut_windows, joined
@@ -22,10 +21,19 @@ from sgp_ros.batch.zero_phase import ZeroPhase
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import ConfigError, RecordingError
+from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.report.findings import collect_findings
-from sgp_ros.report.identification import write_identification
+from sgp_ros.report.identification import (
+    called,
+    cautions,
+    excitation,
+    filter_choice,
+    unknown,
+    verdict,
+    write_identification,
+)
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
 
@@ -226,3 +234,52 @@ def _scored(
         return score_windows(joined(windows), found.robot, best_coefficients(found))
     except (ValueError, np.linalg.LinAlgError):
         return None
+
+
+def print_findings(findings: Mapping[str, Any]) -> None:
+    """Print scores per method, parameters with 95 % intervals, and what is not to be trusted."""
+    print(verdict(findings))
+    print(filter_choice(findings['filter']))
+    _print_scores(findings)
+    _print_rollouts(findings)
+    print('\nparameters of the physics, with 95 % intervals:')
+    width = max((len(p['name']) for p in findings['parameters']), default=0)
+    for p in findings['parameters']:
+        known = unknown(p['status'])
+        if p['std'] is not None:
+            known = f'{p["value"]:12.5g} +- {INTERVAL_95 * p["std"]:<9.3g} {p["unit"]}'
+        print(f'  {p["name"]:{width}s} {known}')
+    print(excitation(findings['excitation']))
+    for text in findings['excitation']['suggestions']:
+        print(f'a motion that would show more: {text}')
+    for text in cautions(findings):
+        print(f'caution: {text}')
+
+
+def _print_scores(findings: Mapping[str, Any]) -> None:
+    units = findings['units'][findings['target']]
+    for name in findings['held_out']:
+        print(f'\n{findings["target"]} in {called(name)}, not learned from: nMSE (rms error)')
+        for method, scores in findings['scores'].items():
+            each = '   '.join(
+                f'{joint} {_short(s["nmse"])} ({_short(s["rmse"])} {units[joint]})'
+                for joint, s in scores[name].get('joints', {}).items()
+            )
+            print(f'  {method:4s} {each or "asks for parameters that are not determined"}')
+
+
+def _print_rollouts(findings: Mapping[str, Any]) -> None:
+    units = findings['units']['position']
+    for name, all_ in findings['rollouts'].items():
+        print(f'\nposition in {called(name)}, simulated from measured efforts: nMSE (rms error)')
+        for score in all_:
+            each = '   '.join(
+                f'{joint} {_short(s["nmse_end"])} ({_short(s["rms_end"])} {units[joint]})'
+                for joint, s in score['joints'].items()
+            )
+            lost = f'   {score["diverged"]} of {score["n"]} diverged' if score['diverged'] else ''
+            print(f'  after {score["horizon_s"]:.3g} s: {each}{lost}')
+
+
+def _short(x: float | None) -> str:
+    return 'none' if x is None else f'{x:.3g}'

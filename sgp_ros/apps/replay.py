@@ -30,8 +30,8 @@ from sgp_ros.recordings.model_files import (
 from sgp_ros.recordings.predictions import PredictionTopics, outputs, write_outputs
 from sgp_ros.recordings.reader import Recording, open_recording
 from sgp_ros.recordings.writer import RecordingWriter
+from sgp_ros.report.figures import History
 from sgp_ros.report.files import replacing_results, write_text
-from sgp_ros.report.history import History
 from sgp_ros.report.html import write_report
 from sgp_ros.report.metrics import Timing, collect_metrics, model_remarks
 from sgp_ros.robots.registry import load_robot

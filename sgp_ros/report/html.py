@@ -11,9 +11,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from sgp_ros.engine.engine import Engine
 from sgp_ros.gp.scores import INTERVAL_95
-from sgp_ros.report.figures import draw_all, png
+from sgp_ros.report.figures import History, draw_all, png
 from sgp_ros.report.files import write_bytes, write_text
-from sgp_ros.report.history import History
 
 MEANINGS = {
     'late': 'older than a state that was already used',

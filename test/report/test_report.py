@@ -10,8 +10,8 @@ import pytest
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
+from sgp_ros.report.figures import History
 from sgp_ros.report.files import replacing_results, write_bytes, write_text
-from sgp_ros.report.history import History
 from sgp_ros.report.html import verdict, write_report
 from sgp_ros.report.metrics import Timing, collect_metrics
 from test.engine.worlds import PENDULUM, START_NS, TRUTH, config, pendulum_events
