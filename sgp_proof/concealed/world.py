@@ -10,10 +10,9 @@ from sgp_proof.concealed import robots
 from sgp_ros.errors import NumericalError
 from sgp_ros.physics.drawing import UnsuitableError
 from sgp_ros.simulation.assembly import make_simulation
-from sgp_ros.simulation.controllers import ControllerChoice
+from sgp_ros.simulation.controllers import ControllerChoice, computed_force, random_multisine
 from sgp_ros.simulation.recording import simulate
 from sgp_ros.simulation.sensors import Sensors
-from sgp_ros.simulation.tracking import computed_force, random_multisine
 from sgp_ros.simulation.tree_simulator import tree_simulator
 
 _LATENCY_S = 2.5e-4

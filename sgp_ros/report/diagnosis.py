@@ -12,9 +12,8 @@ from sgp_ros.diagnosis.prove.held_out import HELD_OUT
 from sgp_ros.diagnosis.result import Diagnosis, Finding, ParameterError, Predictions
 from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.physics.catalogue import EFFECTS
-from sgp_ros.report.diagnosis_bands import band_sentences
 from sgp_ros.report.diagnosis_figures import draw_diagnosis
-from sgp_ros.report.diagnosis_maps import important_joints
+from sgp_ros.report.diagnosis_maps import band_sentences, important_joints
 from sgp_ros.report.diagnosis_proof import densities, near_and_far, proof_rows, rollouts_sentences
 from sgp_ros.report.diagnosis_text import (
     effect_name,

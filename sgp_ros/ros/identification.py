@@ -34,8 +34,7 @@ from sgp_ros.recordings.messages import (
     trajectory_message,
 )
 from sgp_ros.recordings.predictions import Outputs, PredictionTopics
-from sgp_ros.ros.diagnosing import Diagnosing
-from sgp_ros.ros.diagnosis_process import DiagnosisFailed
+from sgp_ros.ros.diagnosing import Diagnosing, DiagnosisFailed
 from sgp_ros.ros.health import parameter_statuses
 from sgp_ros.ros.messages import message_class, new_message
 from sgp_ros.ros.parameters import from_ros, to_ros

@@ -11,11 +11,16 @@ import numpy as np
 
 from sgp_ros.physics.catalogue import COULOMB_FRICTION
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.simulation.controllers import ControllerChoice, external, sinusoids, zero
+from sgp_ros.simulation.controllers import (
+    ControllerChoice,
+    external,
+    pd_reference,
+    sinusoids,
+    zero,
+)
 from sgp_ros.simulation.mechanism import SimulatedJoint, TrueCoefficient, quantity
 from sgp_ros.simulation.sensors import Sensors
 from sgp_ros.simulation.simulator import Simulator
-from sgp_ros.simulation.tracking import pd_reference
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from sgp_ros.simulation.controllers import ControllerChoice, external, zero
+from sgp_ros.simulation.controllers import (
+    ControllerChoice,
+    external,
+    middle_and_reach,
+    multisine_tracking,
+    zero,
+)
 from sgp_ros.simulation.mechanism import SimulatedJoint
 from sgp_ros.simulation.sensors import Sensors, encoder_resolution
 from sgp_ros.simulation.simulator import Simulator
-from sgp_ros.simulation.tracking import middle_and_reach, multisine_tracking
 from sgp_ros.simulation.tree import Tree
 from sgp_ros.simulation.tree_text import TreePart
 from sgp_ros.simulation.tree_xml import STAND_IN_MASS, STAND_IN_RADIUS

@@ -16,8 +16,15 @@ from sgp_ros.diagnosis.criteria import LEAST_SHARE
 from sgp_ros.diagnosis.result import Equivalent, Parameter
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.report.diagnosis import render, write_diagnosis
-from sgp_ros.report.diagnosis_charts import BY_CHANCE, draw_dependence, draw_proof
-from sgp_ros.report.diagnosis_figures import FORCES, draw_diagnosis, draw_laws, draw_time
+from sgp_ros.report.diagnosis_figures import (
+    BY_CHANCE,
+    FORCES,
+    draw_dependence,
+    draw_diagnosis,
+    draw_laws,
+    draw_proof,
+    draw_time,
+)
 from sgp_ros.report.diagnosis_maps import draw_location, important_joints
 from sgp_ros.report.diagnosis_text import (
     equivalence_sentence,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sgp_ros.simulation.tracking import random_multisine
+from sgp_ros.simulation.controllers import random_multisine
 from test.simulation.trees import arm
 
 
@@ -33,10 +33,9 @@ def test_tracked_arm_follows_its_reference():
     """The computed force of the robot itself leaves an error of the sampling alone."""
     pytest.importorskip('mujoco')
     from sgp_ros.simulation.assembly import make_simulation
-    from sgp_ros.simulation.controllers import ControllerChoice
+    from sgp_ros.simulation.controllers import ControllerChoice, computed_force
     from sgp_ros.simulation.recording import simulate
     from sgp_ros.simulation.simulator import Simulator
-    from sgp_ros.simulation.tracking import computed_force
     from sgp_ros.simulation.tree_simulator import tree_simulator
 
     usual = tree_simulator(arm())

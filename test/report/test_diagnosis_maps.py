@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from sgp_ros.report.diagnosis import render
-from sgp_ros.report.diagnosis_bands import band_sentences, draw_bands
 from sgp_ros.report.diagnosis_figures import draw_diagnosis
+from sgp_ros.report.diagnosis_maps import band_sentences, draw_bands
 from test.report.diagnoses import COULOMB, LEVEL, LOCAL, diagnosis
 
 REACH = {'shoulder': 0.5, 'elbow': 0.5}
