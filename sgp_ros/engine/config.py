@@ -239,6 +239,9 @@ def _structural_problems(
     ]
     if unknown:
         problems.append(f'command.joints names {unknown}: the robot has {robot.joint_names}')
+    window = values['filter.window']
+    if window < 0.0 and window != AUTOMATIC:
+        problems.append(f'filter.window = {window:g}: expected 0 to 10 s, or -1 to choose it')
     try:
         columns = robot.residual_columns(values.get('model.residual_inputs', ('default',)))
     except ConfigError as error:

@@ -24,6 +24,7 @@ def _problems(**settings):
     [
         ('filter.window', 'long', 'a number'),
         ('filter.window', -2.0, 'from -1 to 10'),
+        ('filter.window', -0.5, '-1 to choose'),
         ('filter.window', float('nan'), 'a number'),
         ('filter.degree', 4.0, 'an integer'),
         ('filter.degree', True, 'an integer'),

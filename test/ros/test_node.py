@@ -167,7 +167,8 @@ def test_an_invalid_parameter_is_refused_with_the_reason_and_changes_nothing(
     _start(graph)
     client = graph.parameters()
     for name, value, reason in (
-        ('filter.window', -1.0, 'filter.window'),
+        ('filter.window', -2.0, 'filter.window'),
+        ('filter.window', -0.5, 'filter.window'),
         ('filter.window', 1, 'DOUBLE'),
         ('filter.velocity', 'guessed', 'measured'),
         ('hyper.pole.lengthscales', [1.0, 2.0, 3.0], '2 positive'),
@@ -307,7 +308,7 @@ def test_a_record_survives_a_killed_node(graph: Graph, tmp_path: Path) -> None:
     [
         ({'robot': 'submarine'}, 'submarine'),
         ({'filter__window': 1}, 'filter.window'),
-        ({'filter__window': -1.0, 'buffer__budget': 1}, '2 wrong parameters'),
+        ({'filter__window': -2.0, 'buffer__budget': 1}, '2 wrong parameters'),
         ({'command__type': 'std_msgs/Bool'}, 'command.type'),
         ({'model__path': '/no/model.npz'}, 'no model file /no/model.npz'),
     ],
