@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,9 +17,11 @@ from sgp_ros.engine.prior_knowledge import (
     model_of_settings,
     prior_of_robot,
 )
+from sgp_ros.engine.rest import without_rest
 from sgp_ros.engine.results import Channel, Counts, Estimate
 from sgp_ros.engine.windows import Equation
 from sgp_ros.errors import NumericalError
+from sgp_ros.gp.information import Information
 from sgp_ros.gp.learning import initial_model
 from sgp_ros.gp.model import Model, Observations
 from sgp_ros.gp.online import OnlineRegression
@@ -49,6 +52,7 @@ class Estimator:
         columns = robot.residual_columns(config.model_residual_inputs)
         self.inputs = (None,) * k if config.model_method == 'PR' else columns
         self._prior = prior_of_robot(robot, config)
+        self._known = Information.of_prior(self._prior).coefficients
         self._complement_columns = complement_columns(robot)
         self._sees_complement = config.model_method != 'PR' and any(
             self._complement_columns & set(seen) for seen in columns
@@ -111,9 +115,12 @@ class Estimator:
         """Predict an equation, score the prediction, then learn it."""
         self._counts.estimated += 1
         if self.regression is None:
-            estimate = self._unknown(equation)
-            if self._config.learning_enabled:
-                self.waiting.append(self._arrays(equation))
+            u, f, y = self._arrays(equation)
+            _, held = without_rest(equation.slack, f @ self._known[: f.shape[1]], y)
+            self._counts.held += bool(held.any())
+            estimate = self._unknown(equation, is_learned=not held.any())
+            if estimate.is_learned:
+                self.waiting.append((u, f, y))
                 if len(self.waiting) >= self._config.learning_initial:
                     self._start(self.waiting)
                     self.waiting = []
@@ -126,9 +133,12 @@ class Estimator:
         noise = np.array(regression.model.noise)
         target = Channel(y, prediction.mean, np.diag(prediction.covariance) + noise)
         complement = self._complement(regression, equation, prediction)
-        is_scored = self._score(target, complement)
-        self._take_baseline(u, f, y, is_scored=is_scored)
-        is_learned = self._config.learning_enabled and self._learn(regression, prediction, y)
+        y, held = without_rest(equation.slack, prediction.mean, y)
+        self._counts.held += bool(held.any())
+        is_scored = self._score(replace(target, measured=y), complement, held)
+        may_learn = self._config.learning_enabled and not held.any()
+        self._take_baseline(u, f, y, held, is_scored=is_scored)
+        is_learned = may_learn and self._learn(regression, prediction, y)
         channels = {self._robot.target: target, self._robot.complement: complement}
         return Estimate(
             equation.stamp_ns,
@@ -206,37 +216,40 @@ class Estimator:
         mean[joints], variance[joints] = solved[0], np.diag(solved[1])
         return Channel(measured, mean, variance)
 
-    def _score(self, target: Channel, complement: Channel) -> bool:
+    def _score(self, target: Channel, complement: Channel, held: np.ndarray) -> bool:
         is_known = np.isfinite(target.variance) & (target.variance > 0.0)
-        if not is_known.all():  # undetermined, or lost to rounding far outside all samples
+        if not is_known.all() or held.all():  # unknown: undetermined, or far outside all samples
             return False
         self._counts.scored += 1
         errors = (target.measured - target.mean) / np.sqrt(target.variance)
-        for test, error in zip(self.drift, errors, strict=True):
-            test.add(float(error))
-        for channel, values in (
-            (self._robot.target, target), (self._robot.complement, complement)
+        for test, error, is_held in zip(self.drift, errors, held, strict=True):
+            if not is_held:
+                test.add(float(error))
+        # a held joint keeps the other side of the equation from following for all of them
+        is_free = np.full(len(held), not held.any())
+        for channel, values, is_told in (
+            (self._robot.target, target, ~held), (self._robot.complement, complement, is_free)
         ):  # fmt: skip
             for j, score in enumerate(self.scores[channel]):
-                if values.variance[j] > 0.0 and math.isfinite(values.variance[j]):
+                if is_told[j] and values.variance[j] > 0.0 and math.isfinite(values.variance[j]):
                     score.add(
-                        float(values.measured[j]),
-                        float(values.mean[j]),
-                        float(values.variance[j]),
+                        *(float(x[j]) for x in (values.measured, values.mean, values.variance))
                     )
         return True
 
     def _take_baseline(
-        self, u: np.ndarray, f: np.ndarray, y: np.ndarray, *, is_scored: bool
+        self, u: np.ndarray, f: np.ndarray, y: np.ndarray, held: np.ndarray, *, is_scored: bool
     ) -> None:
         if self.baseline is None:
             return
         prediction = self.baseline.predict(u, f)
         variance = np.diag(prediction.covariance) + np.array(self.baseline.model.noise)
         if is_scored and np.all(np.isfinite(variance)):
-            for j, score in enumerate(self.baseline_scores):
-                score.add(float(y[j]), float(prediction.mean[j]), float(variance[j]))
-        if self._config.learning_enabled:
+            for j in np.flatnonzero(~held):
+                self.baseline_scores[j].add(
+                    float(y[j]), float(prediction.mean[j]), float(variance[j])
+                )
+        if self._config.learning_enabled and not held.any():
             self.baseline.learn(prediction, y)
 
     def make_regression(self, model: Model) -> Regression:
@@ -270,7 +283,7 @@ class Estimator:
         else:
             self._counts.learned += len(data.U)
 
-    def _unknown(self, equation: Equation) -> Estimate:
+    def _unknown(self, equation: Equation, *, is_learned: bool) -> Estimate:
         return Estimate(
             equation.stamp_ns,
             self._robot.joint_names,
@@ -279,7 +292,7 @@ class Estimator:
             Channel.unknown(self._measured(equation, 'acceleration')),
             Channel.unknown(self._measured(equation, 'effort')),
             is_scored=False,
-            is_learned=self._config.learning_enabled,
+            is_learned=is_learned and self._config.learning_enabled,
         )
 
 

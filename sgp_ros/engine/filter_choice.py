@@ -13,6 +13,7 @@ import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.intake import CommandHistory, State
+from sgp_ros.engine.rest import white_variance
 from sgp_ros.engine.samples import SettingValue
 from sgp_ros.engine.windows import Equation, WeakForm, WindowFilter
 from sgp_ros.robots.robot import Robot
@@ -25,7 +26,7 @@ WINDOWS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
 NOISE_SHARE = 5e-6
 """Most of the mean square of the acceleration that its noise may be."""
 _SPACING_S = 0.05
-_POINTS, _DEGREE = 5, 3
+_POINTS = 5
 _MEDIAN_OF_SQUARE = 0.4549
 """Of a standard normal variable."""
 
@@ -144,7 +145,7 @@ def _noise_share(stretches: list[list[State]], source: str, window: float) -> fl
     for stretch in stretches:
         t = np.array([state.stamp_ns - stretch[0].stamp_ns for state in stretch]) * 1e-9
         x = np.array([s.position if source == 'position' else s.velocity for s in stretch])
-        noise.append(_squared_noise(t, x))
+        noise.append(white_variance(t, x))
         for centre in np.arange(t[0] + 0.5 * window, t[-1] - 0.5 * window, _SPACING_S):
             inside = np.abs(t - centre) <= 0.5 * window
             if inside.sum() < _POINTS:
@@ -161,16 +162,3 @@ def _noise_share(stretches: list[list[State]], source: str, window: float) -> fl
     if not moves.any():
         return float('inf')
     return float((np.mean(gain) * variance[moves] / power[moves]).max())
-
-
-def _squared_noise(times: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return the squares of what a cubic leaves of five neighbours each, (n - 4, k).
-
-    Their mean is the variance of white noise, for stamps of any spacing.
-    """
-    index = np.arange(len(times) - _POINTS + 1)[:, None] + np.arange(_POINTS)
-    centred = times[index] - times[index].mean(axis=1, keepdims=True)
-    scaled = centred / np.abs(centred).max(axis=1, keepdims=True)
-    Q, _ = np.linalg.qr(scaled[:, :, None] ** np.arange(_DEGREE + 1), mode='complete')
-    left = np.einsum('nm,nmk->nk', Q[:, :, _DEGREE + 1], x[index])
-    return left * left

@@ -109,6 +109,8 @@ class Counts:
         estimated: windows that gave an equation.
         learned: equations that the model learned.
         scored: equations whose prediction entered the scores.
+        held: equations that dry friction makes inequalities, as it holds a joint at rest: scored
+            for the other joints, and not learned.
         unlearnable: equations that repeat others to rounding.
         refits: fits of hyper-parameters put in force.
         refits_refused_for: those refused by reason.
@@ -127,6 +129,7 @@ class Counts:
     estimated: int = 0
     learned: int = 0
     scored: int = 0
+    held: int = 0
     unlearnable: int = 0
     refits: int = 0
     refits_refused_for: dict[str, int] = field(

@@ -20,6 +20,7 @@ import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.intake import CommandHistory, State
+from sgp_ros.engine.rest import friction_slack
 from sgp_ros.physics.term import Motion
 from sgp_ros.robots.robot import Robot
 
@@ -115,6 +116,8 @@ class Equation:
         state_rows: (k, p) part of f that the state alone determines.
         slopes: (c, k, p) change of f per unit of each complement signal.
         complement_joints: the c joints those signals belong to.
+        slack: (2, k) least and largest effort by which the target may exceed the rows where dry
+            friction holds a joint: the equation is then an inequality. None where it holds none.
     """
 
     stamp_ns: int
@@ -123,6 +126,7 @@ class Equation:
     state_rows: np.ndarray
     slopes: np.ndarray
     complement_joints: tuple[int, ...]
+    slack: np.ndarray | None = None
 
     def regressor(self, complement: np.ndarray) -> np.ndarray:
         """Return f (k, p) for complement signals (c,)."""
@@ -258,18 +262,16 @@ class WindowFilter:
             drive if forward else still,
         )
         rows = self._robot.regressor(extended)  # (m + probes, k, p)
+        measured = np.array([state.position for state in window])
+        centre = motion.position[at][None], motion.velocity[at][None]
         return Equation(
             window[at].stamp_ns,
             (window[-1].stamp_ns - window[0].stamp_ns) * 1e-9,
-            Motion(
-                motion.position[at][None],
-                motion.velocity[at][None],
-                motion.acceleration,
-                motion.effort,
-            ),
+            Motion(*centre, motion.acceleration, motion.effort),
             np.tensordot(weights.form.averaging, rows[:m], axes=1),
             rows[m + 1 :] - rows[m],
             joints,
+            friction_slack(self._robot, motion, measured, weights.form),
         )
 
     def _weights(self, offsets_ns: np.ndarray, *, measured: bool) -> _Weights:

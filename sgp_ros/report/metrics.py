@@ -70,6 +70,7 @@ def collect_metrics(
             'made': counts.estimated,
             'scored': counts.scored,
             'learned': counts.learned,
+            'held': counts.held,
             'repeating': counts.unlearnable,
             'refits': counts.refits,
             'refits_refused': counts.refits_refused,
@@ -107,9 +108,11 @@ def model_remarks(engine: Engine, asked: EngineConfig) -> list[str]:
         left_out = [f'{e.name} of {e.joint}' for e in effects if not e.effect.is_online]
         held = sorted({e.joint for e in effects if e.is_holding})
         if held:
+            counts = engine.counts
             remarks.append(
-                f'dry friction can hold {", ".join(held)} at rest, where no effort follows '
-                'from the motion: a diagnosis leaves rest out of its scores, these scores have it'
+                f'dry friction can hold {", ".join(held)} at rest, where no effort follows from '
+                f'the motion: {counts.held} of {counts.estimated} equations were within what it '
+                'may take; they are not learned, nor scored for the joint that it holds'
             )
         if left_out:
             remarks.append(

@@ -125,9 +125,59 @@ class EffortMap:
             if is_measured and stated.effect.is_of_command:
                 continue
             columns = list(stated.effect.effort_columns(stated.kind))
-            force = _forces(self.tree, stated, motion, self.coulomb_width)[:, :, columns]
+            direction = np.tanh(velocity / self.coulomb_width)
+            force = _forces(self.tree, stated, motion, direction)[:, :, columns]
             acting += force @ stated.coefficients[columns]
         return acting
+
+
+def rest_friction(
+    tree: Tree, effects: Sequence[EffectAt], coulomb_width: float
+) -> RestFriction | None:
+    """Return what dry friction may do at rest; None where no stated effect holds a joint.
+
+    Args:
+        tree: nominal robot.
+        effects: stated ones.
+        coulomb_width: velocity over which dry friction changes its sign [rad/s or m/s].
+    """
+    chosen = tuple(e for e in effects if e.effect.is_online and e.is_holding)
+    return RestFriction(tree, chosen, coulomb_width) if chosen else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RestFriction:
+    """Dry friction at rest, anything between what it is in sliding one way and the other.
+
+    Attributes:
+        tree: nominal robot.
+        effects: those that hold a joint at rest.
+        coulomb_width: velocity over which dry friction changes its sign [rad/s or m/s].
+    """
+
+    tree: Tree
+    effects: tuple[EffectAt, ...]
+    coulomb_width: float
+
+    @property
+    def joints(self) -> frozenset[int]:
+        """Indices of the joints that they hold."""
+        return frozenset(e.place.joint for e in self.effects)
+
+    def __call__(self, motion: Motion) -> np.ndarray:
+        """Return the least and the largest force beyond the one that the rows take, (2, n, k).
+
+        The rows take the direction of motion from the velocity, made smooth over the width.
+        """
+        ends = np.zeros((2, *motion.position.shape))
+        for stated in self.effects:
+            now = np.tanh(motion.velocity / self.coulomb_width)
+            taken, *sliding = (
+                _forces(self.tree, stated, motion, direction) @ stated.coefficients
+                for direction in (now, -np.ones_like(now), np.ones_like(now))
+            )
+            ends += np.sort(np.array(sliding) - taken, axis=0)
+        return ends
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,15 +195,15 @@ class _Instant:
         return u if characteristic is None else characteristic(u)
 
 
-def _forces(tree: Tree, stated: EffectAt, motion: Motion, width: float) -> np.ndarray:
+def _forces(tree: Tree, stated: EffectAt, motion: Motion, direction: np.ndarray) -> np.ndarray:
     """Return the force per coefficient on every joint, (n, k, m).
 
-    The rows stand alone, so the direction of motion is the velocity's, made smooth over `width`.
+    The rows stand alone, so the direction of motion (n, k) is given.
     """
     n, k = motion.position.shape
     seen = ObservedMotion(
         tree, np.zeros(n), 0.0, motion.position, motion.velocity, motion.acceleration,
-        motion.effort, _Instant(motion.effort), given_direction=np.tanh(motion.velocity / width),
+        motion.effort, _Instant(motion.effort), given_direction=direction,
     )  # fmt: skip
     columns = stated.columns(seen)
     if columns.ndim == 3:
@@ -165,7 +215,8 @@ def _forces(tree: Tree, stated: EffectAt, motion: Motion, width: float) -> np.nd
 
 def _term(tree: Tree, stated: EffectAt, names: Mapping[int, str], coulomb_width: float) -> Term:
     def columns(motion: Motion) -> np.ndarray:
-        return -_forces(tree, stated, motion, coulomb_width)[:, :, list(names)]
+        direction = np.tanh(motion.velocity / coulomb_width)
+        return -_forces(tree, stated, motion, direction)[:, :, list(names)]
 
     joint = stated.place.joint
     prismatic = joint >= 0 and bool(tree.is_prismatic[joint])

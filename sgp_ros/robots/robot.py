@@ -9,12 +9,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.term import INPUT_CHANNELS, Coefficient, Joint, Motion, Term
 from sgp_ros.robots.bodies import LumpedBodies
+
+
+class RestForce(Protocol):
+    """What dry friction may do where joints rest."""
+
+    @property
+    def joints(self) -> frozenset[int]:
+        """Indices of the joints that it holds."""
+
+    @property
+    def coulomb_width(self) -> float:
+        """Velocity over which it changes its sign [rad/s or m/s]."""
+
+    def __call__(self, motion: Motion) -> np.ndarray:
+        """Return the least and the largest force beyond the one that the rows take, (2, n, k)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +47,8 @@ class Robot:
         source: the entries of a robot YAML that build this robot; empty for a built-in one.
         effort_map: from recorded efforts to those that act on the joints, see
             `effect_terms.EffortMap`; None for the same.
+        rest_friction: what stated dry friction may do at rest beyond what the rows take, see
+            `effect_terms.RestFriction`; None without any.
         bodies: of a robot that lumped coefficients describe; None for one from a URDF.
 
     Examples:
@@ -62,6 +80,7 @@ class Robot:
     description: str = ''
     source: Mapping[str, object] = field(default_factory=dict, compare=False)
     effort_map: Callable[..., np.ndarray] | None = None
+    rest_friction: RestForce | None = None
     bodies: LumpedBodies | None = field(default=None, compare=False)
 
     @property

@@ -45,7 +45,7 @@ from sgp_ros.rigid.inertial import inertial_term
 from sgp_ros.rigid.locking import Plan, plan_joints
 from sgp_ros.rigid.tree import Payload, Tree, read_urdf
 from sgp_ros.rigid.urdf_text import parse_urdf
-from sgp_ros.robots.effect_terms import changed_tree, effect_terms, effort_map
+from sgp_ros.robots.effect_terms import changed_tree, effect_terms, effort_map, rest_friction
 from sgp_ros.robots.entries import Entries
 from sgp_ros.robots.nominal_prior import inertial_prior, joint_prior
 from sgp_ros.robots.robot import Robot
@@ -90,6 +90,7 @@ def build_urdf_robot(
         source={k: v for k, v in document.items() if k not in {'schema', 'urdf'}}
         | {'urdf': str(place.resolve()) if isinstance(place, Path) else place},
         effort_map=effort_map(tree, effects, width),
+        rest_friction=rest_friction(tree, effects, width),
     )
     try:
         return robot.with_inputs(document.get('residual_inputs', 'own'))

@@ -143,6 +143,7 @@ class Health:
             'budget': str(config.buffer_budget),
             'basis_unresolved': str(0 if regression is None else regression.unresolved),
             'delay_s': f'{engine.delay_s:.6f}',
+            'held': str(counts.held),
             'refits': str(counts.refits),
             'refits_refused': str(counts.refits_refused),
             **{f'refits_refused.{why}': str(n) for why, n in counts.refits_refused_for.items()},

@@ -1,0 +1,122 @@
+"""Rest of joints in a window, where dry friction takes up what is needed.
+
+While a joint rests, dry friction is anything between what it is in sliding one way and the other.
+The equation of a window is then an inequality: it holds for some force within that band, and only
+what lies outside the band is an error.
+
+A joint rests while its positions over `SPAN_S` tell no direction of motion: their range is less
+than what the width of velocities over which the model lets dry friction change its sign makes of
+it, or than their noise. The range of a quick reversal is larger.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from sgp_ros.physics.term import Motion
+from sgp_ros.robots.robot import Robot
+
+SPAN_S = 0.03
+"""Time over which positions tell whether a joint moves [s]."""
+_DEVIATIONS = 4.0
+_POINTS = 5
+
+
+class Averaging(Protocol):
+    """How a window averages the equation of motion, as `windows.WeakForm`."""
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times of the samples, (m,) [s]."""
+
+    @property
+    def averaging(self) -> np.ndarray:
+        """Shares of the samples, (m,)."""
+
+
+def white_variance(times: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Return the squares of what a cubic leaves of five neighbours each, (m - 4, k).
+
+    Their mean is the variance of white noise, for stamps (m,) of any spacing and x (m, k).
+    """
+    index = np.arange(len(times) - _POINTS + 1)[:, None] + np.arange(_POINTS)
+    centred = times[index] - times[index].mean(axis=1, keepdims=True)
+    scaled = centred / np.abs(centred).max(axis=1, keepdims=True)
+    Q, _ = np.linalg.qr(scaled[:, :, None] ** np.arange(_POINTS - 1), mode='complete')
+    left = np.einsum('nm,nmk->nk', Q[:, :, _POINTS - 1], x[index])
+    return np.asarray(left * left)
+
+
+def resting(times: np.ndarray, position: np.ndarray, width: float) -> np.ndarray:
+    """Return where joints rest, (m, k).
+
+    Args:
+        times: (m,) [s].
+        position: measured, (m, k) [rad or m].
+        width: velocity below which dry friction has no certain direction [rad/s or m/s].
+    """
+    m = len(times)
+    noise = np.zeros(position.shape[1])
+    if m >= _POINTS:
+        noise = np.sqrt(2.0 * white_variance(times, position).mean(axis=0))
+    first = np.searchsorted(times, times - 0.5 * SPAN_S)
+    last = np.searchsorted(times, times + 0.5 * SPAN_S, side='right')
+    rests = np.zeros(position.shape, dtype=bool)
+    for i in range(1, m - 1):
+        part = slice(min(first[i], i - 1), max(last[i], i + 2))
+        near = position[part]
+        span = times[part][-1] - times[part][0]
+        rests[part] |= np.ptp(near, axis=0) < np.maximum(width * span, _DEVIATIONS * noise)
+    return rests
+
+
+def friction_slack(
+    robot: Robot, motion: Motion, measured: np.ndarray, form: Averaging
+) -> np.ndarray | None:
+    """Return what dry friction may add to the target of a window, from least to largest, (2, k).
+
+    Args:
+        robot: states which effects hold its joints.
+        motion: smoothed positions and velocities of the window, (m, k), with its filtered
+            acceleration and effort, (1, k).
+        measured: positions, (m, k).
+        form: of the window.
+
+    Returns:
+        None where no dry friction is stated, or all its joints move.
+    """
+    friction = robot.rest_friction
+    if friction is None:
+        return None
+    rests = resting(form.times, measured, friction.coulomb_width)
+    if not rests[:, sorted(friction.joints)].any():
+        return None
+    m = len(measured)
+    whole = Motion(
+        motion.position, motion.velocity,
+        np.repeat(motion.acceleration, m, axis=0), np.repeat(motion.effort, m, axis=0),
+    )  # fmt: skip
+    return np.asarray(np.tensordot(friction(whole) * rests, form.averaging, axes=([1], [0])))
+
+
+def without_rest(
+    slack: np.ndarray | None, mean: np.ndarray, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the target beside what dry friction takes at rest, and the joints that it holds.
+
+    Args:
+        slack: (2, k) what it may add to the target, from least to largest; None where joints move.
+        mean: (k,) predicted target.
+        y: (k,) target.
+
+    Returns:
+        (k,) target that only differs from `mean` by what lies outside the band, and (k,) whether
+        nothing does.
+    """
+    if slack is None:
+        return y, np.zeros(len(y), dtype=bool)
+    low, high = slack
+    needed = mean - y
+    return y + np.clip(needed, low, high), (low < needed) & (needed < high)
