@@ -1,6 +1,6 @@
 """What a diagnosis promises and what `sgp replay` delivers with the robot that it leaves.
 
-    python -m sgp_proof.concealed.promises CASES DIAGNOSES
+    python -m sgp_proof.concealed.promises CASES DIAGNOSES [--out FILE]
 
 For every case the training recording runs through the online engine with `robot_diagnosed.yaml`,
 and the nMSE of the effort stands beside the one of the diagnosis, with their ratio. Effects that
@@ -9,14 +9,16 @@ are not modelled online, and joints that dry friction holds at rest, are remarke
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import json
 import tempfile
 from pathlib import Path
 
+from sgp_proof.result_files import make_parser, write_result
 from sgp_ros.apps.replay import run_replay
+
+_NAMES = ('promised', 'delivered')
 
 
 def promised_and_delivered(
@@ -41,11 +43,12 @@ def promised_and_delivered(
 
 
 def main() -> None:
-    """Print one line a joint."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    """Print one line a joint, and write the result."""
+    parser = make_parser(__doc__, 'promises')
     parser.add_argument('cases', type=Path, help='folder of folders with real.mcap')
     parser.add_argument('diagnoses', type=Path, help='folder of the results of sgp diagnose')
     arguments = parser.parse_args()
+    results = {}
     for case in sorted(arguments.cases.iterdir()):
         found, remarks = promised_and_delivered(
             case / 'real.mcap', arguments.diagnoses / case.name
@@ -55,6 +58,9 @@ def main() -> None:
             print(f'{case.name} {joint}: {promised:.2g} promised, {delivered:.2g}, x {ratio:.1f}')
         for remark in remarks:
             print(f'    {remark}')
+        joints = {joint: dict(zip(_NAMES, pair, strict=True)) for joint, pair in found.items()}
+        results[case.name] = {'effort_nmse': joints, 'remarks': remarks}
+    write_result(arguments.out, {'cases': results})
 
 
 if __name__ == '__main__':
