@@ -85,6 +85,8 @@ IMPURE_MODULES = {
 }  # fmt: skip
 FORBIDDEN = {'pickle', 'marshal', 'shelve', 'dill'}
 LONGEST_MODULE, LONGEST_FUNCTION = 300, 50
+SHORTEST_MODULE = 60
+"""A module with fewer lines that one other module alone imports belongs into that one."""
 
 
 def _layer(path):
@@ -221,6 +223,31 @@ def test_modules_and_functions_stay_short(path):
             docstring = ast.get_docstring(node) or ''
             body = node.end_lineno - node.lineno - docstring.count('\n')
             assert body <= LONGEST_FUNCTION, node.name
+
+
+def test_a_short_module_serves_more_than_one_other():
+    """The counterweight to the longest module: nothing is split for its length alone."""
+    paths = [p for p in (*MODULES, *PROOF_MODULES) if p.name != '__init__.py']
+    names = {'.'.join(p.relative_to(PACKAGE.parent).with_suffix('').parts): p for p in paths}
+    importers = {name: set() for name in names}
+    for name, path in names.items():
+        for node in ast.walk(_tree(path)):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                whole = {node.module, *(f'{node.module}.{a.name}' for a in node.names)}
+                for imported in whole & set(names):
+                    importers[imported].add(name)
+    lonely = {
+        name
+        for name, path in names.items()
+        if len(importers[name]) == 1 and path.read_text().count('\n') < SHORTEST_MODULE
+    }
+    assert not lonely
+
+
+@pytest.mark.parametrize('path', MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_imports_are_plain(path):
+    """No block for type checkers alone, in which circles hide."""
+    assert 'TYPE_CHECKING' not in path.read_text(encoding='utf-8')
 
 
 @pytest.mark.parametrize(
