@@ -137,7 +137,7 @@ def random_multisine(
 
 
 _COUNT = 5
-_LOWEST_HZ, _HIGHEST_HZ = 0.1, 0.8
+_TRACKED_HZ = (0.1, 0.8)
 _RMS_M = 0.08
 _BANDWIDTH = 15.0
 _JOINT_BANDWIDTH = 8.0
@@ -154,7 +154,7 @@ def pd_reference(
     about its mean; the gains give critical damping at 15 rad/s.
     """
     mass = next(c.value for c in mechanism.coefficients() if c.name == 'M')
-    rate = 2.0 * math.pi * rng.uniform(_LOWEST_HZ, _HIGHEST_HZ, _COUNT)
+    rate = 2.0 * math.pi * rng.uniform(*_TRACKED_HZ, _COUNT)
     amplitude = rng.choice([-1.0, 1.0], _COUNT) * _RMS_M * math.sqrt(2.0 / _COUNT)
     stiffness, damping = mass * _BANDWIDTH**2, 2.0 * mass * _BANDWIDTH
 
