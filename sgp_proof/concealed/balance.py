@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from sgp_proof.concealed.concealed_effect import Motion
+from sgp_ros.physics.drawing import PilotRun
 
 WIDTH_S, RATE_HZ = 0.012, 200.0
 """Low-pass under which accelerations are compared: standard deviation of a Gaussian, and rate."""
@@ -55,7 +55,7 @@ def pilot_motion(recording, world):
     is_driven = [body.is_driven for body in world.bodies]
     effort = np.where(is_driven, balance.given.std(axis=0), balance.diagonal.std(axis=0))
     q = recording.shown_position
-    return Motion(
+    return PilotRun(
         effort + 1e-9, recording.shown_velocity.std(axis=0) + 1e-9,
         recording.true_acceleration.std(axis=0) + 1e-9, q.std(axis=0) + 1e-9,
         q.min(axis=0), q.max(axis=0), q,

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from sgp_proof.concealed.unknown import NAME, UNKNOWN
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
@@ -42,16 +40,3 @@ class Concealed:
         if self.name != NAME:
             return ()
         return UNKNOWN[self.parameters['kind']](self.index, self.parameters, joints)
-
-
-@dataclass(frozen=True)
-class Motion:
-    """What a pilot run of the nominal robot showed: rms and extremes, per joint."""
-
-    effort: np.ndarray
-    velocity: np.ndarray
-    acceleration: np.ndarray
-    spread: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-    positions: np.ndarray

@@ -39,7 +39,8 @@ class Body(Protocol):
         """Whether it slides."""
 
 
-class Shown(Protocol):
+@dataclass(frozen=True, slots=True, eq=False)
+class PilotRun:
     """What a pilot run of the nominal robot showed: rms and extremes, (k,) each."""
 
     effort: np.ndarray
@@ -88,7 +89,7 @@ class Scene:
 
     rng: np.random.Generator
     bodies: Sequence[Body]
-    motion: Shown
+    motion: PilotRun
     joint: int
     is_hard: bool = False
 
