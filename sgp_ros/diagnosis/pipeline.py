@@ -29,8 +29,9 @@ from sgp_ros.diagnosis.locate.dependence import dependences
 from sgp_ros.diagnosis.locate.remainder import Remainder, learn_remainder
 from sgp_ros.diagnosis.prove.held_out import keep_back
 from sgp_ros.diagnosis.prove.prediction import FinalModel, diagnosed_bodies
+from sgp_ros.diagnosis.prove.processes import harm, kept_processes
 from sgp_ros.diagnosis.prove.proof import prove, reasons_to_doubt
-from sgp_ros.diagnosis.result import Diagnosis, Traces
+from sgp_ros.diagnosis.result import Diagnosis, Proof, Traces
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import NumericalError
@@ -111,15 +112,18 @@ def _diagnosed(
     comparison = compare_models(equations, lambda share: progress(0.05 + 0.85 * share))
     decision = decide(equations, comparison)
     lags = [lag for lag in sensor_lags(raw, equations) if lag.is_physics]
-    remainders = _remainders(equations, decision)
-    final = FinalModel(decision.model, comparison.nominal, equations, remainders)
+    learned = _remainders(equations, decision)
+    final = FinalModel(decision.model, comparison.nominal, equations, learned)
+    remainders, on_z = kept_processes(final)
+    final = replace(final, remainders=remainders)
     contrasts = Contrasts(equations, decision.model)
     parts = {'train': raw, **recordings.kept, **recordings.held}
     proofs = {stem: prove(final, part, tree, stem) for stem, part in parts.items()}
+    on_z += _harm(final, {k: x for k, x in parts.items() if k != 'train'}, proofs)
     doubts = reasons_to_doubt(proofs, recordings.still)
     chances = probabilities(equations, comparison, decision, contrasts)
     depends = dependences(equations, comparison.base.residual)
-    findings, forces = asserted(equations, decision, lags, remainders, chances, depends)
+    findings, forces = asserted(equations, decision, lags, learned, chances, depends)
     certainty = certainty_of(findings, equations, comparison)
     if doubts:
         certainty = min(certainty, DOUBTED)
@@ -144,7 +148,7 @@ def _diagnosed(
         rate_hz=1.0 / (raw.step * equations.filter.decimation),
         rows=len(equations.d),
         refused={reason: count for reason, count in raw.refused.items() if count},
-        remarks=(*raw.remarks, *recordings.remarks, *doubts),
+        remarks=(*raw.remarks, *recordings.remarks, *on_z, *doubts),
         bodies=diagnosed_bodies(equations, decision.model),
         equivalents=equivalents(equations, comparison, decision, contrasts),
     )
@@ -160,6 +164,17 @@ def _remainders(equations: Equations, decision: Decision) -> tuple[Remainder, ..
     joints = [j for j in np.argsort(-left) if left[j] > REMAINDER_SHARE * left.max()]
     found = [learn_remainder(equations, decision.model.residual, int(j)) for j in joints[:2]]
     return tuple(r for r in found if r is not None)
+
+
+def _harm(
+    final: FinalModel, held: Mapping[str, RawTrajectory], proofs: Mapping[str, Proof]
+) -> tuple[str, ...]:
+    """Say where Z does harm on what was held out."""
+    if not final.remainders:
+        return ()
+    tree, physics = final.equations.motion.tree, replace(final, remainders=())
+    plain = {stem: prove(physics, part, tree, stem) for stem, part in held.items()}
+    return harm(final.remainders, tree.joint_names, plain, proofs)
 
 
 def _traces(

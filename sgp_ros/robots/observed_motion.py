@@ -79,6 +79,14 @@ class ObservedMotion:
         return tuple(int(j) for j in np.flatnonzero(self.moves))
 
     @property
+    def is_commanded(self) -> np.ndarray:
+        """Whether the effort of each joint is a command, known before it acts, (k,).
+
+        A measured effort is what models have to predict; nothing may be explained by it.
+        """
+        return self.tree.is_actuated[: self.tree.size] & (self.drive is not None)
+
+    @property
     def is_continuous(self) -> np.ndarray:
         """Whether each joint turns without limits, (k,)."""
         k = self.tree.size

@@ -83,9 +83,7 @@ def _by_past(equations: Equations, r: np.ndarray) -> float:
 
 def _by_motion(equations: Equations, r: np.ndarray, joint: int) -> float:
     """Return the share of r (N,) that Z of the motion explains on parts left out."""
-    inputs, names = process_inputs(equations.motion, joint)
-    seen = [i for i, name in enumerate(names) if not name.startswith('effort')]
-    U = equations.filter(inputs[:, seen])
+    U = equations.filter(process_inputs(equations.motion, joint, sees_effort=False)[0])
     U = U / (U.std(axis=0) + 1e-12)
     part = parts_of(len(r))
     rows = spread(np.flatnonzero(part > 0), LEARNED)

@@ -42,15 +42,15 @@ def surrogates(residual: np.ndarray, count: int) -> Iterator[np.ndarray]:
 def own_variables(equations: Equations, joint: int) -> dict[str, np.ndarray]:
     """Return position, velocity, effort and time of a joint, (N,) each.
 
-    Positions of continuous joints are wrapped [rad or m]; velocity [rad/s or m/s]; the commanded
-    effort, of actuated joints [N m or N]; time since the first state [s].
+    Positions of continuous joints are wrapped [rad or m]; velocity [rad/s or m/s]; the effort
+    where it is a command [N m or N]; time since the first state [s].
     """
     motion, low = equations.motion, equations.filter
     variables = {
         'position': motion.wrapped[low.rows, joint],
         'velocity': low(motion.velocity[:, joint]),
     }
-    if motion.tree.is_actuated[joint]:
+    if motion.is_commanded[joint]:
         variables['effort'] = low(motion.effort[:, joint])
     return variables | {'time': equations.time}
 

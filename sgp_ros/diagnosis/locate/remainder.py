@@ -5,14 +5,15 @@ nearly all of it holds nearly all of the rows. Of all intervals of all variables
 the fewest rows is taken, so chance must be kept out for the best of many: with half of the rows
 it is far from reach for a homogeneous rest, white or correlated (a test simulates both).
 
-Z is given the position, velocity, direction and effort of its joint and the motion of the others,
-and evidence decides which of these it needs. It is checked by cross-validation in blocks, for rows
-that are correlated in time (Burman, Chow and Nolan 1994).
+Z is given what is known before the effort is: the position, velocity and direction of its joint,
+the motion of the others, and a commanded effort. A measured effort is what it has to predict, and
+would explain itself. Evidence decides which of these it needs. It is checked by cross-validation
+in blocks, for rows that are correlated in time (Burman, Chow and Nolan 1994).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -87,19 +88,24 @@ class Remainder:
     Attributes:
         joint: index.
         inputs: names of what it depends on.
-        columns: of `process_inputs`.
+        sees_effort: whether the commanded effort is among the candidates.
+        scale: of the candidates, (d,).
+        seen: candidates over the scale on the rows of the recording, (N, d).
+        residual: that Z was learned from, (N,) [N m or N].
         posterior: of Z.
     """
 
     joint: int
     inputs: tuple[str, ...]
-    columns: tuple[int, ...]
+    sees_effort: bool
     scale: np.ndarray
+    seen: np.ndarray
+    residual: np.ndarray
     posterior: Posterior
 
     def force(self, motion: ObservedMotion) -> np.ndarray:
         """Return the mean of Z, (n,) [N m or N]."""
-        U = process_inputs(motion, self.joint)[0] / self.scale
+        U = process_inputs(motion, self.joint, sees_effort=self.sees_effort)[0] / self.scale
         rows = 2000
         n = len(U)
         F = np.zeros((rows, 1, 0))
@@ -109,15 +115,25 @@ class Remainder:
         ]
         return np.concatenate(parts)
 
+    def without(self, out: np.ndarray) -> Remainder:
+        """Return the process as learned without some rows, (N,) of bool."""
+        rows = spread(np.flatnonzero(~out), CONDITIONED)
+        known = observations(self.seen, self.residual, rows)
+        return replace(
+            self, posterior=Posterior(self.posterior.model, known, CoefficientPrior.flat(0))
+        )
 
-def process_inputs(motion: ObservedMotion, joint: int) -> tuple[np.ndarray, tuple[str, ...]]:
+
+def process_inputs(
+    motion: ObservedMotion, joint: int, *, sees_effort: bool
+) -> tuple[np.ndarray, tuple[str, ...]]:
     """Return what Z of a joint could depend on, (n, d), and the names."""
     tree = motion.tree
     columns = [motion.wrapped[:, joint], motion.velocity[:, joint], motion.direction[:, joint]]
     names = [
         f'{what} of {tree.joint_names[joint]}' for what in ('position', 'velocity', 'direction')
     ]
-    if tree.is_actuated[joint]:
+    if sees_effort:
         columns.append(motion.effort[:, joint])
         names.append(f'effort of {tree.joint_names[joint]}')
     near = sorted((i for i in range(tree.size) if i != joint), key=lambda i: abs(i - joint))
@@ -133,7 +149,8 @@ def learn_remainder(equations: Equations, residual: np.ndarray, joint: int) -> R
     None where there is none, or where it predicts nothing of parts left out: what happens once,
     such as a burst, is no function of the motion, and predictions elsewhere are better without.
     """
-    full, names = process_inputs(equations.motion, joint)
+    sees_effort = bool(equations.motion.is_commanded[joint])
+    full, names = process_inputs(equations.motion, joint, sees_effort=sees_effort)
     U = equations.filter(full)
     scale = U.std(axis=0) + 1e-12
     U = U / scale
@@ -149,7 +166,7 @@ def learn_remainder(equations: Equations, residual: np.ndarray, joint: int) -> R
     rows = spread(np.arange(len(y)), SIZE)
     posterior = Posterior(model, observations(U, y[:, 0], rows), prior)
     return Remainder(
-        joint, tuple(names[i] for i in chosen.inputs), chosen.inputs, scale, posterior
+        joint, tuple(names[i] for i in chosen.inputs), sees_effort, scale, U, y[:, 0], posterior
     )
 
 

@@ -9,7 +9,7 @@ import pytest
 from scipy import signal
 
 from sgp_ros.diagnosis.criteria import REGION_ROWS
-from sgp_ros.diagnosis.locate.dependence import dependences
+from sgp_ros.diagnosis.locate.dependence import dependences, own_variables
 from sgp_ros.diagnosis.locate.remainder import confined, learn_remainder, process_inputs, region
 from test.diagnosis.worlds import CHAINS, simulate
 
@@ -117,7 +117,21 @@ def test_a_passive_joint_depends_on_no_effort_of_its_own(equations_for, perfect)
     first, second = dependences(passive, equations.d)
     assert 'effort' in first.scores
     assert 'effort' not in second.scores
-    assert 'effort of joint1' not in process_inputs(passive.motion, 1)[1]
+    assert 'effort of joint1' not in process_inputs(passive.motion, 1, sees_effort=False)[1]
+
+
+def test_a_measured_effort_explains_nothing(equations_for, perfect):
+    """It is what has to be predicted; a command is known before it acts."""
+    world = perfect[1]
+    _, measured = equations_for(world, effort=world.command, commands=False)
+    _, commanded = equations_for(world)
+    assert 'effort' not in own_variables(measured, 0)
+    assert 'effort' in own_variables(commanded, 0)
+    rest = measured.filter(measured.motion.effort) ** 3  # a function of the effort and no other
+    found = learn_remainder(measured, rest, 0)
+    assert found is None or not any('effort' in name for name in found.inputs)
+    found = learn_remainder(commanded, rest, 0)
+    assert 'effort of joint0' in found.inputs
 
 
 def test_the_process_learns_a_function_and_says_of_what(equations_for, perfect):

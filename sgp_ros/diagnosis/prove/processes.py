@@ -1,0 +1,118 @@
+"""Whether Z is worth having beside the physics: it stays only where predictions are no worse.
+
+Z is learned from one-step errors, and a small error of a force that pushes the wrong way adds up
+along a motion. So each process is learned again without each part of the recording in turn, and
+rolled out over that part: if the positions are worse than by physics alone, its weight is zero.
+Recordings that are held out choose nothing; there only a remark says where Z does harm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from sgp_ros.diagnosis.locate.remainder import PARTS, Remainder, parts_of
+from sgp_ros.diagnosis.prove.prediction import FinalModel
+from sgp_ros.diagnosis.prove.rollouts import RolloutWindows, cut, roll_out
+from sgp_ros.diagnosis.result import Proof
+
+
+def kept_processes(final: FinalModel) -> tuple[tuple[Remainder, ...], tuple[str, ...]]:
+    """Return the processes of a final model that do no harm to roll-outs, and what to remark.
+
+    One after the other joins those that were kept. Cost: one roll-out of the recording each.
+    """
+    if not final.remainders:
+        return (), ()
+    names = final.equations.motion.tree.joint_names
+    windows, part = _windows(final)
+    kept: tuple[Remainder, ...] = ()
+    remarks: tuple[str, ...] = ()
+    before = left_out_errors(final, windows, part, kept)
+    for remainder in final.remainders:
+        after = left_out_errors(final, windows, part, (*kept, remainder))
+        ended = np.isfinite(before)
+        ratio = after[ended].sum() / max(before[ended].sum(), 1e-300)
+        if ratio <= 1.0:
+            kept, before = (*kept, remainder), after
+            continue
+        said = (
+            f'Z of {names[remainder.joint]} was dropped: over parts that it was not learned from, '
+            f'the error of roll-outs is {ratio:.3g} times that of physics alone.'
+        )
+        remarks = (*remarks, said)
+    return kept, remarks
+
+
+def _windows(final: FinalModel) -> tuple[RolloutWindows, np.ndarray]:
+    """Return windows of the recording that was learned from, and the part each lies in, (m,)."""
+    equations = final.equations
+    low = equations.filter
+    windows = cut(equations.motion, len(low.taps) // 2)
+    part = parts_of(len(low.rows), 1)
+    row = np.clip(np.searchsorted(low.rows, windows.first), 0, len(part) - 1)
+    return windows, part[row]
+
+
+def left_out_errors(
+    final: FinalModel,
+    windows: RolloutWindows,
+    part: np.ndarray,
+    remainders: tuple[Remainder, ...],
+) -> np.ndarray:
+    """Return the errors of roll-outs with processes that never saw the part they predict.
+
+    Args:
+        final: model and equations.
+        windows: of the recording that was learned from, m.
+        part: in which each lies, (m,).
+        remainders: processes beside the model; none for physics alone.
+
+    Returns:
+        Squared errors relative to holding the position, summed over joints, (m,); infinite where
+        a window does not end with finite numbers.
+    """
+    rows = parts_of(len(final.equations.d), 1)
+    yardstick = np.maximum(windows.held.mean(axis=0), 1e-300)
+    found = np.full(len(part), np.inf)
+    for i in range(PARTS):
+        there = replace(windows, first=windows.first[part == i])
+        if not len(there.first):
+            continue
+        learned = tuple(r.without(rows == i) for r in remainders)
+        q, ended = roll_out(there, final.model, final.equations, learned)
+        errors = (there.squared(q) / yardstick).sum(axis=1)
+        found[part == i] = np.where(ended, errors, np.inf)
+    return found
+
+
+def harm(
+    remainders: tuple[Remainder, ...],
+    names: tuple[str, ...],
+    plain: Mapping[str, Proof],
+    final: Mapping[str, Proof],
+) -> tuple[str, ...]:
+    """Say where held-out recordings are predicted worse with Z than by physics alone.
+
+    Args:
+        remainders: processes of the final model.
+        names: of the joints.
+        plain: proofs of physics alone, by stem of the held-out recordings.
+        final: proofs with Z.
+    """
+    found = []
+    for stem, alone in plain.items():
+        for remainder in remainders:
+            joint = names[remainder.joint]
+            for what, without, beside in (
+                ('effort', alone.nmse_after, final[stem].nmse_after),
+                ('roll-outs', alone.rollout_after, final[stem].rollout_after),
+            ):
+                if beside.get(joint, 0.0) > without.get(joint, np.inf):
+                    found.append(
+                        f'Z of {joint} does harm in {stem}: nMSE of its {what} '
+                        f'{beside[joint]:.2g}, {without[joint]:.2g} by physics alone.'
+                    )
+    return tuple(found)
