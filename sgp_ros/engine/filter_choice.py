@@ -15,7 +15,8 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.intake import CommandHistory, State
 from sgp_ros.engine.rest import white_variance
 from sgp_ros.engine.samples import SettingValue
-from sgp_ros.engine.windows import Equation, WeakForm, WindowFilter
+from sgp_ros.engine.weak_form import WeakForm
+from sgp_ros.engine.windows import Equation, WindowFilter
 from sgp_ros.robots.robot import Robot
 
 TRIALS_S = (3.0, 6.0, 12.0)

@@ -25,7 +25,7 @@ _POINTS = 5
 
 
 class Averaging(Protocol):
-    """How a window averages the equation of motion, as `windows.WeakForm`."""
+    """How a window averages the equation of motion, as `weak_form.WeakForm`."""
 
     @property
     def times(self) -> np.ndarray:

@@ -2,13 +2,9 @@
 
 One filter for both sides of the equation of motion, for stamps of any spacing.
 
-A least-squares fit over a window gives weights `c_j` with `a = sum_j c_j q(t_j)`. The weights
-annihilate what a motion without acceleration does, so `a = integral kappa(s) q''(s) ds` holds
-exactly, with the Peano kernel `kappa(s) = sum_j c_j max(t_j - s, 0)` (from positions) or
-`kappa(s) = sum_{t_j > s} c_j` (from velocities), which has unit area. Averaging every other term
-of the equation with the same kernel filters the equation instead of approximating it.
-
-Source: Peano 1913 for the kernel; Savitzky and Golay 1964 for the fit.
+What a column holds of the acceleration is averaged with it: `integral kappa M(q) a ds` is the
+averaged M times the averaged a, and what both change together within the window, for which a
+comes from the polynomial that follows the motion.
 """
 
 from __future__ import annotations
@@ -21,88 +17,9 @@ import numpy as np
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.intake import CommandHistory, State
 from sgp_ros.engine.rest import friction_slack
+from sgp_ros.engine.weak_form import WeakForm, polynomial_smoother
 from sgp_ros.physics.term import Motion
 from sgp_ros.robots.robot import Robot
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class WeakForm:
-    """Weights of one window of m samples at times t.
-
-    Attributes:
-        times: (m,) [s], increasing.
-        weights: (m,) `c_j`; times positions [1/s^2] or velocities [1/s] they give acceleration.
-        left, right: (m - 1,) kernel at both ends of each interval, linear in between [1/s].
-    """
-
-    times: np.ndarray
-    weights: np.ndarray
-    left: np.ndarray
-    right: np.ndarray
-
-    @classmethod
-    def from_positions(cls, times: np.ndarray) -> WeakForm:
-        """Return the weights of a quadratic fit to positions at `times` (m,), m >= 3."""
-        centred, half = _scaled(times)
-        basis = np.linalg.pinv(np.vander(centred, 3, increasing=True))  # (3, m)
-        weights = 2.0 * basis[2] / half**2
-        tail = np.cumsum(weights[::-1])[::-1]
-        moment = np.cumsum((weights * times)[::-1])[::-1]
-        kernel = moment - times * tail  # sum over i >= j of c_i (t_i - t_j)
-        kernel[0] = kernel[-1] = 0.0
-        return cls(times, weights, kernel[:-1], kernel[1:])
-
-    @classmethod
-    def from_velocities(cls, times: np.ndarray) -> WeakForm:
-        """Return the weights of a linear fit to velocities at `times` (m,), m >= 2."""
-        centred, half = _scaled(times)
-        basis = np.linalg.pinv(np.vander(centred, 2, increasing=True))  # (2, m)
-        weights = basis[1] / half
-        kernel = np.cumsum(weights[::-1])[::-1][1:]
-        return cls(times, weights, kernel, kernel)
-
-    @property
-    def averaging(self) -> np.ndarray:
-        """Weights that average a signal, linear between samples, with the kernel; (m,), sum 1."""
-        steps = np.diff(self.times) / 6.0
-        shares = np.zeros(len(self.times))
-        shares[:-1] += steps * (2.0 * self.left + self.right)
-        shares[1:] += steps * (self.left + 2.0 * self.right)
-        return shares
-
-    def cumulative(self, seconds: np.ndarray) -> np.ndarray:
-        """Integrate the kernel from the first sample to `seconds` (r,) after it, (r,)."""
-        steps = np.diff(self.times)
-        areas = np.concatenate([[0.0], np.cumsum(0.5 * steps * (self.left + self.right))])
-        since = np.clip(seconds, 0.0, self.times[-1] - self.times[0])
-        offsets = self.times - self.times[0]
-        index = np.clip(np.searchsorted(offsets, since, side='right') - 1, 0, len(steps) - 1)
-        inside = since - offsets[index]
-        slope = (self.right[index] - self.left[index]) / steps[index]
-        return areas[index] + inside * (self.left[index] + 0.5 * slope * inside)
-
-
-def polynomial_smoother(times: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the matrices that smooth and differentiate samples at `times` (m,).
-
-    A polynomial of `degree`, or of m - 1 if that is less, is fitted by least squares.
-
-    Returns:
-        values (m, m) and slopes (m, m) [1/s]: times the samples they give the polynomial and its
-        derivative at the same times.
-    """
-    centred, half = _scaled(times)
-    powers = np.arange(min(degree, len(times) - 1) + 1)
-    basis = centred[:, None] ** powers  # (m, degree + 1)
-    fit = np.linalg.pinv(basis)
-    derivative = np.zeros_like(basis)
-    derivative[:, 1:] = powers[1:] * basis[:, :-1] / half
-    return basis @ fit, derivative @ fit
-
-
-def _scaled(times: np.ndarray) -> tuple[np.ndarray, float]:
-    half = 0.5 * float(times[-1] - times[0])
-    return (times - 0.5 * (times[0] + times[-1])) / half, half
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -210,11 +127,12 @@ class WindowFilter:
         source = position
         if measured:
             source = np.array([state.velocity for state in window])
-        velocity = weights.slopes @ source if source is position else weights.values @ source
+        velocity, acceleration = weights.derivatives(source, measured=measured)
         return self._assemble(
             window,
             at,
             weights,
+            acceleration,
             Motion(
                 weights.values @ position,
                 velocity,
@@ -246,22 +164,28 @@ class WindowFilter:
         return commands.average(*span, form.cumulative, acting)
 
     def _assemble(
-        self, window: list[State], at: int, weights: _Weights, motion: Motion
+        self, window: list[State], at: int, weights: _Weights, within: np.ndarray, motion: Motion
     ) -> Equation:
+        """Return the equation of a window, with accelerations (m, k) that follow the motion."""
         m, k = motion.position.shape
         joints = self._complement_joints
         probes = 1 + len(joints)
-        drive = np.zeros((m + probes, k))
-        drive[np.arange(m + 1, m + probes), joints] = 1.0
-        still = np.zeros_like(drive)
+        nodes, shares = weights.nodes
         forward = self._robot.target == 'acceleration'
+        drive = np.zeros((m + len(nodes) * probes, k))
+        if not forward:
+            drive[:m] = within - weights.form.averaging @ within
+        each = drive[m:].reshape(len(nodes), probes, k)
+        each[:, np.arange(1, probes), joints] = 1.0
+        still = np.zeros_like(drive)
         extended = Motion(
-            np.vstack([motion.position, np.repeat(motion.position[at][None], probes, axis=0)]),
-            np.vstack([motion.velocity, np.repeat(motion.velocity[at][None], probes, axis=0)]),
+            np.vstack([motion.position, np.repeat(motion.position[nodes], probes, axis=0)]),
+            np.vstack([motion.velocity, np.repeat(motion.velocity[nodes], probes, axis=0)]),
             still if forward else drive,
             drive if forward else still,
         )
-        rows = self._robot.regressor(extended)  # (m + probes, k, p)
+        rows = self._robot.regressor(extended)  # (m + 3 probes, k, p)
+        probed = rows[m:].reshape(len(nodes), probes, *rows.shape[1:])
         measured = np.array([state.position for state in window])
         centre = motion.position[at][None], motion.velocity[at][None]
         return Equation(
@@ -269,7 +193,7 @@ class WindowFilter:
             (window[-1].stamp_ns - window[0].stamp_ns) * 1e-9,
             Motion(*centre, motion.acceleration, motion.effort),
             np.tensordot(weights.form.averaging, rows[:m], axes=1),
-            rows[m + 1 :] - rows[m],
+            np.tensordot(shares, probed[:, 1:] - probed[:, :1], axes=1),
             joints,
             friction_slack(self._robot, motion, measured, weights.form),
         )
@@ -280,7 +204,7 @@ class WindowFilter:
             return cached[2]
         times = offsets_ns * 1e-9
         form = WeakForm.from_velocities(times) if measured else WeakForm.from_positions(times)
-        weights = _Weights(form, *polynomial_smoother(times, self._degree))
+        weights = _Weights(form, form.nodes(), *polynomial_smoother(times, self._degree))
         self._cached = (offsets_ns, measured, weights)
         return weights
 
@@ -288,5 +212,13 @@ class WindowFilter:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Weights:
     form: WeakForm
+    nodes: tuple[np.ndarray, np.ndarray]
     values: np.ndarray
     slopes: np.ndarray
+    curvatures: np.ndarray
+
+    def derivatives(self, source: np.ndarray, *, measured: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Return velocities and accelerations of measured velocities, or of positions."""
+        if measured:
+            return self.values @ source, self.slopes @ source
+        return self.slopes @ source, self.curvatures @ source
