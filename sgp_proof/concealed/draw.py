@@ -32,11 +32,16 @@ from sgp_ros.simulation.sensors import Sensors
 from sgp_ros.simulation.transport import Transport
 
 NOTHING, PARAMETERS, UNKNOWN, PAIR = 'none', 'parameters', 'unknown', 'pair'
-PLAN = [
-    *list(LAWS)[:7], NOTHING, PARAMETERS, UNKNOWN, PAIR, *list(LAWS)[7:14], UNKNOWN,
-    NOTHING, PARAMETERS, *list(LAWS)[14:21], PAIR, UNKNOWN, *list(LAWS)[21:], NOTHING,
+FIRST_LAWS = list(LAWS)[:27]
+"""Those from which the worlds of the committed results are drawn."""
+FIRST_PLAN = [
+    *FIRST_LAWS[:7], NOTHING, PARAMETERS, UNKNOWN, PAIR, *FIRST_LAWS[7:14], UNKNOWN,
+    NOTHING, PARAMETERS, *FIRST_LAWS[14:21], PAIR, UNKNOWN, *FIRST_LAWS[21:], NOTHING,
     PARAMETERS,
 ]  # fmt: skip
+PLAN = [*FIRST_PLAN, *list(LAWS)[27:]]
+GROWN = 1000
+"""Seeds from here on draw from all laws, by the whole plan."""
 TOPIC = '/effort_controller/commands'
 _PERFECT = Transport(log_latency_s=1e-4)
 _TRIES = 60
@@ -61,9 +66,15 @@ def main():
         print(f'{line}  {time.perf_counter() - begin:.1f} s', flush=True)
 
 
+def planned(seed):
+    """Return what a seed conceals."""
+    plan = PLAN if seed >= GROWN else FIRST_PLAN
+    return plan[seed % len(plan)]
+
+
 def draw_case(seed, tier, only, out):
     """Write one case and return a line about it."""
-    wanted = only or PLAN[seed % len(PLAN)]
+    wanted = only or planned(seed)
     for attempt in range(_TRIES):
         rng = np.random.default_rng([seed, ord(tier), attempt])
         try:
@@ -74,7 +85,7 @@ def draw_case(seed, tier, only, out):
 
 
 def _attempt(seed, rng, tier, wanted, out):
-    names = _names(rng, wanted)
+    names = _names(rng, wanted, LAWS if seed >= GROWN else FIRST_LAWS)
     world = worlds.draw_world(seed, rng, tier, _largest_error(rng, tier, wanted, names))
     world, motion, relative = observed(
         rng, world, tier, needs_velocity=VELOCITY_FILTER_LAG.name in names
@@ -109,11 +120,11 @@ def run_all(world, concealed):
     return recordings
 
 
-def _names(rng, wanted):
+def _names(rng, wanted, laws):
     if wanted in {NOTHING, PARAMETERS}:
         return []
     if wanted == PAIR:
-        return [str(name) for name in rng.choice(list(LAWS), 2, replace=False)]
+        return [str(name) for name in rng.choice(list(laws), 2, replace=False)]
     return [wanted]
 
 

@@ -38,12 +38,11 @@ from sgp_ros.physics.drawing import UnsuitableError
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import nominal_tree
-from sgp_ros.simulation.registry import LAWS
 
 NOTHING, PARAMETERS, SLIGHT = 'nothing', 'wrong parameters', 'slight unlisted effect'
 LISTED, UNLISTED = 'one effect of the list', 'unlisted effect'
 KINDS = (NOTHING, PARAMETERS, SLIGHT, LISTED, UNLISTED)
-NAMES = tuple(name for name in LAWS if name != VELOCITY_FILTER_LAG.name)
+NAMES = tuple(name for name in draw.FIRST_LAWS if name != VELOCITY_FILTER_LAG.name)
 """What is concealed as one effect; the lag of a sensor's velocity is no force."""
 _CONCEALED = {SLIGHT: (2e-4, 3e-3), LISTED: (0.006, 0.2), UNLISTED: (0.006, 0.2)}
 """Range of the share of the squared effort that a concealed effect makes."""

@@ -7,7 +7,7 @@ this folder, one line here, and one law in `simulation`.
 
 from __future__ import annotations
 
-from sgp_ros.physics import actuation, carried, confined, friction, loads, memory, sensing
+from sgp_ros.physics import actuation, carried, confined, coupled, friction, loads, memory, sensing
 from sgp_ros.physics.effect import Effect
 
 VISCOUS_FRICTION = friction.ViscousFriction()
@@ -25,7 +25,7 @@ TORQUE_GAIN = actuation.TorqueGain()
 COMMAND_DELAY = actuation.CommandDelay()
 HYSTERESIS = memory.Hysteresis()
 BACKLASH = memory.Backlash()
-JOINT_COUPLING = loads.JointCoupling()
+JOINT_COUPLING = coupled.JointCoupling()
 VELOCITY_FILTER_LAG = sensing.VelocityFilterLag()
 
 EFFECTS: dict[str, Effect] = {
@@ -58,6 +58,7 @@ EFFECTS: dict[str, Effect] = {
         HYSTERESIS,
         sensing.EncoderEccentricity(),
         VELOCITY_FILTER_LAG,
+        coupled.CoupledFriction(),
     )
 }
 

@@ -127,9 +127,9 @@ class Effect:
         """Whether the coefficient is 1."""
         return not self.linear
 
-    def holds(self, place: Place) -> bool:
-        """Return whether it can hold the joint at rest."""
-        return self.is_dry and place.kind != 'viscous'
+    def held_joints(self, place: Place) -> frozenset[int]:
+        """Return the joints that it can hold at rest."""
+        return frozenset({place.joint} if self.is_dry and place.kind != 'viscous' else ())
 
     def stated_quantities(self, kind: str = '') -> tuple[Quantity, ...]:
         """Return the numbers that state the effect, with their units on a revolute joint."""

@@ -94,7 +94,12 @@ class EffectAt:
     @property
     def is_holding(self) -> bool:
         """Whether it can hold a joint at rest."""
-        return self.effect.holds(self.place)
+        return bool(self.held_joints)
+
+    @property
+    def held_joints(self) -> frozenset[int]:
+        """Indices of the joints that it can hold at rest."""
+        return self.effect.held_joints(self.place)
 
     @property
     def is_complete(self) -> bool:

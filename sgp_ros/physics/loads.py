@@ -1,4 +1,4 @@
-"""Loads on joints: springs, constant loads, rotors, cogging, couplings."""
+"""Loads on joints: springs, constant loads, rotors, cogging."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from sgp_ros.physics.drawing import Drawn, JointScene, Scene, UnsuitableError
+from sgp_ros.physics.drawing import Drawn, JointScene
 from sgp_ros.physics.effect import EMPTY, Effect, Numbers
 from sgp_ros.physics.motion import SeenMotion
 from sgp_ros.physics.parts import (
@@ -18,7 +18,7 @@ from sgp_ros.physics.parts import (
     Value,
 )
 
-_MECHANICS = 'Khalil and Dombre 2002, Modeling, Identification and Control of Robots, chapter 9'
+MECHANICS = 'Khalil and Dombre 2002, Modeling, Identification and Control of Robots, chapter 9'
 
 
 def per_turn(motion: SeenMotion, joint: int) -> float:
@@ -38,7 +38,7 @@ class Spring(Effect):
     name = 'spring'
     words = 'a spring'
     formula = 'tau_x = -stiffness (q - rest)'
-    source = _MECHANICS
+    source = MECHANICS
     appearance = 'the effort that is left is a straight line over the position'
     quantities = (Quantity('stiffness', 'N m/rad', low=0.0), Quantity('rest', 'rad'))
     linear = ('stiffness', 'rest')
@@ -71,7 +71,7 @@ class ConstantLoad(Effect):
     name = 'constant_load'
     words = 'a constant load'
     formula = 'tau_x = force'
-    source = _MECHANICS
+    source = MECHANICS
     appearance = 'the effort that is left is the same everywhere'
     quantities = (Quantity('force', 'N m'),)
     linear = ('force',)
@@ -90,7 +90,7 @@ class Armature(Effect):
     name = 'armature'
     words = 'rotor inertia'
     formula = 'tau_x = -inertia a'
-    source = _MECHANICS
+    source = MECHANICS
     appearance = 'the effort that is left is proportional to the acceleration'
     quantities = (Quantity('inertia', 'kg m2', low=0.0),)
     linear = ('inertia',)
@@ -159,75 +159,3 @@ class Cogging(Effect):
 
     def sized(self, x: JointScene) -> Drawn:
         return Drawn(x.small, lambda s: {'amplitude': s, 'periods': x.periods, 'phase': x.phase})
-
-
-class JointCoupling(Effect):
-    """Torque of another motor, or a cable of energy `stiffness/2 (q - ratio q_source)^2`."""
-
-    name = 'joint_coupling'
-    words = 'a coupling between joints'
-    formula = 'tau_x = coefficient tau_source, or the force of stiffness/2 (q - ratio q_source)^2'
-    source = _MECHANICS
-    appearance = 'the effort that is left follows the effort or the position of another joint'
-    quantities = (
-        Quantity('coefficient', '1', kinds=('torque',)),
-        Quantity('stiffness', 'N m/rad', low=0.0, kinds=('spring',)),
-        Quantity('ratio', '1', is_scored=False, kinds=('spring',)),
-    )
-    linear = ('coefficient', 'stiffness')
-    kinds = ('torque', 'spring')
-    has_source = True
-
-    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
-        if place.kind == 'torque':
-            return motion.effort[:, place.source, None]
-        n, k = motion.position.shape
-        columns = np.zeros((n, k, 1))
-        stretch = motion.position[:, place.joint] - shape[0] * motion.position[:, place.source]
-        columns[:, place.joint, 0] = -stretch
-        columns[:, place.source, 0] = shape[0] * stretch
-        return columns
-
-    def effort_columns(self, kind: str) -> tuple[int, ...]:
-        return (0,) if kind == 'torque' else ()
-
-    def places(self, motion: SeenMotion) -> list[Place]:
-        tree, moving = motion.tree, motion.moving_joints
-        torques = [
-            Place(j, 'torque', i) for j in moving for i in range(tree.size)
-            if i != j and tree.is_actuated[i]
-        ]  # fmt: skip
-        return torques + [Place(j, 'spring', i) for j in moving for i in moving if i != j]
-
-    def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
-        if place.kind == 'torque':
-            return np.zeros((1, 0))
-        return np.array([-2.0, -1.0, -0.5, 0.5, 1.0, 2.0])[:, None]
-
-    def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        shapes = 1 if place.kind == 'spring' else 0
-        return np.full(shapes, -5.0), np.full(shapes, 5.0)
-
-    def draw(self, scene: Scene) -> Drawn:
-        """Return a coupling of two joints, of motors where it is one of torques."""
-        rng, motion, motors, count = scene.rng, scene.motion, scene.motors, len(scene.bodies)
-        if count < 2:
-            raise UnsuitableError(self.name)
-        kind = 'torque' if len(motors) > 1 and rng.random() < 0.5 else 'spring'
-        j = scene.choice(motors if kind == 'torque' else count)
-        source = scene.choice(
-            [i for i in (motors if kind == 'torque' else range(count)) if i != j]
-        )
-        words = {'source_joint': scene.bodies[source].joint, 'kind': kind}
-        size = 0.3 * motion.effort[j]
-        if kind == 'torque':
-            sign = rng.choice([-1.0, 1.0])
-            return Drawn(
-                size / motion.effort[source], lambda s: {**words, 'coefficient': sign * s},
-                1.0, index=j,
-            )  # fmt: skip
-        ratio = rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 1.5)
-        ratio *= motion.spread[j] / motion.spread[source]
-        return Drawn(
-            size / motion.spread[j], lambda s: {**words, 'stiffness': s, 'ratio': ratio}, index=j
-        )

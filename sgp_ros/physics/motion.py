@@ -49,6 +49,10 @@ class Structure(Protocol):
         """Whether each joint slides, (b,)."""
 
     @property
+    def parents(self) -> np.ndarray:
+        """Body that each joint starts from, -1 for the root, (b,)."""
+
+    @property
     def is_actuated(self) -> np.ndarray:
         """Whether an effort acts on it, (b,)."""
 
@@ -129,6 +133,9 @@ class SeenMotion(Protocol):
     @property
     def direction(self) -> np.ndarray:
         """Mean of sign(v) over each cell of the grid, (n, k)."""
+
+    def direction_of(self, speed: np.ndarray) -> np.ndarray:
+        """Mean of the sign of speeds (n, ...) over each cell of the grid, (n, ...)."""
 
     @property
     def wrapped(self) -> np.ndarray:

@@ -102,7 +102,7 @@ def effect_name(finding: Finding) -> str:
     name = plain_name(finding.effect)
     kind = str(words.get('kind', ''))
     if 'source_joint' in words:
-        return f'{name} ({kind} from {words["source_joint"]})'
+        return f'{name} ({f"{kind} from" if kind else "with"} {words["source_joint"]})'
     return f'{"Coulomb" if kind == "coulomb" else kind} {name}'.strip()
 
 

@@ -21,6 +21,7 @@ from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 _SOURCE = 'stated effect of a diagnosis'
+Sign = Callable[[np.ndarray], np.ndarray]
 
 
 def changed_tree(tree: Tree, effects: Sequence[EffectAt]) -> Tree:
@@ -125,8 +126,7 @@ class EffortMap:
             if is_measured and stated.effect.is_of_command:
                 continue
             columns = list(stated.effect.effort_columns(stated.kind))
-            direction = np.tanh(velocity / self.coulomb_width)
-            force = _forces(self.tree, stated, motion, direction)[:, :, columns]
+            force = _forces(self.tree, stated, motion, _smooth(self.coulomb_width))[:, :, columns]
             acting += force @ stated.coefficients[columns]
         return acting
 
@@ -162,7 +162,7 @@ class RestFriction:
     @property
     def joints(self) -> frozenset[int]:
         """Indices of the joints that they hold."""
-        return frozenset(e.place.joint for e in self.effects)
+        return frozenset(j for e in self.effects for j in e.held_joints)
 
     def __call__(self, motion: Motion) -> np.ndarray:
         """Return the least and the largest force beyond the one that the rows take, (2, n, k).
@@ -171,10 +171,10 @@ class RestFriction:
         """
         ends = np.zeros((2, *motion.position.shape))
         for stated in self.effects:
-            now = np.tanh(motion.velocity / self.coulomb_width)
+            now = _smooth(self.coulomb_width)
             taken, *sliding = (
-                _forces(self.tree, stated, motion, direction) @ stated.coefficients
-                for direction in (now, -np.ones_like(now), np.ones_like(now))
+                _forces(self.tree, stated, motion, sign) @ stated.coefficients
+                for sign in (now, lambda v: -np.ones_like(v), np.ones_like)
             )
             ends += np.sort(np.array(sliding) - taken, axis=0)
         return ends
@@ -195,15 +195,20 @@ class _Instant:
         return u if characteristic is None else characteristic(u)
 
 
-def _forces(tree: Tree, stated: EffectAt, motion: Motion, direction: np.ndarray) -> np.ndarray:
+def _smooth(width: float) -> Sign:
+    """Return the sign of a velocity, made smooth over a width [rad/s or m/s]."""
+    return lambda v: np.tanh(v / width)
+
+
+def _forces(tree: Tree, stated: EffectAt, motion: Motion, sign: Sign) -> np.ndarray:
     """Return the force per coefficient on every joint, (n, k, m).
 
-    The rows stand alone, so the direction of motion (n, k) is given.
+    The rows stand alone, so what stands for the sign of a velocity is given.
     """
     n, k = motion.position.shape
     seen = ObservedMotion(
         tree, np.zeros(n), 0.0, motion.position, motion.velocity, motion.acceleration,
-        motion.effort, _Instant(motion.effort), given_direction=direction,
+        motion.effort, _Instant(motion.effort), sign=sign,
     )  # fmt: skip
     columns = stated.columns(seen)
     if columns.ndim == 3:
@@ -215,8 +220,7 @@ def _forces(tree: Tree, stated: EffectAt, motion: Motion, direction: np.ndarray)
 
 def _term(tree: Tree, stated: EffectAt, names: Mapping[int, str], coulomb_width: float) -> Term:
     def columns(motion: Motion) -> np.ndarray:
-        direction = np.tanh(motion.velocity / coulomb_width)
-        return -_forces(tree, stated, motion, direction)[:, :, list(names)]
+        return -_forces(tree, stated, motion, _smooth(coulomb_width))[:, :, list(names)]
 
     joint = stated.place.joint
     prismatic = joint >= 0 and bool(tree.is_prismatic[joint])

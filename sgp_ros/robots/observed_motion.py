@@ -6,6 +6,7 @@ grid, so that a reversal between two samples counts at its time.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -33,8 +34,8 @@ class ObservedMotion:
         drive: what the drives receive; None where only efforts were measured.
         starts: rows at which the grid begins anew after a pause.
         stated: effects that the nominal robot has, beside those that are part of the tree.
-        given_direction: (n, k) that stands for the sign of the velocity; None takes its mean over
-            the cells of the grid.
+        sign: from velocities to what stands for their sign; None takes its mean over the cells
+            of the grid.
     """
 
     tree: Tree
@@ -47,14 +48,18 @@ class ObservedMotion:
     drive: Commands | None
     starts: tuple[int, ...] = (0,)
     stated: tuple[EffectAt, ...] = ()
-    given_direction: np.ndarray | None = None
+    sign: Callable[[np.ndarray], np.ndarray] | None = None
 
     @cached_property
     def direction(self) -> np.ndarray:
         """Mean of sign(v) over each cell of the grid, (n, k)."""
-        if self.given_direction is not None:
-            return self.given_direction
-        v = self.velocity
+        return self.direction_of(self.velocity)
+
+    def direction_of(self, speed: np.ndarray) -> np.ndarray:
+        """Return the mean of the sign of speeds (n, ...) over each cell of the grid, (n, ...)."""
+        v = speed
+        if self.sign is not None:
+            return self.sign(v)
         middle = 0.5 * (v[1:] + v[:-1])
         before = np.concatenate([v[:1], middle])
         after = np.concatenate([middle, v[-1:]])
@@ -114,7 +119,7 @@ class ObservedMotion:
     @property
     def dry_joints(self) -> frozenset[int]:
         """Indices of the joints that the nominal robot's dry friction may hold."""
-        return frozenset(x.place.joint for x in self.stated if x.is_holding)
+        return frozenset(j for x in self.stated for j in x.held_joints)
 
     @cached_property
     def gravity_columns(self) -> np.ndarray:
@@ -173,7 +178,7 @@ class ObservedMotion:
 
     def sliding(self, direction: float) -> ObservedMotion:
         """Return the same motion with every joint about to slide in one direction."""
-        return replace(self, given_direction=np.full(self.velocity.shape, direction))
+        return replace(self, sign=lambda v: np.full(v.shape, direction))
 
     def free_inertia(self, joint: int, rows: slice) -> float:
         """Return the least inertia of a joint while all others are free [kg m^2 or kg].

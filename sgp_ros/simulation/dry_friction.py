@@ -3,7 +3,8 @@
 At rest the friction takes any value up to its level. By Gauss's principle of least constraint the
 friction forces r of the joints at rest are those that minimise `r^T A r / 2 + a^T r` in their
 range, where a is the acceleration without them and A the matching block of the inverse mass
-matrix: a joint whose friction is inside its range sticks, the others start to slide.
+matrix: a joint whose friction is inside its range sticks, the others start to slide. What is said
+of joints holds of any axis `g^T v` with dry friction, such as a motor that turns with two joints.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 _SWEEPS = 200
 _TOLERANCE = 1e-14
+_DEPENDENT = 1e-10
 
 
 def friction_at_rest(
@@ -57,6 +59,16 @@ def directions_from_rest(
     starting = acceleration + A @ r
     inside = (-level_up < r) & (r < level_down)
     return [0 if inside[j] else int(np.sign(starting[j])) for j in range(len(r))]
+
+
+def hold_axes(inverse_mass: np.ndarray, acceleration: np.ndarray, G: np.ndarray) -> np.ndarray:
+    """Return the accelerations (k,) once the axes `G v`, (s, k), are held at rest.
+
+    They may depend on each other: two joints and a motor that turns with both.
+    """
+    columns = inverse_mass @ G.T
+    reaction = np.linalg.pinv(G @ columns, rcond=_DEPENDENT, hermitian=True) @ (G @ acceleration)
+    return np.asarray(acceleration - columns @ reaction)
 
 
 def hold_still(

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from sgp_ros.errors import ConfigError
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.parts import SIDES, Quantity, Value
 from sgp_ros.simulation.mechanism import SimulatedJoint
@@ -51,6 +52,8 @@ class Action:
         force: smooth force on the joint [N m or N].
         dry_level: magnitude of the dry friction when sliding in direction +1 or -1 [N m or N];
             at rest it holds up to this magnitude.
+        geared: joint and ratio r of a motor that turns with `v + r v_joint`; the dry friction is
+            along this speed then, and acts on both joints.
         inertia: added to the joint's own [kg m^2 or kg].
         sense: position and velocity that the encoder has.
         sense_velocity: velocity that is measured in place of the encoder's [rad/s or m/s].
@@ -65,6 +68,7 @@ class Action:
     drive: Callable[[Moment], float] | None = None
     force: Callable[[Moment], float] | None = None
     dry_level: Callable[[Moment, int], float] | None = None
+    geared: tuple[int, float] | None = None
     inertia: float = 0.0
     sense: Callable[[Moment], tuple[float, float]] | None = None
     sense_velocity: Callable[[Moment], float] | None = None
@@ -123,6 +127,23 @@ def side_of(joint: SimulatedJoint, edge: float, side: Value) -> int:
         return 1 if side == 'upper' else -1
     middle = 0.5 * (joint.lower + joint.upper)
     return 1 if edge >= (middle if math.isfinite(middle) else 0.0) else -1
+
+
+def source_of(
+    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value], effect: str
+) -> int:
+    """Return the index of another joint that the effect comes from.
+
+    Raises:
+        ConfigError: there is none of this name, or it is the joint itself.
+    """
+    names = [description.name for description in joints]
+    if values['source_joint'] not in names or values['source_joint'] == names[joint]:
+        raise ConfigError(
+            f'{effect} of {names[joint]!r} with {values["source_joint"]!r}',
+            f'another one of {names}',
+        )
+    return names.index(str(values['source_joint']))
 
 
 Build = Callable[[tuple['SimulatedJoint', ...], int, 'Mapping[str, Value]'], tuple[Action, ...]]

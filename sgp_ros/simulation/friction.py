@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.parts import Value
-from sgp_ros.simulation.effects import Action, Moment, side_of
+from sgp_ros.simulation.effects import Action, Moment, side_of, source_of
 from sgp_ros.simulation.mechanism import SimulatedJoint
 
 
@@ -159,3 +159,22 @@ def hysteresis(
             substep_s=_STIFF_S,
         ),
     )
+
+
+def coupled(
+    joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
+) -> tuple[Action, ...]:
+    """Return friction of a motor that turns with `w = v + ratio v_source`, on both joints."""
+    source, ratio = source_of(joints, joint, values, 'coupled_friction'), float(values['ratio'])
+    coulomb, viscous = float(values['coulomb']), float(values['viscous'])
+
+    def drag(moment: Moment) -> float:
+        return -viscous * float(moment.velocity[joint] + ratio * moment.velocity[source])
+
+    return (
+        Action(
+            joint, force=drag, dry_level=lambda _moment, _direction: coulomb,
+            geared=(source, ratio),
+        ),
+        Action(source, force=lambda moment: ratio * drag(moment)),
+    )  # fmt: skip

@@ -31,7 +31,7 @@ def integrate(plant: Plant, time_s: float, y: np.ndarray, h: float, inputs: Inpu
         h: length of the step [s].
         inputs: constant over the step.
     """
-    if not plant.dry_joints:
+    if not plant.has_dry_friction:
         return _Flow(plant, time_s, y, inputs, ()).after(h)
     rest = h
     for _ in range(_MOST_SWITCHES):
@@ -97,14 +97,11 @@ def _first_rest(flow: _Flow, after: np.ndarray, longest: float) -> tuple[float, 
         else:
             low, above = middle, margin
             weight = max(2.0 * weight, 1.0)
-    k = flow.plant.k
-    stopped = [k + j for j in flow.plant.dry_joints if y[k + j] * flow.directions[j] < 0.0]
-    y[stopped] = 0.0
-    return high, y
+    speeds = flow.plant.sliding(y) * flow.directions
+    return high, flow.plant.stopped(y, np.flatnonzero(speeds < 0.0))
 
 
 def _margin(flow: _Flow, y: np.ndarray) -> float:
     """Return the smallest speed in the direction of sliding; negative once a joint reversed."""
-    k = flow.plant.k
-    speeds = [y[k + j] * flow.directions[j] for j in flow.plant.dry_joints if flow.directions[j]]
-    return float(min(speeds, default=0.0))
+    speeds = flow.plant.sliding(y).tolist()
+    return min((w * d for w, d in zip(speeds, flow.directions, strict=True) if d), default=0.0)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from sgp_ros.errors import ConfigError
 from sgp_ros.physics.parts import Value
-from sgp_ros.simulation.effects import Action, Moment, side_of
+from sgp_ros.simulation.effects import Action, Moment, side_of, source_of
 from sgp_ros.simulation.mechanism import SimulatedJoint
 
 _STIFF_S = 1e-3
@@ -64,13 +63,7 @@ def coupling(
     joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:
     """Return a share of the force of another motor, or a cable between two joints."""
-    names = [description.name for description in joints]
-    if values['source_joint'] not in names or values['source_joint'] == names[joint]:
-        raise ConfigError(
-            f'joint_coupling of {names[joint]!r} with {values["source_joint"]!r}',
-            f'another one of {names}',
-        )
-    source = names.index(str(values['source_joint']))
+    source = source_of(joints, joint, values, 'joint_coupling')
     if values['kind'] == 'torque':
         share = float(values['coefficient'])
         return (Action(joint, force=lambda moment: share * float(moment.drive[source])),)

@@ -1,7 +1,8 @@
 """A mechanism together with the effects that act on it, as one differential equation.
 
 The state is `y = (position, velocity, memories of the effects)`. Dry friction makes the equation
-switch: the directions, one of -1, 0 (sticks), 1 per joint, are part of its arguments.
+switch: the directions, one of -1, 0 (sticks), 1 per axis along which it acts, are part of its
+arguments. An axis is a joint, or a motor that turns with two joints.
 """
 
 from __future__ import annotations
@@ -12,11 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from sgp_ros.errors import NumericalError
-from sgp_ros.simulation.dry_friction import directions_from_rest, hold_still
+from sgp_ros.simulation.dry_friction import directions_from_rest, hold_axes, hold_still
 from sgp_ros.simulation.effects import Action, Moment
 from sgp_ros.simulation.mechanism import Mechanism
 
 _SHORT_S = 1e-6
+_AT_REST = 1e-12
+"""Speed that is rounding alone where a motor holds two joints together [rad/s or m/s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,9 +75,20 @@ class Plant:
         self._actions = tuple(pairs)
         self._currents = tuple(x for x in pairs if x[0].current)
         self._behind = tuple(x for x in pairs if not x[0].current)
-        self._dry = tuple(x for x in pairs if x[0].dry_level is not None)
         self._inertias = tuple((x.joint, x.inertia) for x, _ in pairs if x.inertia)
-        self.dry_joints = tuple(sorted({action.joint for action, _ in self._dry}))
+        dry = [x for x in pairs if x[0].dry_level is not None]
+        joints = sorted({x.joint for x, _ in dry if x.geared is None})
+        geared = list(dict.fromkeys((x.joint, *x.geared) for x, _ in dry if x.geared))
+        self._dry_joints = joints
+        self._axes = np.zeros((len(joints) + len(geared), k))
+        self._axes[range(len(joints)), joints] = 1.0
+        for axis, (joint, other, ratio) in zip(self._axes[len(joints) :], geared, strict=True):
+            axis[joint], axis[other] = 1.0, ratio
+        self._dry = tuple(
+            (x, part, joints.index(x.joint) if x.geared is None
+             else len(joints) + geared.index((x.joint, *x.geared)))
+            for x, part in dry
+        )  # fmt: skip
 
     def initial(self, position: Sequence[float], velocity: Sequence[float]) -> np.ndarray:
         """Return the state at the start, (2 k + s,)."""
@@ -99,7 +113,7 @@ class Plant:
             time_s: since the start [s].
             y: (2 k + s,) state.
             inputs: in force.
-            directions: (k,) of sliding; used for joints with dry friction only.
+            directions: of sliding along the axes of dry friction.
 
         Raises:
             NumericalError: an effect that takes more inertia from a joint than it has.
@@ -107,38 +121,73 @@ class Plant:
         rate = np.empty_like(y)
         rate[: self.k] = y[self.k : 2 * self.k]
         inverse_mass, force, drive = self._smooth(time_s, y, inputs, rate)
-        for action, part in self._dry:
-            direction = directions[action.joint]
+        for action, part, axis in self._dry:
+            direction = directions[axis]
             if direction:
                 moment = self._moment(time_s, y, drive, part)
-                force[action.joint] -= direction * self._level(action, moment, direction)
-        acceleration = inverse_mass @ force
-        if self._dry:
-            stuck = [joint for joint in self.dry_joints if directions[joint] == 0]
-            acceleration = hold_still(inverse_mass, acceleration, stuck)
-        rate[self.k : 2 * self.k] = acceleration
+                force -= (direction * self._level(action, moment, direction)) * self._axes[axis]
+        rate[self.k : 2 * self.k] = self._held(inverse_mass, inverse_mass @ force, directions)
         return rate
 
+    def _held(
+        self, inverse_mass: np.ndarray, acceleration: np.ndarray, directions: Sequence[int]
+    ) -> np.ndarray:
+        """Return the accelerations (k,) once the axes that stick are held."""
+        stuck = [axis for axis, direction in enumerate(directions) if direction == 0]
+        joints = [self._dry_joints[axis] for axis in stuck if axis < len(self._dry_joints)]
+        free = np.ones(self.k)
+        free[joints] = 0.0
+        geared = [a for a in stuck if a >= len(self._dry_joints) and (self._axes[a] * free).any()]
+        if not geared:
+            return hold_still(inverse_mass, acceleration, joints)
+        held = hold_axes(inverse_mass, acceleration, self._axes[[*stuck[: len(joints)], *geared]])
+        return held * free
+
+    @property
+    def has_dry_friction(self) -> bool:
+        """Whether the equation switches."""
+        return bool(self._dry)
+
+    def sliding(self, y: np.ndarray) -> np.ndarray:
+        """Return the speeds along the axes of dry friction; exactly 0 at rest."""
+        speeds: np.ndarray = self._axes @ y[self.k : 2 * self.k]
+        if len(speeds) > len(self._dry_joints):
+            speeds[np.abs(speeds) < _AT_REST] = 0.0
+        return speeds
+
+    def stopped(self, y: np.ndarray, axes: Iterable[int]) -> np.ndarray:
+        """Return the state with exactly no speed along some axes that were about to reverse."""
+        y, k = y.copy(), self.k
+        for axis in axes:
+            joint = int(np.argmax(self._axes[axis] == 1.0))
+            y[k + joint] = 0.0 if axis < len(self._dry_joints) else (
+                y[k + joint] - self._axes[axis] @ y[k : 2 * k]
+            )  # fmt: skip
+        return y
+
     def directions(self, time_s: float, y: np.ndarray, inputs: Inputs) -> tuple[int, ...]:
-        """Return the directions of sliding from now on, (k,); 0 where dry friction holds."""
-        found = [(v > 0.0) - (v < 0.0) for v in y[self.k : 2 * self.k].tolist()]
-        resting = [joint for joint in self.dry_joints if found[joint] == 0]
+        """Return the directions of sliding along the axes of dry friction from now on.
+
+        0 where it holds.
+        """
+        found = [(w > 0.0) - (w < 0.0) for w in self.sliding(y).tolist()]
+        resting = [axis for axis, direction in enumerate(found) if direction == 0]
         if resting:
             inverse_mass, force, drive = self._smooth(time_s, y, inputs, np.empty_like(y))
-            up, down = np.zeros(self.k), np.zeros(self.k)
-            for action, part in self._dry:
-                moment, joint = self._moment(time_s, y, drive, part), action.joint
-                if found[joint]:
-                    force[joint] -= found[joint] * self._level(action, moment, found[joint])
+            up, down = np.zeros(len(found)), np.zeros(len(found))
+            for action, part, axis in self._dry:
+                moment, direction = self._moment(time_s, y, drive, part), found[axis]
+                if direction:
+                    force -= direction * self._level(action, moment, direction) * self._axes[axis]
                 else:
-                    up[joint] += self._level(action, moment, 1)
-                    down[joint] += self._level(action, moment, -1)
-            block = inverse_mass[np.ix_(resting, resting)]
+                    up[axis] += self._level(action, moment, 1)
+                    down[axis] += self._level(action, moment, -1)
+            G = self._axes[resting]
             starts = directions_from_rest(
-                block, (inverse_mass @ force)[resting], up[resting], down[resting]
+                G @ inverse_mass @ G.T, G @ (inverse_mass @ force), up[resting], down[resting]
             )
-            for joint, start in zip(resting, starts, strict=True):
-                found[joint] = start
+            for axis, start in zip(resting, starts, strict=True):
+                found[axis] = start
         return tuple(found)
 
     def shown(self, time_s: float, y: np.ndarray, command: np.ndarray) -> Shown:

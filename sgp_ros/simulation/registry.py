@@ -50,5 +50,6 @@ LAWS: dict[str, Law] = {
     'backlash': Law(actuation.backlash, own=(_CONTACT_HZ,)),
     'encoder_eccentricity': Law(actuation.eccentricity),
     'velocity_filter_lag': Law(actuation.velocity_lag),
+    'coupled_friction': Law(friction.coupled),
 }
 """Several effects in a motor act in this order, from the command to the joint."""

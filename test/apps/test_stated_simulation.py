@@ -70,6 +70,7 @@ EFFECT_VALUES = {
     'joint_coupling': {'kind': 'torque', 'coefficient': 0.2},
     'encoder_eccentricity': {'amplitude': 1e-5, 'periods': 1.0, 'phase': 0.3},
     'velocity_filter_lag': {'time_constant': 0.02},
+    'coupled_friction': {'ratio': 1.0, 'coulomb': 0.1, 'viscous': 0.05},
     'friction_drift': {'start': 0.3, 'end': 0.1, 'time_constant': 5.0, 'kind': 'coulomb'},
     'constant_load': {'force': 0.2},
     'tip_force': {'fx': 0.5, 'fy': -0.3, 'fz': 1.0},
@@ -125,10 +126,11 @@ def stated(folder, name, effect):
         index = tree.moving_names.index(joints[-1])
         values['motor_inertia'] = MOTOR_SHARE / float(np.linalg.inv(M)[index, index])
     has_tool = any(frame.name == 'tool0' for frame in tree.frames)
-    if effect == 'joint_coupling' and len(joints) > 1:
+    if CATALOGUE[effect].has_source and len(joints) > 1:
         values['source_joint'] = joints[0]
     is_possible = {
         'joint_coupling': len(joints) > 1 and tree.is_actuated.any(),
+        'coupled_friction': len(joints) > 1,
         'limit_friction': bool(np.isfinite(tree.upper[0])),
         'tip_force': has_tool,
     }.get(effect, bool(joints))  # fmt: skip
@@ -183,9 +185,9 @@ class Simulated:
         )
 
 
-APPLICABLE = {'arm': 27, 'turned': 27, 'underactuated': 27, 'forearm': 26, 'reaction_wheel': 25,
-              'reaction_wheel_6': 25, 'toy_pendulum': 17, 'linear_axis': 24, 'simple_pendulum': 24,
-              'double_pendulum': 25}  # fmt: skip
+APPLICABLE = {'arm': 28, 'turned': 28, 'underactuated': 28, 'forearm': 26, 'reaction_wheel': 26,
+              'reaction_wheel_6': 26, 'toy_pendulum': 17, 'linear_axis': 24, 'simple_pendulum': 24,
+              'double_pendulum': 26}  # fmt: skip
 """Robot to how many effects it can have."""
 
 

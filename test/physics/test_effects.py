@@ -25,7 +25,7 @@ KINDS = ('revolute', 'continuous', 'prismatic', 'revolute')
 PASSIVE = 1
 DRY = (
     'coulomb_friction', 'stribeck_friction', 'position_friction', 'limit_friction',
-    'asymmetric_coulomb', 'load_friction', 'friction_drift',
+    'asymmetric_coulomb', 'load_friction', 'friction_drift', 'coupled_friction',
 )  # fmt: skip
 
 
@@ -188,7 +188,9 @@ def test_only_dry_friction_holds_a_joint(name):
     """Of the kinds, `coulomb` does."""
     effect = EFFECTS[name]
     for place in effect.places(MOTION):
-        assert effect.holds(place) == (name in DRY and place.kind != 'viscous')
+        held = {place.joint, place.source} if name == 'coupled_friction' else {place.joint}
+        expected = held if name in DRY and place.kind != 'viscous' else set()
+        assert effect.held_joints(place) == expected
 
 
 @pytest.mark.parametrize('name', EFFECTS)
@@ -207,10 +209,9 @@ def test_an_effect_without_memory_sees_each_sample_alone(effect, place):
     """In any order of the rows the force is the same; with memory it must not be."""
     order = np.random.default_rng(5).permutation(ROWS)
     sliding = _motion(drive=effect.has_memory)
-    sliding = replace(sliding, given_direction=np.sign(sliding.velocity))
+    sliding = replace(sliding, sign=np.sign)
     fields = ('time', 'position', 'velocity', 'acceleration', 'effort')
     mixed = replace(sliding, **{name: getattr(sliding, name)[order] for name in fields})
-    mixed = replace(mixed, given_direction=sliding.direction[order])
     starts = _starts(effect, place)
     shape = starts[len(starts) // 2]
     given, found = (effect.columns(m, place, shape) for m in (sliding, mixed))
@@ -291,6 +292,8 @@ def test_friction_opposes_the_motion_as_the_formulas_say(j):
         ('joint_coupling', [0.5], [4.0], {'kind': 'spring', 'source': 2},
          {'kind': 'spring', 'stiffness': 4.0, 'ratio': 0.5, 'source_joint': 'j2'}),
         ('hysteresis', [0.05], [0.3], {}, {'level': 0.3, 'presliding': 0.05}),
+        ('coupled_friction', [-2.0], [0.3, 0.1], {'source': 2},
+         {'ratio': -2.0, 'coulomb': 0.3, 'viscous': 0.1, 'source_joint': 'j2'}),
         ('backlash', [0.1, 0.01], [1.0], {},
          {'gap': 0.01, 'motor_inertia': 0.1 * float(np.mean(MOTION.mass_diagonal[:, 0]))}),
     ],
@@ -316,6 +319,7 @@ def test_the_report_says_the_numbers_that_went_into_the_columns(name, shape, c, 
         ('joint_coupling', [0.5], [-4.0], {'kind': 'spring', 'source': 2}),
         ('end_stop', [1.0], [-300.0, 4.0], {'side': 1}), ('torque_gain', [], [-1.5], {}),
         ('gravity_tilt', [0.6, 0.6], [1.0], {}), ('payload', [-0.1, 0, 0, 0], [1.0], {}),
+        ('coupled_friction', [1.0], [0.3, -0.2], {'source': 2}),
         ('command_delay', [0.0], [1.0], {}), ('encoder_eccentricity', [3.0, 0.3, 0.1], [1.0], {}),
     ],
 )  # fmt: skip
@@ -360,6 +364,21 @@ def test_loads_pull_as_the_formulas_say(j):
     np.testing.assert_allclose(
         x[:, other], -(energy(q, _q(other) + h) - energy(q, _q(other) - h)) / (2 * h), atol=1e-8
     )
+
+
+@pytest.mark.parametrize('ratio', [1.0, -0.7])
+def test_a_motor_on_two_joints_rubs_with_their_sum(ratio):
+    """Its force does on both joints the work `-(coulomb |w| + viscous w^2)`, on no other any."""
+    x = columns('coupled_friction', 3, [ratio], source=2) @ [0.3, 0.2]
+    w = _v(3) + ratio * _v(2)
+    np.testing.assert_array_equal(x[:, :2], 0.0)
+    np.testing.assert_allclose(x[:, 2], ratio * x[:, 3])
+    same = np.sign(w)
+    steady = np.flatnonzero((same[1:-1] == same[2:]) & (same[1:-1] == same[:-2])) + 1
+    work = (x * MOTION.velocity).sum(axis=1)
+    np.testing.assert_allclose(work[steady], -(0.3 * np.abs(w) + 0.2 * w**2)[steady], atol=1e-12)
+    pairs = {(p.joint, p.source) for p in EFFECTS['coupled_friction'].places(MOTION)}
+    assert pairs == {(2, 1), (3, 2)}  # each motor with the joint that carries it
 
 
 @pytest.mark.parametrize('j', range(4))

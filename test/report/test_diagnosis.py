@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from matplotlib.colors import to_hex
 
 from sgp_ros.diagnosis.criteria import LEAST_SHARE
-from sgp_ros.diagnosis.result import Equivalent, Parameter
+from sgp_ros.diagnosis.result import Equivalent, Finding, Location, Parameter
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.report.diagnosis import render, write_diagnosis
 from sgp_ros.report.diagnosis_figures import (
@@ -27,6 +27,7 @@ from sgp_ros.report.diagnosis_figures import (
 )
 from sgp_ros.report.diagnosis_maps import draw_location, important_joints
 from sgp_ros.report.diagnosis_text import (
+    effect_name,
     equivalence_sentence,
     explained,
     held_out_sentence,
@@ -108,6 +109,14 @@ def test_the_unexplained_is_said_with_what_it_depends_on_and_the_nearest_effect(
 def test_every_effect_has_a_plain_name(name):
     """Nothing of the schema's spelling reaches the reader."""
     assert '_' not in plain_name(name)
+
+
+def test_the_other_joint_of_an_effect_is_named():
+    """With the kind of the effect where it has one."""
+    for kind, words in (({}, 'with hip'), ({'kind': Parameter('torque')}, 'torque from hip')):
+        parameters = {'source_joint': Parameter('hip'), **kind}
+        found = Finding('knee', 'joint_coupling', parameters, Location(), 1.0, 0.9, 0.1, '')
+        assert effect_name(found) == f'a coupling between joints ({words})'
 
 
 @given(value=st.floats(-1e6, 1e6), std=st.floats(1e-9, 1e6))

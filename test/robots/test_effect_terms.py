@@ -51,7 +51,7 @@ def _entry(name, kind, std=0.01):
         numbers['fz'] = -2.0
     numbers |= {'position_friction': {'hi': 2.5}, 'torque_gain': {'gain': 0.6}}.get(name, {})
     words = {'kind': kind} if kind else {}
-    words |= {'source_joint': 'shoulder'} if name == 'joint_coupling' else {}
+    words |= {'source_joint': 'shoulder'} if EFFECTS[name].has_source else {}
     parameters = {k: {'value': v, 'std': std} for k, v in numbers.items()}
     parameters |= {k: {'value': v} for k, v in words.items()}
     return {'effect': name, 'joint': joint, 'parameters': parameters}, numbers
@@ -69,10 +69,10 @@ def _diagnosed_force(name, kind, numbers, motion):
     drive = Drive(time - 0.5, motion.effort, ((0.0, n),), 1e-3)
     seen = ObservedMotion(
         TREE, time, 0.0, motion.position, motion.velocity, motion.acceleration, motion.effort,
-        drive, given_direction=np.tanh(motion.velocity / WIDTH),
+        drive, sign=lambda v: np.tanh(v / WIDTH),
     )  # fmt: skip
     words = {'kind': kind} if kind else {}
-    words |= {'source_joint': 'shoulder'} if name == 'joint_coupling' else {}
+    words |= {'source_joint': 'shoulder'} if EFFECTS[name].has_source else {}
     stated = EffectAt.stated(EFFECTS[name], JOINTS.get(name, 'elbow'), numbers | words, TREE)
     place, shape, c = stated.place, stated.shape, stated.coefficients
     if name in {'dead_zone', 'saturation'}:

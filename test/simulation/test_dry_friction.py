@@ -8,7 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sgp_ros.simulation.assembly import make_simulation
-from sgp_ros.simulation.dry_friction import directions_from_rest, friction_at_rest, hold_still
+from sgp_ros.simulation.dry_friction import (
+    directions_from_rest,
+    friction_at_rest,
+    hold_axes,
+    hold_still,
+)
 from sgp_ros.simulation.recording import simulate
 from sgp_ros.simulation.sensors import Sensors
 
@@ -45,6 +50,19 @@ def test_held_joints_do_not_accelerate_and_free_ones_follow_the_reduced_mass():
     held = hold_still(inverse, inverse @ np.array([3.0, 7.0]), [1])
     np.testing.assert_allclose(held, [1.5, 0.0], atol=1e-12)
     assert held[1] == 0.0
+
+
+def test_axes_that_depend_on_each_other_are_held():
+    """Two joints and a motor that turns with both; alone it leaves the two to turn together."""
+    inverse = np.linalg.inv(np.array([[2.0, 0.5], [0.5, 1.0]]))
+    free = inverse @ np.array([3.0, 7.0])
+    G = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, -0.5]])
+    np.testing.assert_allclose(hold_axes(inverse, free, G), 0.0, atol=1e-12)
+    np.testing.assert_allclose(hold_axes(inverse, free, G[:1]), [0.0, 7.0], atol=1e-12)
+    both = hold_axes(inverse, free, G[2:])
+    assert both[0] == pytest.approx(0.5 * both[1])
+    # virtual work of the motion that the motor allows, (0.5, 1)
+    assert both[1] == pytest.approx((0.5 * 3.0 + 7.0) / (0.25 * 2.0 + 0.5 + 1.0))
 
 
 def test_wheel_held_by_its_bearing_turns_with_the_pole():

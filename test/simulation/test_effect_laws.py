@@ -44,6 +44,10 @@ def inside(q, lo, hi):
     return (lo <= q) & (q <= hi)
 
 
+def _geared(v, recording):
+    return v - 0.6 * recording.shown_velocity[:, SHOULDER]
+
+
 LAWS = {
     'viscous_friction:b=0.2': lambda t, q, v, r: -0.2 * v,
     'coulomb_friction:level=0.2': lambda t, q, v, r: -0.2 * np.sign(v),
@@ -94,6 +98,9 @@ LAWS = {
     'joint_coupling:source_joint=shoulder,kind=spring,stiffness=2,ratio=0.5': lambda t, q, v, r: (
         -2.0 * (q - 0.5 * r.shown_position[:, SHOULDER])
     ),
+    'coupled_friction:source_joint=shoulder,ratio=-0.6,coulomb=0.2,viscous=0.1': (
+        lambda t, q, v, r: -0.2 * np.sign(_geared(v, r)) - 0.1 * _geared(v, r)
+    ),
     'torque_gain:gain=0.8': lambda t, q, v, r: -0.2 * r.command[:, ELBOW],
     'dead_zone:width=0.2': lambda t, q, v, r: -np.clip(r.command[:, ELBOW], -0.2, 0.2),
     'saturation:limit=0.3': lambda t, q, v, r: (
@@ -110,20 +117,35 @@ def test_force_on_the_joint_is_that_of_the_formula(text):
     found = extra_force(recording)
     t, q, v = signals(recording)
     expected = LAWS[text](t, q, v, recording)
-    moves = np.abs(v) > 1e-9
+    moves = np.abs(v if 'coupled' not in text else _geared(v, recording)) > 1e-9
     assert np.abs(expected[moves]).max() > 0.05
     np.testing.assert_allclose(found[moves, ELBOW], expected[moves], atol=1e-8)
-    if 'kind=spring' not in text:
+    if 'ratio=' in text:
+        np.testing.assert_allclose(found[moves, SHOULDER], _reaction(text) * found[moves, ELBOW],
+                                   atol=1e-8)  # fmt: skip
+    else:
         np.testing.assert_allclose(found[:, SHOULDER], 0.0, atol=1e-8)
 
 
-def test_cable_pulls_back_at_the_source():
-    """The energy `k (q - r p)^2 / 2` gives the source `r` times the tension."""
+def _reaction(text):
+    """The energy `k (q - r p)^2 / 2` gives the source `r` times the tension, `q + r p` of a motor
+    the opposite."""
+    return -0.5 if 'kind=spring' in text else -0.6
+
+
+def test_a_motor_on_two_joints_can_hold_their_sum_at_rest():
+    """Beside dry friction of each joint, which stops them one by one and all together."""
     recording = run(
-        'joint_coupling:joint=elbow,source_joint=shoulder,kind=spring,stiffness=2,ratio=0.5'
-    )
-    found = extra_force(recording)
-    np.testing.assert_allclose(found[:, SHOULDER], -0.5 * found[:, ELBOW], atol=1e-8)
+        'coupled_friction:joint=elbow,source_joint=shoulder,ratio=-1,coulomb=3,viscous=0',
+        'coulomb_friction:joint=elbow,level=0.1', 'coulomb_friction:joint=shoulder,level=0.3',
+        controller='zero', position=(1.0, -0.5), seconds=4.0,
+    )  # fmt: skip
+    v = recording.true_velocity
+    held = np.abs(v[:, ELBOW] - v[:, SHOULDER]) < 1e-10
+    moves = np.abs(v[:, SHOULDER]) > 1e-3
+    assert np.mean(held & moves) > 0.1  # as one body
+    assert np.abs(v[-20:]).max() < 1e-12
+    assert np.ptp(recording.true_position[-20:], axis=0).max() < 1e-12
 
 
 def test_hysteresis_of_a_fast_joint_stays_within_its_level():

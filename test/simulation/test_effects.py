@@ -37,7 +37,9 @@ def example(name, joint, other=None):
     known = LAWS[name].parameters(EFFECTS[name])
     values = {p.name: EXAMPLE_VALUE.get(p.name, 0.05) for p in known if not p.default}
     if name == 'joint_coupling':
-        values = {'source_joint': other, 'kind': 'spring', 'stiffness': 0.05, 'ratio': 2.0}
+        values = {'kind': 'spring', 'stiffness': 0.05, 'ratio': 2.0}
+    if EFFECTS[name].has_source:
+        values['source_joint'] = other
     values = ','.join(f'{name}={value}' for name, value in values.items())
     return f'{name}:joint={joint},{values}'
 
@@ -90,7 +92,7 @@ def test_every_effect_runs_on_every_joint_that_can_have_it(robot, name):
     for joint in simulator.joint_names:
         other = next((x for x in simulator.joint_names if x != joint), None)
         text = example(name, joint, other)
-        lacks_joints = name == 'joint_coupling' and other is None
+        lacks_joints = effect.has_source and other is None
         if joint not in places(simulator, effect) or name == 'limit_friction' or lacks_joints:
             with pytest.raises(ConfigError, match=joint):
                 make_simulation(robot, effects=[text])

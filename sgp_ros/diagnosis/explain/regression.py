@@ -66,7 +66,7 @@ class Columns:
 
 def dry_joints(candidates: tuple[EffectAt, ...]) -> frozenset[int]:
     """Return the joints that some candidate can hold at rest."""
-    return frozenset(s.place.joint for s in candidates if s.is_holding)
+    return frozenset(j for s in candidates for j in s.held_joints)
 
 
 def shape_bounds(

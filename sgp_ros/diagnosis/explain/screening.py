@@ -37,7 +37,7 @@ def screen(columns: Columns, model: Model, effects: Iterable[Effect]) -> list[Tr
         for place in effect.places(columns.equations(held).motion):
             if (effect.name, place) in known:
                 continue
-            dry = held | ({place.joint} if effect.holds(place) else set())
+            dry = held | effect.held_joints(place)
             if dry not in rests:
                 rests[dry] = _Rest.of(columns, model, dry)
             motion = columns.corrected(model.w if effect.uses_bodies else None)

@@ -81,8 +81,11 @@ class DiagnosedDynamics:
             motion = self._motion(q, still, still, loads)
             up, down = motion.sliding(1.0), motion.sliding(-1.0)
             for x in dry:
-                jump = x.columns(down) - x.columns(up)
-                level[:, x.place.joint] += 0.5 * (jump @ x.coefficients)
+                jump = 0.5 * (x.columns(down) - x.columns(up)) @ x.coefficients
+                if jump.ndim == 2:  # of several joints, which may turn against each other
+                    level += np.abs(jump)
+                else:
+                    level[:, x.place.joint] += jump
         return level
 
     def fastest_rate(self, q: np.ndarray, v: np.ndarray, loads: np.ndarray) -> float:
@@ -120,7 +123,7 @@ class DiagnosedDynamics:
         given = np.tile(loads, (len(q) // len(loads), 1))
         return ObservedMotion(
             self.tree, given[:, 2 * k], self.step, q, v, a, given[:, :k], None, stated=stated,
-            given_direction=np.sign(v),
+            sign=np.sign,
         )  # fmt: skip
 
 
