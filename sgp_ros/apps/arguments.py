@@ -151,6 +151,9 @@ def _add_diagnose(add: AddCommand) -> None:
     parser.add_argument('--test', dest='tests', action='append', default=[], metavar='BAG',
                         help='held-out recording for the proof; may be repeated; without any, '
                         'a quarter of REAL is held out')  # fmt: skip
+    parser.add_argument('--bodies', metavar='YAML',
+                        help='mass, com and inertia of links of which the URDF has none; else '
+                        'they are estimated from REAL')  # fmt: skip
 
 
 def _add_import(add: AddCommand) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 from sgp_ros.apps.diagnosed_robot import write_diagnosed
 from sgp_ros.diagnosis.compare.equations import disagreement, nominal_shares
-from sgp_ros.diagnosis.compare.sufficiency import require_inertia
+from sgp_ros.diagnosis.compare.open_bodies import open_bodies
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.result import Diagnosis, Proof
@@ -29,6 +29,7 @@ from sgp_ros.report.diagnosis_text import (
     why_it_lost,
 )
 from sgp_ros.report.files import replacing_results, write_text
+from sgp_ros.robots.given_bodies import with_bodies
 from sgp_ros.robots.nominal import Nominal, nominal_model
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
@@ -46,6 +47,7 @@ class DiagnoseOptions:
         joint_states: topic of the states; None for the one there is.
         command: topic of the commands; None for the one there is.
         effort: the effort that acts, a key of `EFFORT_SOURCES`; the simulation is read as `auto`.
+        bodies: YAML file of bodies that the robot's file lacks; None for none.
     """
 
     sim: str | None = None
@@ -53,6 +55,7 @@ class DiagnoseOptions:
     joint_states: str | None = None
     command: str | None = None
     effort: str = 'auto'
+    bodies: str | None = None
 
 
 def run_diagnose(
@@ -73,9 +76,9 @@ def run_diagnose(
         NumericalError: the motion leaves the equations without a solution.
     """
     chosen = DiagnoseOptions(**options)
-    nominal = nominal_model(load_robot(robot))
+    nominal = _nominal(robot, chosen)
     model, tree = nominal.robot, nominal.tree
-    require_inertia(model.name, tree)  # before a long recording is read
+    open_bodies(model.name, tree)  # refuses one that cannot move before much is read
     remarks = list(nominal.remarks)
     events = _events(bag, model, chosen, remarks)
     tests = _held_out(model, chosen, remarks)
@@ -86,6 +89,14 @@ def run_diagnose(
     )  # fmt: skip
     remarks = [*found.remarks, *remarks]
     return _written(out, nominal, replace(found, simulation=simulation, remarks=tuple(remarks)))
+
+
+def _nominal(robot: str, options: DiagnoseOptions) -> Nominal:
+    """Return the nominal robot, with the bodies that are given beside its file."""
+    nominal = nominal_model(load_robot(robot))
+    if options.bodies is None:
+        return nominal
+    return nominal_model(with_bodies(nominal.robot, options.bodies))
 
 
 def _simulation(

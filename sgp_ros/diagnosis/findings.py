@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -133,8 +133,16 @@ def _unknown(
     )
 
 
-def parameter_errors(equations: Equations, model: Model) -> tuple[ParameterError, ...]:
-    """Return masses and centres that differ by more than two standard deviations."""
+def parameter_errors(
+    equations: Equations, model: Model, unstated: Collection[int] = ()
+) -> tuple[ParameterError, ...]:
+    """Return masses and centres that differ by more than two standard deviations.
+
+    Args:
+        equations: of the recording.
+        model: that was asserted.
+        unstated: bodies that the robot's file leaves open: nothing that was stated is wrong.
+    """
     tree = equations.motion.tree
     if not model.is_free:
         return ()
@@ -144,7 +152,7 @@ def parameter_errors(equations: Equations, model: Model) -> tuple[ParameterError
     found = []
     for body, link in enumerate(tree.link_names):
         before, after = tree.parameters[body], tree.parameters[body] + change[body]
-        if after[0] <= 0.0 or before[0] <= 0.0:
+        if after[0] <= 0.0 or before[0] <= 0.0 or body in unstated:
             continue
         slopes = {'mass': D[:, body, 0]}
         for axis, name in enumerate('xyz'):

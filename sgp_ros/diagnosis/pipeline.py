@@ -9,12 +9,8 @@ import numpy as np
 
 from sgp_ros.batch.acceptance import USUAL
 from sgp_ros.diagnosis.compare.equations import Equations, make_equations
-from sgp_ros.diagnosis.compare.sufficiency import (
-    at_rest,
-    require_inertia,
-    require_motion,
-    require_rows,
-)
+from sgp_ros.diagnosis.compare.open_bodies import open_bodies, open_remark, with_open_bodies
+from sgp_ros.diagnosis.compare.sufficiency import at_rest, require_motion, require_rows
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory, choose_bandwidth, collect
 from sgp_ros.diagnosis.compare.velocity_sensor import sensor_lags
 from sgp_ros.diagnosis.criteria import DOUBTED, REMAINDER_SHARE
@@ -65,11 +61,11 @@ def diagnose(
         progress: called with the share that is done.
 
     Raises:
-        ConfigError: a nominal robot of which a joint has no inertia.
+        ConfigError: a nominal robot that cannot move as its file states it.
         RecordingError: nothing can be used, nothing moves, or too little is left to decide.
         NumericalError: the motion leaves the equations without a solution.
     """
-    require_inertia(robot.name, tree)
+    unstated = open_bodies(robot.name, tree)
     known = list(events)
     still = require_motion(known, robot.name, tree.moving_names)
     raw = at_rest(collect(known, robot, stated, config), np.isin(tree.moving_names, still))
@@ -77,11 +73,13 @@ def diagnose(
     learned, kept, remarks = keep_back(raw) if holds_out else (raw, {}, ())
     if still:
         remarks += (f'Nothing can be said of joints that do not move: {", ".join(still)}.',)
-    recordings = _Recordings(learned, kept, held, still, remarks)
+    tree = with_open_bodies(learned, tree, unstated)
+    remarks += open_remark(tree, unstated)
+    recordings = _Recordings(learned, kept, held, still, remarks, unstated)
     bandwidth = choose_bandwidth(learned, tree)
     require_rows(learned, bandwidth)
     try:
-        return _diagnosed(recordings, make_equations(learned, tree, bandwidth),
+        return _diagnosed(recordings, make_equations(learned, tree, bandwidth, unstated),
                           robot.name, progress)  # fmt: skip
     except np.linalg.LinAlgError as error:
         raise NumericalError(
@@ -93,13 +91,14 @@ def diagnose(
 
 @dataclass(frozen=True, eq=False)
 class _Recordings:
-    """What is learned from, kept back and held out, with still joints and remarks."""
+    """What is learned from, kept back and held out, with still joints, remarks, open bodies."""
 
     learned: RawTrajectory
     kept: Mapping[str, RawTrajectory]
     held: Mapping[str, RawTrajectory]
     still: tuple[str, ...]
     remarks: tuple[str, ...]
+    unstated: tuple[int, ...] = ()
 
 
 def _diagnosed(
@@ -138,7 +137,7 @@ def _diagnosed(
         certainty=certainty,
         findings=findings,
         alternatives=alternatives(decision, chances),
-        parameter_errors=parameter_errors(equations, decision.model),
+        parameter_errors=parameter_errors(equations, decision.model, recordings.unstated),
         proofs=proofs,
         predictions={stem: final.predict(part, tree) for stem, part in recordings.held.items()},
         dependences=depends,
@@ -149,7 +148,7 @@ def _diagnosed(
         rows=len(equations.d),
         refused={reason: count for reason, count in raw.refused.items() if count},
         remarks=(*raw.remarks, *recordings.remarks, *on_z, *doubts),
-        bodies=diagnosed_bodies(equations, decision.model),
+        bodies=diagnosed_bodies(equations, decision.model, recordings.unstated),
         equivalents=equivalents(equations, comparison, decision, contrasts),
     )
 

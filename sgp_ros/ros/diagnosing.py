@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.sufficiency import require_inertia, require_motion
+from sgp_ros.diagnosis.compare.open_bodies import open_bodies
+from sgp_ros.diagnosis.compare.sufficiency import require_motion
 from sgp_ros.diagnosis.compare.trajectory import SHORTEST_ROWS
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import CommandSample, Event, JointSample
@@ -200,7 +201,7 @@ class Diagnosing:
             return False, 'a diagnosis is already running; /diagnostics tells its outcome'
         try:
             nominal = nominal_model(self._robot)
-            require_inertia(self._robot.name, nominal.tree)
+            open_bodies(self._robot.name, nominal.tree)  # refuses one that cannot move
             if states < SHORTEST_ROWS:
                 return False, f'too few states: {states}, at least {SHORTEST_ROWS} are needed'
             events = self.events

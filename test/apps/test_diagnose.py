@@ -168,7 +168,12 @@ def test_a_recording_that_tells_nothing_ends_in_one_line(
     ('bag', 'robot', 'more', 'said'),
     [
         ('case_05/real.mcap', 'case_01/robot.urdf', (), 'expected states of the joints'),
-        ('case_05/real.mcap', ROOT / 'config' / 'robots' / 'panda.yaml', (), 'is singular'),
+        (
+            'case_05/real.mcap',
+            ROOT / 'config' / 'robots' / 'panda.yaml',
+            (),
+            'states of the joints',
+        ),
         (
             'case_05/real.mcap',
             'case_05/robot.urdf',
@@ -189,7 +194,7 @@ def test_a_recording_that_tells_nothing_ends_in_one_line(
     ],
 )
 def test_bad_arguments_end_in_one_line(tmp_path, capsys, bag, robot, more, said):
-    """Another robot, one without inertias, missing files."""
+    """Another robot, one of other joints, missing files."""
     named = PRACTICE / 'cases' / robot
     assert _diagnose(PRACTICE / 'cases' / bag, named, tmp_path / 'out', *map(str, more)) == 2
     error = capsys.readouterr().err.strip()

@@ -12,7 +12,7 @@ would no longer be those of the robot that was given. The simulation only checks
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -38,6 +38,8 @@ from sgp_ros.robots.robot import Robot
 
 SPREAD = 0.25
 """Prior standard deviation of mass and inertia, relative; of the centre, to the radius."""
+OPEN_SPREAD = 1.0
+"""The same of bodies that the robot file leaves open."""
 
 
 _OTHER_PLACES = {index: name for name, index in PLACES.items()}
@@ -174,14 +176,19 @@ def joint_name(motion: ObservedMotion, joint: int) -> str:
     return _OTHER_PLACES.get(joint) or motion.tree.joint_names[joint]
 
 
-def body_directions(tree: Tree) -> np.ndarray:
+def body_directions(tree: Tree, unstated: Collection[int] = ()) -> np.ndarray:
     """Return changes of the inertial parameters, one standard deviation each, (p, 10 b).
 
     Per body: mass at the same centre and size, the centre along three axes, six entries of the
     inertia about the centre.
+
+    Args:
+        tree: nominal robot.
+        unstated: bodies that its file leaves open.
     """
     rows = []
     for body, values in enumerate(tree.parameters):
+        spread = OPEN_SPREAD if body in unstated else SPREAD
         mass = max(float(values[0]), 1e-6)
         c = values[1:4] / mass
         about = 0.5 * (values[4] + values[6] + values[9])
@@ -190,13 +197,13 @@ def body_directions(tree: Tree) -> np.ndarray:
         own = values[4:] - mass * shift
         size = float(np.clip(own[[0, 2, 5]].mean(), 1e-3 * mass * radius**2, None))
         changes = np.zeros((10, 10))
-        changes[0] = SPREAD * values
+        changes[0] = spread * values
         for axis in range(3):
-            e = np.eye(3)[axis] * 0.5 * SPREAD * radius
+            e = np.eye(3)[axis] * 0.5 * spread * radius
             changes[1 + axis, 1:4] = mass * e
             changes[1 + axis, 4:] = mass * (_point(c + e) - _point(c - e)) / 2.0
         for entry in range(6):
-            changes[4 + entry, 4 + entry] = SPREAD * size
+            changes[4 + entry, 4 + entry] = spread * size
         full = np.zeros((10, tree.parameters.size))
         full[:, 10 * body : 10 * body + 10] = changes
         rows.append(full)
@@ -221,13 +228,22 @@ def _smoothing_error(
     return np.asarray((change**2).mean(axis=0))
 
 
-def make_equations(raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth) -> Equations:
-    """Return the equations of a recording; a joint that does not move is asked nothing."""
+def make_equations(
+    raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth, unstated: Collection[int] = ()
+) -> Equations:
+    """Return the equations of a recording; a joint that does not move is asked nothing.
+
+    Args:
+        raw: the recording.
+        tree: nominal robot.
+        bandwidth: of the filters.
+        unstated: bodies that the robot's file leaves open.
+    """
     motion = observe(raw, tree, bandwidth)
     low = parallel_filter(raw, bandwidth)
     k = tree.size
     d = low(motion.nominal_effort - motion.effort - motion.stated_force) * motion.moves
-    directions = body_directions(tree)
+    directions = body_directions(tree, unstated)
     base = np.empty((len(d), k, len(directions)))
     Y = torque_regressor(tree, motion.position, motion.velocity, motion.acceleration)
     for j in range(k):

@@ -1,4 +1,4 @@
-"""Sufficiency of a recording and of a robot: what must be there before anything can be decided.
+"""Sufficiency of a recording: what must be there before anything can be decided.
 
 An encoder at rest still shows positions: white noise, or a count that flickers. A joint moves
 where its positions range over many units of that noise; the unit is the standard deviation of it,
@@ -21,37 +21,12 @@ from sgp_ros.diagnosis.compare.trajectory import (
 )
 from sgp_ros.diagnosis.criteria import LEAST_MOTION, LEAST_ROWS
 from sgp_ros.engine.samples import Event, JointSample
-from sgp_ros.errors import ConfigError, RecordingError
-from sgp_ros.rigid.rigid_body import mass_matrix
-from sgp_ros.rigid.tree import Tree
+from sgp_ros.errors import RecordingError
 
 _FEW = 16
 """Positions below which no spectrum is taken."""
 _ROUNDING = 1e-9
 """Steps that are smaller, relative to the range, are no counts of an encoder."""
-_SINGULAR = 1e-12
-"""Least eigenvalue of the mass matrix with a unit diagonal."""
-
-
-def require_inertia(robot: str, tree: Tree) -> None:
-    """Refuse a nominal robot of which a joint does not resist acceleration.
-
-    Args:
-        robot: its name.
-        tree: nominal robot; its zero position is looked at.
-
-    Raises:
-        ConfigError: its mass matrix is singular.
-    """
-    (M,) = mass_matrix(tree, tree.parameters, np.zeros((1, tree.size)))
-    size = np.sqrt(np.maximum(np.diag(M), 0.0))
-    if size.min() > 0.0 and np.linalg.eigvalsh(M / np.outer(size, size))[0] > _SINGULAR:
-        return
-    raise ConfigError(
-        f'the mass matrix of the nominal robot {robot} is singular',
-        'a mass and inertias for every moving link of the URDF',
-        'identify it first and give the robot_identified.urdf of sgp identify',
-    )
 
 
 def motion_to_noise(position: np.ndarray) -> float:

@@ -7,7 +7,7 @@ starts from. A joint that dry friction holds does not accelerate.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -125,7 +125,9 @@ class FinalModel:
         return e
 
 
-def diagnosed_bodies(equations: Equations, model: Model) -> np.ndarray | None:
+def diagnosed_bodies(
+    equations: Equations, model: Model, unstated: Collection[int] = ()
+) -> np.ndarray | None:
     """Return the inertial parameters of the bodies, (b, 10), in the order of the tree.
 
     The model's change w of the parameters has the information `R^T R`, its prior included. Where
@@ -134,13 +136,14 @@ def diagnosed_bodies(equations: Equations, model: Model) -> np.ndarray | None:
     Args:
         equations: of the recording.
         model: that was asserted.
+        unstated: bodies that the robot's file leaves open.
 
     Returns:
-        None where the bodies are the nominal ones, or none that can exist were found.
+        None where the bodies are those of the file, or none that can exist were found.
     """
-    if not model.is_free:
-        return None
     nominal = equations.motion.tree.parameters
+    if not model.is_free:
+        return nominal if unstated else None
     D = equations.directions  # (p, 10 b), parameters change by w @ D
     changed = (nominal.ravel() + model.w @ D).reshape(nominal.shape)
     if np.all(is_consistent(changed)):

@@ -1,4 +1,4 @@
-"""Too little to decide anything: encoders at rest, few rows, robots without inertia."""
+"""Too little to decide anything: encoders at rest, few rows."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.compare.sufficiency import motion_to_noise, require_inertia, still_joints
+from sgp_ros.diagnosis.compare.sufficiency import motion_to_noise, still_joints
 from sgp_ros.diagnosis.criteria import LEAST_MOTION, LEAST_ROWS
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.engine.samples import JointSample, frozen_array
-from sgp_ros.errors import ConfigError, RecordingError
+from sgp_ros.errors import RecordingError
 from test.diagnosis.worlds import CHAINS, PERIOD, World, events_of, simulate
 
 RESULTS = Path(__file__).parents[3] / 'sgp_proof' / 'results' / 'diagnosis_guards.json'
@@ -82,15 +82,6 @@ def test_a_model_worse_than_a_constant_certifies_nothing(robots):
     assert found.certainty < 0.5
     assert all(f.probability < 0.5 for f in found.findings)
     assert any('joint0' in remark and 'constant' in remark for remark in found.remarks)
-
-
-def test_a_robot_without_inertia_is_refused(robots):
-    robot, tree = robots[1]
-    hollow = replace(tree, parameters=np.zeros_like(tree.parameters))
-    with pytest.raises(ConfigError, match='singular'):
-        require_inertia('chain', hollow)
-    with pytest.raises(ConfigError, match='singular'):
-        diagnose(events_of(simulate(CHAINS[1], 1, 0.5)), robot, hollow, {})
 
 
 def test_a_joint_not_seen_is_not_still():
