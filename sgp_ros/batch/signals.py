@@ -11,7 +11,7 @@ other.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +22,8 @@ from sgp_ros.batch.zero_phase import sharpened
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import RecordingError
-from sgp_ros.robots.robot import Robot
+from sgp_ros.physics.drive import Drive
+from sgp_ros.robots.robot import ActingEffort, Robot
 
 SHORTEST_SEGMENT = 16
 """Fewest states of a stretch that is used."""
@@ -87,7 +88,7 @@ def collect_signals(
     parts = [_Part.of(accepted, rows, step) for rows in used]
     if robot.effort_map is not None:
         parts = [
-            part.acting(robot.effort_map, is_measured=bool(accepted.is_measured[rows[0]]))
+            part.acting(robot.effort_map, accepted, rows, step)
             for part, rows in zip(parts, used, strict=True)
         ]
     ends = np.cumsum([len(part.time) for part in parts])
@@ -136,17 +137,24 @@ class _Part:
         start = (int(stamps[0]) - int(accepted.stamps_ns[0])) * 1e-9
         return cls(start + np.arange(n) * step, path(grid), velocity, effort, command)
 
-    def acting(self, effort_map: Callable[..., np.ndarray], *, is_measured: bool) -> _Part:
+    def acting(
+        self, effort_map: ActingEffort, accepted: Accepted, rows: np.ndarray, step: float
+    ) -> _Part:
         """Return the segment with the efforts that act in place of the recorded ones."""
+        is_measured = bool(accepted.is_measured[rows[0]])
         v = self.velocity
         if v is None:
             v = np.gradient(self.position, self.time, axis=0)
-        command = self.command
+        effort, command = effort_map(self.effort, v, is_measured=is_measured), self.command
         if command is not None:
-            command = effort_map(command, v, is_measured=False)
-        return replace(
-            self, effort=effort_map(self.effort, v, is_measured=is_measured), command=command
-        )
+            assert accepted.commands is not None
+            times = (accepted.commands.stamps_ns - accepted.stamps_ns[rows[0]]) * 1e-9
+            grid = ((0.0, len(v)),)
+            late = effort_map.late_effort(Drive(times, accepted.commands.effort, grid, step))
+            effort = effort if is_measured else effort + late
+            following = np.concatenate([0.5 * (late[1:] + late[:-1]), late[-1:]])
+            command = effort_map(command, v, is_measured=False) + following
+        return replace(self, effort=effort, command=command)
 
 
 def _velocity(

@@ -15,6 +15,8 @@ import numpy as np
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.results import Counts
 from sgp_ros.engine.samples import CommandSample, Event, JointSample
+from sgp_ros.engine.weak_form import WeakForm
+from sgp_ros.physics.drive import WindowDrive
 from sgp_ros.robots.robot import Robot
 
 
@@ -38,12 +40,16 @@ class State:
 class CommandHistory:
     """Zero-order hold over commands: each holds until the next one.
 
+    Args:
+        memory_s: how long a command matters after the next one [s].
+
     Attributes:
         stamps_ns: times at which commands began [ns], increasing.
         efforts: one (k,) per command.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, memory_s: float = 0.0) -> None:
+        self._memory_ns = round(memory_s * 1e9)
         self.stamps_ns: list[int] = []
         self.efforts: list[np.ndarray] = []
 
@@ -89,9 +95,17 @@ class CommandHistory:
             held = acting(held, 0.5 * (seconds[1:] + seconds[:-1]))
         return shares @ held
 
+    def drive(self, first_ns: int, form: WeakForm) -> WindowDrive:
+        """Return the commands as drives receive them, for the window that begins at `first_ns`."""
+        offsets = [stamp - first_ns for stamp in self.stamps_ns]
+        samples = form.times - form.times[0]
+        return WindowDrive(
+            np.array(offsets) * 1e-9, np.array(self.efforts), samples, form.left, form.right
+        )
+
     def forget_before(self, stamp_ns: int) -> None:
-        """Drop commands that ended before `stamp_ns`."""
-        keep = max(bisect_right(self.stamps_ns, stamp_ns) - 1, 0)
+        """Drop commands that do not matter any more from `stamp_ns` on."""
+        keep = max(bisect_right(self.stamps_ns, stamp_ns - self._memory_ns) - 1, 0)
         del self.stamps_ns[:keep]
         del self.efforts[:keep]
 
@@ -120,7 +134,7 @@ class Intake:
         self._actuated = np.array([joint.is_actuated for joint in robot.joints])
         self._gains = np.array([joint.effort_gain for joint in robot.joints])
         self._last_order: tuple[tuple[str, ...], np.ndarray | None] = ((), None)
-        self.commands = CommandHistory()
+        self.commands = CommandHistory(robot.effort_map.memory_s if robot.effort_map else 0.0)
         self.last_state_ns: int | None = None
         self.is_measured = False
         self.configure(config)

@@ -161,7 +161,8 @@ class WindowFilter:
             v = np.column_stack([np.interp(seconds, offsets, column) for column in velocity.T])
             return effort_map(held, v, is_measured=False)
 
-        return commands.average(*span, form.cumulative, acting)
+        now = commands.average(*span, form.cumulative, acting)
+        return now + effort_map.late_effort(commands.drive(span[0], form))[0]
 
     def _assemble(
         self, window: list[State], at: int, weights: _Weights, within: np.ndarray, motion: Motion

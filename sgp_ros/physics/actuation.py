@@ -135,7 +135,10 @@ class _Late(_Drive):
     """A drive whose torque comes late; the shape is a time [s]."""
 
     drawn_over = 'seconds'
-    is_online = False
+    is_late = True
+
+    def effort_columns(self, kind: str) -> tuple[int, ...]:
+        return (0,)
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
         return np.geomspace(0.002, 0.12, 16)[:, None]

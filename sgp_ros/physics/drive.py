@@ -4,7 +4,8 @@ Every effort is averaged with the hat of one step to either side of its grid poi
 as a second difference treats the position (Fornberg 1988). The averages are exact for any times of
 change: with V the twofold integral of the effort, the average is `(V(t + h) - 2 V(t) + V(t - h)) /
 h^2`, and V of a held command is piecewise quadratic. A lag `T y' + y = u` adds exponentials:
-`int y = int u - T (y - y0)`.
+`int y = int u - T (y - y0)`. Online the kernel of a window, linear between the samples, takes the
+place of the hat.
 """
 
 from __future__ import annotations
@@ -73,6 +74,58 @@ class Drive:
             return u[i]
         y = _lagged(knots, u, time_constant)
         return u[i] + (y[i] - u[i]) * np.exp(-np.maximum(times - knots[i], 0.0) / time_constant)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WindowDrive:
+    """Commands of the recent past, whose efforts are wanted averaged with the kernel of a window.
+
+    Attributes:
+        times: (c,) from which each command holds [s], strictly increasing.
+        values: (c, k) [N m or N].
+        samples: (m,) times of the window's samples [s].
+        left, right: (m - 1,) kernel at both ends of each interval, linear in between [1/s].
+    """
+
+    times: np.ndarray
+    values: np.ndarray
+    samples: np.ndarray
+    left: np.ndarray
+    right: np.ndarray
+
+    def effort(
+        self,
+        joint: int,
+        *,
+        delay: float = 0.0,
+        time_constant: float = 0.0,
+        characteristic: Callable[[np.ndarray], np.ndarray] | None = None,
+    ) -> np.ndarray:
+        """Return the average effort of one joint, (1,), see `Drive.effort`.
+
+        In a piece of length h with the kernel `a + b x` the lag leaves of its distance from the
+        command `int (a + b x) exp(-x / T) dx = T (a E + b (T E - h exp(-h / T)))`,
+        `E = 1 - exp(-h / T)`.
+        """
+        u = self.values[:, joint]
+        if characteristic is not None:
+            u = characteristic(u)
+        knots, samples = self.times + delay, self.samples
+        inside = (samples[0] < knots) & (knots < samples[-1])
+        edges = np.union1d(samples, knots[inside])
+        start, h = edges[:-1], np.diff(edges)
+        i = np.maximum(np.searchsorted(knots, start, side='right') - 1, 0)
+        at = np.searchsorted(samples, start, side='right') - 1
+        b = (self.right - self.left)[at] / np.diff(samples)[at]
+        a = self.left[at] + b * (start - samples[at])
+        held = float((h * (a + 0.5 * b * h)) @ u[i])
+        if time_constant <= 0.0:
+            return np.array([held])
+        T = time_constant
+        y = _lagged(knots, u, T)
+        behind = (y[i] - u[i]) * np.exp(-np.maximum(start - knots[i], 0.0) / T)
+        E = -np.expm1(-h / T)
+        return np.array([held + float(behind @ (T * (a * E + b * (T * E - h * (1.0 - E)))))])
 
 
 def _averaged(

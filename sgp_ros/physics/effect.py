@@ -83,7 +83,8 @@ class Effect:
         drawn_over: what its force is drawn over: `position`, `velocity`, `acceleration`,
             `effort`, `time` (its magnitude over the recording) or `seconds` (a few of them).
         is_force: it exerts a force; else it only changes what a sensor shows.
-        is_online: a model that sees one time at once can hold it.
+        is_online: a model that sees one time of the motion at once can hold it.
+        is_late: it answers to commands of the past; the stated number is a time [s].
         is_dry: it holds a joint at rest; where there are kinds, only `coulomb` does.
         is_inertial: proportional to the acceleration.
         uses_bodies: its columns depend on the inertial parameters of the robot.
@@ -113,6 +114,7 @@ class Effect:
     drawn_over: str = 'position'
     is_force: bool = True
     is_online: bool = True
+    is_late: bool = False
     is_dry: bool = False
     is_inertial: bool = False
     uses_bodies: bool = False

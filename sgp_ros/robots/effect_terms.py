@@ -3,8 +3,8 @@
 They enter in one of three places, each by the same columns as in a diagnosis. What is a force of
 the motion, `tau_x = columns @ coefficients` in `M a + h = tau + tau_x`, becomes a physics term of
 the efforts, `tau = M a + h - tau_x`. What depends on the effort itself (gain, dead zone,
-saturation, friction under load, torque from another joint) changes the recorded effort into the
-one that acts, `tau + tau_x(tau)`. Tilt and payload belong to the tree.
+saturation, friction under load, torque from another joint, delay, lag) changes the recorded effort
+into the one that acts, `tau + tau_x(tau)`. Tilt and payload belong to the tree.
 """
 
 from __future__ import annotations
@@ -16,12 +16,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.motion import Commands
+from sgp_ros.physics.parts import Place
 from sgp_ros.physics.term import Coefficient, Motion, Term
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 _SOURCE = 'stated effect of a diagnosis'
 Sign = Callable[[np.ndarray], np.ndarray]
+_SETTLED = 20.0
+"""Time constants after which a lag forgets: 2e-9 of a step is left."""
 
 
 def changed_tree(tree: Tree, effects: Sequence[EffectAt]) -> Tree:
@@ -91,8 +95,18 @@ def effort_map(tree: Tree, effects: Sequence[EffectAt], coulomb_width: float) ->
         effects: stated ones.
         coulomb_width: velocity over which dry friction changes its sign [rad/s or m/s].
     """
-    chosen = tuple(e for e in effects if e.effect.is_online and e.effect.effort_columns(e.kind))
-    return EffortMap(tree, chosen, coulomb_width) if chosen else None
+    chosen = [e for e in effects if e.effect.is_online and e.effect.effort_columns(e.kind)]
+    late = [each for e in chosen if e.effect.is_late for each in _on_motors(tree, e)]
+    instant = tuple(e for e in chosen if not e.effect.is_late)
+    return EffortMap(tree, instant, tuple(late), coulomb_width) if chosen else None
+
+
+def _on_motors(tree: Tree, stated: EffectAt) -> list[EffectAt]:
+    """Return an effect on every motor, joint by joint, of one that acts on all of them."""
+    if stated.place.joint >= 0:
+        return [stated]
+    motors = np.flatnonzero(tree.is_actuated[: tree.size])
+    return [replace(stated, place=Place(int(j))) for j in motors]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,18 +115,20 @@ class EffortMap:
 
     Attributes:
         tree: nominal robot.
-        effects: those that depend on the effort.
+        effects: those that depend on the effort of the same time.
+        late: those that depend on commands of the past, on one joint each.
         coulomb_width: velocity over which dry friction changes its sign [rad/s or m/s].
     """
 
     tree: Tree
     effects: tuple[EffectAt, ...]
+    late: tuple[EffectAt, ...]
     coulomb_width: float
 
     def __call__(
         self, effort: np.ndarray, velocity: np.ndarray, *, is_measured: bool
     ) -> np.ndarray:
-        """Return the efforts that act, (n, k) [N m or N].
+        """Return the efforts that act but for what comes late, (n, k) [N m or N].
 
         Args:
             effort: recorded, (n, k) [N m or N].
@@ -129,6 +145,27 @@ class EffortMap:
             force = _forces(self.tree, stated, motion, _smooth(self.coulomb_width))[:, :, columns]
             acting += force @ stated.coefficients[columns]
         return acting
+
+    @property
+    def memory_s(self) -> float:
+        """How long a command matters after the next one [s]."""
+        return _SETTLED * max((float(e.shape[0]) for e in self.late), default=0.0)
+
+    def late_effort(self, drive: Commands) -> np.ndarray:
+        """Return what comes later than the commands, over what they are now, (n, k) [N m or N].
+
+        Args:
+            drive: commands of at least the last `memory_s`, with n rows wanted.
+        """
+        if not self.late:
+            return np.zeros((1, self.tree.size))
+        now = np.column_stack([drive.effort(j) for j in range(self.tree.size)])
+        still = np.zeros_like(now)
+        added = np.zeros_like(now)
+        motion = Motion(still, still, still, now)
+        for stated in self.late:
+            added += _forces(self.tree, stated, motion, np.sign, drive) @ stated.coefficients
+        return added
 
 
 def rest_friction(
@@ -200,15 +237,18 @@ def _smooth(width: float) -> Sign:
     return lambda v: np.tanh(v / width)
 
 
-def _forces(tree: Tree, stated: EffectAt, motion: Motion, sign: Sign) -> np.ndarray:
+def _forces(
+    tree: Tree, stated: EffectAt, motion: Motion, sign: Sign, drive: Commands | None = None
+) -> np.ndarray:
     """Return the force per coefficient on every joint, (n, k, m).
 
-    The rows stand alone, so what stands for the sign of a velocity is given.
+    The rows stand alone, so what stands for the sign of a velocity is given. Without a drive the
+    efforts are its commands.
     """
     n, k = motion.position.shape
     seen = ObservedMotion(
         tree, np.zeros(n), 0.0, motion.position, motion.velocity, motion.acceleration,
-        motion.effort, _Instant(motion.effort), sign=sign,
+        motion.effort, drive or _Instant(motion.effort), sign=sign,
     )  # fmt: skip
     columns = stated.columns(seen)
     if columns.ndim == 3:

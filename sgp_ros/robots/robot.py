@@ -7,15 +7,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.physics.motion import Commands
 from sgp_ros.physics.term import INPUT_CHANNELS, Coefficient, Joint, Motion, Term
 from sgp_ros.robots.bodies import LumpedBodies
+
+
+class ActingEffort(Protocol):
+    """How recorded efforts become those that act."""
+
+    @property
+    def memory_s(self) -> float:
+        """How long a command matters after the next one [s]."""
+
+    def __call__(
+        self, effort: np.ndarray, velocity: np.ndarray, *, is_measured: bool
+    ) -> np.ndarray:
+        """Return the efforts (n, k) that act at once, of recorded ones."""
+
+    def late_effort(self, drive: Commands) -> np.ndarray:
+        """Return what comes later than the commands, over what they are now, (n, k)."""
 
 
 class RestForce(Protocol):
@@ -79,7 +96,7 @@ class Robot:
     residual_inputs: tuple[tuple[str, ...], ...]
     description: str = ''
     source: Mapping[str, object] = field(default_factory=dict, compare=False)
-    effort_map: Callable[..., np.ndarray] | None = None
+    effort_map: ActingEffort | None = None
     rest_friction: RestForce | None = None
     bodies: LumpedBodies | None = field(default=None, compare=False)
 

@@ -15,7 +15,7 @@ from rclpy.node import Node
 
 from sgp_ros.engine.config import EngineConfig, describe_settings
 from sgp_ros.engine.engine import Engine
-from sgp_ros.engine.samples import JointSample, SettingValue, frozen_array
+from sgp_ros.engine.samples import CommandSample, JointSample, SettingValue, frozen_array
 from sgp_ros.engine.setting import Setting
 from sgp_ros.engine.snapshots import restored, snapshot_config
 from sgp_ros.recordings.command_types import COMMAND_TYPES, FLOAT64_ARRAY, NO_COMMAND
@@ -111,7 +111,10 @@ def _with_defaults(
 
 
 def warm_up(robot: Robot) -> None:
-    """Run a short made-up stream through an engine that is then thrown away."""
+    """Run a short made-up stream through an engine that is then thrown away.
+
+    Its efforts are commanded first, then measured.
+    """
     values: dict[str, object] = {
         'filter.window': 0.008, 'filter.hop': 0.0, 'buffer.budget': 4, 'learning.initial': 4,
     }  # fmt: skip
@@ -121,10 +124,12 @@ def warm_up(robot: Robot) -> None:
     engine = Engine(robot, EngineConfig.from_mapping(values, robot))
     rng = np.random.default_rng(0)
     k = len(robot.joints)
-    for i in range(_SAMPLES):
+    names = tuple(joint.name for joint in robot.joints if joint.is_actuated)
+    engine.push(CommandSample(0, frozen_array([0.0] * len(names)), names))
+    for i in range(2 * _SAMPLES):
         position, effort = rng.normal(size=(2, k))
-        sample = JointSample(
-            i * _PERIOD_NS, robot.joint_names, frozen_array(position), effort=frozen_array(effort)
+        measured = frozen_array(effort) if i >= _SAMPLES else None
+        engine.push(
+            JointSample(i * _PERIOD_NS, robot.joint_names, frozen_array(position), effort=measured)
         )
-        engine.push(sample)
     engine.flush()

@@ -197,3 +197,40 @@ def test_joining_uneven_samples_costs_no_acceleration():
     trim = zero_phase.trim
     error = (found - exact)[trim:-trim]
     assert np.std(error) < 1e-3 * np.std(exact)
+
+
+class _Delayed:
+    """A drive that gives each command `delay` later, as a stated effect."""
+
+    memory_s = 1.0
+
+    def __init__(self, delay):
+        self._delay = delay
+
+    def __call__(self, effort, velocity, *, is_measured):
+        return effort
+
+    def late_effort(self, drive):
+        return (drive.effort(0, delay=self._delay) - drive.effort(0))[:, None]
+
+
+def test_late_drives_give_the_efforts_of_commands_that_come_later():
+    """On the grid; following means of commands, which roll-outs take, come close."""
+    rng = np.random.default_rng(1)
+    states = [_state(t, [np.sin(t)]) for t in np.arange(200) * 0.01]
+
+    def signals(delay, shift):
+        robot = replace(LINEAR_AXIS, effort_map=_Delayed(delay))
+        commands = [
+            CommandSample(START_NS + round((t + shift) * 1e9), frozen_array([u]), ('axis',))
+            for t, u in zip([-0.1, *changes], values, strict=True)
+        ]
+        return collect_signals([*commands, *states], robot)
+
+    changes, values = np.sort(rng.uniform(0.05, 1.9, size=30)), rng.normal(size=31)
+    found, late = signals(0.023, 0.0), signals(0.0, 0.023)
+    now = signals(0.0, 0.0)
+    # the two are sharpened alike but for the last terms of the series
+    for name, share in (('effort', 0.05), ('command', 0.3)):
+        one, other, undelayed = (getattr(x, name) for x in (found, late, now))
+        assert np.std(one - other) < share * np.std(undelayed - other), name

@@ -32,8 +32,10 @@ JOINTS = {
 }  # fmt: skip
 KINDS = {'joint_coupling': ('spring', 'torque'), 'position_friction': ('coulomb', 'viscous')}
 ONLINE = [
-    (name, kind) for name in EFFECTS if EFFECTS[name].is_online for kind in KINDS.get(name, ('',))
-]
+    (name, kind) for name, effect in EFFECTS.items() if effect.is_online and not effect.is_late
+    for kind in KINDS.get(name, ('',))
+]  # fmt: skip
+LATE = [name for name, effect in EFFECTS.items() if effect.is_late]
 
 
 def _robot(folder, effects, terms='{viscous: all}'):
@@ -211,6 +213,56 @@ def test_held_commands_act_through_the_drive_exactly(tmp_path):
     efforts = {round(float(e.effort.measured[elbow]), 6) for e in found}
     # half of the time 1 - 0.5, half of it nothing; the average 0.3 alone would give 0
     assert all(0.2 < x < 0.3 for x in efforts)
+
+
+def _efforts(robot, stamps, values):
+    """The averaged effort of every window, under commands (c, 3) that hold from `stamps` [ns]."""
+    settings = {'filter.window': 0.1, 'filter.hop': 0.0, 'reorder_window': 0.0}
+    engine = Engine(robot, EngineConfig.from_mapping(settings, robot))
+    states = [
+        JointSample(t, robot.joint_names, frozen_array([1e-9 * t, 0.0, 0.0]))
+        for t in range(0, 1_000_000_000, 7_000_000)
+    ]
+    commands = [
+        CommandSample(int(t), frozen_array(u), robot.joint_names)
+        for t, u in zip(stamps, values, strict=True)
+    ]
+    found = []
+    for event in sorted([*commands, *states], key=lambda event: event.stamp_ns):
+        found += engine.push(event).estimates
+    return np.array([e.effort.measured for e in found])
+
+
+@pytest.mark.parametrize('joint', ['elbow', 'all'])
+def test_a_stated_delay_is_that_of_commands_that_come_later(tmp_path, joint):
+    """In each window exactly, whenever the commands change; other joints are not delayed."""
+    rng = np.random.default_rng(3)
+    stamps = np.concatenate([[-200_000_000], np.sort(rng.integers(0, 10**9, size=60))])
+    values = rng.normal(size=(61, 3))
+    entry, _ = _entry('command_delay', '')
+    entry |= {'joint': joint, 'parameters': {'delay': {'value': 0.023}}}
+    (tmp_path / 'plain').mkdir()
+    plain = _robot(tmp_path / 'plain', [])
+    found = _efforts(_robot(tmp_path, [entry]), stamps, values)
+    late = _efforts(plain, stamps + 23_000_000, values)
+    now = _efforts(plain, stamps, values)
+    is_late = np.array([joint in {name, 'all'} for name in plain.joint_names])
+    np.testing.assert_allclose(found, np.where(is_late, late, now), atol=1e-9)
+    assert np.abs(late - now).max() > 0.1
+
+
+def test_late_drives_take_the_commands_alone(tmp_path):
+    """A lag smooths what was commanded; a measured effort lies behind it."""
+    for name in LATE:
+        entry, _ = _entry(name, '')
+        robot, m = _robot(tmp_path, [entry]), _motion()
+        measured = robot.effort_map(m.effort, m.velocity, is_measured=True)
+        np.testing.assert_array_equal(measured, m.effort)
+        stamps = np.arange(-1, 20) * 50_000_000
+        found = _efforts(robot, stamps, np.sign(np.sin(np.arange(21)))[:, None] * np.ones(3))
+        joint = robot.joint_names.index('elbow')
+        assert 0.1 < np.ptp(found[:, joint]) < 3.0
+        assert np.abs(found[:, joint] - found[:, joint - 1]).max() > 0.1
 
 
 BAD = [
