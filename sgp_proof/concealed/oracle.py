@@ -30,13 +30,14 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.prove.prediction import FinalModel
+from sgp_ros.diagnosis.prove.proof import prove
 from sgp_ros.physics.catalogue import BACKLASH, EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place, Quantity
 from sgp_ros.recordings.reader import open_recording
+from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.registry import load_robot
-from sgp_ros.robots.urdf_robot import nominal_tree
 from sgp_ros.simulation.effects import Moment
 
 LEAST = 1e-3
@@ -50,27 +51,25 @@ _ROUNDS = 6
 class Oracle:
     """The true structure of a world with fitted numbers."""
 
-    robot: object
-    tree: object
+    nominal: object
     final: FinalModel
 
     @classmethod
     def fitted(cls, folder, answer):
         """Fit the structure of an answer to `folder/real.mcap`."""
-        robot = load_robot(str(folder / 'robot.urdf'))
-        tree = nominal_tree(robot)
-        raw = _trajectory(folder / 'real.mcap', robot)
+        nominal = nominal_model(load_robot(str(folder / 'robot.urdf')))
+        raw, tree = _trajectory(folder / 'real.mcap', nominal), nominal.tree
         equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
         start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
         model = fit(
             Columns(equations), candidates(answer, equations.motion), start,
             is_free=bool(answer['parameter_errors']), rounds=_ROUNDS,
         )  # fmt: skip
-        return cls(robot, tree, FinalModel(model, model, equations, ()))
+        return cls(nominal, FinalModel(model, model, equations, ()))
 
     def predict(self, recording):
         """Return the accelerations that it predicts on a recording."""
-        return self.final.predict(_trajectory(recording, self.robot), self.tree)
+        return self.final.predict(_trajectory(recording, self.nominal), self.nominal.tree)
 
     def findings(self):
         """Return its effects as `diagnosis.json` has them."""
@@ -117,6 +116,15 @@ def improvements(sealed, answer, truth, out):
         },
         'oracle_parameters': parameter_scores(answer, {'findings': oracle.findings()}),
     }
+
+
+def effort_ratios(sealed, answer, diagnosis):
+    """Return the nMSE of the effort held out, in units of that of the best possible, by joint."""
+    oracle = Oracle.fitted(sealed, answer)
+    raw = _trajectory(sealed / 'real_test.mcap', oracle.nominal)
+    best = prove(oracle.final, raw, oracle.nominal.tree, 'real_test').nmse_after
+    found = diagnosis['fit']['real_test']['nmse_after']
+    return {joint: found[joint] / best[joint] for joint in best if best[joint] > 0.0}
 
 
 def share(nominal, found, best):
@@ -212,5 +220,6 @@ class Unlisted(Effect):
         return np.array([[self._force(Moment(*row, np.zeros(0)))] for row in rows])
 
 
-def _trajectory(path, robot):
-    return collect(open_recording(str(path)).events(None, None), robot)
+def _trajectory(path, nominal):
+    events = open_recording(str(path)).events(None, None)
+    return collect(events, nominal.robot, nominal.stated)

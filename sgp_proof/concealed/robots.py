@@ -36,6 +36,7 @@ class Body:
     effort: float = 1e4
     is_driven: bool = True
     centre: float = 0.0
+    friction: float = 0.0
 
     @property
     def is_prismatic(self):
@@ -232,7 +233,7 @@ def urdf(family, bodies):
             f'<child link="{b.link}"/><origin xyz="{_text(b.xyz)}" rpy="{_text(b.rpy)}"/>'
             f'<axis xyz="{_text(b.axis)}"/><limit {limits}effort="{b.effort:.4g}" '
             f'velocity="{500 if b.kind == "continuous" else 20}"/>'
-            f'<dynamics damping="{b.damping:.4g}" friction="0"/></joint>'
+            f'<dynamics damping="{b.damping:.4g}" friction="{b.friction:.4g}"/></joint>'
         )
     lines.append(
         f'  <link name="tool0"/>\n  <joint name="tool0_fixed" type="fixed"><parent '
