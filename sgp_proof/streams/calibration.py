@@ -109,7 +109,7 @@ def _summary(estimates, engine):
     """Return coverage and NLPD of the target over all joints, once the model has settled."""
     channels = [getattr(e, engine.robot.target) for e in estimates if e.is_scored][SETTLED:]
     error = np.array([c.measured - c.mean for c in channels])
-    variance = np.array([c.variance for c in channels])
+    variance = np.array([c.raw_variance for c in channels])
     return {
         'coverage95': np.mean(np.abs(error) <= INTERVAL_95 * np.sqrt(variance), axis=0).tolist(),
         'nlpd': np.mean(

@@ -139,12 +139,13 @@ class Comparison:
 def compare(bag: Path, estimates: Sequence[Estimate]) -> Comparison:
     """Hold the predictions in a record against replayed estimates, bit for bit."""
     made = [found for found in map(outputs, estimates) if found is not None]
-    comparison = Comparison(replayed=2 * len(made))
+    comparison = Comparison(replayed=3 * len(made))
     topics = PredictionTopics()
     recording = open_recording(bag)
     for topic, points in (
         (topics.prediction, [found.prediction for found in made]),
         (topics.prediction_variance, [found.variance for found in made]),
+        (topics.prediction_raw_variance, [found.raw_variance for found in made]),
     ):
         messages = list(recording.messages(topic))
         comparison.live += len(messages)

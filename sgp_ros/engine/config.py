@@ -99,6 +99,12 @@ class EngineConfig:
         'prior.scale', 'float', 1.0, 'Factor on the prior standard deviation of W.',
         low=1e-9, high=1e12, read_only=True,
     )  # fmt: skip
+    intervals_calibration: str = _setting(
+        'intervals.calibration', 'str', 'always',
+        'When the errors of predictions set the width of the next intervals: always, only while '
+        'the model learns, or off: as the model states them.',
+        choices=('always', 'learning', 'off'),
+    )  # fmt: skip
     learning_enabled: bool = _setting(
         'learning.enabled', 'bool', default=True, description='Learn from samples, not only score.'
     )

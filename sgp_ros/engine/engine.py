@@ -74,7 +74,7 @@ class Engine:
     @property
     def drift(self) -> tuple[DriftTest, ...]:
         """Whether the errors of each joint have grown."""
-        return self.estimator.drift
+        return self.estimator.scoring.drift
 
     def push(self, event: Event) -> Step:
         """Take one event; count it as refused if it cannot be used.
@@ -186,11 +186,11 @@ class Engine:
 
     def scores(self) -> dict[str, dict[str, Score]]:
         """Return the scores of each joint's channels; a channel without samples is absent."""
-        return read_scores(self.robot, self.estimator.scores)
+        return read_scores(self.robot, self.estimator.scoring.scores)
 
     def baseline_scores(self) -> dict[str, dict[str, Score]]:
         """Return the scores of the physics alone on the same samples, target channel only."""
-        return read_scores(self.robot, {self.robot.target: self.estimator.baseline_scores})
+        return read_scores(self.robot, {self.robot.target: self.estimator.scoring.baseline})
 
     def begin_stream(self) -> None:
         """Keep what was learned; forget stream, counts and scores: another recording follows."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +18,7 @@ from sgp_ros.engine.prior_knowledge import (
 )
 from sgp_ros.engine.rest import without_rest
 from sgp_ros.engine.results import Channel, Counts, Estimate
+from sgp_ros.engine.scoring import Scoring
 from sgp_ros.engine.windows import Equation
 from sgp_ros.errors import NumericalError
 from sgp_ros.gp.information import Information
@@ -26,7 +26,6 @@ from sgp_ros.gp.learning import initial_model
 from sgp_ros.gp.model import Model, Observations
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.regression import Memory, OnlinePrediction, Regression
-from sgp_ros.gp.scores import DriftTest, RunningScore
 from sgp_ros.robots.robot import Robot
 
 Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -39,9 +38,7 @@ class Estimator:
     Attributes:
         regression: physics and process; None until enough samples started it.
         baseline: physics alone on the same samples; None where the method has no process.
-        scores: of the model, channel name to one score per joint.
-        drift: tests of the target, one per joint.
-        baseline_scores: of the baseline on the target, one per joint.
+        scoring: what the errors so far tell.
         waiting: inputs, regressors and targets gathered before the first model.
     """
 
@@ -61,24 +58,14 @@ class Estimator:
         self.regression: Regression | None = None
         self.baseline: Regression | None = None
         self.waiting: list[Arrays] = []
-        self.forget_scores()
+        self.scoring = Scoring(k)
         if not any(joint.is_automatic for joint in config.hyper):
             self._start([])
-
-    def forget_scores(self) -> None:
-        """Begin all scores anew."""
-        k = len(self._robot.joints)
-        self.scores = {
-            channel: tuple(RunningScore() for _ in range(k))
-            for channel in ('acceleration', 'effort')
-        }
-        self.baseline_scores = tuple(RunningScore() for _ in range(k))
-        self.drift = tuple(DriftTest() for _ in range(k))
 
     def begin_stream(self, counts: Counts) -> None:
         """Keep the models; count and score anew."""
         self._counts = counts
-        self.forget_scores()
+        self.scoring.begin()
 
     def configure(self, config: EngineConfig) -> None:
         """Take new settings between two samples.
@@ -105,7 +92,7 @@ class Estimator:
 
     def _refresh_baseline(self) -> None:
         """Give the physics alone the noise that its own errors show."""
-        scores = self.baseline_scores
+        scores = self.scoring.baseline
         if self.baseline is None or not all(score.squared_error > 0.0 for score in scores):
             return
         noise = tuple(score.squared_error / score.n for score in scores)
@@ -131,8 +118,13 @@ class Estimator:
         u, f, y = self._arrays(equation)
         prediction = predict_soundly(regression, u, f, self._counts)
         noise = np.array(regression.model.noise)
-        target = Channel(y, prediction.mean, np.diag(prediction.covariance) + noise)
-        complement = self._complement(regression, equation, prediction)
+        target = self._calibrated(
+            self._robot.target,
+            Channel.raw(y, prediction.mean, np.diag(prediction.covariance) + noise),
+        )
+        complement = self._calibrated(
+            self._robot.complement, self._complement(regression, equation, prediction)
+        )
         y, held = without_rest(equation.slack, prediction.mean, y)
         self._counts.held += bool(held.any())
         is_scored = self._score(replace(target, measured=y), complement, held)
@@ -214,27 +206,25 @@ class Estimator:
             return unknown
         mean, variance = np.zeros(k), np.zeros(k)
         mean[joints], variance[joints] = solved[0], np.diag(solved[1])
-        return Channel(measured, mean, variance)
+        return Channel.raw(measured, mean, variance)
+
+    def _calibrated(self, channel: str, values: Channel) -> Channel:
+        if self._config.intervals_calibration == 'off':
+            return values
+        return self.scoring.calibrated(channel, values)
 
     def _score(self, target: Channel, complement: Channel, held: np.ndarray) -> bool:
-        is_known = np.isfinite(target.variance) & (target.variance > 0.0)
+        is_known = np.isfinite(target.raw_variance) & (target.raw_variance > 0.0)
         if not is_known.all() or held.all():  # unknown: undetermined, or far outside all samples
             return False
         self._counts.scored += 1
-        errors = (target.measured - target.mean) / np.sqrt(target.variance)
-        for test, error, is_held in zip(self.drift, errors, held, strict=True):
-            if not is_held:
-                test.add(float(error))
+        mode = self._config.intervals_calibration
+        adapts = mode == 'always' or (mode == 'learning' and self._config.learning_enabled)
+        self.scoring.take_target(target, ~held)
+        self.scoring.take(self._robot.target, target, ~held, adapts=adapts)
         # a held joint keeps the other side of the equation from following for all of them
         is_free = np.full(len(held), not held.any())
-        for channel, values, is_told in (
-            (self._robot.target, target, ~held), (self._robot.complement, complement, is_free)
-        ):  # fmt: skip
-            for j, score in enumerate(self.scores[channel]):
-                if is_told[j] and values.variance[j] > 0.0 and math.isfinite(values.variance[j]):
-                    score.add(
-                        *(float(x[j]) for x in (values.measured, values.mean, values.variance))
-                    )
+        self.scoring.take(self._robot.complement, complement, is_free, adapts=adapts)
         return True
 
     def _take_baseline(
@@ -245,10 +235,7 @@ class Estimator:
         prediction = self.baseline.predict(u, f)
         variance = np.diag(prediction.covariance) + np.array(self.baseline.model.noise)
         if is_scored and np.all(np.isfinite(variance)):
-            for j in np.flatnonzero(~held):
-                self.baseline_scores[j].add(
-                    float(y[j]), float(prediction.mean[j]), float(variance[j])
-                )
+            self.scoring.take_baseline(y, prediction.mean, variance, ~held)
         if self._config.learning_enabled and not held.any():
             self.baseline.learn(prediction, y)
 

@@ -31,17 +31,26 @@ class Channel:
     Attributes:
         measured: filtered measurement [unit of the channel].
         mean: predicted mean, made before the measurement was revealed.
-        variance: of that measurement under the prediction, noise included [unit squared].
+        variance: of that measurement under the prediction, noise included, calibrated by earlier
+            errors [unit squared].
+        raw_variance: as the model states it [unit squared].
     """
 
     measured: np.ndarray
     mean: np.ndarray
     variance: np.ndarray
+    raw_variance: np.ndarray
+
+    @classmethod
+    def raw(cls, measured: np.ndarray, mean: np.ndarray, variance: np.ndarray) -> Channel:
+        """Return a prediction before it is calibrated."""
+        return cls(measured, mean, variance, variance)
 
     @classmethod
     def unknown(cls, measured: np.ndarray) -> Channel:
         """Return these measurements without a prediction."""
-        return cls(measured, np.full(len(measured), np.nan), np.full(len(measured), np.nan))
+        nothing = np.full(len(measured), np.nan)
+        return cls(measured, nothing, nothing, nothing)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,12 +98,14 @@ class Score:
         nmse: mean squared error over the variance of the measured target.
         nlpd: mean negative log predictive density [nat].
         coverage95: share of measurements inside the 95 % interval.
+        raw_coverage95: the same for the variance as the model states it.
         n: number of scored samples.
     """
 
     nmse: float
     nlpd: float
     coverage95: float
+    raw_coverage95: float
     n: int
 
 
@@ -190,4 +201,4 @@ def read_scores(
 def _score(running: RunningScore) -> Score | None:
     if running.n == 0 or not np.isfinite(running.nmse):
         return None
-    return Score(running.nmse, running.nlpd, running.coverage95, running.n)
+    return Score(running.nmse, running.nlpd, running.coverage95, running.raw_coverage95, running.n)

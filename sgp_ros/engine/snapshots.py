@@ -30,10 +30,9 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.gp.kernel import Kernel
 from sgp_ros.gp.model import Model
 from sgp_ros.gp.regression import Regression
-from sgp_ros.gp.scores import DriftTest, RunningScore
 from sgp_ros.robots.robot import Robot
 
-VERSION = 5
+VERSION = 6
 
 
 def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
@@ -66,9 +65,7 @@ def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
         else [None if s is None else _encode_state(s) for s in engine.filter.trial.states],
         'last_state_ns': intake.last_state_ns,
         'is_measured': intake.is_measured,
-        'scores': {c: [asdict(s) for s in scores] for c, scores in estimator.scores.items()},
-        'drift': [asdict(test) for test in estimator.drift],
-        'baseline_scores': [asdict(score) for score in estimator.baseline_scores],
+        'scoring': estimator.scoring.state(),
     }
     arrays = {'json': np.array(json.dumps(text))}
     for i, name in enumerate(('U', 'F', 'y')):
@@ -137,12 +134,7 @@ def _fill(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
         [_decode(event) for event in text['pending']],
     )
     estimator = engine.estimator
-    estimator.scores = {
-        channel: tuple(RunningScore(**score) for score in scores)
-        for channel, scores in text['scores'].items()
-    }
-    estimator.baseline_scores = tuple(RunningScore(**s) for s in text['baseline_scores'])
-    estimator.drift = tuple(DriftTest(**test) for test in text['drift'])
+    estimator.scoring.restore(text['scoring'])
     estimator.waiting = list(
         zip(*(snapshot[f'waiting_{name}'] for name in ('U', 'F', 'y')), strict=True)
     )

@@ -53,16 +53,18 @@ class RunningScore:
     squared_error: float = 0.0
     log_loss: float = 0.0
     inside: int = 0
+    inside_raw: int = 0
     target_mean: float = 0.0
     target_squares: float = 0.0
 
-    def add(self, y: float, mean: float, variance: float) -> None:
-        """Score one prediction of variance > 0 against its target."""
+    def add(self, y: float, mean: float, variance: float, raw_variance: float) -> None:
+        """Score one prediction against its target; both variances, calibrated and raw, are > 0."""
         self.n += 1
         error = y - mean
         self.squared_error += error * error
         self.log_loss += 0.5 * (math.log(2.0 * math.pi * variance) + error * error / variance)
         self.inside += abs(error) <= INTERVAL_95 * math.sqrt(variance)
+        self.inside_raw += abs(error) <= INTERVAL_95 * math.sqrt(raw_variance)
         step = y - self.target_mean
         self.target_mean += step / self.n
         self.target_squares += step * (y - self.target_mean)
@@ -81,6 +83,11 @@ class RunningScore:
     def coverage95(self) -> float:
         """Share of targets inside the 95 % interval; NaN without samples."""
         return self.inside / self.n if self.n else math.nan
+
+    @property
+    def raw_coverage95(self) -> float:
+        """Share of targets inside the 95 % interval of the raw variance; NaN without samples."""
+        return self.inside_raw / self.n if self.n else math.nan
 
 
 SLACK = 0.25

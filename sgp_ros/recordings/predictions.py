@@ -25,7 +25,9 @@ class Outputs:
         stamp_ns: of the sample predicted [ns].
         names: joints, k of them.
         prediction: query and means.
-        variance: variances, noise included [units squared]; no positions or velocities.
+        variance: calibrated variances, noise included [units squared]; no positions or
+            velocities.
+        raw_variance: the same as the model states them.
         joint_state: measured state with the predicted effort.
     """
 
@@ -33,13 +35,14 @@ class Outputs:
     names: tuple[str, ...]
     prediction: Point
     variance: Point
+    raw_variance: Point
     joint_state: JointSample
 
 
 def outputs(estimate: Estimate) -> Outputs | None:
     """Return what is published of `estimate`; None where it predicts nothing."""
     acceleration, effort = (
-        (_NONE, _NONE) if np.all(np.isnan(c.mean)) else (c.mean, c.variance)
+        (_NONE,) * 3 if np.all(np.isnan(c.mean)) else (c.mean, c.variance, c.raw_variance)
         for c in (estimate.acceleration, estimate.effort)
     )
     if not (len(acceleration[0]) or len(effort[0])):
@@ -50,6 +53,7 @@ def outputs(estimate: Estimate) -> Outputs | None:
         estimate.names,
         Point(*state, acceleration[0], effort[0]),
         Point(_NONE, _NONE, acceleration[1], effort[1]),
+        Point(_NONE, _NONE, acceleration[2], effort[2]),
         JointSample(
             estimate.stamp_ns, estimate.names, *state, effort[0] if len(effort[0]) else None
         ),
@@ -63,6 +67,7 @@ class PredictionTopics:
     prediction: str = '/sgp_node/prediction'
     prediction_variance: str = '/sgp_node/prediction_variance'
     predicted_joint_states: str = '/sgp_node/predicted_joint_states'
+    prediction_raw_variance: str = '/sgp_node/prediction_raw_variance'
 
 
 def write_outputs(writer: RecordingWriter, topics: PredictionTopics, found: Outputs) -> None:
@@ -70,4 +75,5 @@ def write_outputs(writer: RecordingWriter, topics: PredictionTopics, found: Outp
     stamp_ns, names = found.stamp_ns, found.names
     writer.write_trajectory(topics.prediction, stamp_ns, names, found.prediction)
     writer.write_trajectory(topics.prediction_variance, stamp_ns, names, found.variance)
+    writer.write_trajectory(topics.prediction_raw_variance, stamp_ns, names, found.raw_variance)
     writer.write_joint_state(topics.predicted_joint_states, found.joint_state)

@@ -13,7 +13,9 @@ from sgp_ros.recordings.messages import JOINT_STATE
 CHANGES_TOPIC = '/sgp/changes'
 """Where a record keeps the changes of settings."""
 
-_OWN_OUTPUTS = ('predicted_joint_states', 'prediction', 'prediction_variance')
+_OWN_OUTPUTS = (
+    'predicted_joint_states', 'prediction', 'prediction_variance', 'prediction_raw_variance',
+)  # fmt: skip
 _COMMAND_NAMES = ('command', 'commands')
 
 

@@ -6,7 +6,7 @@ import math
 import platform
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -138,7 +138,7 @@ def versions() -> dict[str, str]:
 
 
 def _score(score: Score) -> dict[str, float]:
-    return {'nmse': score.nmse, 'nlpd': score.nlpd, 'coverage95': score.coverage95, 'n': score.n}
+    return asdict(score)
 
 
 def _parameter(parameter: ParameterEstimate) -> dict[str, Any]:

@@ -65,7 +65,7 @@ class Health:
         for estimate in estimates:
             if estimate.is_scored:
                 channel = getattr(estimate, target)
-                ratio = (channel.measured - channel.mean) ** 2 / channel.variance
+                ratio = (channel.measured - channel.mean) ** 2 / channel.raw_variance
                 before = ratio if self._surprise is None else self._surprise
                 self._surprise = before + (ratio - before) / _MEMORY
 
@@ -165,7 +165,7 @@ class Health:
         values = {
             f'{channel}.{name}': f'{getattr(score, name):.6g}'
             for channel, score in scores.items()
-            for name in ('nmse', 'nlpd', 'coverage95', 'n')
+            for name in ('nmse', 'nlpd', 'coverage95', 'raw_coverage95', 'n')
         }
         target = scores.get(engine.robot.target)
         if target is None or self._surprise is None:

@@ -87,6 +87,9 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
     def _advertise(self) -> None:
         self._prediction = self.create_publisher(JointTrajectory, '~/prediction', 10)
         self._variance = self.create_publisher(JointTrajectory, '~/prediction_variance', 10)
+        self._raw_variance = self.create_publisher(
+            JointTrajectory, '~/prediction_raw_variance', 10
+        )
         self._overlay = self.create_publisher(JointState, '~/predicted_joint_states', 10)
         kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._parameters_out = self.create_publisher(DiagnosticArray, '~/parameters', kept)
@@ -99,7 +102,7 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
         path = str(self._settings['record.path'])
         if not path:
             return None
-        outputs = (self._prediction, self._variance, self._overlay)
+        outputs = (self._prediction, self._variance, self._overlay, self._raw_variance)
         predictions = PredictionTopics(*(o.topic_name for o in outputs))
         topics = Topics(self._joint_states, self._command, predictions)
         return Record(Path(path), topics, str(self._settings['command.type']))
@@ -164,8 +167,10 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
         stamp_ns, names = outputs.stamp_ns, outputs.names
         prediction = trajectory_message(new_message, stamp_ns, names, outputs.prediction)
         variance = trajectory_message(new_message, stamp_ns, names, outputs.variance)
+        raw_variance = trajectory_message(new_message, stamp_ns, names, outputs.raw_variance)
         self._prediction.publish(prediction)
         self._variance.publish(variance)
+        self._raw_variance.publish(raw_variance)
         self._overlay.publish(joint_state_message(new_message, outputs.joint_state))
 
     def _poll(self) -> None:

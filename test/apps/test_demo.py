@@ -53,12 +53,13 @@ def _estimates():
     rng = np.random.default_rng(0)
     made = []
     for i in range(5):
-        values = [rng.normal(size=2) for _ in range(8)]
+        values = [rng.normal(size=2) for _ in range(10)]
         made.append(
             Estimate(
                 10**18 + i, ('pole', 'wheel'), values[0], values[1],
-                Channel(values[2], values[3], values[4] ** 2),
-                Channel(values[5], values[6], values[7] ** 2), is_scored=True, is_learned=True,
+                Channel(values[2], values[3], values[4] ** 2, values[8] ** 2),
+                Channel(values[5], values[6], values[7] ** 2, values[9] ** 2),
+                is_scored=True, is_learned=True,
             )
         )  # fmt: skip
     return made
@@ -73,12 +74,12 @@ def _record(path, estimates):
 
 
 def test_equal_predictions_compare_equal(tmp_path):
-    """Every number of mean and variance is compared: 4 x 2 and 2 x 2 per estimate."""
+    """Every number of mean and variances is compared: 4 x 2 and twice 2 x 2 per estimate."""
     estimates = _estimates()
     _record(tmp_path / 'record.mcap', estimates)
     comparison = compare(tmp_path / 'record.mcap', estimates)
     assert comparison.is_equal
-    assert comparison.compared == 5 * 12
+    assert comparison.compared == 5 * 16
 
 
 def test_one_differing_bit_is_found(tmp_path):

@@ -67,7 +67,9 @@ def test_metrics_follow_the_contract(replayed):
     assert set(samples['refused']) == {
         'late', 'duplicate', 'nonfinite', 'unpaired', 'unknown_joint', 'gap',
     }  # fmt: skip
-    assert set(metrics['joints']['axis']['effort']) == {'nmse', 'nlpd', 'coverage95', 'n'}
+    assert set(metrics['joints']['axis']['effort']) == {
+        'nmse', 'nlpd', 'coverage95', 'raw_coverage95', 'n',
+    }  # fmt: skip
     for parameter in metrics['parameters']:
         assert set(parameter) == {'name', 'joint', 'value', 'std', 'unit', 'identifiable'}
         assert (parameter['std'] is None) == (not parameter['identifiable'])

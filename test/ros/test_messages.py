@@ -24,7 +24,8 @@ NAN = float('nan')
 
 
 def _channel(mean: Sequence[float]) -> Channel:
-    return Channel(np.array([9.0, 9.0]), np.array(mean), np.abs(np.array(mean)))
+    variance = np.abs(np.array(mean))
+    return Channel(np.array([9.0, 9.0]), np.array(mean), variance, 0.25 * variance)
 
 
 def _estimate(acceleration: Sequence[float], effort: Sequence[float]) -> Estimate:
@@ -55,6 +56,8 @@ def test_a_variance_has_no_query() -> None:
     assert [len(point.positions), len(point.velocities)] == [0, 0]
     assert list(point.accelerations) == [3.0, 4.0]
     assert list(point.effort) == [0.5, 5.0]
+    assert list(found.raw_variance.accelerations) == [0.75, 1.0]
+    assert list(found.raw_variance.effort) == [0.125, 1.25]
 
 
 def test_a_channel_that_the_robot_lacks_stays_empty() -> None:

@@ -64,6 +64,7 @@ def test_every_topic_and_service_of_the_contract_exists(graph: Graph) -> None:
     expected = {
         '/sgp_node/prediction': 'trajectory_msgs/msg/JointTrajectory',
         '/sgp_node/prediction_variance': 'trajectory_msgs/msg/JointTrajectory',
+        '/sgp_node/prediction_raw_variance': 'trajectory_msgs/msg/JointTrajectory',
         '/sgp_node/predicted_joint_states': 'sensor_msgs/msg/JointState',
         '/sgp_node/parameters': 'diagnostic_msgs/msg/DiagnosticArray',
         '/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray',

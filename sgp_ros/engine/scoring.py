@@ -1,0 +1,105 @@
+"""What the errors of one-step predictions tell: scores, drift, and the width of intervals.
+
+Everything here sees an error after the prediction it belongs to. Scores and drift are of one
+stream; the scales of the intervals belong to the model and stay with it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from sgp_ros.engine.results import Channel
+from sgp_ros.gp.calibration import IntervalScale
+from sgp_ros.gp.scores import DriftTest, RunningScore
+
+CHANNELS = ('acceleration', 'effort')
+
+
+class Scoring:
+    """Scores, drift and interval scales of k joints.
+
+    Attributes:
+        scores: of the model, channel name to one score per joint.
+        baseline: scores of the physics alone on the target, one per joint.
+        drift: tests of the target, one per joint.
+        scales: of the intervals, channel name to one per joint.
+
+    Args:
+        k: number of joints.
+    """
+
+    def __init__(self, k: int) -> None:
+        self._k = k
+        self.scales = {channel: tuple(IntervalScale() for _ in range(k)) for channel in CHANNELS}
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin all scores anew; the scales stay."""
+        k = self._k
+        self.scores = {channel: tuple(RunningScore() for _ in range(k)) for channel in CHANNELS}
+        self.baseline = tuple(RunningScore() for _ in range(k))
+        self.drift = tuple(DriftTest() for _ in range(k))
+
+    def calibrated(self, channel: str, values: Channel) -> Channel:
+        """Return a prediction with the variance that holds the rate of its 95 % interval."""
+        factor = np.array([scale.factor for scale in self.scales[channel]])
+        return replace(values, variance=values.raw_variance * factor)
+
+    def take(self, channel: str, values: Channel, is_told: np.ndarray, *, adapts: bool) -> None:
+        """Score the joints whose variance is known; their scales follow if `adapts`.
+
+        Args:
+            channel: key of `CHANNELS`.
+            values: measured and predicted.
+            is_told: whether the equation says something of each joint.
+            adapts: whether the intervals learn from these errors.
+        """
+        for j in np.flatnonzero(is_told):
+            y, mean, variance, raw = (
+                float(x[j])
+                for x in (values.measured, values.mean, values.variance, values.raw_variance)
+            )
+            if not (math.isfinite(variance) and variance > 0.0 and raw > 0.0):
+                continue
+            self.scores[channel][j].add(y, mean, variance, raw)
+            if adapts:
+                self.scales[channel][j].add((y - mean) / math.sqrt(raw))
+
+    def take_target(self, values: Channel, is_told: np.ndarray) -> None:
+        """Test the errors of the target for drift, beside what the model itself expects."""
+        errors = (values.measured - values.mean) / np.sqrt(values.raw_variance)
+        for j in np.flatnonzero(is_told):
+            self.drift[j].add(float(errors[j]))
+
+    def take_baseline(
+        self, y: np.ndarray, mean: np.ndarray, variance: np.ndarray, is_told: np.ndarray
+    ) -> None:
+        """Score the physics alone, (k,) each."""
+        for j in np.flatnonzero(is_told):
+            self.baseline[j].add(*(float(x[j]) for x in (y, mean, variance, variance)))
+
+    def state(self) -> dict[str, Any]:
+        """Return everything as plain values; `restore` takes it back."""
+        return {
+            'scores': {c: [asdict(s) for s in scores] for c, scores in self.scores.items()},
+            'scales': {c: [asdict(s) for s in scales] for c, scales in self.scales.items()},
+            'drift': [asdict(test) for test in self.drift],
+            'baseline': [asdict(score) for score in self.baseline],
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue exactly where `state` was taken."""
+        self.scores = {
+            c: tuple(RunningScore(**score) for score in scores)
+            for c, scores in state['scores'].items()
+        }
+        self.scales = {
+            c: tuple(IntervalScale(**scale) for scale in scales)
+            for c, scales in state['scales'].items()
+        }
+        self.drift = tuple(DriftTest(**test) for test in state['drift'])
+        self.baseline = tuple(RunningScore(**score) for score in state['baseline'])
