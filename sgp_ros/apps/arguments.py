@@ -52,8 +52,12 @@ def _seed(text: str) -> int:
     return int(text)
 
 
-def _add_recording(parser: argparse.ArgumentParser, metavar: str = 'BAG') -> None:
-    parser.add_argument('bag', metavar=metavar, help='.mcap file, rosbag2 directory or ROS 1 .bag')
+def _add_recording(
+    parser: argparse.ArgumentParser, metavar: str = 'BAG', *, takes_several: bool = False
+) -> None:
+    more = '; several of one machine are one diagnosis' if takes_several else ''
+    parser.add_argument('bag', metavar=metavar, nargs='+' if takes_several else None,
+                        help=f'.mcap file, rosbag2 directory or ROS 1 .bag{more}')  # fmt: skip
     parser.add_argument(
         '--robot', required=True, metavar='ROBOT', help='a built-in robot, a robot YAML or a URDF'
     )
@@ -145,7 +149,7 @@ def _add_diagnose(add: AddCommand) -> None:
         'Locate, name and model the physics that the nominal robot lacks.',
         'sgp diagnose real.mcap --robot robot.urdf --test real_test.mcap --out out/diagnose',
     )  # fmt: skip
-    _add_recording(parser, 'REAL')
+    _add_recording(parser, 'REAL', takes_several=True)
     parser.add_argument('--sim', metavar='SIM',
                         help='recording of the simulation, to check ROBOT with')  # fmt: skip
     parser.add_argument('--test', dest='tests', action='append', default=[], metavar='BAG',

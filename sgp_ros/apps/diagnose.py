@@ -22,6 +22,7 @@ from sgp_ros.recordings.reader import open_recording
 from sgp_ros.report.diagnosis import write_diagnosis, write_predictions
 from sgp_ros.report.diagnosis_proof import interval_text, tables
 from sgp_ros.report.diagnosis_text import (
+    differences_text,
     equivalence_sentence,
     parameter_errors_text,
     phrase,
@@ -59,12 +60,13 @@ class DiagnoseOptions:
 
 
 def run_diagnose(
-    bag: str, robot: str, out: Path, *, progress: Callable[[float], None], **options: Any
-) -> dict[str, Any]:
-    """Diagnose a recording and write diagnosis.json, predictions and the report.
+    bag: str | Sequence[str], robot: str, out: Path, *, progress: Callable[[float], None],
+    **options: Any,
+) -> dict[str, Any]:  # fmt: skip
+    """Diagnose one or several recordings; write diagnosis.json, predictions and the report.
 
     Args:
-        bag: the recording.
+        bag: the recording, or several of one machine.
         robot: a URDF, or a robot YAML with one, or a built-in name.
         out: folder of the results.
         progress: called with the share that is done.
@@ -80,8 +82,8 @@ def run_diagnose(
     model, tree = nominal.robot, nominal.tree
     open_bodies(model.name, tree)  # refuses one that cannot move before much is read
     remarks = list(nominal.remarks)
-    events = _events(bag, model, chosen, remarks)
-    tests = _held_out(model, chosen, remarks)
+    events = _read([bag] if isinstance(bag, str) else bag, model, chosen, remarks)
+    tests = _read(chosen.tests, model, chosen, remarks, taken=('train', *events))
     simulation = _simulation(nominal, chosen, remarks)
     found = diagnose(
         events, model, tree, tests, stated=nominal.stated, holds_out=not chosen.tests,
@@ -112,18 +114,20 @@ def _simulation(
     return shares
 
 
-def _held_out(
-    robot: Robot, options: DiagnoseOptions, remarks: list[str]
-) -> dict[str, list[Event]]:
-    tests: dict[str, list[Event]] = {}
-    for test in options.tests:
-        stem = Path(test).stem
-        if stem in tests or stem == 'train':
+def _read(
+    bags: Sequence[str], robot: Robot, options: DiagnoseOptions, remarks: list[str],
+    taken: Sequence[str] = (),
+) -> dict[str, list[Event]]:  # fmt: skip
+    """Return the events of recordings by stem, which must differ from those that are taken."""
+    found: dict[str, list[Event]] = {}
+    for bag in bags:
+        stem = Path(bag).stem
+        if stem in found or stem in taken:
             raise RecordingError(
                 f'two recordings with the name {stem!r}', 'different names', 'rename one'
             )
-        tests[stem] = _events(test, robot, options, remarks)
-    return tests
+        found[stem] = _events(bag, robot, options, remarks)
+    return found
 
 
 def _written(out: Path, nominal: Nominal, found: Diagnosis) -> dict[str, Any]:
@@ -148,13 +152,16 @@ def print_diagnosis(found: Diagnosis) -> None:
         print(f'  found     p {f.probability:.2f}  {where}{f"; {f.why}" if f.why else ""}')
         if f.formula:
             print(f'                    {f.formula}')
-    best = found.findings[0] if found.verdict == 'missing_physics' else None
+    is_missing = found.verdict == 'missing_physics' and bool(found.findings)
+    best = found.findings[0] if is_missing else None
     if found.findings:
         for f in found.alternatives[:_RIVALS]:
             print(f'  not       p {f.probability:.2f}  {f.joint}: {phrase(f)}: '
                   f'{why_it_lost(f, best)}')  # fmt: skip
     for e in found.equivalents:
         print(f'  or        {equivalence_sentence(e)}')
+    for line in differences_text(found):
+        print(f'  differs   {line}')
     if found.parameter_errors:
         print(f'  bodies    {parameter_errors_text(found.parameter_errors)}')
     for stem, proof in found.proofs.items():

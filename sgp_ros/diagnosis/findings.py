@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,11 +12,20 @@ from sgp_ros.diagnosis.compare.velocity_sensor import SensorLag
 from sgp_ros.diagnosis.criteria import NUMBER_ERROR, REGION_ENERGY
 from sgp_ros.diagnosis.decide.certainty import Probabilities
 from sgp_ros.diagnosis.decide.decision import Decision
+from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.in_recording import InRecording
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.locate.remainder import Remainder, region
-from sgp_ros.diagnosis.result import Dependence, Finding, Location, Parameter, ParameterError
+from sgp_ros.diagnosis.result import (
+    Dependence,
+    Difference,
+    Finding,
+    Location,
+    Parameter,
+    ParameterError,
+)
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -33,13 +43,14 @@ def asserted(
 ) -> tuple[tuple[Finding, ...], tuple[np.ndarray, ...]]:
     """Return the findings of a verdict, most probable first, and the force of each (N, k)."""
     findings: list[Finding] = []
-    forces = list(decision.model.forces) if decision.verdict == 'missing_physics' else []
+    model = decision.model
+    common = [i for i, s in enumerate(model.effects) if not isinstance(s.effect, InRecording)]
+    if decision.verdict != 'missing_physics':
+        common = []
+    forces = [model.forces[i] for i in common]
     if decision.verdict == 'missing_physics':
-        std = reported_std(decision.model, Columns(equations))
-        findings = [
-            _finding(decision, decision.model, i, std[i], chances)
-            for i in range(len(decision.model.effects))
-        ]
+        std = reported_std(model, Columns(equations))
+        findings = [_finding(decision, model, i, std[i], chances) for i in common]
     if decision.verdict == 'unexplained':
         findings.append(_unknown(equations, decision, remainders, chances, depends))
     names = equations.motion.tree.joint_names
@@ -54,6 +65,39 @@ def asserted(
     forces += [np.zeros_like(equations.d)] * (len(findings) - len(forces))
     order = sorted(range(len(findings)), key=lambda i: -findings[i].probability)
     return tuple(findings[i] for i in order), tuple(forces[i] for i in order)
+
+
+def differences(several: Several, names: Sequence[str]) -> tuple[Difference, ...]:
+    """Return what differs between recordings of these names, most probable first.
+
+    The standard deviation of a number in its recording is that of the difference, which is wider.
+    """
+    model = several.model
+    equations = model.frame.equations
+    motion = equations.motion
+    if not several.chances or motion.recording is None:
+        return ()
+    std = reported_std(model, Columns(equations))
+    common = {s.key: s for s in model.effects}
+    at = motion.recording[equations.filter.rows]
+    found = []
+    for i, s in enumerate(model.effects):
+        if not isinstance(s.effect, InRecording):
+            continue
+        law, force = s.effect.law, model.forces[i][at == s.effect.recording]
+        own = _parameters(s, motion, std[i])
+        whole, shared = own, common.get((law.name, s.place))
+        if shared is not None and law.linear:
+            c = s.coefficients + shared.coefficients
+            whole = _parameters(replace(s, coefficients=c), motion, std[i])
+        found.append(
+            Difference(
+                names[s.effect.recording], joint_name(motion, s.place.joint), law.name,
+                whole, own, several.chances[s.key],
+                float(((force**2).mean(axis=0) / equations.power).max()),
+            )
+        )  # fmt: skip
+    return tuple(sorted(found, key=lambda d: -d.probability))
 
 
 def alternatives(decision: Decision, chances: Probabilities) -> tuple[Finding, ...]:

@@ -15,7 +15,7 @@ def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
     fit |= {stem: _proof(proof) for stem, proof in found.proofs.items()}
     fit['predictions'] = {stem: f'pred_{stem}.csv' for stem in found.predictions}
     return {
-        'schema': 1,
+        'schema': 2,
         'verdict': found.verdict,
         'certainty': _finite(found.certainty),
         'findings': [_finding(f) for f in found.findings],
@@ -27,6 +27,15 @@ def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
                 'contrast': _finite(e.contrast),
             }
             for e in found.equivalents
+        ],
+        'recordings': [
+            {
+                'recording': d.recording, 'effect': d.effect, 'joint': d.joint,
+                'parameters': {name: _parameter(p) for name, p in d.parameters.items()},
+                'difference': {name: _parameter(p) for name, p in d.difference.items()},
+                'probability': _finite(d.probability), 'share': _finite(d.share),
+            }
+            for d in found.differences
         ],
         'parameter_errors': [
             {

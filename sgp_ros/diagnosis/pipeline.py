@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,20 +10,22 @@ import numpy as np
 from sgp_ros.batch.acceptance import USUAL
 from sgp_ros.diagnosis.compare.equations import Equations, make_equations
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies, open_remark, with_open_bodies
+from sgp_ros.diagnosis.compare.several import join
 from sgp_ros.diagnosis.compare.sufficiency import at_rest, require_motion, require_rows
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory, choose_bandwidth, collect
 from sgp_ros.diagnosis.compare.velocity_sensor import sensor_lags
 from sgp_ros.diagnosis.criteria import DOUBTED, REMAINDER_SHARE
 from sgp_ros.diagnosis.decide.certainty import certainty_of, probabilities
-from sgp_ros.diagnosis.decide.decision import Decision, decide
+from sgp_ros.diagnosis.decide.decision import Decision
+from sgp_ros.diagnosis.decide.differences import Several, decide_several
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, equivalents
-from sgp_ros.diagnosis.explain.comparison import Comparison, compare_models
+from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.findings import alternatives, asserted, parameter_errors
+from sgp_ros.diagnosis.findings import alternatives, asserted, differences, parameter_errors
 from sgp_ros.diagnosis.locate.bands import bands
 from sgp_ros.diagnosis.locate.dependence import dependences
 from sgp_ros.diagnosis.locate.remainder import Remainder, learn_remainder
-from sgp_ros.diagnosis.prove.held_out import keep_back
+from sgp_ros.diagnosis.prove.held_out import HELD_OUT, keep_back
 from sgp_ros.diagnosis.prove.prediction import FinalModel, diagnosed_bodies
 from sgp_ros.diagnosis.prove.processes import harm, kept_processes
 from sgp_ros.diagnosis.prove.proof import prove, reasons_to_doubt
@@ -37,7 +39,7 @@ from sgp_ros.robots.robot import Robot
 
 
 def diagnose(
-    events: Iterable[Event],
+    events: Iterable[Event] | Mapping[str, Iterable[Event]],
     robot: Robot,
     tree: Tree,
     tests: Mapping[str, Iterable[Event]],
@@ -50,7 +52,7 @@ def diagnose(
     """Say what a recording has that the nominal robot lacks.
 
     Args:
-        events: of the training recording.
+        events: of the training recording; of several, by stem.
         robot: names, actuated joints and gains.
         tree: nominal robot.
         tests: events of held-out recordings, by stem.
@@ -66,16 +68,15 @@ def diagnose(
         NumericalError: the motion leaves the equations without a solution.
     """
     unstated = open_bodies(robot.name, tree)
-    known = list(events)
-    still = require_motion(known, robot.name, tree.moving_names)
-    raw = at_rest(collect(known, robot, stated, config), np.isin(tree.moving_names, still))
+    several = dict(events) if isinstance(events, Mapping) else {'': events}
+    raws, still = _collected(several, robot, tree, stated, config)
     held = {stem: collect(test, robot, stated, config) for stem, test in tests.items()}
-    learned, kept, remarks = keep_back(raw) if holds_out else (raw, {}, ())
+    learned, kept, remarks = _kept_back(raws) if holds_out else (join(raws), {}, ())
     if still:
         remarks += (f'Nothing can be said of joints that do not move: {", ".join(still)}.',)
     tree = with_open_bodies(learned, tree, unstated)
     remarks += open_remark(tree, unstated)
-    recordings = _Recordings(learned, kept, held, still, remarks, unstated)
+    recordings = _Recordings(tuple(several), learned, kept, held, still, remarks, unstated)
     bandwidth = choose_bandwidth(learned, tree)
     require_rows(learned, bandwidth)
     try:
@@ -93,6 +94,7 @@ def diagnose(
 class _Recordings:
     """What is learned from, kept back and held out, with still joints, remarks, open bodies."""
 
+    names: tuple[str, ...]
     learned: RawTrajectory
     kept: Mapping[str, RawTrajectory]
     held: Mapping[str, RawTrajectory]
@@ -101,20 +103,52 @@ class _Recordings:
     unstated: tuple[int, ...] = ()
 
 
+def _collected(
+    several: Mapping[str, Iterable[Event]],
+    robot: Robot,
+    tree: Tree,
+    stated: tuple[EffectAt, ...],
+    config: EngineConfig,
+) -> tuple[list[RawTrajectory], tuple[str, ...]]:
+    """Return the recordings on grids of one step, and the joints that are still in all."""
+    known = [list(events) for events in several.values()]
+    still = [require_motion(events, robot.name, tree.moving_names) for events in known]
+    raws = [collect(events, robot, stated, config) for events in known]
+    step = max(raw.step for raw in raws)
+    raws = [
+        raw if raw.step == step else collect(events, robot, stated, config, least_step=step)
+        for raw, events in zip(raws, known, strict=True)
+    ]
+    raws = [
+        at_rest(raw, np.isin(tree.moving_names, names))
+        for raw, names in zip(raws, still, strict=True)
+    ]
+    return raws, tuple(name for name in still[0] if all(name in names for names in still))
+
+
+def _kept_back(
+    raws: Sequence[RawTrajectory],
+) -> tuple[RawTrajectory, dict[str, RawTrajectory], tuple[str, ...]]:
+    """Return what to learn from, what is held out of it by name, and what is to be said."""
+    parts = [keep_back(raw) for raw in raws]
+    kept = [held[HELD_OUT] for _, held, _ in parts if held]
+    said = dict.fromkeys(remark for _, _, remarks in parts for remark in remarks)
+    learned = join([part for part, _, _ in parts])
+    return learned, {HELD_OUT: join(kept)} if kept else {}, tuple(said)
+
+
 def _diagnosed(
     recordings: _Recordings,
     equations: Equations,
     robot: str,
     progress: Callable[[float], None],
 ) -> Diagnosis:
-    raw, tree = recordings.learned, equations.motion.tree
-    comparison = compare_models(equations, lambda share: progress(0.05 + 0.85 * share))
-    decision = decide(equations, comparison)
+    raw, tree, names = recordings.learned, equations.motion.tree, recordings.names
+    several = decide_several(equations, len(names), lambda x: progress(0.05 + 0.85 * x))
+    whole, equations = equations, several.equations
+    comparison, decision, model = several.comparison, several.decision, several.model
     lags = [lag for lag in sensor_lags(raw, equations) if lag.is_physics]
-    learned = _remainders(equations, decision)
-    final = FinalModel(decision.model, comparison.nominal, equations, learned)
-    remainders, on_z = kept_processes(final)
-    final = replace(final, remainders=remainders)
+    final, learned, on_z = _final(several, whole)
     contrasts = Contrasts(equations, decision.model)
     parts = {'train': raw, **recordings.kept, **recordings.held}
     proofs = {stem: prove(final, part, tree, stem) for stem, part in parts.items()}
@@ -122,10 +156,11 @@ def _diagnosed(
     doubts = reasons_to_doubt(proofs, recordings.still)
     chances = probabilities(equations, comparison, decision, contrasts)
     depends = dependences(equations, comparison.base.residual)
-    findings, forces = asserted(equations, decision, lags, learned, chances, depends)
-    certainty = certainty_of(findings, equations, comparison)
-    if doubts:
-        certainty = min(certainty, DOUBTED)
+    on_all = replace(decision, model=model)
+    findings, forces = asserted(whole, on_all, lags, learned, chances, depends)
+    differ = differences(several, names)
+    certainty = certainty_of((*findings, *differ), equations, comparison)
+    certainty = min(certainty, DOUBTED) if doubts else certainty
     if reasons_to_doubt({'train': proofs['train']}, recordings.still):
         findings = tuple(replace(f, probability=min(f.probability, DOUBTED)) for f in findings)
     progress(1.0)
@@ -133,27 +168,41 @@ def _diagnosed(
         robot=robot,
         joints=tree.moving_names,
         units=tuple('N' if p else 'N m' for p in tree.is_prismatic[: tree.size]),
-        verdict='missing_physics' if lags and decision.verdict in _CALM else decision.verdict,
+        verdict=_verdict(decision, is_missing=bool(lags or differ)),
         certainty=certainty,
         findings=findings,
         alternatives=alternatives(decision, chances),
-        parameter_errors=parameter_errors(equations, decision.model, recordings.unstated),
+        parameter_errors=parameter_errors(whole, model, recordings.unstated),
         proofs=proofs,
         predictions={stem: final.predict(part, tree) for stem, part in recordings.held.items()},
         dependences=depends,
         bands=bands(equations, comparison.base.residual, depends),
-        traces=_traces(equations, comparison, decision.model, remainders, forces),
+        traces=_traces(whole, comparison, model, final.remainders, forces),
         cutoff_hz=equations.filter.cutoff,
         rate_hz=1.0 / (raw.step * equations.filter.decimation),
         rows=len(equations.d),
         refused={reason: count for reason, count in raw.refused.items() if count},
         remarks=(*raw.remarks, *recordings.remarks, *on_z, *doubts),
-        bodies=diagnosed_bodies(equations, decision.model, recordings.unstated),
+        bodies=diagnosed_bodies(whole, model, recordings.unstated),
         equivalents=equivalents(equations, comparison, decision, contrasts),
+        recordings=names if len(names) > 1 else (),
+        differences=differ,
     )
 
 
-_CALM = ('no_mismatch', 'parameters_only')
+def _verdict(decision: Decision, *, is_missing: bool) -> str:
+    is_calm = decision.verdict in {'no_mismatch', 'parameters_only'}
+    return 'missing_physics' if is_missing and is_calm else decision.verdict
+
+
+def _final(
+    several: Several, equations: Equations
+) -> tuple[FinalModel, tuple[Remainder, ...], tuple[str, ...]]:
+    """Return the final model, all processes that were learned, and what is to be said of them."""
+    learned = _remainders(several.equations, several.decision)
+    final = FinalModel(several.model, several.comparison.nominal, equations, learned)
+    kept, remarks = kept_processes(final)
+    return replace(final, remainders=kept), learned, remarks
 
 
 def _remainders(equations: Equations, decision: Decision) -> tuple[Remainder, ...]:
@@ -187,7 +236,12 @@ def _traces(
     after = model.residual.copy()
     for r in remainders:
         after[:, r.joint] -= low(r.force(motion))
+    time = equations.time
+    if motion.recording is not None:  # one after the other, each on its own clock
+        at = motion.recording[low.rows]
+        lengths = [motion.time[motion.recording == r].max() for r in range(at.max() + 1)]
+        time = time + np.cumsum([0.0, *lengths])[at]
     return Traces(
-        equations.time, low(motion.position), low(motion.velocity), low(motion.effort),
+        time, low(motion.position), low(motion.velocity), low(motion.effort),
         equations.d, comparison.parameters.residual, after, equations.noise, forces,
     )  # fmt: skip

@@ -70,6 +70,25 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
+class Difference:
+    """What one of several recordings has beyond what is common to all.
+
+    Attributes:
+        recording: its stem; joint, effect, probability and share in it as of a finding.
+        parameters: by name, in this recording: what is common and what differs together.
+        difference: by name, from what is common.
+    """
+
+    recording: str
+    joint: str
+    effect: str
+    parameters: Mapping[str, Parameter]
+    difference: Mapping[str, Parameter]
+    probability: float
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
 class Equivalent:
     """Another explanation that fits the recording as well as the asserted one.
 
@@ -249,6 +268,8 @@ class Diagnosis:
         remarks: for the user.
         equivalents: what this motion cannot tell from the findings, best first.
         bands: Z over each variable of each joint; empty where too few rows were had.
+        recordings: stems of several training recordings; empty for one.
+        differences: what differs between these, most probable first.
         bodies: (b, 10) inertial parameters of the final model, of bodies that can exist, in the
             order of the tree; None for the nominal ones.
     """
@@ -274,3 +295,5 @@ class Diagnosis:
     bodies: np.ndarray | None = None
     equivalents: tuple[Equivalent, ...] = ()
     bands: tuple[Band, ...] = ()
+    recordings: tuple[str, ...] = ()
+    differences: tuple[Difference, ...] = ()

@@ -248,11 +248,11 @@ class FrictionDrift(Effect):
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
         """Return shares of the duration."""
-        return np.asarray(motion.time[-1] * np.array([0.04, 0.1, 0.25, 0.6])[:, None])
+        return np.asarray(motion.time.max() * np.array([0.04, 0.1, 0.25, 0.6])[:, None])
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
         """Return a hundredth of the duration, and twice it."""
-        return np.array([0.01 * motion.time[-1]]), np.array([2.0 * motion.time[-1]])
+        return np.array([0.01 * motion.time.max()]), np.array([2.0 * motion.time.max()])
 
     def sized(self, x: JointScene) -> Drawn:
         def values(s: float) -> dict[str, Value]:

@@ -16,6 +16,7 @@ from sgp_ros.report.diagnosis_figures import draw_diagnosis
 from sgp_ros.report.diagnosis_maps import band_sentences, important_joints
 from sgp_ros.report.diagnosis_proof import densities, near_and_far, proof_rows, rollouts_sentences
 from sgp_ros.report.diagnosis_text import (
+    differences_text,
     effect_name,
     equivalence_sentence,
     explained,
@@ -73,6 +74,7 @@ def render(found: Diagnosis, figures: Mapping[str, bytes]) -> str:
         findings=[_finding(f) for f in found.findings],
         rivals=[_rival(f, best) for f in found.alternatives[:_SHOWN_RIVALS]],
         more_rivals=[_rival(f, best) for f in found.alternatives[_SHOWN_RIVALS:]],
+        differences=[_typeset(line) for line in differences_text(found)],
         equivalents=[equivalence_sentence(e) for e in found.equivalents],
         is_unexplained=found.verdict == 'unexplained',
         errors=[_error(e) for e in found.parameter_errors],

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from sgp_ros.diagnosis.result import (
     Diagnosis,
+    Difference,
     Equivalent,
     Finding,
     Parameter,
@@ -86,7 +88,7 @@ def explained(found: Diagnosis) -> float:
     return 1.0 - sum(proof.nmse_after[name] for name in joints) / max(before, 1e-300)
 
 
-def phrase(finding: Finding) -> str:
+def phrase(finding: Finding | Difference) -> str:
     """Return an effect in plain words, with its interval and parameters."""
     return ', '.join([effect_name(finding), *numbers(finding)])
 
@@ -96,7 +98,7 @@ def plain_name(effect: str) -> str:
     return 'an unknown effect' if effect == UNKNOWN else words_of(effect)
 
 
-def effect_name(finding: Finding) -> str:
+def effect_name(finding: Finding | Difference) -> str:
     """Return the plain name of an effect and of its variant."""
     words = {name: p.value for name, p in finding.parameters.items() if isinstance(p.value, str)}
     name = plain_name(finding.effect)
@@ -106,12 +108,12 @@ def effect_name(finding: Finding) -> str:
     return f'{"Coulomb" if kind == "coulomb" else kind} {name}'.strip()
 
 
-def place(finding: Finding) -> str:
+def place(finding: Finding | Difference) -> str:
     """Return where an effect acts, in plain words."""
     return _PLACES.get(finding.joint, f'on {finding.joint}')
 
 
-def numbers(finding: Finding) -> list[str]:
+def numbers(finding: Finding | Difference) -> list[str]:
     """Return the parameters of an effect, its interval first."""
     shown = dict(finding.parameters)
     if {'lo', 'hi'} <= shown.keys():
@@ -144,6 +146,22 @@ def quantity(p: Parameter, *, is_short: bool = False) -> str:
     if is_short:
         return f'{p.value:.{places}f}'
     return f'{p.value:.{places}f} +- {half:.{places}f}{unit}'
+
+
+def differences_text(found: Diagnosis) -> list[str]:
+    """Say what differs between several recordings; nothing of one recording."""
+    if not found.recordings:
+        return []
+    if not found.differences:
+        return [f'nothing, between {" and ".join(found.recordings)}']
+    lines = []
+    for d in found.differences:
+        text = f'{d.recording} has {place(d)} {phrase(d)}'
+        if d.difference != d.parameters:
+            own = replace(d, parameters=d.difference)
+            text += f', that is {", ".join(numbers(own))} beyond the others'
+        lines.append(f'{text} (probability {d.probability:.2f})')
+    return lines
 
 
 def equivalence_sentence(found: Equivalent) -> str:
@@ -198,6 +216,11 @@ def _count(finding: Finding) -> int:
 
 
 def _missing(found: Diagnosis) -> str:
+    if not found.findings:
+        return (
+            'Nothing is missing that all recordings have in common, but they differ: '
+            f'{"; ".join(differences_text(found))}.'
+        )
     first = found.findings[0]
     text = f'Missing {place(first)}: {phrase(first)} (probability {first.probability:.2f})'
     for previous, f in pairwise(found.findings):

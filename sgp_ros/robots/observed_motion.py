@@ -34,6 +34,8 @@ class ObservedMotion:
         drive: what the drives receive; None where only efforts were measured.
         starts: rows at which the grid begins anew after a pause.
         stated: effects that the nominal robot has, beside those that are part of the tree.
+        recording: (n,) index of the recording that each row is from, of several that a diagnosis
+            learns from; None for any other motion.
         sign: from velocities to what stands for their sign; None takes its mean over the cells
             of the grid.
     """
@@ -48,6 +50,7 @@ class ObservedMotion:
     drive: Commands | None
     starts: tuple[int, ...] = (0,)
     stated: tuple[EffectAt, ...] = ()
+    recording: np.ndarray | None = None
     sign: Callable[[np.ndarray], np.ndarray] | None = None
 
     @cached_property

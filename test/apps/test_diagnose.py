@@ -84,7 +84,7 @@ def test_the_file_is_complete_and_agrees_with_the_last_line(finished):
     number, out, printed = finished
     content = json.loads((out / 'diagnosis.json').read_text())
     assert json.loads(printed.splitlines()[-1]) == content
-    assert content['schema'] == 1
+    assert content['schema'] == 2
     assert content['verdict'] in VERDICTS
     assert 0.0 <= content['certainty'] <= 1.0
     for entry in (*content['findings'], *content['alternatives']):

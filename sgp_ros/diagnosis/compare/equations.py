@@ -131,6 +131,7 @@ class Equations:
         still = replace(
             self.motion, time=self.motion.time[rows], position=q, velocity=np.zeros_like(q),
             acceleration=np.zeros_like(q), effort=np.zeros_like(q), drive=None, starts=(0,),
+            recording=None,
         )  # fmt: skip
         units = np.eye(q.shape[1])
         pushed = (replace(still, acceleration=np.tile(unit, (len(q), 1))) for unit in units)

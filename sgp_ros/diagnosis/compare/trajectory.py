@@ -23,6 +23,7 @@ from sgp_ros.engine.samples import Event, JointSample
 from sgp_ros.errors import RecordingError
 from sgp_ros.physics.drive import Drive
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.motion import Commands
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
 from sgp_ros.robots.robot import Robot
@@ -55,6 +56,7 @@ class RawTrajectory:
         start_ns: stamp of the first state of the recording.
         stated: effects that the nominal robot has, beside those of its tree.
         remarks: what is odd about the efforts.
+        recording: (n,) index of the recording of each row, of several; None of one.
     """
 
     time: np.ndarray
@@ -62,13 +64,14 @@ class RawTrajectory:
     position: np.ndarray
     velocity: np.ndarray | None
     effort: np.ndarray | None
-    drive: Drive | None
+    drive: Commands | None
     segments: tuple[slice, ...]
     refused: dict[str, int]
     noise_density: np.ndarray
     start_ns: int
     stated: tuple[EffectAt, ...] = ()
     remarks: tuple[str, ...] = ()
+    recording: np.ndarray | None = None
 
 
 def collect(
@@ -76,6 +79,7 @@ def collect(
     robot: Robot,
     stated: tuple[EffectAt, ...] = (),
     config: EngineConfig = USUAL,
+    least_step: float = 0.0,
 ) -> RawTrajectory:
     """Bring a recording to its uniform grid.
 
@@ -88,6 +92,7 @@ def collect(
         robot: names, actuated joints and gains.
         stated: effects that the nominal robot has, beside those of its tree.
         config: settings of the intake.
+        least_step: of the grid, which is otherwise that of the states [s].
 
     Raises:
         RecordingError: too little is left.
@@ -107,7 +112,8 @@ def collect(
             f'{len(seconds)} states, no {SHORTEST_ROWS} without a pause of {config.max_gap:g} s',
             'at least some seconds of motion', 'take a longer recording',
         )  # fmt: skip
-    step = float(np.median(np.concatenate([np.diff(seconds[rows]) for rows in stretches])))
+    own_step = float(np.median(np.concatenate([np.diff(seconds[rows]) for rows in stretches])))
+    step = max(own_step, least_step)
     parts = [_Stretch.of(accepted, rows, seconds, step) for rows in stretches]
     ends = np.cumsum([len(part.time) for part in parts])
     segments = tuple(
@@ -259,6 +265,7 @@ def observe(raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth) -> ObservedMot
         raw.drive,
         starts,
         raw.stated,
+        raw.recording,
     )
 
 

@@ -19,7 +19,7 @@ from sgp_ros.diagnosis.decide.decision import Decision, Scale
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.result import Finding
+from sgp_ros.diagnosis.result import Difference, Finding
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +77,7 @@ def probabilities(
 
 
 def certainty_of(
-    findings: Sequence[Finding],
+    findings: Sequence[Finding | Difference],
     equations: Equations,
     comparison: Comparison,
 ) -> float:

@@ -28,7 +28,7 @@ class DiagnosedDynamics:
     """Equations of motion `M(q) a = drive` of k joints, see `batch.forward.ForcedMotion`.
 
     What is called loads is, row by row, the commanded effort (k), the force of effects that
-    remember (k), and the time since the first state (1).
+    remember (k), the time since the first state (1), and the recording (1), see `ObservedMotion`.
 
     Attributes:
         model: effects without memory.
@@ -55,7 +55,7 @@ class DiagnosedDynamics:
         Args:
             q: (m, k) [rad or m].
             v: (m, k) [rad/s or m/s].
-            loads: (m, 2 k + 1) [N m or N, s].
+            loads: (m, 2 k + 2) [N m or N, s].
         """
         m, k = q.shape
         a = np.repeat(np.vstack([np.zeros((1, k)), np.eye(k)]), m, axis=0)
@@ -123,7 +123,7 @@ class DiagnosedDynamics:
         given = np.tile(loads, (len(q) // len(loads), 1))
         return ObservedMotion(
             self.tree, given[:, 2 * k], self.step, q, v, a, given[:, :k], None, stated=stated,
-            sign=np.sign,
+            recording=given[:, 2 * k + 1], sign=np.sign,
         )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from sgp_ros.diagnosis.compare.trajectory import SHORTEST_ROWS, RawTrajectory, noise_density
+from sgp_ros.physics.drive import Drive
 
 HELD_OUT = 'held_out'
 """Name of the blocks among the recordings of a proof."""
@@ -85,13 +86,17 @@ def _part(raw: RawTrajectory, runs: list[np.ndarray]) -> RawTrajectory:
     segments = tuple(slice(end - len(run), end) for run, end in zip(runs, ends, strict=True))
     grids = tuple((float(raw.time[run[0]]), len(run)) for run in runs)
     position = raw.position[rows]
+    drive = raw.drive
+    if drive is not None:
+        assert isinstance(drive, Drive)  # recordings are cut before they are joined
+        drive = replace(drive, grids=grids)
     return replace(
         raw,
         time=raw.time[rows],
         position=position,
         velocity=None if raw.velocity is None else raw.velocity[rows],
         effort=None if raw.effort is None else raw.effort[rows],
-        drive=None if raw.drive is None else replace(raw.drive, grids=grids),
+        drive=drive,
         segments=segments,
         noise_density=noise_density(position, segments, raw.step),
     )

@@ -133,10 +133,14 @@ def _rolled(
     windows: RolloutWindows, dynamics: DiagnosedDynamics, force: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     motion, nodes = windows.motion, windows.nodes
+    recording = -np.ones(len(motion.time)) if motion.recording is None else motion.recording
     loads = np.concatenate(
-        [windows.means(motion.effort), windows.means(force), windows.means(motion.time[:, None])],
+        [
+            windows.means(motion.effort), windows.means(force),
+            windows.means(motion.time[:, None]), windows.means(recording[:, None]),
+        ],
         axis=2,
-    )  # (m, n, 2 k + 1)
+    )  # (m, n, 2 k + 2)  # fmt: skip
     h = windows.stride * motion.step
     substeps = _substeps(dynamics, windows, loads, h)
     q, v = (np.full((*nodes.shape, motion.position.shape[1]), np.nan) for _ in range(2))

@@ -98,7 +98,9 @@ def test_a_joint_that_friction_holds_does_not_creep(equations_for, dry):
     model = _model(equations, _candidate('coulomb_friction', 0), _candidate('viscous_friction', 0))
     motion = equations.motion
     dynamics = dynamics_of(model, equations, motion)
-    loads = np.column_stack([motion.effort, np.zeros_like(motion.effort), motion.time])
+    loads = np.column_stack(
+        [motion.effort, np.zeros_like(motion.effort), motion.time, 0.0 * motion.time]
+    )
     level = dynamics.level_of_dry_friction(motion.position, loads)
     np.testing.assert_allclose(level, model.effects[0].coefficients[0])
     windows = cut(motion, TRIM, horizon=0.05)

@@ -1,0 +1,104 @@
+"""Several recordings of one robot as one trajectory, each with its own clock, rate and drive.
+
+The rows of all recordings stand one after the other, and no filter crosses from one to the next.
+They are brought to the grid of the slowest recording. Time counts from the beginning of each
+recording, as laws of the clock such as warm-up do.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
+from sgp_ros.physics.motion import Commands
+
+_NO_COMMANDS = (
+    'Only some of the recordings have commands that act: the efforts are taken as measured, and '
+    'nothing can be said of delay, dead zone, saturation and lag of the drive.'
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SeveralDrives:
+    """What the drives receive in recordings one after the other.
+
+    Attributes:
+        parts: of each recording.
+    """
+
+    parts: tuple[Commands, ...]
+
+    @property
+    def values(self) -> np.ndarray:
+        """Commands of all recordings, (c, k) [N m or N]."""
+        return np.concatenate([part.values for part in self.parts])
+
+    def effort(
+        self, joint: int, *, delay: float = 0.0, time_constant: float = 0.0,
+        characteristic: Callable[[np.ndarray], np.ndarray] | None = None,
+    ) -> np.ndarray:  # fmt: skip
+        """Return the effort of a joint behind delay, characteristic and lag, (n,) [N m or N]."""
+        return np.concatenate(
+            [
+                part.effort(joint, delay=delay, time_constant=time_constant,
+                            characteristic=characteristic)
+                for part in self.parts
+            ]
+        )  # fmt: skip
+
+
+def join(raws: Sequence[RawTrajectory]) -> RawTrajectory:
+    """Return recordings as one trajectory; of one recording, that.
+
+    Args:
+        raws: on grids of one step.
+
+    Raises:
+        ValueError: grids of different steps.
+    """
+    first = raws[0]
+    if len(raws) == 1:
+        return first
+    if any(raw.step != first.step for raw in raws):
+        raise ValueError(f'grids of {sorted({raw.step for raw in raws})} s, expected one step')
+    starts = np.cumsum([0, *(len(raw.time) for raw in raws)])
+    segments = tuple(
+        slice(s.start + int(start), s.stop + int(start))
+        for raw, start in zip(raws, starts, strict=False)
+        for s in raw.segments
+    )
+    drives = tuple(raw.drive for raw in raws if raw.drive is not None)
+    is_driven = len(drives) == len(raws)
+    refused: Counter[str] = Counter()
+    for raw in raws:
+        refused.update(raw.refused)
+    remarks = [remark for raw in raws for remark in raw.remarks]
+    remarks += [_NO_COMMANDS] if drives and not is_driven else []
+    return RawTrajectory(
+        np.concatenate([raw.time for raw in raws]), first.step,
+        np.concatenate([raw.position for raw in raws]),
+        _joined([raw.velocity for raw in raws]),
+        _joined([_efforts(raw) for raw in raws]),
+        SeveralDrives(drives) if is_driven else None,
+        segments, dict(refused), np.max([raw.noise_density for raw in raws], axis=0),
+        first.start_ns, first.stated, tuple(dict.fromkeys(remarks)),
+        np.repeat(np.arange(len(raws)), np.diff(starts)),
+    )  # fmt: skip
+
+
+def _efforts(raw: RawTrajectory) -> np.ndarray | None:
+    """Return the efforts that act, (n, k); None without any."""
+    if raw.drive is None or raw.effort is not None:
+        return raw.effort
+    k = raw.position.shape[1]
+    return np.column_stack([raw.drive.effort(j) for j in range(k)])
+
+
+def _joined(parts: Sequence[np.ndarray | None]) -> np.ndarray | None:
+    """Return arrays one after the other; None where a recording has none."""
+    arrays = [part for part in parts if part is not None]
+    return np.concatenate(arrays) if len(arrays) == len(parts) else None

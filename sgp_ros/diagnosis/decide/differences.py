@@ -1,0 +1,241 @@
+"""What differs between several recordings of one robot: a load taken up, friction, a mount.
+
+All recordings share one model. A difference is a law that acts in one recording alone, on top of
+what is common, fitted together with it. Laws that may differ are those without a shape to search,
+such as levels of friction and loads, and those that change gravity or bodies. One after the other
+is added while it is worth its price and predicts parts that were left out. A law of the common
+model that one recording alone needs is moved there; so of two recordings of which one carries a
+load, that one is named. Where either says the same, such as friction that is lower in the second
+or higher in the first, the first recording stands for what is common.
+
+What differs would hide what is common. So once differences are found, they are taken off, the
+common models are compared anew, and differences are looked for again beside the new one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, DOUBTED, EVIDENCE, MOST_CERTAIN, TEMPER
+from sgp_ros.diagnosis.decide.cross_validation import support
+from sgp_ros.diagnosis.decide.decision import Decision, Scale, decide
+from sgp_ros.diagnosis.decide.equivalence import Contrasts
+from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.comparison import Comparison, compare_models
+from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.in_recording import InRecording, may_differ
+from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.diagnosis.explain.screening import screen
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect import Effect
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
+
+TRIED = 3
+"""Laws that are fitted on a recording, each time one is added."""
+ALIKE = 0.1
+"""Difference in worth below which two models are the same one, found twice [nats]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Several:
+    """What is common to several recordings, and what differs.
+
+    Attributes:
+        equations: with what differs taken off.
+        comparison, decision: of what is common, on these.
+        model: effects that are common and effects in one recording, fitted together on all.
+        chances: probability of each effect of the model that is in one recording, by its key.
+    """
+
+    equations: Equations
+    comparison: Comparison
+    decision: Decision
+    model: Model
+    chances: dict[object, float]
+
+
+def decide_several(equations: Equations, count: int, progress: Callable[[float], None]) -> Several:
+    """Compare models on several recordings and return what is common and what differs.
+
+    Args:
+        equations: of all recordings.
+        count: of the recordings.
+        progress: called with the share that is done.
+    """
+    part = 1.0 if count == 1 else 0.4
+    comparison = compare_models(equations, lambda share: progress(part * share))
+    decision = decide(equations, comparison)
+    if count == 1:
+        return Several(equations, comparison, decision, decision.model, {})
+    search = _Search(Columns(equations), Scale.of(equations, comparison), count)
+    model = search.extended(_start(comparison, decision, search.scale))
+    progress(0.5)
+    own = _own(model.effects)
+    if not own:
+        return Several(equations, comparison, decision, decision.model, {})
+    left = replace(equations, d=equations.d - _force(model, own))
+    comparison = compare_models(left, lambda share: progress(0.5 + 0.4 * share))
+    decision = decide(left, comparison)
+    model = search.fitted(decision.model, (*decision.model.effects, *own))
+    if decision.verdict != 'unexplained':
+        model = search.extended(model)
+    chances: dict[object, float] = {s.key: search.chance(model, s) for s in _own(model.effects)}
+    if decision.verdict == 'unexplained':  # what is unknown may differ by chance
+        chances = {key: min(p, DOUBTED) for key, p in chances.items()}
+    return Several(left, comparison, decision, model, chances)
+
+
+def _start(comparison: Comparison, decision: Decision, scale: Scale) -> Model:
+    """Return the best common model, be it adequate or not: what differs may spoil it."""
+    models = (comparison.base, *comparison.singles, *comparison.pairs, *comparison.more)
+    return max((decision.model, *models), key=scale.worth)
+
+
+def _own(effects: Iterable[EffectAt]) -> tuple[EffectAt, ...]:
+    """Return the effects that act in one recording alone."""
+    return tuple(s for s in effects if isinstance(s.effect, InRecording))
+
+
+def _within(model: Model, recording: int) -> Model:
+    """Return the model as one recording alone shows it, with laws that hold everywhere."""
+    effects = []
+    for s in model.effects:
+        if not isinstance(s.effect, InRecording):
+            effects.append(s)
+        elif s.effect.recording == recording:
+            effects.append(replace(s, effect=s.effect.law))
+    return replace(model, effects=tuple(effects))
+
+
+def _force(model: Model, some: tuple[EffectAt, ...]) -> np.ndarray:
+    """Return the filtered force of some effects of a model, (N, k) [N m or N]."""
+    parts = zip(model.effects, model.forces, strict=True)
+    return np.asarray(sum(force for s, force in parts if s in some))
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Looks for what differs between so many recordings."""
+
+    columns: Columns
+    scale: Scale
+    count: int
+
+    def extended(self, model: Model) -> Model:
+        """Return the model with all differences that are worth their price."""
+        while True:
+            trials = [*self._moved(model), *self._shared(model), *self._simpler(model)]
+            for r in range(self.count):
+                trials += self._added(model, r)
+            trials = [m for m in trials if m.is_possible() and np.isfinite(m.score)]
+            best = max(trials, key=self._worth, default=model)
+            if self._worth(best) <= self._worth(model) + ALIKE or not self._holds(best):
+                return model
+            model = best
+
+    def _worth(self, model: Model) -> float:
+        """Return the worth of a model; of two that say the same, the one with more in common."""
+        own = [s.effect.recording for s in model.effects if isinstance(s.effect, InRecording)]
+        return self.scale.worth(model) - 4.0 * ALIKE * len(own) - 2.0 * ALIKE * own.count(0)
+
+    def fitted(self, model: Model, effects: tuple[EffectAt, ...]) -> Model:
+        """Return the model with other effects."""
+        joints = frozenset(s.place.joint for s in effects if not isinstance(s.effect, InRecording))
+        effects = tuple(
+            replace(s, effect=InRecording(s.effect.law, s.effect.recording, joints))
+            if isinstance(s.effect, InRecording) else s
+            for s in effects
+        )  # fmt: skip
+        return fit(self.columns, effects, model.sigma, is_free=model.is_free, w=model.w, rounds=2,
+                   steps=8)  # fmt: skip
+
+    def chance(self, model: Model, one: EffectAt) -> float:
+        """Return the probability of an effect in one recording, against none and others there."""
+        assert isinstance(one.effect, InRecording)
+        without = self.fitted(model, tuple(s for s in model.effects if s.key != one.key))
+        r = one.effect.recording
+        said = Contrasts(self.columns.equations(frozenset()), _within(model, r))
+        others = (m for m in self._added(without, r) if m.key != model.key and m.is_possible())
+        rivals = [without, *(m for m in others if not said.is_same_law(_within(m, r)))]
+        worth = np.array([self.scale.worth(m) for m in rivals]) - self.scale.worth(model)
+        odds = float(np.exp(np.minimum(TEMPER * worth, 50.0)).sum())
+        return min(1.0 / (1.0 + odds), MOST_CERTAIN)
+
+    def _added(self, model: Model, recording: int) -> list[Model]:
+        """Return the model with one more law in a recording."""
+        signed = frozenset(
+            s.place.joint for s in model.effects if not isinstance(s.effect, InRecording)
+        )
+        laws = [InRecording(e, recording, signed) for e in EFFECTS.values() if may_differ(e)]
+        found: dict[object, EffectAt] = {}
+        for _, candidate in screen(self.columns, model, laws):
+            found.setdefault(candidate.key, candidate)
+        return [self.fitted(model, (*model.effects, s)) for s in list(found.values())[:TRIED]]
+
+    def _moved(self, model: Model) -> list[Model]:
+        """Return the model with a common law moved into one recording."""
+        found = []
+        for i, s in enumerate(model.effects):
+            if isinstance(s.effect, InRecording) or not may_differ(s.effect):
+                continue
+            for r in range(self.count):
+                there = replace(s, effect=InRecording(s.effect, r))
+                if there.key not in model.key:
+                    others = (*model.effects[:i], *model.effects[i + 1 :])
+                    found.append(self.fitted(model, (*others, there)))
+        return found
+
+    def _shared(self, model: Model) -> list[Model]:
+        """Return the model with a law of one recording made common to all."""
+        found = []
+        for i, s in enumerate(model.effects):
+            if isinstance(s.effect, InRecording):
+                common = replace(s, effect=s.effect.law)
+                if common.key not in model.key:
+                    others = (*model.effects[:i], *model.effects[i + 1 :])
+                    found.append(self.fitted(model, (common, *others)))
+        return found
+
+    def _simpler(self, model: Model) -> list[Model]:
+        """Return the model with a law of one number in place of each richer one."""
+        motion = model.frame.equations.motion
+        simple = [e for e in EFFECTS.values() if may_differ(e) and len(e.quantities) == 1]
+        found = []
+        for i, s in enumerate(model.effects):
+            wrap = s.effect.of if isinstance(s.effect, InRecording) else _same
+            law = s.effect.law if isinstance(s.effect, InRecording) else s.effect
+            if not may_differ(law) or len(law.quantities) == 1 or law.is_on_tree:
+                continue
+            place = Place(s.place.joint)
+            for e in simple:
+                one = EffectAt(wrap(e), place)
+                if place in e.places(motion) and one.key not in model.key:
+                    effects = (*model.effects[:i], one, *model.effects[i + 1 :])
+                    found.append(self.fitted(model, effects))
+        return found
+
+    def _holds(self, model: Model) -> bool:
+        """Return whether the last effect counts as physics and predicts what was left out.
+
+        Anything is said of effects in one recording alone.
+        """
+        equations, last = model.frame.equations, model.effects[-1]
+        if not isinstance(last.effect, InRecording):
+            return True
+        recording = equations.motion.recording
+        assert recording is not None
+        there = recording[equations.filter.rows] == last.effect.recording
+        share = (model.forces[-1][there] ** 2).mean(axis=0) / equations.power
+        floor = self.scale.floor * self.scale.power
+        told = self.scale.rows * support(self.columns, model, floor)[-1]
+        return bool(share.max() > COUNTED_SHARE) and told > EVIDENCE and math.isfinite(told)
+
+
+def _same(law: Effect) -> Effect:
+    return law

@@ -1,0 +1,117 @@
+"""Several recordings of one machine: one answer, and what differs between them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.compare.several import join
+from sgp_ros.diagnosis.compare.trajectory import collect
+from sgp_ros.diagnosis.mapping import diagnosis_mapping
+from sgp_ros.diagnosis.pipeline import diagnose
+from sgp_ros.report.diagnosis_text import differences_text, verdict_sentence
+from test.diagnosis.worlds import CHAINS, Link, events_of, simulate
+
+SECONDS = 6.0
+LOAD, ARM = 0.5, 0.35
+"""Point mass [kg] and its distance from the joint [m]."""
+
+
+def _loaded(link):
+    """Return a link that carries a point mass."""
+    mass = link.mass + LOAD
+    centre = (link.mass * link.centre + LOAD * ARM) / mass
+    inertia = link.inertia + link.mass * (link.centre - centre) ** 2 + LOAD * (ARM - centre) ** 2
+    return Link(mass, centre, inertia, link.length, link.damping)
+
+
+def _friction(level):
+    return {'dry': lambda t, q, s: level}
+
+
+WORLDS = {
+    'alike': ((CHAINS[1], _friction(0.4)), (CHAINS[1], _friction(0.4))),
+    'payload': ((CHAINS[1], _friction(0.4)), ((_loaded(CHAINS[1][0]),), _friction(0.4))),
+    'friction': ((CHAINS[1], _friction(0.6)), (CHAINS[1], _friction(0.3))),
+}
+"""Chain and options of the first and the second recording."""
+
+
+@pytest.fixture(scope='module')
+def found(robots):
+    """Diagnosis of each pair of recordings, made when first asked for."""
+    done = {}
+
+    def make(name):
+        if name not in done:
+            events = {
+                stem: events_of(simulate(chain, seed, SECONDS, **options))
+                for stem, seed, (chain, options) in zip(
+                    ('cold', 'warm'), (11, 12), WORLDS[name], strict=True
+                )
+            }
+            done[name] = diagnose(events, *robots[1], {})
+        return done[name]
+
+    return make
+
+
+def test_two_recordings_of_one_machine_give_one_answer(found):
+    """The friction that both have, and nothing that differs."""
+    one = found('alike')
+    assert [(f.joint, f.effect) for f in one.findings] == [('joint0', 'coulomb_friction')]
+    assert one.findings[0].parameters['level'].value == pytest.approx(0.4, rel=0.02)
+    assert one.recordings == ('cold', 'warm')
+    assert one.differences == ()
+    assert differences_text(one) == ['nothing, between cold and warm']
+    assert np.all(np.diff(one.traces.time) > 0.0)
+
+
+def test_a_load_taken_up_differs_and_what_is_common_stays(found):
+    one = found('payload')
+    assert [(f.joint, f.effect) for f in one.findings] == [('joint0', 'coulomb_friction')]
+    assert one.findings[0].parameters['level'].value == pytest.approx(0.4, rel=0.05)
+    (load,) = one.differences
+    assert (load.recording, load.joint, load.effect) == ('warm', 'joint0', 'payload')
+    # one joint tells the moment and the inertia of a mass, not where it is
+    mass, z = (load.parameters[name].value for name in ('mass', 'z'))
+    assert mass * z == pytest.approx(-LOAD * ARM, rel=0.05)
+    assert load.probability > 0.5
+    (entry,) = diagnosis_mapping(one)['recordings']
+    assert entry.keys() >= {'recording', 'effect', 'joint', 'parameters', 'probability'}
+
+
+def test_friction_that_is_lower_in_the_second_differs(found):
+    """The first recording stands for what is common."""
+    one = found('friction')
+    assert [(f.joint, f.effect) for f in one.findings] == [('joint0', 'coulomb_friction')]
+    assert one.findings[0].parameters['level'].value == pytest.approx(0.6, rel=0.03)
+    (less,) = one.differences
+    assert (less.recording, less.joint, less.effect) == ('warm', 'joint0', 'coulomb_friction')
+    assert less.parameters['level'].value == pytest.approx(0.3, rel=0.03)
+    assert less.difference['level'].value == pytest.approx(-0.3, rel=0.03)
+    assert less.difference['level'].std > 0.0
+    (line,) = differences_text(one)
+    assert line.startswith('warm has on joint0 Coulomb friction, level 0.30')
+    assert 'Coulomb friction' in verdict_sentence(one)
+    assert (
+        one.proofs['train'].nmse_after['joint0'] < 0.02 * one.proofs['train'].nmse_before['joint0']
+    )
+
+
+def test_recordings_of_different_rates_lie_on_the_grid_of_the_slower(robots):
+    robot, _ = robots[1]
+    world = simulate(CHAINS[1], 11, 2.0)
+    every, half = events_of(world), events_of(world)
+    half = [e for i, e in enumerate(half) if i // 2 % 2 == 0]
+    slow = collect(half, robot)
+    both = join([collect(every, robot, least_step=slow.step), slow])
+    assert both.step == slow.step > collect(every, robot).step
+    assert both.segments[1].start == both.segments[0].stop
+    np.testing.assert_array_equal(np.unique(both.recording), [0, 1])
+    first, second = (both.time[both.recording == i] for i in (0, 1))
+    assert first[0] == second[0] == 0.0
+    slower = collect(every, robot, least_step=slow.step)
+    np.testing.assert_array_equal(both.drive.effort(0)[: len(first)], slower.drive.effort(0))
+    with pytest.raises(ValueError, match='one step'):
+        join([collect(every, robot), slow])
