@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from sgp_ros.apps.diagnosed_robot import write_diagnosed
+from sgp_ros.apps.diagnosed_robot import replayed, write_diagnosed
 from sgp_ros.diagnosis.compare.equations import disagreement, nominal_shares
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
@@ -90,7 +90,8 @@ def run_diagnose(
         config=EngineConfig(effort_source=EFFORT_SOURCES[chosen.effort]), progress=progress,
     )  # fmt: skip
     remarks = [*found.remarks, *remarks]
-    return _written(out, nominal, replace(found, simulation=simulation, remarks=tuple(remarks)))
+    found = replace(found, simulation=simulation, remarks=tuple(remarks))
+    return _written(out, nominal, found, events, EFFORT_SOURCES[chosen.effort])
 
 
 def _nominal(robot: str, options: DiagnoseOptions) -> Nominal:
@@ -130,14 +131,22 @@ def _read(
     return found
 
 
-def _written(out: Path, nominal: Nominal, found: Diagnosis) -> dict[str, Any]:
+def _written(
+    out: Path, nominal: Nominal, found: Diagnosis, events: Sequence[Event], effort_source: str
+) -> dict[str, Any]:
     """Write all files, print the findings and return the content of diagnosis.json."""
     with replacing_results(out, 'diagnose'):
         write_predictions(out, found)
-        content = diagnosis_mapping(found)
-        write_text(out / 'diagnosis.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
         bodies = nominal.without_stated(found.bodies)
         write_diagnosed(out, nominal.robot, replace(found, bodies=bodies))
+        online = replayed(out, found.findings, events, effort_source)
+        if online is not None:
+            said = online.remark(found.proofs['train'].nmse_after)
+            found = replace(found, remarks=(*found.remarks, said))
+        content = diagnosis_mapping(found)
+        if online is not None:
+            content['online'] = online.content()
+        write_text(out / 'diagnosis.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
         write_diagnosis(out, found)
     print_diagnosis(found)
     print(f'report: {out / "report.html"}')

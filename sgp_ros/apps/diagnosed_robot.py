@@ -2,11 +2,14 @@
 
 The YAML states the effects that were found in the words of diagnosis.json, with their standard
 deviations, behind those that the nominal robot states; the URDF has the bodies of the final model.
+Where a node does not model all that was found, a replay measures what it leaves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +17,13 @@ import numpy as np
 import yaml
 
 from sgp_ros.diagnosis.result import Diagnosis, Finding, Parameter
+from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.replay import replay
+from sgp_ros.engine.samples import Event
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.report.files import write_text
+from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.stated_effects import dry_friction
 from sgp_ros.robots.stated_values import stated_urdf
@@ -25,6 +33,9 @@ YAML_NAME, URDF_NAME = 'robot_diagnosed.yaml', 'robot_diagnosed.urdf'
 SPREAD = 0.05
 """Relative prior spread of bodies and damping: the diagnosis kept or corrected them. On three
 practice recordings any from 0.01 to 0.2 gives the same scores within a tenth."""
+
+_REPLAYED_S = 60.0
+"""Most of a recording that is replayed for what a node does not model [s]."""
 
 
 def write_diagnosed(out: Path, robot: Robot, found: Diagnosis) -> None:
@@ -57,6 +68,76 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis) -> None:
         'parameters': stated,
     }
     write_text(out / YAML_NAME, yaml.safe_dump(document, sort_keys=False))
+
+
+@dataclass(frozen=True, slots=True)
+class Online:
+    """What a node leaves of the efforts with a diagnosed robot that does not hold all findings.
+
+    Attributes:
+        left_out: the findings that a node does not model.
+        effort_nmse: of a replay of what was diagnosed, by joint.
+        seconds: that were replayed, from the first on; infinite for all of it.
+    """
+
+    left_out: tuple[Finding, ...]
+    effort_nmse: Mapping[str, float]
+    seconds: float
+
+    def remark(self, promised: Mapping[str, float]) -> str:
+        """Return what a reader of the diagnosis must know of the file.
+
+        Args:
+            promised: what the diagnosis leaves of the effort, by joint.
+        """
+        named = ', '.join(
+            f'what has no name at {f.joint} (its Gaussian process stays here, a node learns its '
+            'own)' if f.effect not in EFFECTS else f'{f.effect} of {f.joint}'
+            for f in self.left_out
+        )  # fmt: skip
+        numbers = ', '.join(
+            f'{joint} {x:.2g} (here {promised[joint]:.2g})'
+            for joint, x in self.effort_nmse.items()
+            if joint in promised
+        )
+        part = '' if math.isinf(self.seconds) else f' of the first {self.seconds:g} s'
+        return (
+            f'A node does not take over {named}. With {YAML_NAME} a replay{part} left an nMSE of '
+            f'the effort of {numbers or "nothing, for it did not start to learn"}.'
+        )
+
+    def content(self) -> dict[str, Any]:
+        """Return the same for diagnosis.json."""
+        left_out = [{'joint': f.joint, 'effect': f.effect} for f in self.left_out]
+        return {'left_out': left_out, 'effort_nmse': dict(self.effort_nmse)}
+
+
+def replayed(
+    out: Path, findings: Iterable[Finding], events: Sequence[Event], effort_source: str
+) -> Online | None:
+    """Return what a node would leave of what was diagnosed; None where nothing is left out.
+
+    Args:
+        out: folder with the diagnosed robot.
+        findings: of the diagnosis.
+        events: that were diagnosed.
+        effort_source: setting `effort.source`.
+    """
+    left_out = tuple(
+        f for f in findings if f.effect not in EFFECTS or not EFFECTS[f.effect].is_online
+    )
+    if not left_out:
+        return None
+    robot = load_robot(str(out / YAML_NAME))
+    engine = Engine(robot, EngineConfig.from_mapping({'effort.source': effort_source}, robot))
+    stamps = [event.stamp_ns for event in events]
+    end_ns = min(stamps) + round(_REPLAYED_S * 1e9)
+    replay(engine, (e for e in events if e.stamp_ns <= end_ns), lambda _: None)
+    found = {
+        joint: scores['effort'].nmse for joint, scores in engine.scores().items()
+        if 'effort' in scores and math.isfinite(scores['effort'].nmse)
+    }  # fmt: skip
+    return Online(left_out, found, math.inf if max(stamps) <= end_ns else _REPLAYED_S)
 
 
 def stated_findings(findings: Iterable[Finding]) -> list[dict[str, Any]]:

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 import yaml
 
-from sgp_ros.apps.diagnosed_robot import URDF_NAME, YAML_NAME, write_diagnosed
+from sgp_ros.apps.diagnosed_robot import URDF_NAME, YAML_NAME, replayed, write_diagnosed
 from sgp_ros.diagnosis.result import Diagnosis, Finding, Location, Parameter
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
+from sgp_ros.engine.samples import JointSample, frozen_array
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.rigid.tree import read_urdf
 from sgp_ros.robots.nominal import nominal_model
@@ -196,3 +197,40 @@ def test_dry_friction_of_the_urdf_stays_and_is_a_term(tmp_path):
     robot = load_robot(str(out / YAML_NAME))
     rubbing = [c for c in robot.coefficients if c.name.endswith('.coulomb')]
     assert [(c.joint, c.prior_mean) for c in rubbing] == [('elbow', 0.2)]
+
+
+def _stream(joints, n=400):
+    """States of a robot on a swing, with efforts of their own."""
+    t = np.arange(n)[:, None] * 0.01
+    q = np.sin(t * np.linspace(2.0, 4.0, joints)) + 0.3 * np.sin(7.0 * t)
+    effort = 3.0 * np.cos(3.0 * t) * np.ones(joints)
+    return [
+        JointSample(i * 10_000_000, ('shoulder', 'elbow', 'grip'), *map(frozen_array, row))
+        for i, row in enumerate(zip(q, np.gradient(q, 0.01, axis=0), effort, strict=True))
+    ]
+
+
+def test_what_a_node_does_not_model_is_said_with_what_a_replay_leaves(tmp_path):
+    """Backlash needs more than one time, and the process of an unknown effect is in no file."""
+    (tmp_path / 'known').mkdir()
+    coulomb = _finding('coulomb_friction', 'elbow', {'level': 0.3})
+    known = _written(tmp_path / 'known', URDF, [coulomb])
+    events = _stream(3)
+    assert replayed(known, [coulomb], events, 'auto') is None
+
+    backlash = _finding('backlash', 'elbow', {'gap': 0.01, 'motor_inertia': 0.02})
+    unknown = _finding('unknown', 'shoulder', {})
+    out = _written(tmp_path, URDF, [backlash, unknown])
+    found = replayed(out, [backlash, unknown], events, 'auto')
+    robot = load_robot(str(out / YAML_NAME))
+    engine = Engine(robot, EngineConfig.from_mapping({}, robot))
+    replay(engine, events, lambda _: None)
+    scores = {joint: x['effort'].nmse for joint, x in engine.scores().items()}
+    assert found.content() == {
+        'left_out': [{'joint': 'elbow', 'effect': 'backlash'},
+                     {'joint': 'shoulder', 'effect': 'unknown'}],
+        'effort_nmse': scores,
+    }  # fmt: skip
+    said = found.remark({'elbow': 0.0012})
+    assert 'does not take over backlash of elbow, what has no name at shoulder' in said
+    assert f'elbow {scores["elbow"]:.2g} (here 0.0012)' in said
