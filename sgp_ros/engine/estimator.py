@@ -16,7 +16,7 @@ from sgp_ros.engine.prior_knowledge import (
     model_of_settings,
     prior_of_robot,
 )
-from sgp_ros.engine.rest import without_rest
+from sgp_ros.engine.rest import free_targets, is_enough, told, without_rest
 from sgp_ros.engine.results import Channel, Counts, Estimate
 from sgp_ros.engine.scoring import Scoring
 from sgp_ros.engine.windows import Equation
@@ -30,6 +30,8 @@ from sgp_ros.robots.robot import Robot
 
 Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Input u (4 k,), regressor f (k, p) and target y (k,) of one equation."""
+Waiting = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""The same, and which joints dry friction may hold (k,)."""
 
 
 class Estimator:
@@ -39,7 +41,7 @@ class Estimator:
         regression: physics and process; None until enough samples started it.
         baseline: physics alone on the same samples; None where the method has no process.
         scoring: what the errors so far tell.
-        waiting: inputs, regressors and targets gathered before the first model.
+        waiting: equations gathered before the first model.
     """
 
     def __init__(self, robot: Robot, config: EngineConfig, counts: Counts) -> None:
@@ -57,7 +59,7 @@ class Estimator:
         self._config = config
         self.regression: Regression | None = None
         self.baseline: Regression | None = None
-        self.waiting: list[Arrays] = []
+        self.waiting: list[Waiting] = []
         self.scoring = Scoring(k)
         if not any(joint.is_automatic for joint in config.hyper):
             self._start([])
@@ -105,13 +107,12 @@ class Estimator:
             u, f, y = self._arrays(equation)
             _, held = without_rest(equation.slack, f @ self._known[: f.shape[1]], y)
             self._counts.held += bool(held.any())
-            estimate = self._unknown(equation, is_learned=not held.any())
-            if estimate.is_learned:
-                self.waiting.append((u, f, y))
-                if len(self.waiting) >= self._config.learning_initial:
+            if self._config.learning_enabled:
+                self.waiting.append((u, f, y, held))
+                if is_enough([row[3] for row in self.waiting], self._config.learning_initial):
                     self._start(self.waiting)
                     self.waiting = []
-            return estimate
+            return self._unknown(equation, is_learned=not held.any())
         return self._predict_score_learn(self.regression, equation)
 
     def _predict_score_learn(self, regression: Regression, equation: Equation) -> Estimate:
@@ -128,9 +129,8 @@ class Estimator:
         y, held = without_rest(equation.slack, prediction.mean, y)
         self._counts.held += bool(held.any())
         is_scored = self._score(replace(target, measured=y), complement, held)
-        may_learn = self._config.learning_enabled and not held.any()
         self._take_baseline(u, f, y, held, is_scored=is_scored)
-        is_learned = may_learn and self._learn(regression, prediction, y)
+        is_learned = self._learn(regression, prediction, y, held)
         channels = {self._robot.target: target, self._robot.complement: complement}
         return Estimate(
             equation.stamp_ns,
@@ -143,9 +143,14 @@ class Estimator:
             is_learned,
         )
 
-    def _learn(self, regression: Regression, prediction: OnlinePrediction, y: np.ndarray) -> bool:
+    def _learn(
+        self, regression: Regression, prediction: OnlinePrediction, y: np.ndarray, held: np.ndarray
+    ) -> bool:
+        sample = told(regression, prediction, y, held)
+        if sample is None or not self._config.learning_enabled:
+            return False
         try:
-            regression.learn(prediction, y)
+            regression.learn(*sample)
         except NumericalError:
             self._counts.unlearnable += 1
             return False
@@ -236,8 +241,9 @@ class Estimator:
         variance = np.diag(prediction.covariance) + np.array(self.baseline.model.noise)
         if is_scored and np.all(np.isfinite(variance)):
             self.scoring.take_baseline(y, prediction.mean, variance, ~held)
-        if self._config.learning_enabled and not held.any():
-            self.baseline.learn(prediction, y)
+        sample = told(self.baseline, prediction, y, held)
+        if sample is not None and self._config.learning_enabled:
+            self.baseline.learn(*sample)
 
     def make_regression(self, model: Model) -> Regression:
         """Return an empty model with these hyper-parameters."""
@@ -247,10 +253,13 @@ class Estimator:
         """Return an empty model of the physics alone."""
         return OnlineRegression(model, self._prior, _baseline_memory(self._config))
 
-    def _start(self, arrays: list[Arrays]) -> None:
+    def _start(self, waiting: list[Waiting]) -> None:
         """Make the first model from what was gathered, then learn that."""
-        columns = [np.array(column) for column in zip(*arrays, strict=True)]
-        data = Observations(*columns) if arrays else None
+        columns = [np.array(column) for column in zip(*waiting, strict=True)]
+        data = None
+        if waiting:
+            U, F, y, held_rows = columns
+            data = Observations(U, F, free_targets(y, held_rows))
         kernel = kernel_named(self._config.model_kernel)
         start = None if data is None else initial_model(data, self.inputs, kernel=kernel)
         model = model_of_settings(self._config, self.inputs, start)
@@ -259,16 +268,20 @@ class Estimator:
             self.baseline = self.make_baseline(Model((None,) * len(model.kernels), model.noise))
         if data is None:
             return
-        if self.baseline is not None:
+        is_whole = not columns[3].any()
+        if self.baseline is not None and is_whole:
             self.baseline.learn_all(data)
         try:
-            self.regression.learn_all(data)
+            if is_whole:
+                self.regression.learn_all(data)  # nothing was held, so these are the targets
+                self._counts.learned += len(data.U)
+                return
         except NumericalError:  # some repeat others to rounding: the rest is learned without them
             self.regression = self.make_regression(model)
-            for u, f, y in arrays:
-                self._learn(self.regression, self.regression.predict(u, f), y)
-        else:
-            self._counts.learned += len(data.U)
+        for u, f, y, held in waiting:
+            if not is_whole:
+                self._take_baseline(u, f, y, held, is_scored=False)
+            self._learn(self.regression, self.regression.predict(u, f), y, held)
 
     def _unknown(self, equation: Equation, *, is_learned: bool) -> Estimate:
         return Estimate(

@@ -11,10 +11,12 @@ it, or than their noise. The range of a quick reversal is larger.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 
+from sgp_ros.gp.regression import OnlinePrediction, Regression
 from sgp_ros.physics.term import Motion
 from sgp_ros.robots.robot import Robot
 
@@ -22,6 +24,7 @@ SPAN_S = 0.03
 """Time over which positions tell whether a joint moves [s]."""
 _DEVIATIONS = 4.0
 _POINTS = 5
+_PATIENCE = 10
 
 
 class Averaging(Protocol):
@@ -99,6 +102,54 @@ def friction_slack(
         np.repeat(motion.acceleration, m, axis=0), np.repeat(motion.effort, m, axis=0),
     )  # fmt: skip
     return np.asarray(np.tensordot(friction(whole) * rests, form.averaging, axes=([1], [0])))
+
+
+def is_enough(held: Sequence[np.ndarray], initial: int) -> bool:
+    """Return whether equations suffice for a first model: so many of each joint that is not held.
+
+    Args:
+        held: of each equation, (k,) joints that dry friction may hold.
+        initial: setting `learning.initial`. A joint that never moves is not waited for for ever.
+    """
+    free = len(held) - np.sum(held, axis=0)
+    return bool(free.min() >= initial or len(held) >= _PATIENCE * initial > 0)
+
+
+def free_targets(y: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """Return targets (n, k) where those of held joints (n, k) repeat the others of that joint.
+
+    Their spread is that of a moving joint, and zero for one that never moved.
+    """
+    targets = y.copy()
+    for j, rests in enumerate(held.T):
+        moving = y[~rests, j]
+        targets[rests, j] = np.resize(moving, rests.sum()) if len(moving) else 0.0
+    return targets
+
+
+def told(
+    regression: Regression, prediction: OnlinePrediction, y: np.ndarray, held: np.ndarray
+) -> tuple[OnlinePrediction, np.ndarray] | None:
+    """Return the sample that an equation tells, in which rows of held joints are zero.
+
+    Such a row tells W nothing where the joint has no Z. One that Z enters cannot be left out
+    alone: outputs share their samples.
+
+    Args:
+        regression: that made the prediction.
+        prediction: of the whole equation.
+        y: (k,) target.
+        held: (k,) joints that dry friction may hold.
+
+    Returns:
+        What `regression.learn` takes; None where nothing can be learned.
+    """
+    if not held.any():
+        return prediction, y
+    if held.all() or any(regression.model.kernels[j] is not None for j in np.flatnonzero(held)):
+        return None
+    f = np.where(held[:, None], 0.0, prediction.f)
+    return regression.with_regressor(prediction, f), np.where(held, 0.0, y)
 
 
 def without_rest(

@@ -121,7 +121,7 @@ class Counts:
         learned: equations that the model learned.
         scored: equations whose prediction entered the scores.
         held: equations that dry friction makes inequalities, as it holds a joint at rest: scored
-            for the other joints, and not learned.
+            for the other joints, and learned from their rows only where no Z is learned.
         unlearnable: equations that repeat others to rounding.
         refits: fits of hyper-parameters put in force.
         refits_refused_for: those refused by reason.

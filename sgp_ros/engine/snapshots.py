@@ -32,7 +32,8 @@ from sgp_ros.gp.model import Model
 from sgp_ros.gp.regression import Regression
 from sgp_ros.robots.robot import Robot
 
-VERSION = 6
+VERSION = 7
+_WAITING = ('U', 'F', 'y', 'held')
 
 
 def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
@@ -68,7 +69,7 @@ def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
         'scoring': estimator.scoring.state(),
     }
     arrays = {'json': np.array(json.dumps(text))}
-    for i, name in enumerate(('U', 'F', 'y')):
+    for i, name in enumerate(_WAITING):
         rows = [row[i] for row in estimator.waiting]
         arrays[f'waiting_{name}'] = np.array(rows) if rows else np.zeros(0)
     for name, regression in _regressions(estimator).items():
@@ -135,9 +136,7 @@ def _fill(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
     )
     estimator = engine.estimator
     estimator.scoring.restore(text['scoring'])
-    estimator.waiting = list(
-        zip(*(snapshot[f'waiting_{name}'] for name in ('U', 'F', 'y')), strict=True)
-    )
+    estimator.waiting = list(zip(*(snapshot[f'waiting_{name}'] for name in _WAITING), strict=True))
     if 'model_noise' in snapshot:
         estimator.regression = _read_regression('model', snapshot, engine)
     if 'baseline_noise' in snapshot:

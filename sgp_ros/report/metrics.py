@@ -112,7 +112,8 @@ def model_remarks(engine: Engine, asked: EngineConfig) -> list[str]:
             remarks.append(
                 f'dry friction can hold {", ".join(held)} at rest, where no effort follows from '
                 f'the motion: {counts.held} of {counts.estimated} equations were within what it '
-                'may take; they are not learned, nor scored for the joint that it holds'
+                'may take; they are not scored for the joint that it holds, and a model with Z '
+                'learns nothing from them'
             )
         if left_out:
             remarks.append(

@@ -121,3 +121,57 @@ def test_a_robot_without_stated_dry_friction_has_no_inequalities(tmp_path, terms
     engine, found = _run(robot)
     assert engine.counts.held == 0
     assert engine.counts.learned == len(found)
+
+
+TWO_CARTS = """
+schema: 1
+urdf: |
+  <robot name="carts"><link name="base"/>
+    <link name="first"><inertial><mass value="2"/>
+      <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <link name="second"><inertial><mass value="2"/>
+      <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <joint name="x" type="prismatic"><parent link="base"/><child link="first"/>
+      <axis xyz="1 0 0"/><limit lower="-9" upper="9" effort="9" velocity="9"/></joint>
+    <joint name="y" type="prismatic"><parent link="first"/><child link="second"/>
+      <axis xyz="0 1 0"/><limit lower="-9" upper="9" effort="9" velocity="9"/></joint>
+  </robot>
+terms: {inertial: all}
+prior: {inertial: {spread: 0.2}}
+effects:
+  - {effect: coulomb_friction, joint: x, parameters: {level: {value: 0.6, std: 0.01}}}
+  - {effect: coulomb_friction, joint: y, parameters: {level: {value: 0.6, std: 0.01}}}
+"""
+
+
+@pytest.mark.parametrize('method', ['PR', 'SGP'])
+def test_one_joint_is_moved_after_the_other(tmp_path, method):
+    """The physics learns the joint that moves from the equation of both; Z has to wait.
+
+    Masses of 2 kg are stated; those of 2.2 and 1.8 kg move.
+    """
+    t = np.arange(0.0, 12.0, 0.005)
+    moves = np.array([t < 6.0, t >= 6.0]).T
+    phase = np.pi * t[:, None] * [1.0, 1.0]
+    v = np.where(moves, np.sin(phase), 0.0)
+    a = np.where(moves, np.pi * np.cos(phase), 0.0)
+    q = np.where(moves, (1.0 - np.cos(phase)) / np.pi, 0.0)
+    masses = np.array([4.0, 1.8])
+    effort = masses * a + np.where(moves, LEVEL * np.sign(v), 0.3 * LEVEL)
+    robot = _robot(tmp_path, TWO_CARTS)
+    settings = {'model.method': method, 'filter.window': 0.1, 'learning.initial': 20,
+                'refit.enabled': False}  # fmt: skip
+    engine = Engine(robot, EngineConfig.from_mapping(settings, robot))
+    replay(
+        engine,
+        [JointSample(START_NS + round(s * 1e9), ('x', 'y'), frozen_array(x), None, frozen_array(u))
+         for s, x, u in zip(t, q, effort, strict=True)],
+        lambda _: None,
+    )  # fmt: skip
+    assert engine.is_ready
+    counts = engine.counts
+    assert counts.held > 0.9 * counts.estimated
+    assert counts.learned > 0.9 * counts.estimated if method == 'PR' else counts.learned < 20
+    found = {p.name: p.value for p in engine.physics_parameters()}
+    assert found['second.mass'] == pytest.approx(1.8, rel=0.01)
+    assert found['first.mass'] == pytest.approx(2.2, rel=0.01)
