@@ -23,7 +23,9 @@ terms: {inertial: all}
 prior: {inertial: {spread: 0.01}}
 effects:
   - {effect: armature, joint: x, parameters: {inertia: {value: 0.3, std: 0.2, unit: kg}}}
-  - {effect: command_delay, joint: x, parameters: {delay: {value: 0.01, std: 0.001, unit: s}}}
+  - effect: hysteresis
+    joint: x
+    parameters: {level: {value: 0.01, unit: N}, presliding: {value: 0.001, unit: m}}
 """
 
 
@@ -51,9 +53,9 @@ def test_a_negative_armature_is_said(tmp_path):
 
 
 def test_what_is_not_modelled_online_and_what_was_chosen_are_said(tmp_path):
-    """A delay needs the past of the commands."""
+    """Hysteresis needs the past of the motion."""
     remarks = _run(tmp_path, 2.3)
-    assert any('not modelled online' in r and 'command_delay of x' in r for r in remarks)
+    assert any('not modelled online' in r and 'hysteresis of x' in r for r in remarks)
     assert any('filter.window = ' in r and 'chosen' in r for r in remarks)
 
 
