@@ -27,6 +27,7 @@ from sgp_ros.report.diagnosis_text import (
     parameter_errors_text,
     phrase,
     verdict_sentence,
+    visibility_sentences,
     why_it_lost,
 )
 from sgp_ros.report.files import replacing_results, write_text
@@ -173,6 +174,9 @@ def print_diagnosis(found: Diagnosis) -> None:
         print(f'  differs   {line}')
     if found.parameter_errors:
         print(f'  bodies    {parameter_errors_text(found.parameter_errors)}')
+    print(
+        *(f'  hidden    {sentence}\n' for sentence in visibility_sentences(found)), sep='', end=''
+    )
     for stem, proof in found.proofs.items():
         _print_proof(stem, proof)
     for remark in found.remarks:

@@ -21,11 +21,8 @@ def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
         'findings': [_finding(f) for f in found.findings],
         'alternatives': [_finding(f) for f in found.alternatives],
         'equivalents': [
-            {
-                'effects': [{'joint': joint, 'effect': effect} for joint, effect in e.effects],
-                'separating_motion': e.motion,
-                'contrast': _finite(e.contrast),
-            }
+            {'effects': [{'joint': joint, 'effect': effect} for joint, effect in e.effects],
+             'separating_motion': e.motion, 'contrast': _finite(e.contrast)}
             for e in found.equivalents
         ],
         'recordings': [
@@ -44,6 +41,7 @@ def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
             }
             for e in found.parameter_errors
         ],
+        'visibility': _visibility(found),
         'fit': fit,
         'simulation': {name: _finite(x) for name, x in found.simulation.items()},
         'dependence': [
@@ -60,6 +58,13 @@ def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
             'remarks': list(found.remarks),
         },
     }  # fmt: skip
+
+
+def _visibility(found: Diagnosis) -> list[dict[str, Any]]:
+    return [
+        {'joint': joint, 'effect': effect, 'parameter': name, **_parameter(p)}
+        for (joint, effect, name), p in found.visibility.items()
+    ]
 
 
 def _finding(f: Finding) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from sgp_ros.diagnosis.decide.certainty import certainty_of, probabilities
 from sgp_ros.diagnosis.decide.decision import Decision
 from sgp_ros.diagnosis.decide.differences import Several, decide_several
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, equivalents
+from sgp_ros.diagnosis.decide.visibility import visibility
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.findings import alternatives, asserted, differences, parameter_errors
@@ -187,6 +188,7 @@ def _diagnosed(
         equivalents=equivalents(equations, comparison, decision, contrasts),
         recordings=names if len(names) > 1 else (),
         differences=differ,
+        visibility=visibility(equations, comparison, decision),
     )
 
 

@@ -263,13 +263,13 @@ class Diagnosis:
         cutoff_hz, rate_hz: of the filtered rows.
         rows: number of them.
         refused: states by reason, of the training recording.
-        simulation: share of the mean squared effort that the nominal robot leaves on the
-            recording of its simulation, by joint; empty without one.
+        simulation: share of the mean squared effort that is left there, by joint; empty without.
         remarks: for the user.
         equivalents: what this motion cannot tell from the findings, best first.
         bands: Z over each variable of each joint; empty where too few rows were had.
         recordings: stems of several training recordings; empty for one.
         differences: what differs between these, most probable first.
+        visibility: least that would show, infinite if nothing would; by joint, effect, parameter.
         bodies: (b, 10) inertial parameters of the final model, of bodies that can exist, in the
             order of the tree; None for the nominal ones.
     """
@@ -297,3 +297,4 @@ class Diagnosis:
     bands: tuple[Band, ...] = ()
     recordings: tuple[str, ...] = ()
     differences: tuple[Difference, ...] = ()
+    visibility: Mapping[tuple[str, str, str], Parameter] = field(default_factory=dict)

@@ -171,7 +171,7 @@ class CommandDelay(_Late):
     words = 'a delay of the command'
     formula = 'motor torque(t) = command(t - delay)'
     appearance = 'the motion answers to commands later than they were given, unchanged in shape'
-    quantities = (Quantity('delay', 's', low=0.0, is_positive=True),)
+    quantities = (Quantity('delay', 's', low=0.0, is_positive=True, is_sought=True),)
     takes_all = True
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:

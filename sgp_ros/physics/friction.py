@@ -29,7 +29,7 @@ class ViscousFriction(Effect):
     formula = 'tau_x = -b v'
     source = _ARMSTRONG
     appearance = 'the effort that is left grows in proportion to the velocity'
-    quantities = (Quantity('b', 'N m s/rad', low=0.0),)
+    quantities = (Quantity('b', 'N m s/rad', low=0.0, is_sought=True),)
     linear = ('b',)
     term = TermForm('viscous', ('viscous',), dynamics='damping', is_dissipative=True)
     drawn_over = 'velocity'
@@ -49,7 +49,7 @@ class CoulombFriction(Effect):
     formula = 'tau_x = -level sign(v)'
     source = _ARMSTRONG
     appearance = 'a step of the effort at each reversal; the joint sticks at rest'
-    quantities = (Quantity('level', 'N m', low=0.0),)
+    quantities = (Quantity('level', 'N m', low=0.0, is_sought=True),)
     linear = ('level',)
     term = TermForm('coulomb', ('coulomb',), dynamics='friction', is_dissipative=True)
     drawn_over = 'velocity'

@@ -101,7 +101,7 @@ class Backlash(Effect):
     source = 'Nordin and Gutman 2002'
     appearance = 'bursts of effort each time the load on the gear changes its sign'
     quantities = (
-        Quantity('gap', 'rad', low=0.0, is_positive=True),
+        Quantity('gap', 'rad', low=0.0, is_positive=True, is_sought=True),
         Quantity('motor_inertia', 'kg m2', 1e-12, is_positive=True, is_optional=True,
                  is_scored=False),
     )  # fmt: skip

@@ -118,6 +118,7 @@ class Quantity:
         is_optional: whether a model does without.
         is_scored: whether estimates are compared with the truth where worlds are drawn.
         kinds: the kind of the effect that it belongs to; empty for all.
+        is_sought: whether a diagnosis states the least of it that the recording would show.
     """
 
     name: str
@@ -127,6 +128,7 @@ class Quantity:
     is_optional: bool = False
     is_scored: bool = True
     kinds: tuple[str, ...] = ()
+    is_sought: bool = False
 
     def of_kind(self, kind: str) -> Quantity:
         """Return the quantity of a kind of the effect: viscous levels are per velocity."""

@@ -26,6 +26,7 @@ from sgp_ros.report.diagnosis_text import (
     place,
     quantity,
     verdict_sentence,
+    visibility_sentences,
     why_it_lost,
     worst_joint,
 )
@@ -76,6 +77,7 @@ def render(found: Diagnosis, figures: Mapping[str, bytes]) -> str:
         more_rivals=[_rival(f, best) for f in found.alternatives[_SHOWN_RIVALS:]],
         differences=[_typeset(line) for line in differences_text(found)],
         equivalents=[equivalence_sentence(e) for e in found.equivalents],
+        hidden=visibility_sentences(found),
         is_unexplained=found.verdict == 'unexplained',
         errors=[_error(e) for e in found.parameter_errors],
         proofs=proof_rows(found),

@@ -215,6 +215,19 @@ def _count(finding: Finding) -> int:
     return sum(not isinstance(p.value, str) for p in finding.parameters.values())
 
 
+def visibility_sentences(found: Diagnosis) -> list[str]:
+    """Say, effect by effect, what the recording could not have shown."""
+    sentences = []
+    for effect in dict.fromkeys(effect for _, effect, _ in found.visibility):
+        own = {joint: p for (joint, e, _), p in found.visibility.items() if e == effect}
+        never = [joint for joint, p in own.items() if p.value == math.inf]
+        seen = [f'{joint} {quantity(p)}' for joint, p in own.items() if joint not in never]
+        parts = [f'below {", ".join(seen)}'] if seen else []
+        parts += [f'of any size on {", ".join(never)}'] if never else []
+        sentences.append(f'{plain_name(effect)}, {"; ".join(parts)}')
+    return sentences
+
+
 def _missing(found: Diagnosis) -> str:
     if not found.findings:
         return (

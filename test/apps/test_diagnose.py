@@ -95,6 +95,7 @@ def test_the_file_is_complete_and_agrees_with_the_last_line(finished):
     for stem in ('train', 'real_test', 'real_far'):
         for key in ('nmse_before', 'nmse_after'):
             assert content['fit'][stem][key].keys() == joints
+    assert {v['joint'] for v in content['visibility']} == joints
     for path in content['fit']['predictions'].values():
         assert (out / path).exists()
 

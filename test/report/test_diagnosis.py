@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from matplotlib.colors import to_hex
 
 from sgp_ros.diagnosis.criteria import LEAST_SHARE
+from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.result import Equivalent, Finding, Location, Parameter
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.report.diagnosis import render, write_diagnosis
@@ -35,6 +36,7 @@ from sgp_ros.report.diagnosis_text import (
     plain_name,
     quantity,
     verdict_sentence,
+    visibility_sentences,
     why_it_lost,
 )
 from test.report.diagnoses import (
@@ -58,6 +60,22 @@ def test_missing_physics_is_said_with_joint_name_interval_probability_and_gain()
         'Missing on elbow: Coulomb friction, level 0.3170 +- 0.0020 N m (probability 0.99); '
         'it explains more than 99.9 % of what the nominal robot leaves.'
     )
+
+
+def test_what_could_not_have_shown_is_said_in_words_and_numbers():
+    """A line for each effect; what no size would show is null in the file."""
+    seen = {
+        ('shoulder', 'backlash', 'gap'): Parameter(0.00213, None, 'rad'),
+        ('elbow', 'backlash', 'gap'): Parameter(math.inf, None, 'rad'),
+    }
+    found = replace(diagnosis('no_mismatch'), visibility=seen)
+    assert visibility_sentences(found) == [
+        'backlash, below shoulder 0.00213 rad; of any size on elbow'
+    ]
+    assert 'What this recording could not have shown' in render(found, {})
+    entries = diagnosis_mapping(found)['visibility']
+    assert [e['value'] for e in entries] == [0.00213, None]
+    assert entries[0].keys() == {'joint', 'effect', 'parameter', 'value', 'unit'}
 
 
 def test_both_effects_of_a_pair_are_said_with_their_joints():
