@@ -50,6 +50,7 @@ class DiagnoseOptions:
         command: topic of the commands; None for the one there is.
         effort: the effort that acts, a key of `EFFORT_SOURCES`; the simulation is read as `auto`.
         bodies: YAML file of bodies that the robot's file lacks; None for none.
+        static: whether the recordings hold settled points, one row a pose.
     """
 
     sim: str | None = None
@@ -58,6 +59,7 @@ class DiagnoseOptions:
     command: str | None = None
     effort: str = 'auto'
     bodies: str | None = None
+    static: bool = False
 
 
 def run_diagnose(
@@ -88,7 +90,8 @@ def run_diagnose(
     simulation = _simulation(nominal, chosen, remarks)
     found = diagnose(
         events, model, tree, tests, stated=nominal.stated, holds_out=not chosen.tests,
-        config=EngineConfig(effort_source=EFFORT_SOURCES[chosen.effort]), progress=progress,
+        is_static=chosen.static, progress=progress,
+        config=EngineConfig(effort_source=EFFORT_SOURCES[chosen.effort]),
     )  # fmt: skip
     remarks = [*found.remarks, *remarks]
     found = replace(found, simulation=simulation, remarks=tuple(remarks))

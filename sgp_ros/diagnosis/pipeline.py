@@ -10,6 +10,7 @@ import numpy as np
 from sgp_ros.batch.acceptance import USUAL
 from sgp_ros.diagnosis.compare.equations import Equations, make_equations
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies, open_remark, with_open_bodies
+from sgp_ros.diagnosis.compare.settled import collect_settled
 from sgp_ros.diagnosis.compare.several import join
 from sgp_ros.diagnosis.compare.sufficiency import at_rest, require_motion, require_rows
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory, choose_bandwidth, collect
@@ -30,7 +31,7 @@ from sgp_ros.diagnosis.prove.held_out import HELD_OUT, keep_back
 from sgp_ros.diagnosis.prove.prediction import FinalModel, diagnosed_bodies
 from sgp_ros.diagnosis.prove.processes import harm, kept_processes
 from sgp_ros.diagnosis.prove.proof import prove, reasons_to_doubt
-from sgp_ros.diagnosis.result import Diagnosis, Proof, Traces
+from sgp_ros.diagnosis.result import Diagnosis, Predictions, Proof, Traces
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import NumericalError
@@ -47,6 +48,7 @@ def diagnose(
     *,
     stated: tuple[EffectAt, ...] = (),
     holds_out: bool = False,
+    is_static: bool = False,
     config: EngineConfig = USUAL,
     progress: Callable[[float], None] = lambda _share: None,
 ) -> Diagnosis:
@@ -60,6 +62,7 @@ def diagnose(
         stated: effects that the nominal robot has, beside those of its tree.
         holds_out: whether blocks of the training recording are kept for the proof, as
             `held_out`; everything is then learned from the rest.
+        is_static: whether the recordings hold settled points, one row a pose.
         config: settings of the intake.
         progress: called with the share that is done.
 
@@ -70,8 +73,9 @@ def diagnose(
     """
     unstated = open_bodies(robot.name, tree)
     several = dict(events) if isinstance(events, Mapping) else {'': events}
-    raws, still = _collected(several, robot, tree, stated, config)
-    held = {stem: collect(test, robot, stated, config) for stem, test in tests.items()}
+    raws, still = _collected(several, robot, tree, stated, config, is_static=is_static)
+    read = collect_settled if is_static else collect
+    held = {stem: read(test, robot, stated, config) for stem, test in tests.items()}
     learned, kept, remarks = _kept_back(raws) if holds_out else (join(raws), {}, ())
     if still:
         remarks += (f'Nothing can be said of joints that do not move: {", ".join(still)}.',)
@@ -110,8 +114,12 @@ def _collected(
     tree: Tree,
     stated: tuple[EffectAt, ...],
     config: EngineConfig,
+    *,
+    is_static: bool,
 ) -> tuple[list[RawTrajectory], tuple[str, ...]]:
     """Return the recordings on grids of one step, and the joints that are still in all."""
+    if is_static:
+        return [collect_settled(x, robot, stated, config) for x in several.values()], ()
     known = [list(events) for events in several.values()]
     still = [require_motion(events, robot.name, tree.moving_names) for events in known]
     raws = [collect(events, robot, stated, config) for events in known]
@@ -175,7 +183,7 @@ def _diagnosed(
         alternatives=alternatives(decision, chances),
         parameter_errors=parameter_errors(whole, model, recordings.unstated),
         proofs=proofs,
-        predictions={stem: final.predict(part, tree) for stem, part in recordings.held.items()},
+        predictions=_predictions(final, recordings.held, tree),
         dependences=depends,
         bands=bands(equations, comparison.base.residual, depends),
         traces=_traces(whole, comparison, model, final.remainders, forces),
@@ -214,6 +222,14 @@ def _remainders(equations: Equations, decision: Decision) -> tuple[Remainder, ..
     joints = [j for j in np.argsort(-left) if left[j] > REMAINDER_SHARE * left.max()]
     found = [learn_remainder(equations, decision.model.residual, int(j)) for j in joints[:2]]
     return tuple(r for r in found if r is not None)
+
+
+def _predictions(
+    final: FinalModel, held: Mapping[str, RawTrajectory], tree: Tree
+) -> dict[str, Predictions]:
+    """Return the accelerations of held-out recordings; settled points have none."""
+    moved = {stem: part for stem, part in held.items() if part.approach is None}
+    return {stem: final.predict(part, tree) for stem, part in moved.items()}
 
 
 def _harm(

@@ -38,6 +38,7 @@ class ObservedMotion:
             learns from; None for any other motion.
         sign: from velocities to what stands for their sign; None takes its mean over the cells
             of the grid.
+        is_static: settled points, each of which stands for itself, not a motion.
     """
 
     tree: Tree
@@ -52,6 +53,7 @@ class ObservedMotion:
     stated: tuple[EffectAt, ...] = ()
     recording: np.ndarray | None = None
     sign: Callable[[np.ndarray], np.ndarray] | None = None
+    is_static: bool = False
 
     @cached_property
     def direction(self) -> np.ndarray:

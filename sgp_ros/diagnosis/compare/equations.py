@@ -147,6 +147,8 @@ class Equations:
             w: (p,) change of the bodies.
             added: (k, k), or (`POSES`, k, k) for the poses [kg m^2 or kg].
         """
+        if self.motion.is_static:  # efforts are measured there, no motion is predicted
+            return 0.0
         tree, q = self.motion.tree, self.poses[0].position
         nominal = mass_matrix(tree, tree.parameters, q)
         changed = tree.parameters + (w @ self.directions).reshape(tree.parameters.shape)

@@ -87,6 +87,7 @@ def join(raws: Sequence[RawTrajectory]) -> RawTrajectory:
         segments, dict(refused), np.max([raw.noise_density for raw in raws], axis=0),
         first.start_ns, first.stated, tuple(dict.fromkeys(remarks)),
         np.repeat(np.arange(len(raws)), np.diff(starts)),
+        _joined([raw.approach for raw in raws]),
     )  # fmt: skip
 
 

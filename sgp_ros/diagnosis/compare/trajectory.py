@@ -36,6 +36,8 @@ _NO_EFFORTS = (
     'The commands are no efforts: the measured effort does not follow them. It is taken as the '
     'effort that acts: nothing can be said of delay, dead zone, saturation and lag of the drive.'
 )
+VANISHING = 1e-9
+"""Speed at which settled points are approached [rad/s or m/s]: only its direction counts."""
 LOWEST_CUTOFF_HZ, HIGHEST_CUTOFF_HZ = 3.0, 25.0
 
 
@@ -57,6 +59,7 @@ class RawTrajectory:
         stated: effects that the nominal robot has, beside those of its tree.
         remarks: what is odd about the efforts.
         recording: (n,) index of the recording of each row, of several; None of one.
+        approach: (n, k) direction from which each settled point was approached; None of motion.
     """
 
     time: np.ndarray
@@ -72,6 +75,7 @@ class RawTrajectory:
     stated: tuple[EffectAt, ...] = ()
     remarks: tuple[str, ...] = ()
     recording: np.ndarray | None = None
+    approach: np.ndarray | None = None
 
 
 def collect(
@@ -216,8 +220,13 @@ class Bandwidth:
 
 
 def choose_bandwidth(raw: RawTrajectory, tree: Tree) -> Bandwidth:
-    """Return the filters that noise, rate and motion of a recording ask for."""
+    """Return the filters that noise, rate and motion of a recording ask for.
+
+    Each row of settled points stands for itself: nothing is filtered.
+    """
     rate = 1.0 / raw.step
+    if raw.approach is not None:
+        return Bandwidth(0.45 * rate, 0.45 * rate)
     highest = min(HIGHEST_CUTOFF_HZ, 0.15 * rate)
     k = tree.size
     motion = observe(raw, tree, Bandwidth(highest, min(2.0 * highest, 0.4 * rate)))
@@ -237,7 +246,17 @@ def _driven(motion: ObservedMotion) -> np.ndarray:
 
 
 def observe(raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth) -> ObservedMotion:
-    """Return the lightly smoothed motion of a trajectory."""
+    """Return the lightly smoothed motion of a trajectory; settled points as they are.
+
+    Those are approached at a speed at which only its direction counts.
+    """
+    if raw.approach is not None:
+        assert raw.effort is not None
+        return ObservedMotion(
+            tree, raw.time, raw.step, raw.position, VANISHING * raw.approach,
+            np.zeros_like(raw.position), np.where(tree.is_actuated[: tree.size], raw.effort, 0.0),
+            None, (0,), raw.stated, sign=np.sign, is_static=True,
+        )  # fmt: skip
     light = ZeroPhase(1.0 / raw.step, bandwidth.state_cutoff)
     states = [light.states(raw.position[s]) for s in raw.segments]
     position, velocity, acceleration = (np.concatenate(x) for x in zip(*states, strict=True))

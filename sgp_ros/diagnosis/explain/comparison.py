@@ -9,6 +9,7 @@ import numpy as np
 
 from sgp_ros.batch.least_squares import correlation_factor
 from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.compare.settled import shows
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, EVIDENCE
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
@@ -155,7 +156,11 @@ def _simpler(columns: Columns, model: Model) -> list[Model]:
         if len(candidate.effect.quantities) == 1:
             continue
         place = Place(candidate.place.joint)
-        others = [EffectAt(e, place) for e in simple if place in e.places(motion)]
+        others = [
+            EffectAt(e, place)
+            for e in simple
+            if place in e.places(motion) and shows(e, place, motion)
+        ]
         trials = [_replaced(columns, model, i, s) for s in others if s.key not in model.key]
         best = _ranked(trials)
         if best:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.compare.settled import shows
 from sgp_ros.diagnosis.explain.candidates import split
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
 from sgp_ros.diagnosis.explain.regression import Columns, Frame, dry_joints
@@ -36,6 +37,8 @@ def screen(columns: Columns, model: Model, effects: Iterable[Effect]) -> list[Tr
             continue
         for place in effect.places(columns.equations(held).motion):
             if (effect.name, place) in known:
+                continue
+            if not shows(effect, place, columns.equations(held).motion):
                 continue
             dry = held | effect.held_joints(place)
             if dry not in rests:

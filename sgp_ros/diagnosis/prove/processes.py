@@ -24,7 +24,7 @@ def kept_processes(final: FinalModel) -> tuple[tuple[Remainder, ...], tuple[str,
 
     One after the other joins those that were kept. Cost: one roll-out of the recording each.
     """
-    if not final.remainders:
+    if not final.remainders or final.equations.motion.is_static:  # no motion to roll out
         return (), ()
     names = final.equations.motion.tree.joint_names
     windows, part = _windows(final)

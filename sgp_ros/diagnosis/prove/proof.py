@@ -19,7 +19,13 @@ from scipy import spatial, stats
 from sgp_ros.batch.zero_phase import ZeroPhase
 from sgp_ros.diagnosis.compare.equations import resting
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
-from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, observe, parallel_filter
+from sgp_ros.diagnosis.compare.trajectory import (
+    Bandwidth,
+    RawTrajectory,
+    choose_bandwidth,
+    observe,
+    parallel_filter,
+)
 from sgp_ros.diagnosis.prove.prediction import FinalModel, accelerations
 from sgp_ros.diagnosis.prove.rollouts import cut, roll_out
 from sgp_ros.diagnosis.result import Proof
@@ -148,6 +154,8 @@ def prove(final: FinalModel, raw: RawTrajectory, tree: Tree, name: str) -> Proof
     """
     cutoff, rate = final.equations.filter.cutoff, 1.0 / raw.step
     bandwidth = Bandwidth(min(cutoff, 0.3 * rate), min(2.5 * cutoff, 0.4 * rate))
+    if raw.approach is not None:
+        bandwidth = choose_bandwidth(raw, tree)
     motion, low = observe(raw, tree, bandwidth), parallel_filter(raw, bandwidth)
     if not len(low.rows):
         raise RecordingError(
@@ -161,7 +169,7 @@ def prove(final: FinalModel, raw: RawTrajectory, tree: Tree, name: str) -> Proof
     values = scores.values
     return Proof(
         values['nmse_before'], values['nmse_after'],
-        values['acceleration_nmse_before'], values['acceleration_nmse_after'],
+        values.get('acceleration_nmse_before', {}), values.get('acceleration_nmse_after', {}),
         float(densities[0].mean()), float(densities[1].mean()),
         values.get('rollout_nmse_before', {}), values.get('rollout_nmse_after', {}),
         scores.intervals, (mean_interval(densities[0]), mean_interval(densities[1])),
@@ -187,8 +195,11 @@ def _one_step(
     ):  # fmt: skip
         e = low(final.imbalance(model, motion, rests, remainders))
         scores.add(f'nmse_{when}', e**2, (driven - driven.mean(axis=0)) ** 2)
-        a = low(accelerations(model, final.equations, motion, rests, remainders))
-        scores.add(f'acceleration_nmse_{when}', (a - true) ** 2, (true - true.mean(axis=0)) ** 2)
+        if not motion.is_static:
+            a = low(accelerations(model, final.equations, motion, rests, remainders))
+            scores.add(
+                f'acceleration_nmse_{when}', (a - true) ** 2, (true - true.mean(axis=0)) ** 2
+            )
         variance = model.sigma**2
         nats = 0.5 * np.log(2 * np.pi * variance) + 0.5 * e**2 / variance
         densities.append(nats.mean(axis=1))
@@ -199,6 +210,8 @@ def _rolled_out(
     final: FinalModel, motion: ObservedMotion, trim: int, scores: _Scores
 ) -> tuple[int, int]:
     """Score the roll-outs that both models finish; return all windows, and the others."""
+    if motion.is_static:
+        return 0, 0
     windows = cut(motion, trim)
     if not len(windows.first):
         return 0, 0

@@ -1,0 +1,77 @@
+"""Settled points: one row a pose, no clock, statics alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.compare.settled import approaches, collect_settled, every_fourth, shows
+from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, observe
+from sgp_ros.diagnosis.pipeline import diagnose
+from sgp_ros.engine.samples import JointSample, frozen_array
+from sgp_ros.errors import RecordingError
+from sgp_ros.physics.catalogue import EFFECTS
+from test.diagnosis.worlds import CHAINS, GRAVITY
+
+LEVEL, STIFF, REST = 0.3, 1.5, 0.4
+
+
+def _points(n=400):
+    """A hanging link, there and back, held by a motor against friction, a spring and gravity."""
+    link = CHAINS[1][0]
+    rng = np.random.default_rng(5)
+    q = np.concatenate([np.linspace(-1.2, 1.2, n), np.linspace(1.2, -1.2, n)])
+    s = np.repeat([1.0, -1.0], n)
+    effort = link.mass * GRAVITY * link.centre * np.sin(q) + STIFF * (q - REST) + LEVEL * s
+    effort += 0.01 * rng.normal(size=len(q))
+    return [
+        JointSample(
+            7, ('joint0',), frozen_array([x]), None, frozen_array([u])
+        )  # one stamp for all
+        for x, u in zip(q, effort, strict=True)
+    ]
+
+
+def test_directions_of_approach_ignore_the_flicker_of_an_encoder():
+    """Back by one count is no reversal; the turn at the end is."""
+    q = 0.1 * np.array([0, 1, 2, 1, 2, 3, 4, 4, 5, 4, 2, 1, 0, 1, 0, -1])
+    np.testing.assert_array_equal(approaches(q), [1] * 10 + [-1] * 6)
+
+
+def test_statics_of_a_link_names_friction_and_a_spring_without_a_clock(robots):
+    """Gravity is known; what holds the rest is found in the same equations as of a motion."""
+    found = diagnose(_points(), *robots[1], {}, holds_out=True, is_static=True)
+    named = {f.effect: {k: p.value for k, p in f.parameters.items()} for f in found.findings}
+    assert set(named) == {'coulomb_friction', 'spring'}
+    assert named['coulomb_friction']['level'] == pytest.approx(LEVEL, rel=0.02)
+    assert named['spring']['stiffness'] == pytest.approx(STIFF, rel=0.02)
+    assert named['spring']['rest'] == pytest.approx(REST, abs=0.01)
+    assert found.proofs['held_out'].nmse_after['joint0'] < 1e-3
+    assert found.proofs['held_out'].acceleration_after == {}
+
+
+def test_only_what_shows_at_rest_is_a_candidate(robots):
+    """Nothing that depends on speed, acceleration, time or the way between the poses."""
+    robot, tree = robots[1]
+    raw = collect_settled(_points(100), robot)
+    motion = observe(raw, tree, choose_bandwidth(raw, tree))
+    shown = {
+        name for name, effect in EFFECTS.items() for place in effect.places(motion)
+        if shows(effect, place, motion)
+    }  # fmt: skip
+    assert {'coulomb_friction', 'asymmetric_coulomb', 'spring', 'cogging', 'constant_load',
+            'gravity_tilt', 'payload'} <= shown  # fmt: skip
+    assert not {'viscous_friction', 'quadratic_drag', 'armature', 'friction_drift', 'hysteresis',
+                'backlash', 'command_delay'} & shown  # fmt: skip
+
+
+def test_each_fourth_pose_is_held_out_with_its_direction(robots):
+    raw = collect_settled(_points(100), robots[1][0])
+    learned, held = every_fourth(raw)
+    assert (len(learned.time), len(held.time)) == (150, 50)
+    np.testing.assert_array_equal(held.approach, raw.approach[3::4])
+
+
+def test_too_few_points_are_refused_in_one_line(robots):
+    with pytest.raises(RecordingError, match='40 settled points'):
+        collect_settled(_points(20), robots[1][0])
