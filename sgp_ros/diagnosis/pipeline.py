@@ -153,9 +153,10 @@ def _diagnosed(
     progress: Callable[[float], None],
 ) -> Diagnosis:
     raw, tree, names = recordings.learned, equations.motion.tree, recordings.names
-    several = decide_several(equations, len(names), lambda x: progress(0.05 + 0.85 * x))
+    several = decide_several(equations, len(names), lambda x: progress(0.05 + 0.95 * x))
     whole, equations = equations, several.equations
     comparison, decision, model = several.comparison, several.decision, several.model
+    depends = dependences(equations, comparison.base.residual)
     lags = [lag for lag in sensor_lags(raw, equations) if lag.is_physics]
     final, learned, on_z = _final(several, whole)
     contrasts = Contrasts(equations, decision.model)
@@ -164,7 +165,6 @@ def _diagnosed(
     on_z += _harm(final, {k: x for k, x in parts.items() if k != 'train'}, proofs)
     doubts = reasons_to_doubt(proofs, recordings.still)
     chances = probabilities(equations, comparison, decision, contrasts)
-    depends = dependences(equations, comparison.base.residual)
     on_all = replace(decision, model=model)
     findings, forces = asserted(whole, on_all, lags, learned, chances, depends)
     differ = differences(several, names)
@@ -172,7 +172,6 @@ def _diagnosed(
     certainty = min(certainty, DOUBTED) if doubts else certainty
     if reasons_to_doubt({'train': proofs['train']}, recordings.still):
         findings = tuple(replace(f, probability=min(f.probability, DOUBTED)) for f in findings)
-    progress(1.0)
     return Diagnosis(
         robot=robot,
         joints=tree.moving_names,
