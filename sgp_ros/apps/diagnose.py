@@ -95,7 +95,9 @@ def run_diagnose(
     )  # fmt: skip
     remarks = [*found.remarks, *remarks]
     found = replace(found, simulation=simulation, remarks=tuple(remarks))
-    return _written(out, nominal, found, events, EFFORT_SOURCES[chosen.effort])
+    # a node meets one recording of a motion; settled points are none
+    first = [] if chosen.static else next(iter(events.values()))
+    return _written(out, nominal, found, first, EFFORT_SOURCES[chosen.effort])
 
 
 def _nominal(robot: str, options: DiagnoseOptions) -> Nominal:

@@ -120,13 +120,13 @@ def replayed(
     Args:
         out: folder with the diagnosed robot.
         findings: of the diagnosis.
-        events: that were diagnosed.
+        events: of a motion that was diagnosed; none of settled points.
         effort_source: setting `effort.source`.
     """
     left_out = tuple(
         f for f in findings if f.effect not in EFFECTS or not EFFECTS[f.effect].is_online
     )
-    if not left_out:
+    if not left_out or not events:
         return None
     robot = load_robot(str(out / YAML_NAME))
     engine = Engine(robot, EngineConfig.from_mapping({'effort.source': effort_source}, robot))

@@ -130,9 +130,12 @@ def shows(effect: Effect, place: Place, motion: ObservedMotion) -> bool:
     starts = effect.starts(motion, place)
     if not len(starts):
         return False
-    slow, fast = (_columns(effect, place, starts[0], m) for m in (motion, faster))
-    size = float(np.abs(slow).max(initial=0.0))
-    return size > 0.0 and bool(np.abs(fast - slow).max() <= _ALIKE * size)
+    for shape in (starts[0], starts[len(starts) // 2], starts[-1]):
+        slow, fast = (_columns(effect, place, shape, m) for m in (motion, faster))
+        size = float(np.abs(slow).max(initial=0.0))
+        if size == 0.0 or np.abs(fast - slow).max() > _ALIKE * size:
+            return False
+    return True
 
 
 def _columns(

@@ -62,6 +62,7 @@ def test_only_what_shows_at_rest_is_a_candidate(robots):
     assert {'coulomb_friction', 'asymmetric_coulomb', 'spring', 'cogging', 'constant_load',
             'gravity_tilt', 'payload'} <= shown  # fmt: skip
     assert not {'viscous_friction', 'quadratic_drag', 'armature', 'friction_drift', 'hysteresis',
+                'stribeck_friction',
                 'backlash', 'command_delay'} & shown  # fmt: skip
 
 
