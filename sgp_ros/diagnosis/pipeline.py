@@ -153,7 +153,7 @@ def _diagnosed(
     progress: Callable[[float], None],
 ) -> Diagnosis:
     raw, tree, names = recordings.learned, equations.motion.tree, recordings.names
-    several = decide_several(equations, len(names), lambda x: progress(0.05 + 0.95 * x))
+    several = decide_several(equations, len(names), lambda x: progress(0.05 + 0.85 * x))
     whole, equations = equations, several.equations
     comparison, decision, model = several.comparison, several.decision, several.model
     depends = dependences(equations, comparison.base.residual)
@@ -169,7 +169,7 @@ def _diagnosed(
     findings, forces = asserted(whole, on_all, lags, learned, chances, depends)
     differ = differences(several, names)
     certainty = certainty_of((*findings, *differ), equations, comparison)
-    certainty = min(certainty, DOUBTED) if doubts else certainty
+    progress(1.0)
     if reasons_to_doubt({'train': proofs['train']}, recordings.still):
         findings = tuple(replace(f, probability=min(f.probability, DOUBTED)) for f in findings)
     return Diagnosis(
@@ -177,7 +177,7 @@ def _diagnosed(
         joints=tree.moving_names,
         units=tuple('N' if p else 'N m' for p in tree.is_prismatic[: tree.size]),
         verdict=_verdict(decision, is_missing=bool(lags or differ)),
-        certainty=certainty,
+        certainty=min(certainty, DOUBTED) if doubts else certainty,
         findings=findings,
         alternatives=alternatives(decision, chances),
         parameter_errors=parameter_errors(whole, model, recordings.unstated),
