@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from sgp_ros.physics.drawing import Drawn, JointScene, Scene
 from sgp_ros.physics.effect import EMPTY, Effect, Numbers
 from sgp_ros.physics.motion import Commands, SeenMotion
-from sgp_ros.physics.parts import MOTOR, PLACES, Place, Placed, Quantity, Value
+from sgp_ros.physics.parts import MOTOR, PLACES, Place, Placed, Quantity, Value, relative_scales
 
 _MECHATRONICS = 'Isermann 2005, Mechatronic Systems'
 _ALL = PLACES['all']
+CONNECTED = 0.05
+"""Part of its command that a motor delivers at least; what delivers less does not drive."""
+
+_FITTING = 20.0
+"""Times that the longest delay or lag fits into a recording; a longer one is seen too seldom."""
+_LATER = 1.35
+"""Ratio of delays from which searches start."""
 
 
 def _sizes(motion: SeenMotion, place: Place) -> np.ndarray:
@@ -55,7 +64,7 @@ class TorqueGain(Effect):
         return {'gain': 1.0 + float(at.coefficients[0])}
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
-        return bool(-0.7 < at.coefficients[0] < 1.5)
+        return bool(at.coefficients[0] > CONNECTED - 1.0)
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         return motion.effort[:, place.joint, None]
@@ -88,11 +97,12 @@ class DeadZone(_Drive):
         return (0,)
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
-        shares = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7)
+        shares = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
         return np.unique(np.quantile(_sizes(motion, place), shares))[:, None]
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        return np.zeros(1), np.array([np.quantile(_sizes(motion, place), 0.9)])
+        """Return nothing and the greatest command: a wider one is a motor that is off."""
+        return np.zeros(1), np.array([_sizes(motion, place).max()])
 
     def sized(self, x: JointScene) -> Drawn:
         return Drawn(0.3 * x.force, lambda s: {'width': s})
@@ -119,12 +129,12 @@ class Saturation(_Drive):
         return (0,)
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
-        shares = (0.3, 0.5, 0.65, 0.8, 0.88, 0.94, 0.97, 0.99)
+        shares = (0.1, 0.3, 0.5, 0.65, 0.8, 0.88, 0.94, 0.97, 0.99)
         return np.unique(np.quantile(_sizes(motion, place), shares))[:, None]
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        size = _sizes(motion, place)
-        return np.array([np.quantile(size, 0.2)]), np.array([size.max()])
+        """Return nothing and the greatest command, which every limit above it passes."""
+        return np.zeros(1), np.array([_sizes(motion, place).max()])
 
     def draw(self, scene: Scene) -> Drawn:
         force = scene.motion.effort[scene.joint]
@@ -141,10 +151,20 @@ class _Late(_Drive):
         return (0,)
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
-        return np.geomspace(0.002, 0.12, 16)[:, None]
+        longest = self._longest(motion)
+        least = min(0.2 * motion.step, 0.1 * longest)
+        count = 2 + math.ceil(math.log(longest / least) / math.log(_LATER))
+        return np.geomspace(least, longest, count)[:, None]
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        return np.zeros(1), np.full(1, 0.25)
+        """Return no time, and the longest that fits often enough into the recording."""
+        return np.zeros(1), np.full(1, self._longest(motion))
+
+    def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        return relative_scales(*self.bounds(motion, place), shape)
+
+    def _longest(self, motion: SeenMotion) -> float:
+        return float(np.ptp(motion.time)) / _FITTING
 
 
 class ActuatorLag(_Late):

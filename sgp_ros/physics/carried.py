@@ -14,6 +14,11 @@ from sgp_ros.physics.parts import BASE, LAST, TOOL, Place, Placed, Quantity
 GRAVITY = 9.81
 _MECHANICS = 'Khalil and Dombre 2002, Modeling, Identification and Control of Robots, chapter 9'
 
+_FARTHER = 2.0
+"""Distance of a load over that of the farthest frame of its link."""
+_STRONGER = 2.0
+"""Load over that for which the efforts of the recording would just do."""
+
 
 class GravityTilt(Effect):
     """A base that is not level: its orientation in the world is `Ry(pitch) Rx(roll)`."""
@@ -35,7 +40,7 @@ class GravityTilt(Effect):
         ])  # fmt: skip
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
-        return bool(np.hypot(*at.shape) < 0.7)
+        return True
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         """Return the force of the change of gravity, (n, k, 1)."""
@@ -47,7 +52,9 @@ class GravityTilt(Effect):
         return 0.03 * np.array(ways)
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        return np.full(2, -0.7), np.full(2, 0.7)
+        """Return every orientation of gravity."""
+        most = np.array([math.pi, 0.5 * math.pi])
+        return -most, most
 
     def draw(self, scene: Scene) -> Drawn:
         """Return a tilt in a direction."""
@@ -95,9 +102,20 @@ class Payload(Effect):
         return np.array([[0.3 * float(body[0]), *centre] for centre in centres])
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        reach = _reach(motion, place.joint)
-        heavy = 3.0 * float(motion.tree.parameters[place.joint, 0])
+        """Return what the efforts could carry at the centre of the link, and how far it may be."""
+        reach, body = _reach(motion, place.joint), motion.tree.parameters[place.joint]
+        unit = self.added_body(np.array([1.0, *(body[1:4] / max(float(body[0]), 1e-9))]))
+        efforts = np.hypot(motion.effort, motion.nominal_effort)
+        carried = np.sqrt((efforts**2).sum() / max(((motion.last_body_columns @ unit) ** 2).sum(),
+                                                   1e-300))  # fmt: skip
+        heavy = max(_STRONGER * float(carried), 3.0 * float(body[0]))
         return np.array([0.0, -reach, -reach, -reach]), np.array([heavy, reach, reach, reach])
+
+    def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        low, high = self.bounds(motion, place)
+        link = float(motion.tree.parameters[place.joint, 0])
+        mass = min(float(high[0]), 4.0 * max(float(shape[0]), 0.3 * link))
+        return np.array([mass, *(high - low)[1:]])
 
     def draw(self, scene: Scene) -> Drawn:
         """Return a mass at the tip."""
@@ -114,8 +132,8 @@ def _reach(motion: SeenMotion, joint: int) -> float:
     tree = motion.tree
     values = tree.parameters[joint]
     radius = math.sqrt(max(0.5 * (values[4] + values[6] + values[9]) / max(values[0], 1e-9), 1e-4))
-    frames = [np.linalg.norm(f.translation) for f in tree.frames if f.body == joint]
-    return float(max([2.0 * radius, *(1.2 * length for length in frames)]))
+    frames = [float(np.linalg.norm(f.translation)) for f in tree.frames if f.body == joint]
+    return _FARTHER * float(max([2.0 * radius, *frames]))
 
 
 class TipForce(Effect):

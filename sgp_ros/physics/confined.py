@@ -208,7 +208,7 @@ class EndStop(Effect):
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
         q = motion.position[:, place.joint]
         low, high = q.min(), q.max()
-        shares = np.concatenate([np.linspace(0.5, 0.9, 9), np.linspace(0.92, 0.99, 8)])
+        shares = np.concatenate([np.linspace(0.05, 0.9, 18), np.linspace(0.92, 0.99, 8)])
         found = low + (high - low) * (shares if place.side > 0 else 1.0 - shares)
         return np.asarray(found[:, None])
 

@@ -29,8 +29,10 @@ from sgp_ros.physics.parts import (
     SmallEffect,
     TermForm,
     Value,
+    propagated,
     side_word,
 )
+from sgp_ros.physics.waves import Wave
 
 EMPTY = np.zeros(0)
 Numbers = Mapping[str, float]
@@ -171,24 +173,10 @@ class Effect:
         return values
 
     def coefficient_std(self, numbers: Numbers, std: Numbers, kind: str = '') -> np.ndarray:
-        """Return the standard deviations of the coefficients from those of the numbers, (m,).
-
-        Errors of the numbers count as independent, to first order:
-        `var c_i = sum_k (dc_i / dx_k)^2 var x_k`. Infinite where one that matters is not known,
-        or none does.
-        """
+        """Return the standard deviations of the coefficients, (m,), see `propagated`."""
         if self.size:  # its coefficient scales the whole
             return np.array([std.get(self.size, math.inf) / max(abs(numbers[self.size]), 1e-300)])
-        variance = np.zeros(len(self.model(numbers, kind)[1]))
-        for name, value in numbers.items():
-            step = 1e-6 * max(abs(value), 1.0)
-            ends = (
-                self.model({**numbers, name: value + sign * step}, kind)[1] for sign in (1.0, -1.0)
-            )
-            slope = np.subtract(*ends) / (2.0 * step)
-            matters = slope != 0.0
-            variance[matters] += (slope[matters] * std.get(name, math.inf)) ** 2
-        return np.sqrt(np.where(variance > 0.0, variance, math.inf))
+        return propagated(lambda x: self.model(x, kind)[1], numbers, std)
 
     def stated_words(self, place: Place, tree: Structure) -> dict[str, str]:
         """Return the words that `EffectAt.stated` takes beside joint and numbers."""
@@ -281,6 +269,18 @@ class Effect:
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
         """Return the bounds of the shape, (s,) each."""
         return np.zeros(0), np.zeros(0)
+
+    def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        """Return the change of each number of a shape over which the columns change, (s,).
+
+        A search takes steps of a part of it; usually the width of the bounds.
+        """
+        low, high = self.bounds(motion, place)
+        return np.asarray(high - low)
+
+    def wave(self, motion: SeenMotion, place: Place) -> Wave | None:
+        """Return the wave over the position that it is, which starts a search; usually None."""
+        return None
 
     def sized(self, x: JointScene) -> Drawn:
         """Return its parameters in a drawn world, as a function of one size."""

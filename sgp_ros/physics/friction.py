@@ -7,7 +7,16 @@ import numpy as np
 from sgp_ros.physics.drawing import Drawn, JointScene
 from sgp_ros.physics.effect import Effect, Numbers
 from sgp_ros.physics.motion import SeenMotion
-from sgp_ros.physics.parts import MOTOR, OwnMotion, Place, Placed, Quantity, TermForm, Value
+from sgp_ros.physics.parts import (
+    MOTOR,
+    OwnMotion,
+    Place,
+    Placed,
+    Quantity,
+    TermForm,
+    Value,
+    relative_scales,
+)
 
 KINDS = ('coulomb', 'viscous')
 SELF_LOCKING = 0.5
@@ -114,9 +123,14 @@ class StribeckFriction(Effect):
         return np.asarray(speed * np.array([0.02, 0.05, 0.1, 0.2, 0.4, 0.7])[:, None])
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        """Return the first start, and twice the last."""
+        """Return the speed of the slowest hundredth of the rows, and twice the greatest."""
+        speed = np.abs(motion.velocity[:, place.joint])
         starts = self.starts(motion, place)
-        return starts[0], 2.0 * starts[-1]
+        low = np.minimum(starts[0], np.quantile(speed, 0.01))
+        return np.maximum(low, 1e-3 * starts[0]), np.maximum(starts[-1], [2.0 * speed.max()])
+
+    def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        return relative_scales(*self.bounds(motion, place), shape)
 
     def sized(self, x: JointScene) -> Drawn:
         return Drawn(
@@ -248,11 +262,15 @@ class FrictionDrift(Effect):
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
         """Return shares of the duration."""
-        return np.asarray(motion.time.max() * np.array([0.04, 0.1, 0.25, 0.6])[:, None])
+        return np.asarray(motion.time.max() * np.array([0.01, 0.04, 0.1, 0.25, 0.6])[:, None])
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        """Return a hundredth of the duration, and twice it."""
-        return np.array([0.01 * motion.time.max()]), np.array([2.0 * motion.time.max()])
+        """Return ten rows, and twice the duration: slower ones are a straight line over time."""
+        end = float(motion.time.max())
+        return np.array([min(0.01 * end, 10.0 * motion.step)]), np.array([2.0 * end])
+
+    def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        return relative_scales(*self.bounds(motion, place), shape)
 
     def sized(self, x: JointScene) -> Drawn:
         def values(s: float) -> dict[str, Value]:

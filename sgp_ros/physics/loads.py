@@ -17,13 +17,12 @@ from sgp_ros.physics.parts import (
     TermForm,
     Value,
 )
+from sgp_ros.physics.waves import Wave, most_periods, peak_width, per_turn
 
 MECHANICS = 'Khalil and Dombre 2002, Modeling, Identification and Control of Robots, chapter 9'
 
-
-def per_turn(motion: SeenMotion, joint: int) -> float:
-    """Return the phase per position and period, 1 on a revolute and 2 pi on a prismatic joint."""
-    return 2.0 * math.pi if motion.tree.is_prismatic[joint] else 1.0
+LEAST_PERIODS = 3.0
+"""Periods of cogging per revolution; fewer are no cogging. The schema."""
 
 
 def wave_coefficients(x: Numbers) -> tuple[float, float]:
@@ -139,23 +138,26 @@ class Cogging(Effect):
         angle = shape[0] * per_turn(motion, place.joint) * motion.position[:, place.joint]
         return np.column_stack([np.sin(angle), np.cos(angle)])
 
+    def wave(self, motion: SeenMotion, place: Place) -> Wave:
+        j, (low, high) = place.joint, self.bounds(motion, place)
+        force = np.zeros(motion.position.shape)
+        force[:, j] = 1.0
+        phase = per_turn(motion, j) * motion.position[:, j]
+        return Wave(phase, (force,), float(low[0]), float(high[0]))
+
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
-        """Return periods: at least one in the range of motion, spaced a third of a period."""
-        q = motion.position[:, place.joint]
-        turn = per_turn(motion, place.joint)
-        span = float(np.ptp(q)) * turn / (2.0 * math.pi)
-        speed = np.quantile(np.abs(motion.velocity[:, place.joint]), 0.5) * turn / (2.0 * math.pi)
-        fastest = 0.2 / motion.step / max(speed, 1e-9)
-        least = 3.0 if turn == 1.0 else 1.0 / max(span, 1e-9)
-        most = min(60.0 if turn == 1.0 else 60.0 / max(span, 1e-9), fastest)
-        step = 1.0 / 3.0 / max(span, 1e-9)
-        step = float(np.clip(step, 0.02, 1.0)) if turn == 1.0 else step
-        count = int(np.clip((most - least) / step, 1, 300))
-        return np.linspace(least, max(most, least + step), count + 1)[:, None]
+        """Return a few periods; a search starts from those of its wave."""
+        low, high = self.bounds(motion, place)
+        return np.geomspace(low, high, 4)
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        periods = self.starts(motion, place)
-        return 0.9 * periods[0], 1.1 * periods[-1]
+        """Return one wave in the range of motion, three a turn, and the shortest one resolved."""
+        j = place.joint
+        least = peak_width(motion, j) if motion.tree.is_prismatic[j] else LEAST_PERIODS
+        return np.array([least]), np.array([max(most_periods(motion, j), 1.5 * least)])
+
+    def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        return np.array([peak_width(motion, place.joint)])
 
     def sized(self, x: JointScene) -> Drawn:
         return Drawn(x.small, lambda s: {'amplitude': s, 'periods': x.periods, 'phase': x.phase})

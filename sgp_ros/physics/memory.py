@@ -10,7 +10,7 @@ from numba import njit
 from sgp_ros.physics.drawing import Drawn, JointScene, Scene, UnsuitableError
 from sgp_ros.physics.effect import Effect, Numbers
 from sgp_ros.physics.motion import SeenMotion
-from sgp_ros.physics.parts import MOTOR, Place, Placed, Quantity, Value
+from sgp_ros.physics.parts import MOTOR, Place, Placed, Quantity, Value, relative_scales
 
 _POSES = 200
 _MOST_OF_LINK = 0.9
@@ -52,8 +52,17 @@ class Hysteresis(Effect):
         return np.asarray(span * np.array([0.003, 0.01, 0.03, 0.07, 0.15, 0.3, 0.6])[:, None])
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        ways = self.starts(motion, place)
-        return ways[0] / 5.0, ways[-1] * 3.0
+        """Return the way of half a row, which is Coulomb friction, and twice the whole range.
+
+        Over the range, a longer presliding is a spring.
+        """
+        q = motion.position[:, place.joint]
+        row = 0.5 * float(np.mean(np.abs(motion.velocity[:, place.joint]))) * motion.step
+        starts = self.starts(motion, place)
+        return np.minimum(starts[0], row), np.maximum(starts[-1], [2.0 * float(np.ptp(q))])
+
+    def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        return relative_scales(*self.bounds(motion, place), shape)
 
     def sized(self, x: JointScene) -> Drawn:
         return Drawn(x.small, lambda s: {'level': s, 'presliding': x.presliding})
@@ -145,7 +154,7 @@ class Backlash(Effect):
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
         span = float(np.ptp(motion.position[:, place.joint]))
-        widths = np.geomspace(0.0005, 0.04, 7) * span
+        widths = np.geomspace(0.0005, 0.3, 9) * span
         shares = (0.06, 0.12, 0.18, 0.24, 0.3, 0.37, 0.45, 0.55, 0.7)
         return np.array([[share, width] for share in shares for width in widths])
 

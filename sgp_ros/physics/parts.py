@@ -203,3 +203,29 @@ class TermForm:
     sign: float = 1.0
     dynamics: str = ''
     is_dissipative: bool = False
+
+
+def propagated(
+    coefficients: Callable[[Mapping[str, float]], np.ndarray],
+    numbers: Mapping[str, float],
+    std: Mapping[str, float],
+) -> np.ndarray:
+    """Return the standard deviations of coefficients from those of the numbers behind them, (m,).
+
+    Errors of the numbers count as independent, to first order:
+    `var c_i = sum_k (dc_i / dx_k)^2 var x_k`. Infinite where one that matters is not known, or
+    none does.
+    """
+    variance = np.zeros(len(coefficients(numbers)))
+    for name, value in numbers.items():
+        step = 1e-6 * max(abs(value), 1.0)
+        ends = (coefficients({**numbers, name: value + sign * step}) for sign in (1.0, -1.0))
+        slope = np.subtract(*ends) / (2.0 * step)
+        matters = slope != 0.0
+        variance[matters] += (slope[matters] * std.get(name, math.inf)) ** 2
+    return np.asarray(np.sqrt(np.where(variance > 0.0, variance, math.inf)))
+
+
+def relative_scales(low: np.ndarray, high: np.ndarray, shape: np.ndarray) -> np.ndarray:
+    """Return the scales (s,) of times, gaps and other sizes in a search: a few times the size."""
+    return np.asarray(np.minimum(high - low, np.maximum(4.0 * shape, 1e-3 * high)))

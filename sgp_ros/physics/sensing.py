@@ -8,9 +8,10 @@ import numpy as np
 
 from sgp_ros.physics.drawing import Drawn, JointScene
 from sgp_ros.physics.effect import Effect, Numbers
-from sgp_ros.physics.loads import per_turn, wave_coefficients
+from sgp_ros.physics.loads import wave_coefficients
 from sgp_ros.physics.motion import SeenMotion
 from sgp_ros.physics.parts import Place, Placed, Quantity, SmallEffect, Value
+from sgp_ros.physics.waves import Wave, most_periods, peak_width, per_turn
 
 _NEWTON = 6
 """Steps to the true position."""
@@ -98,18 +99,33 @@ class EncoderEccentricity(Effect):
         change = by_q * (q - x)[:, None] + by_v * (v - dx)[:, None] + by_a * (a - ddx)[:, None]
         return np.asarray(change[:, :, None])
 
+    def wave(self, motion: SeenMotion, place: Place) -> Wave:
+        """Return the first order in its size: `e = Im exp(i r x)` and its two derivatives."""
+        j, (low, high) = place.joint, self.bounds(motion, place)
+        by_q, by_v, by_a = motion.effort_slopes(j)
+        v, a = motion.velocity[:, j, None], motion.acceleration[:, j, None]
+        phase = per_turn(motion, j) * motion.position[:, j]
+        # r is per turn: derivatives by the position have a factor more on a slide
+        turn = per_turn(motion, j)
+        parts = (by_q, turn * (by_v * v + by_a * a), turn**2 * by_a * v**2)
+        return Wave(phase, parts, float(low[0]), float(high[0]))
+
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
-        """Return periods, on prismatic joints from half a wave in the range."""
-        if motion.tree.is_prismatic[place.joint]:
-            span = float(np.ptp(motion.position[:, place.joint]))
-            return np.arange(0.5, 9.0, 0.5)[:, None] / max(span, 1e-9)
-        return np.arange(1.0, 11.0)[:, None]
+        """Return a few periods; a search starts from those of its wave."""
+        low, high = self.bounds(motion, place)
+        return np.geomspace(low[:1], high[:1], 4)
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        turns = self.starts(motion, place)
-        low, high = 0.9 * float(turns[0, 0]), 1.5 * float(turns[-1, 0])
-        most = _STEEPEST / (low * per_turn(motion, place.joint))
+        """Return one wave a turn, half of one in the range of a slide, and the shortest seen."""
+        j = place.joint
+        low = 0.5 * peak_width(motion, j) if motion.tree.is_prismatic[j] else 0.9
+        high = max(most_periods(motion, j), 3.0 * low)
+        most = _STEEPEST / (low * per_turn(motion, j))
         return np.array([low, -most, -most]), np.array([high, most, most])
+
+    def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        steepest = _STEEPEST / (shape[0] * per_turn(motion, place.joint))
+        return np.array([peak_width(motion, place.joint), 2.0 * steepest, 2.0 * steepest])
 
     def sized(self, x: JointScene) -> Drawn:
         turns, slope = x.turns, 2.0 * math.pi * x.turns if x.is_prismatic else x.turns

@@ -14,6 +14,7 @@ from sgp_ros.diagnosis.explain.regression import (
     Frame,
     dry_joints,
     shape_bounds,
+    shape_scales,
     with_shapes,
 )
 from sgp_ros.physics.effect_at import EffectAt
@@ -103,7 +104,7 @@ def _searched(
     if not len(low):
         return candidates
     x = np.clip(np.concatenate([s.shape for s in candidates]), low, high)
-    span = np.maximum(high - low, 1e-12)
+    span = np.maximum(shape_scales(frame.equations, candidates), 1e-12)
     r = residual_of(frame, columns, with_shapes(candidates, x), w)
     cost, damping = float(r @ r), 1e-2
     for _ in range(steps):

@@ -84,6 +84,14 @@ def shape_bounds(
     return np.concatenate(low), np.concatenate(high)
 
 
+def shape_scales(equations: Equations, candidates: tuple[EffectAt, ...]) -> np.ndarray:
+    """Return the changes of all shapes over which the columns change, (s,)."""
+    found = [
+        s.effect.scales(equations.motion, s.place, s.shape) for s in candidates if len(s.shape)
+    ]
+    return np.concatenate(found) if found else np.zeros(0)
+
+
 def with_shapes(candidates: tuple[EffectAt, ...], x: np.ndarray) -> tuple[EffectAt, ...]:
     """Return the candidates with shapes from one vector."""
     result, at = [], 0

@@ -91,10 +91,20 @@ def _trials(
     if bins is not None:
         yield from _intervals(rest, EffectAt(effect, place), bins, before)
         return
-    for shape in effect.starts(rest.equations.motion, place):
+    for shape in _starts(rest, effect, place):
         trial = _trial(rest, EffectAt(effect, place, shape), motion, before)
         if trial is not None:
             yield trial
+
+
+def _starts(rest: _Rest, effect: Effect, place: Place) -> np.ndarray:
+    """Return the shapes that are tried; the periods of a wave are where the residual has them."""
+    equations = rest.equations
+    wave = effect.wave(equations.motion, place)
+    if wave is None:
+        return effect.starts(equations.motion, place)
+    residual = rest.y[: equations.d.size].reshape(equations.d.shape)
+    return wave.strongest(equations.filter.rows, residual, rest.frame.sigma)
 
 
 def _trial(

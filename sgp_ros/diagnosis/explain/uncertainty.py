@@ -14,7 +14,13 @@ import numpy as np
 from sgp_ros.batch.least_squares import correlation_factor
 from sgp_ros.diagnosis.explain.candidates import UNSEEN
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.regression import Columns, Frame, shape_bounds, with_shapes
+from sgp_ros.diagnosis.explain.regression import (
+    Columns,
+    Frame,
+    shape_bounds,
+    shape_scales,
+    with_shapes,
+)
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -46,8 +52,8 @@ def covariance(model: Model, columns: Columns) -> np.ndarray:
     if len(low):
         x = np.concatenate([s.shape for s in model.effects if len(s.shape)])
         slopes = []
-        for i in range(len(x)):
-            h = 1e-3 * (high[i] - low[i])
+        steps = 1e-3 * shape_scales(frame.equations, model.effects)
+        for i, h in enumerate(steps):
             moved = []
             for sign in (1.0, -1.0):
                 y = x.copy()
