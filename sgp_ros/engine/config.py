@@ -105,6 +105,12 @@ class EngineConfig:
         'the model learns, or off: as the model states them.',
         choices=('always', 'learning', 'off'),
     )  # fmt: skip
+    process_weighting: str = _setting(
+        'process.weighting', 'str', 'always',
+        'When errors beside those of the physics alone weigh Z in predictions: always, only while '
+        'the model learns, or off: Z counts in full.',
+        choices=('always', 'learning', 'off'),
+    )  # fmt: skip
     learning_enabled: bool = _setting(
         'learning.enabled', 'bool', default=True, description='Learn from samples, not only score.'
     )

@@ -32,6 +32,7 @@ from sgp_ros.engine.samples import (
 )
 from sgp_ros.engine.windows import Equation
 from sgp_ros.gp.scores import DriftTest
+from sgp_ros.gp.stacking import ProcessWeight
 from sgp_ros.robots.robot import Robot
 
 
@@ -183,6 +184,13 @@ class Engine:
         if model is None or self.config.model_method == 'GP':
             return np.zeros(0), np.zeros((0, 0))
         return model.information.coefficients, model.information.R
+
+    def process_weights(self) -> dict[str, ProcessWeight]:
+        """Return the weight of Z beside the physics alone by joint; empty without both."""
+        if self.estimator.baseline is None or self.config.process_weighting == 'off':
+            return {}
+        weights = self.estimator.scoring.weights
+        return dict(zip(self.robot.joint_names, weights, strict=True))
 
     def scores(self) -> dict[str, dict[str, Score]]:
         """Return the scores of each joint's channels; a channel without samples is absent."""

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from sgp_ros.engine.complement import Complement
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.hyperparameters import kernel_named
-from sgp_ros.engine.prediction import check_factor, predict_soundly, solve_complement
+from sgp_ros.engine.prediction import check_factor, predict_soundly, weighted
 from sgp_ros.engine.prior_knowledge import (
-    complement_columns,
     empty_regression,
     memory_of_settings,
     model_of_settings,
@@ -41,6 +41,7 @@ class Estimator:
         regression: physics and process; None until enough samples started it.
         baseline: physics alone on the same samples; None where the method has no process.
         scoring: what the errors so far tell.
+        complement: predicts the other side of the equation of motion.
         waiting: equations gathered before the first model.
     """
 
@@ -52,10 +53,7 @@ class Estimator:
         self.inputs = (None,) * k if config.model_method == 'PR' else columns
         self._prior = prior_of_robot(robot, config)
         self._known = Information.of_prior(self._prior).coefficients
-        self._complement_columns = complement_columns(robot)
-        self._sees_complement = config.model_method != 'PR' and any(
-            self._complement_columns & set(seen) for seen in columns
-        )
+        self.complement = Complement(robot, config, columns)
         self._config = config
         self.regression: Regression | None = None
         self.baseline: Regression | None = None
@@ -68,6 +66,7 @@ class Estimator:
         """Keep the models; count and score anew."""
         self._counts = counts
         self.scoring.begin()
+        self.complement.begin_stream()
 
     def configure(self, config: EngineConfig) -> None:
         """Take new settings between two samples.
@@ -103,6 +102,11 @@ class Estimator:
     def take(self, equation: Equation) -> Estimate:
         """Predict an equation, score the prediction, then learn it."""
         self._counts.estimated += 1
+        estimate = self._estimate(equation)
+        self.complement.take(equation, self._config.filter_hop)
+        return estimate
+
+    def _estimate(self, equation: Equation) -> Estimate:
         if self.regression is None:
             u, f, y = self._arrays(equation)
             _, held = without_rest(equation.slack, f @ self._known[: f.shape[1]], y)
@@ -118,20 +122,27 @@ class Estimator:
     def _predict_score_learn(self, regression: Regression, equation: Equation) -> Estimate:
         u, f, y = self._arrays(equation)
         prediction = predict_soundly(regression, u, f, self._counts)
-        noise = np.array(regression.model.noise)
-        target = self._calibrated(
-            self._robot.target,
-            Channel.raw(y, prediction.mean, np.diag(prediction.covariance) + noise),
-        )
+        model, physics = (regression, prediction), None
+        if self.baseline is not None:
+            physics = (self.baseline, self.baseline.predict(u, f))
+        weight = self.scoring.weight(is_used=self._config.process_weighting != 'off')
+        mean, covariance = weighted(weight, model, physics)
+        target_name = self._robot.target
+        target = self._calibrated(target_name, Channel.raw(y, mean, covariance.diagonal().copy()))
         complement = self._calibrated(
-            self._robot.complement, self._complement(regression, equation, prediction)
+            self._robot.complement,
+            self.complement.predict(equation, model, physics, weight, target),
         )
+        measured, _ = without_rest(equation.slack, mean, y)
         y, held = without_rest(equation.slack, prediction.mean, y)
         self._counts.held += bool(held.any())
-        is_scored = self._score(replace(target, measured=y), complement, held)
-        self._take_baseline(u, f, y, held, is_scored=is_scored)
+        is_scored = self._score(replace(target, measured=measured), complement, held)
+        if physics is not None:
+            if is_scored:
+                self._score_baseline(y, y - prediction.mean, physics[1], held)
+            self._learn_baseline(physics[1], y, held)
         is_learned = self._learn(regression, prediction, y, held)
-        channels = {self._robot.target: target, self._robot.complement: complement}
+        channels = {target_name: target, self._robot.complement: complement}
         return Estimate(
             equation.stamp_ns,
             self._robot.joint_names,
@@ -177,54 +188,17 @@ class Estimator:
         values: np.ndarray = getattr(equation.motion, channel)[0]
         return values
 
-    def _complement(
-        self, regression: Regression, equation: Equation, prediction: OnlinePrediction
-    ) -> Channel:
-        measured = self._measured(equation, self._robot.complement)
-        k = len(measured)
-        unknown = Channel.unknown(measured)
-        joints = list(equation.complement_joints)
-        if not joints or self._config.model_method == 'GP':
-            return unknown
-        w = regression.information.coefficients
-        zero = equation.state_rows
-        slope = (equation.slopes @ w).T  # (k, c)
-
-        def predict(signal: np.ndarray) -> OnlinePrediction:
-            f = equation.regressor(signal)
-            if not self._sees_complement:
-                return regression.with_regressor(prediction, f)
-            u = prediction.u.copy()
-            columns = sorted(self._complement_columns)
-            u[columns] = signal
-            return regression.predict(u, f)
-
-        solved = solve_complement(
-            self._measured(equation, self._robot.target),
-            slope,
-            np.array(regression.model.noise),
-            zero @ w,
-            predict,
-            2 if self._sees_complement else 1,
-        )
-        if solved is None:
-            return unknown
-        mean, variance = np.zeros(k), np.zeros(k)
-        mean[joints], variance[joints] = solved[0], np.diag(solved[1])
-        return Channel.raw(measured, mean, variance)
-
     def _calibrated(self, channel: str, values: Channel) -> Channel:
         if self._config.intervals_calibration == 'off':
             return values
-        return self.scoring.calibrated(channel, values)
+        return replace(values, variance=self.scoring.calibrated(channel, values.raw_variance))
 
     def _score(self, target: Channel, complement: Channel, held: np.ndarray) -> bool:
         is_known = np.isfinite(target.raw_variance) & (target.raw_variance > 0.0)
         if not is_known.all() or held.all():  # unknown: undetermined, or far outside all samples
             return False
         self._counts.scored += 1
-        mode = self._config.intervals_calibration
-        adapts = mode == 'always' or (mode == 'learning' and self._config.learning_enabled)
+        adapts = self._adapts(self._config.intervals_calibration)
         self.scoring.take_target(target, ~held)
         self.scoring.take(self._robot.target, target, ~held, adapts=adapts)
         # a held joint keeps the other side of the equation from following for all of them
@@ -232,15 +206,24 @@ class Estimator:
         self.scoring.take(self._robot.complement, complement, is_free, adapts=adapts)
         return True
 
-    def _take_baseline(
-        self, u: np.ndarray, f: np.ndarray, y: np.ndarray, held: np.ndarray, *, is_scored: bool
+    def _adapts(self, mode: str) -> bool:
+        return mode == 'always' or (mode == 'learning' and self._config.learning_enabled)
+
+    def _score_baseline(
+        self, y: np.ndarray, errors: np.ndarray, prediction: OnlinePrediction, held: np.ndarray
     ) -> None:
-        if self.baseline is None:
-            return
-        prediction = self.baseline.predict(u, f)
-        variance = np.diag(prediction.covariance) + np.array(self.baseline.model.noise)
-        if is_scored and np.all(np.isfinite(variance)):
+        """Score the physics alone, and weigh it against the errors (k,) of the model."""
+        assert self.baseline is not None
+        variance = prediction.covariance.diagonal() + np.array(self.baseline.model.noise)
+        if np.all(np.isfinite(variance)):
             self.scoring.take_baseline(y, prediction.mean, variance, ~held)
+            if self._adapts(self._config.process_weighting):
+                self.scoring.take_experts(errors, y - prediction.mean, ~held)
+
+    def _learn_baseline(
+        self, prediction: OnlinePrediction, y: np.ndarray, held: np.ndarray
+    ) -> None:
+        assert self.baseline is not None
         sample = told(self.baseline, prediction, y, held)
         if sample is not None and self._config.learning_enabled:
             self.baseline.learn(*sample)
@@ -279,8 +262,8 @@ class Estimator:
         except NumericalError:  # some repeat others to rounding: the rest is learned without them
             self.regression = self.make_regression(model)
         for u, f, y, held in waiting:
-            if not is_whole:
-                self._take_baseline(u, f, y, held, is_scored=False)
+            if self.baseline is not None and not is_whole:
+                self._learn_baseline(self.baseline.predict(u, f), y, held)
             self._learn(self.regression, self.regression.predict(u, f), y, held)
 
     def _unknown(self, equation: Equation, *, is_learned: bool) -> Estimate:

@@ -1,13 +1,13 @@
-"""What the errors of one-step predictions tell: scores, drift, and the width of intervals.
+"""What the errors of one-step predictions tell: scores, drift, intervals, the weight of Z.
 
 Everything here sees an error after the prediction it belongs to. Scores and drift are of one
-stream; the scales of the intervals belong to the model and stay with it.
+stream; the scales of the intervals and the weights of Z belong to the model and stay with it.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -15,18 +15,20 @@ import numpy as np
 from sgp_ros.engine.results import Channel
 from sgp_ros.gp.calibration import IntervalScale
 from sgp_ros.gp.scores import DriftTest, RunningScore
+from sgp_ros.gp.stacking import ProcessWeight
 
 CHANNELS = ('acceleration', 'effort')
 
 
 class Scoring:
-    """Scores, drift and interval scales of k joints.
+    """Scores, drift, interval scales and weights of Z of k joints.
 
     Attributes:
         scores: of the model, channel name to one score per joint.
         baseline: scores of the physics alone on the target, one per joint.
         drift: tests of the target, one per joint.
         scales: of the intervals, channel name to one per joint.
+        weights: of Z beside the physics alone, one per joint.
 
     Args:
         k: number of joints.
@@ -35,19 +37,27 @@ class Scoring:
     def __init__(self, k: int) -> None:
         self._k = k
         self.scales = {channel: tuple(IntervalScale() for _ in range(k)) for channel in CHANNELS}
+        self.weights = tuple(ProcessWeight() for _ in range(k))
         self.begin()
 
     def begin(self) -> None:
-        """Begin all scores anew; the scales stay."""
+        """Begin all scores anew; scales and weights stay."""
         k = self._k
         self.scores = {channel: tuple(RunningScore() for _ in range(k)) for channel in CHANNELS}
         self.baseline = tuple(RunningScore() for _ in range(k))
         self.drift = tuple(DriftTest() for _ in range(k))
 
-    def calibrated(self, channel: str, values: Channel) -> Channel:
-        """Return a prediction with the variance that holds the rate of its 95 % interval."""
-        factor = np.array([scale.factor for scale in self.scales[channel]])
-        return replace(values, variance=values.raw_variance * factor)
+    def calibrated(self, channel: str, raw: np.ndarray) -> np.ndarray:
+        """Return the variances with which the 95 % intervals of a channel hold their rate, (k,).
+
+        Args:
+            channel: key of `CHANNELS`.
+            raw: variances of the model, (k,); what is no variance stays as it is.
+        """
+        return np.array([
+            scale.variance(v) if 0.0 < v < math.inf else v
+            for scale, v in zip(self.scales[channel], raw.tolist(), strict=True)
+        ])  # fmt: skip
 
     def take(self, channel: str, values: Channel, is_told: np.ndarray, *, adapts: bool) -> None:
         """Score the joints whose variance is known; their scales follow if `adapts`.
@@ -67,7 +77,7 @@ class Scoring:
                 continue
             self.scores[channel][j].add(y, mean, variance, raw)
             if adapts:
-                self.scales[channel][j].add((y - mean) / math.sqrt(raw))
+                self.scales[channel][j].add(y - mean, raw)
 
     def take_target(self, values: Channel, is_told: np.ndarray) -> None:
         """Test the errors of the target for drift, beside what the model itself expects."""
@@ -82,11 +92,21 @@ class Scoring:
         for j in np.flatnonzero(is_told):
             self.baseline[j].add(*(float(x[j]) for x in (y, mean, variance, variance)))
 
+    def weight(self, *, is_used: bool) -> np.ndarray:
+        """Return the weight of Z for each joint, (k,); 1 where none is used."""
+        return np.array([weight.value if is_used else 1.0 for weight in self.weights])
+
+    def take_experts(self, model: np.ndarray, physics: np.ndarray, is_told: np.ndarray) -> None:
+        """Weigh the errors (k,) with Z against those of the physics alone."""
+        for j in np.flatnonzero(is_told):
+            self.weights[j].add(float(model[j]), float(physics[j]))
+
     def state(self) -> dict[str, Any]:
         """Return everything as plain values; `restore` takes it back."""
         return {
             'scores': {c: [asdict(s) for s in scores] for c, scores in self.scores.items()},
             'scales': {c: [asdict(s) for s in scales] for c, scales in self.scales.items()},
+            'weights': [asdict(weight) for weight in self.weights],
             'drift': [asdict(test) for test in self.drift],
             'baseline': [asdict(score) for score in self.baseline],
         }
@@ -101,5 +121,6 @@ class Scoring:
             c: tuple(IntervalScale(**scale) for scale in scales)
             for c, scales in state['scales'].items()
         }
+        self.weights = tuple(ProcessWeight(**weight) for weight in state['weights'])
         self.drift = tuple(DriftTest(**test) for test in state['drift'])
         self.baseline = tuple(RunningScore(**score) for score in state['baseline'])

@@ -32,7 +32,7 @@ from sgp_ros.gp.model import Model
 from sgp_ros.gp.regression import Regression
 from sgp_ros.robots.robot import Robot
 
-VERSION = 7
+VERSION = 8
 _WAITING = ('U', 'F', 'y', 'held')
 
 
@@ -72,6 +72,7 @@ def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
     for i, name in enumerate(_WAITING):
         rows = [row[i] for row in estimator.waiting]
         arrays[f'waiting_{name}'] = np.array(rows) if rows else np.zeros(0)
+    arrays |= {f'complement.{k}': array for k, array in estimator.complement.state().items()}
     for name, regression in _regressions(estimator).items():
         arrays[f'{name}_noise'] = np.array(regression.model.noise)
         for key, array in regression.state().items():
@@ -137,6 +138,7 @@ def _fill(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
     estimator = engine.estimator
     estimator.scoring.restore(text['scoring'])
     estimator.waiting = list(zip(*(snapshot[f'waiting_{name}'] for name in _WAITING), strict=True))
+    estimator.complement.restore(_part('complement.', snapshot))
     if 'model_noise' in snapshot:
         estimator.regression = _read_regression('model', snapshot, engine)
     if 'baseline_noise' in snapshot:
@@ -160,11 +162,12 @@ def _read_regression(name: str, snapshot: Mapping[str, np.ndarray], engine: Engi
     noise = tuple(float(x) for x in snapshot[f'{name}_noise'])
     make = engine.estimator.make_regression if name == 'model' else engine.estimator.make_baseline
     regression = make(Model(tuple(kernels), noise))
-    prefix = f'{name}.'
-    regression.restore(
-        {key.removeprefix(prefix): snapshot[key] for key in snapshot if key.startswith(prefix)}
-    )
+    regression.restore(_part(f'{name}.', snapshot))
     return regression
+
+
+def _part(prefix: str, snapshot: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {key.removeprefix(prefix): snapshot[key] for key in snapshot if key.startswith(prefix)}
 
 
 def _text(snapshot: Mapping[str, np.ndarray]) -> dict[str, Any]:

@@ -64,6 +64,7 @@ def collect_metrics(
             for joint, channels in baseline.items()
             if channels
         },
+        'process_weight': _weights(engine),
         'parameters': [_parameter(p) for p in engine.parameters()],
         'physics_parameters': [_parameter(p) for p in engine.physics_parameters()],
         'estimates': {
@@ -121,6 +122,12 @@ def model_remarks(engine: Engine, asked: EngineConfig) -> list[str]:
                 f'diagnosis: {", ".join(left_out)}'
             )
     remarks += [
+        f'Z of {joint} erred more than the physics alone: its weight in predictions was '
+        f'{weight.mean:.2f} on average and ended at {weight.value:.2f}'
+        for joint, weight in engine.process_weights().items()
+        if weight.n and weight.mean < 0.5
+    ]
+    remarks += [
         f'{p.name} ended at {p.value:.3g} {p.unit}, below {c.low:g}: no such value exists. '
         'Something that the model lacks stands behind it, or the motion does not determine it'
         for p, c in zip(engine.parameters(), robot.coefficients, strict=False)
@@ -136,6 +143,11 @@ def versions() -> dict[str, str]:
     with suppress(PackageNotFoundError):
         found['rclpy'] = version('rclpy')
     return found
+
+
+def _weights(engine: Engine) -> dict[str, dict[str, float]]:
+    weights = engine.process_weights()
+    return {joint: {'now': w.value, 'mean': w.mean} for joint, w in weights.items()}
 
 
 def _score(score: Score) -> dict[str, float]:

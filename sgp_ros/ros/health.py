@@ -174,6 +174,13 @@ class Health:
         values['surprise'] = f'{surprise:.4f}'
         values['drift'] = f'{drift.level:.4f}'
         message = f'nMSE {target.nmse:.3g}, coverage {100 * target.coverage95:.1f} %'
+        weight = engine.process_weights().get(joint)
+        if weight is not None:
+            values['process_weight'] = f'{weight.value:.4f}'
+            if weight.value < 0.5:
+                message += (
+                    f'; Z errs more than the physics alone and has weight {weight.value:.2f}'
+                )
         is_wrong = surprise > _SURPRISING
         if is_wrong:
             message += f'; recent squared errors are {surprise:.1f} times what the model expects'

@@ -17,8 +17,8 @@ def _followed(errors):
     """Return the half width before each error, and the scale after all of them."""
     scale, widths = IntervalScale(), []
     for error in errors:
-        widths.append(INTERVAL_95 * np.sqrt(scale.factor))
-        scale.add(float(error))
+        widths.append(INTERVAL_95 * np.sqrt(scale.variance(1.0)))
+        scale.add(float(error), 1.0)
     return np.array(widths), scale
 
 
@@ -62,16 +62,16 @@ def test_an_outlier_widens_no_interval_for_long():
 def test_errors_of_zero_leave_a_variance():
     """A channel that is constant for an hour can still be scored after it."""
     _, scale = _followed(np.zeros(10_000))
-    assert scale.factor > 0.0
-    assert np.isfinite(1.0 / scale.factor)
+    assert scale.variance(1.0) > 0.0
+    assert np.isfinite(1.0 / scale.variance(1.0))
 
 
 def test_a_scale_continues_from_its_saved_values():
-    """The two numbers and the count are the whole state."""
+    """Three numbers and the count are the whole state."""
     errors = np.random.default_rng(3).standard_normal(50)
     _, first = _followed(errors[:25])
     again = IntervalScale(**asdict(first))
     _, whole = _followed(errors)
     for error in errors[25:]:
-        again.add(float(error))
+        again.add(float(error), 1.0)
     assert again == whole
