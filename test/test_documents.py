@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from sgp_proof.concealed.promises import FACTOR
+
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted([*ROOT.glob('*.md'), *(ROOT / 'docs').rglob('*.md')])
 
@@ -63,6 +65,19 @@ def test_numbers_in_the_filter_page_are_the_measured_ones():
     text = (ROOT / 'docs/filter.md').read_text(encoding='utf-8')
     for row in result['median_relative_error'].values():
         assert ' | '.join(f'{100 * x:.2f}' for x in row) in text
+
+
+def test_what_a_diagnosis_promises_is_delivered_on_the_practice_cases():
+    """Within a factor of two, but for what the page names."""
+    path = ROOT / 'sgp_proof/results/promises.json'
+    cases = json.loads(path.read_text(encoding='utf-8'))['cases']
+    missed = {
+        (name, joint)
+        for name, case in cases.items()
+        for joint, x in case['effort_nmse'].items()
+        if x['delivered'] > FACTOR * x['promised']
+    }
+    assert missed == set()
 
 
 def test_numbers_in_the_emps_page_are_the_measured_ones():

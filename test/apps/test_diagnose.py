@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sgp_proof.concealed.promises import FACTOR, promised_and_delivered
 from sgp_ros.cli import main
 from sgp_ros.diagnosis.result import VERDICTS
 from sgp_ros.engine.samples import JointSample, frozen_array
@@ -114,6 +115,16 @@ def test_predictions_have_a_column_for_each_joint_and_come_often_enough(finished
         assert (steps > 0.0).all()
         assert np.median(1.0 / steps) >= LEAST_RATE_HZ
         assert numbers[0, 0] >= 0.0
+
+
+def test_a_replay_of_the_diagnosed_robot_delivers_what_was_promised(finished):
+    """Within a factor of two, joint by joint, in windows that the stream chose."""
+    number, out, _ = finished
+    found = promised_and_delivered(_case(number) / 'real.mcap', out)
+    assert found['left_out'] == []
+    for joint, x in found['effort_nmse'].items():
+        assert x['promised'] == x['diagnosed']
+        assert x['delivered'] < FACTOR * x['promised'], joint
 
 
 def test_no_half_written_file_is_left(finished):
