@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,5 +15,7 @@ def run_import(
     """Write a table as a recording, see `import_table`."""
     summary = import_table(table, map_path, out)
     progress(1.0)
+    for remark in summary.remarks:
+        sys.stderr.write(f'remark: {remark}\n')
     print(f'{summary.samples} states of {", ".join(summary.joints)} in {summary.path}')
     return summary.to_mapping()

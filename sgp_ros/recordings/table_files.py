@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import csv
+import re
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,13 +17,20 @@ from sgp_ros.errors import RecordingError
 
 Columns = dict[str, np.ndarray]
 _DELIMITERS = (';', '\t', ',', ' ')
+_COMMENTS = '#%'
+_IN_BRACKETS = re.compile(r'\[[^\]]*\]')
+_APART = re.compile(r'\[[^\]]*\]|\S+')
+_TIME = re.compile(r'\d{4}-\d\d-\d\d[T ]\d')
 
 
-def load_columns(path: Path) -> Columns:
-    """Return the arrays of a table file by name; texts of a CSV file stay texts.
+def load_columns(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]]:
+    """Return the arrays of a table file by name, and the line of each row; empty without lines.
+
+    Texts of a CSV file stay texts.
 
     Args:
         path: `.csv`, `.tsv`, `.txt`, `.dat` with a header row; `.npz`; `.mat` up to version 7.
+        remarks: what is left out of it is appended here.
 
     Raises:
         RecordingError: no such file, another format, or a damaged one.
@@ -31,37 +39,107 @@ def load_columns(path: Path) -> Columns:
         raise RecordingError(f'no table at {path}', 'a CSV, NPZ or MAT file', 'check the path')
     suffix = path.suffix.lower()
     if suffix == '.npz':
-        return _load_npz(path)
+        return _load_npz(path), ()
     if suffix == '.mat':
-        return _load_mat(path)
+        return _load_mat(path), ()
     if suffix in {'.csv', '.tsv', '.txt', '.dat'}:
-        return _load_csv(path)
+        return _load_csv(path, remarks)
     raise RecordingError(f'{path} with ending {suffix!r}', '.csv, .tsv, .txt, .dat, .npz or .mat')
 
 
-def _load_csv(path: Path) -> Columns:
+def _load_csv(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]]:
     try:
         lines = path.read_text(encoding='utf-8-sig').splitlines()
     except UnicodeDecodeError as error:
         raise RecordingError(f'{path} is no text ({error})', 'a CSV file in UTF-8') from error
-    header = lines[0].lstrip('# ') if lines else ''
-    delimiter = next((mark for mark in _DELIMITERS if mark in header), ',')
-    names = [name.strip() for name in next(csv.reader([header], delimiter=delimiter), [])]
-    rows = []
-    for number, line in enumerate(lines[1:], start=2):
-        if line.strip():
-            row = line.split() if delimiter == ' ' else line.split(delimiter)
-            if len(row) != len(names):
-                raise RecordingError(
-                    f'{path} line {number} has {len(row)} values', f'{len(names)} as the header'
-                )
+    header, mark, rest = _header(path, lines)
+    names = [name.strip().strip('"') for name in _cells(header, mark)]
+    rows: list[list[str]] = []
+    taken: list[int] = []
+    skipped, last = [], rest[-1][0] if rest else 0
+    for number, line in rest:
+        row = _cells(line, mark)
+        if not rows and not any(map(_is_value, row)):
+            skipped.append(number)  # a second line of the header, such as units
+        elif len(row) == len(names):
             rows.append(row)
+            taken.append(number)
+        elif number == last and rows and len(row) < len(names):
+            remarks.append(
+                f'{path.name}: line {number}, the last one, ends after {len(row)} of {len(names)} '
+                'values; it is left out, the rows before it are used'
+            )
+        else:
+            raise RecordingError(
+                f'{path} line {number} has {len(row)} values', f'{len(names)} as the header'
+            )
     if not rows:
         raise RecordingError(f'{path} holds no row', 'a header row, then rows of numbers')
+    if skipped:
+        remarks.append(f'{path.name}: lines {skipped} hold no number and are taken for header')
     table = np.char.strip(np.array(rows, dtype=str))  # (n, number of columns)
-    if delimiter == ';':
+    if mark == ';':
         table = np.char.replace(table, ',', '.')  # a decimal comma goes with semicolons
-    return {name: table[:, column] for column, name in enumerate(names)}
+    return {name: _column(table[:, i]) for i, name in enumerate(names)}, taken
+
+
+def _header(path: Path, lines: list[str]) -> tuple[str, str, list[tuple[int, str]]]:
+    """Return the header, what separates its cells, and the numbered lines behind it.
+
+    Lines of comment are left out; the last one before the numbers is the header where no other is.
+    """
+    numbered = [(i, line) for i, line in enumerate(lines, start=1) if line.strip()]
+    plain = [(i, line) for i, line in numbered if line.lstrip()[0] not in _COMMENTS]
+    first = plain[0] if plain else (len(lines) + 1, '')
+    comments = [line.lstrip(_COMMENTS + ' ') for i, line in numbered if i < first[0]]
+    mark = _mark(first[1] or (comments[-1] if comments else ''))
+    if not plain or any(map(_is_value, _cells(first[1], mark))):
+        titles = [line for line in comments if len(_cells(line, _mark(line))) > 1]
+        width = len(_cells(first[1], mark)) if plain else 0
+        fitting = [line for line in titles if not plain or len(_cells(line, _mark(line))) == width]
+        if not fitting and plain:
+            raise RecordingError(
+                f'{path} has no header row: line {first[0]} holds numbers',
+                'the names of the columns in the first row, such as t,q,tau',
+                'write them there',
+            )
+        return (fitting or comments or [''])[-1], mark, plain
+    return first[1], mark, plain[1:]
+
+
+def _mark(line: str) -> str:
+    """Return what separates the cells of a line; what stands in brackets does not count."""
+    bare = _IN_BRACKETS.sub('', line)
+    return next((mark for mark in _DELIMITERS if mark in bare.strip()), ',')
+
+
+def _cells(line: str, mark: str) -> list[str]:
+    """Return the cells of a line; a list in brackets or quotes is one cell."""
+    if mark == ' ':
+        return line.split() if '[' not in line else _APART.findall(line)
+    kept = _IN_BRACKETS.sub(lambda m: m.group().replace(mark, '\0'), line)
+    cells = next(csv.reader([kept], delimiter=mark), [])
+    return [cell.replace('\0', mark) for cell in cells]
+
+
+def _is_value(cell: str) -> bool:
+    """Return whether a cell holds a number, a list or a time."""
+    text = cell.strip()
+    if text.startswith('[') or _TIME.match(text):
+        return True
+    try:
+        float(text.replace(',', '.'))
+    except ValueError:
+        return False
+    return True
+
+
+def _column(cells: np.ndarray) -> np.ndarray:
+    """Return a column (n,) of texts; of lists in its cells, the matrix (n, m) of their texts."""
+    if not all(cell.startswith('[') and cell.endswith(']') for cell in cells):
+        return cells
+    rows = [cell[1:-1].replace(',', ' ').replace(';', ' ').split() for cell in cells]
+    return np.array(rows, dtype=str) if len({len(row) for row in rows}) == 1 else cells
 
 
 def _load_npz(path: Path) -> Columns:
@@ -97,10 +175,23 @@ def _load_mat(path: Path) -> Columns:
     return dict(_flattened('', content))
 
 
-def _flattened(prefix: str, content: dict[str, object]) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the arrays of nested structures under dotted names."""
+def _flattened(prefix: str, content: Mapping[str, object]) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the arrays of nested structures and cells under dotted names.
+
+    A cell array of vectors of one length is a matrix, one row a cell; each cell also has its own
+    name, `data.0` and so on, and so have the elements of an array of structures.
+    """
     for name, value in content.items():
+        place = prefix + name
         if isinstance(value, dict):
-            yield from _flattened(f'{prefix}{name}.', value)
+            yield from _flattened(f'{place}.', value)
+        elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
+            cells = list(np.asarray(value, dtype=object).ravel()) if len(value) else []
+            yield from _flattened(f'{place}.', {str(i): cell for i, cell in enumerate(cells)})
+            arrays = [np.atleast_1d(np.asarray(c)) for c in cells if not isinstance(c, dict)]
+            if len(arrays) == len(cells) > 0 and len({a.shape for a in arrays}) == 1:
+                stacked = np.array(arrays)
+                if stacked.ndim == 2 and stacked.dtype.kind in 'fiub':
+                    yield place, stacked
         elif isinstance(value, np.ndarray) and value.ndim and value.dtype.kind in 'fiub':
-            yield prefix + name, value
+            yield place, value

@@ -8,6 +8,7 @@ The map is a YAML file, here for a CSV file with the columns `t_s`, `q_m`, `forc
         position: {column: q_m, unit: m}
         effort: {column: force_N, unit: N}
 
+A time may also be a text such as `2024-05-01T12:00:00.25Z`, whatever its unit.
 Keys of `time`: `column`, `unit`, `index`, `rate` [Hz], `start`, the epoch [s] that belongs to the
 zero of the column (0 by default). A joint has a `position`, and may have `velocity` and `effort`.
 `commands` lists joints the same way; they are written in that order, as the type `command_type`

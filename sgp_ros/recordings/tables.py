@@ -7,8 +7,10 @@ the map.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from datetime import datetime
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
@@ -21,6 +23,11 @@ from sgp_ros.recordings.table_files import Columns, load_columns
 from sgp_ros.recordings.table_map import Quantity, TableMap, TimeBase, check_map, read_map
 from sgp_ros.recordings.writer import RecordingWriter
 
+_ISO = re.compile(r'(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:\d\d)?')
+_GREATEST = 1e150
+"""Above this a number has no square, so nothing can be computed of it."""
+_LISTED = 5
+"""Refused rows that are listed by number."""
 _LATEST_NS = 2**31 * 10**9
 """First stamp that a ROS message cannot hold [ns]."""
 
@@ -36,6 +43,7 @@ class ImportSummary:
         commands: number of commands.
         start_ns: least stamp [ns].
         end_ns: greatest stamp [ns].
+        remarks: what was left out of the table.
     """
 
     path: Path
@@ -44,10 +52,12 @@ class ImportSummary:
     commands: int
     start_ns: int
     end_ns: int
+    remarks: tuple[str, ...] = ()
 
     def to_mapping(self) -> dict[str, object]:
         """Return the summary as JSON holds it."""
-        return {**asdict(self), 'path': str(self.path), 'joints': list(self.joints)}
+        lists = {'joints': list(self.joints), 'remarks': list(self.remarks)}
+        return {**asdict(self), 'path': str(self.path), **lists}
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +72,7 @@ class Table:
         commands: (n, c) commands, None without.
         command_joints: their joints, c of them.
         command_type: message type of the commands.
+        remarks: what was left out of the file.
     """
 
     stamps_ns: tuple[int, ...]
@@ -70,6 +81,7 @@ class Table:
     commands: np.ndarray | None
     command_joints: tuple[str, ...]
     command_type: str
+    remarks: tuple[str, ...] = ()
 
     def events(self) -> Iterator[JointSample | CommandSample]:
         """Yield the rows in order, the command of a row before its state."""
@@ -94,7 +106,8 @@ def read_table(path: str | Path, content: Mapping[str, object]) -> Table:
         RecordingError: the file cannot be read, or holds something that is no number or time.
     """
     path = Path(path)
-    columns = load_columns(path)
+    remarks: list[str] = []
+    columns, lines = load_columns(path, remarks)
     table_map = check_map(content, columns)
     quantities = {
         f'{joint}.{channel}': quantity
@@ -109,7 +122,8 @@ def read_table(path: str | Path, content: Mapping[str, object]) -> Table:
     lengths['time'] = len(stamps_ns)
     if set(lengths.values()) != {n}:
         raise ConfigError(f'{path}: columns of different length {lengths}', 'one length')
-    return _assemble(table_map, values, stamps_ns)
+    table = _assemble(table_map, values, stamps_ns)
+    return _without_impossible(path, table, lines, remarks)
 
 
 def import_table(path: str | Path, map_path: str | Path, out: str | Path) -> ImportSummary:
@@ -140,6 +154,7 @@ def import_table(path: str | Path, map_path: str | Path, out: str | Path) -> Imp
         n if table.commands is not None else 0,
         min(table.stamps_ns),
         max(table.stamps_ns),
+        table.remarks,
     )
 
 
@@ -163,6 +178,35 @@ def _assemble(
         commands,
         tuple(table_map.commands),
         table_map.command_type,
+    )
+
+
+def _without_impossible(
+    path: Path, table: Table, lines: Sequence[int], remarks: list[str]
+) -> Table:
+    """Return a table less the rows that no robot can have shown, which are counted.
+
+    A missing velocity, effort or command is none of them; a position must be there.
+    """
+    arrays = [x for x in (*table.channels.values(), table.commands) if x is not None]
+    wrong = np.isnan(table.channels['position']).any(axis=1)
+    for array in arrays:
+        wrong |= (np.isinf(array) | (np.abs(np.nan_to_num(array)) > _GREATEST)).any(axis=1)
+    if not wrong.any():
+        return replace(table, remarks=tuple(remarks))
+    what = 'lines' if lines else 'rows from 0'
+    listed = ', '.join(str(lines[i] if lines else i) for i in np.flatnonzero(wrong)[:_LISTED])
+    more = ', ...' if wrong.sum() > _LISTED else ''
+    said = f'{path.name}: {wrong.sum()} of {len(wrong)} rows refused, {what} {listed}{more}'
+    if wrong.all():
+        raise RecordingError(said, 'finite numbers below 1e150', 'clean the table')
+    kept = ~wrong
+    return replace(
+        table,
+        stamps_ns=tuple(s for s, k in zip(table.stamps_ns, kept, strict=True) if k),
+        channels={name: array[kept] for name, array in table.channels.items()},
+        commands=None if table.commands is None else table.commands[kept],
+        remarks=(*remarks, f'{said}: a position is missing, or a number is not below 1e150'),
     )
 
 
@@ -200,11 +244,28 @@ def _stamps(path: Path, columns: Columns, time: TimeBase, n: int) -> tuple[int, 
 
 
 def _stamp(value: float | str, unit_ns: Decimal, start_ns: int) -> int | None:
+    if isinstance(value, str) and _ISO.fullmatch(value.strip()):
+        return _iso_stamp(value.strip())
     try:
         stamp = Decimal(str(value)) * unit_ns + start_ns
         return round(stamp) if stamp.is_finite() else None
     except InvalidOperation:
         return None
+
+
+def _iso_stamp(text: str) -> int | None:
+    """Return the stamp of an ISO 8601 time, UTC where it names no zone; None of an impossible one.
+
+    Decimals of a second are kept to the nanosecond.
+    """
+    match = _ISO.fullmatch(text)
+    assert match is not None
+    day, clock, decimals, zone = match.groups()
+    try:
+        whole = datetime.fromisoformat(f'{day}T{clock}{(zone or "+00:00").replace("Z", "+00:00")}')
+    except ValueError:
+        return None
+    return int(whole.timestamp()) * 10**9 + int((decimals or '').ljust(9, '0')[:9])
 
 
 def _vector(columns: Columns, quantity: Quantity) -> np.ndarray:

@@ -43,6 +43,10 @@ READY = {
     'dfki_double_pendulum/design_C.0__20220914__sys_id__trajectory_00.npz': (
         'dfki_double_pendulum', ('shoulder', 'elbow'), 4993,
     ),
+    'staubli_tx40/tx40_joint_test.npz': ('tx40', tuple(f'joint_{i}' for i in range(1, 7)), 20250),
+    'tflex/tflex_slow.npz': ('tflex', ('axis',), 12999),
+    'laas_cogging/settled_points.npz': ('laas_settled', ('axis',), 31666),
+    'laas_cogging/constant_speed.npz': ('laas_speed', ('axis',), 30001),
 }  # fmt: skip
 
 
@@ -97,10 +101,12 @@ def test_imported_numbers_are_those_of_the_table():
 
 @pytest.mark.parametrize('mark', [',', ';', '\t', ' '])
 def test_delimiter_is_found_in_the_header(mark, tmp_path):
+    """A row without a position is no state."""
     text = 't,q\n0.5,1.25\n\n1.0,\n'.replace(',', mark) if mark != ' ' else 't q\n0.5 1.25\n1 nan'
     table = read_table(_csv(tmp_path, text), MAP)
-    assert table.stamps_ns == (500_000_000, 1_000_000_000)
-    np.testing.assert_array_equal(table.channels['position'], [[1.25], [math.nan]])
+    assert table.stamps_ns == (500_000_000,)
+    np.testing.assert_array_equal(table.channels['position'], [[1.25]])
+    assert '1 of 2 rows refused' in table.remarks[0]
 
 
 def test_decimal_comma_goes_with_semicolons(tmp_path):
@@ -286,3 +292,60 @@ def test_rate_must_be_positive_and_alone(tmp_path):
     content = {**MAP, 'time': {'rate': 0.0, 'column': 't'}}
     with pytest.raises(ConfigError, match=r"unknown key 'column'.*time.rate 0.0"):
         read_table(_csv(tmp_path, 't,q\n0,0\n'), content)
+
+
+@pytest.mark.parametrize(
+    ('text', 'said'),
+    [
+        ('t,q\n1,0\n2,0.5\n3', 'line 4, the last one, ends after 1 of 2'),
+        ('t,q\ns,m\n1,0\n2,0.5\n', 'lines [2] hold no number'),
+        ('t,q\n1,0\n\n2,1e280\n3,0.5\n4,nan\n', '2 of 4 rows refused, lines 4, 6'),
+        ('% robot 7\n# t,q\n1,0\n2,0.5\n', ''),
+        ('# made by a logger\nt,q\n# units: s,m\n1,0\n2,0.5\n', ''),
+        ('"t","q"\n"1","0"\n2,0.5\n', ''),
+    ],
+    ids=['cut off', 'units', 'impossible', 'header as comment', 'comments', 'quotes'],
+)
+def test_what_can_be_read_of_a_table_is_used_and_the_rest_is_told(text, said, tmp_path):
+    """Two whole rows in each; what is left out has its line in a remark."""
+    table = read_table(_csv(tmp_path, text), MAP)
+    np.testing.assert_array_equal(table.channels['position'], [[0.0], [0.5]])
+    assert len(table.stamps_ns) == 2
+    assert len(table.remarks) == bool(said)
+    assert said in ''.join(table.remarks)
+
+
+def test_a_table_without_header_says_so(tmp_path):
+    with pytest.raises(RecordingError, match=r'no header row: line 1 holds numbers'):
+        read_table(_csv(tmp_path, '1,0\n2,0.5\n'), MAP)
+
+
+def test_a_list_in_a_cell_is_a_row_of_a_matrix(tmp_path):
+    """Whatever separates the cells, in quotes or not."""
+    content = _map(index=1)
+    for text in ('t,q\n1,"[0.1, 0.2]"\n2,"[0.3, 0.4]"\n', 't,q\n1,[0.1, 0.2]\n2,[0.3, 0.4]\n',
+                 't q\n1 [0.1, 0.2]\n2 [0.3, 0.4]\n'):  # fmt: skip
+        table = read_table(_csv(tmp_path, text), content)
+        np.testing.assert_array_equal(table.channels['position'], [[0.2], [0.4]])
+
+
+def test_iso_times_keep_their_nanoseconds(tmp_path):
+    """UTC where no zone is named; 02:00 in the zone +02:00 is midnight."""
+    text = 't,q\n1970-01-02T00:00:00.123456789Z,0\n1970-01-02 02:00:01+02:00,0\n'
+    table = read_table(_csv(tmp_path, text), MAP)
+    assert table.stamps_ns == (86_400_123_456_789, 86_401_000_000_000)
+
+
+def test_cells_and_arrays_of_structures_of_a_mat_file_are_reached_by_number(tmp_path):
+    cells = np.empty(2, dtype=object)
+    cells[:] = [np.array([1.0, 2.0, 3.0]), np.array([0.1, 0.2, 0.3])]
+    runs = np.array([(np.array([5.0, 6.0]),), (np.array([7.0, 8.0]),)], dtype=[('q', object)])
+    savemat(tmp_path / 'x.mat', {'data': cells, 'runs': runs})
+    time = {'column': 'data.0', 'unit': 's'}
+    content = {'time': time, 'joints': {'axis': {'position': {'column': 'data.1', 'unit': 'm'}}}}
+    table = read_table(tmp_path / 'x.mat', content)
+    np.testing.assert_array_equal(table.channels['position'][:, 0], [0.1, 0.2, 0.3])
+    content = _map(column='runs.1.q')
+    content['time'] = {'rate': 1.0}
+    table = read_table(tmp_path / 'x.mat', content)
+    np.testing.assert_array_equal(table.channels['position'][:, 0], [7.0, 8.0])
