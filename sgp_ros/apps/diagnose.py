@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from sgp_ros.apps.diagnosed_robot import replayed, write_diagnosed
+from sgp_ros.batch.acceptance import require_joints
 from sgp_ros.diagnosis.compare.equations import disagreement, nominal_shares
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.result import Diagnosis, Proof
 from sgp_ros.engine.config import EngineConfig
-from sgp_ros.engine.samples import Event, JointSample
+from sgp_ros.engine.samples import Event
 from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.reader import open_recording
@@ -93,11 +94,17 @@ def run_diagnose(
         is_static=chosen.static, progress=progress,
         config=EngineConfig(effort_source=EFFORT_SOURCES[chosen.effort]),
     )  # fmt: skip
-    remarks = [*found.remarks, *remarks]
+    remarks = [*found.remarks, *remarks, *_refusals(found)]
     found = replace(found, simulation=simulation, remarks=tuple(remarks))
     # a node meets one recording of a motion; settled points are none
     first = [] if chosen.static else next(iter(events.values()))
     return _written(out, nominal, found, first, EFFORT_SOURCES[chosen.effort])
+
+
+def _refusals(found: Diagnosis) -> list[str]:
+    """Say how many states were refused, and why; nothing where none was."""
+    counts = ', '.join(f'{count} {reason}' for reason, count in found.refused.items())
+    return [f'States that were refused, by reason: {counts}.'] if counts else []
 
 
 def _nominal(robot: str, options: DiagnoseOptions) -> Nominal:
@@ -207,13 +214,7 @@ def _events(bag: str, robot: Robot, options: DiagnoseOptions, remarks: list[str]
     """Return what a recording holds of a robot."""
     recording = open_recording(bag)
     events = list(recording.events(options.joint_states, options.command))
-    seen = {name for event in events if isinstance(event, JointSample) for name in event.names}
-    if seen and not seen & set(robot.joint_names):
-        raise RecordingError(
-            f'{Path(bag).name} shows the joints {sorted(seen)}',
-            f'states of the joints {list(robot.joint_names)} of {robot.name}',
-            'take a recording of this robot, or name its joints in a robot file',
-        )
+    require_joints(events, robot, Path(bag).name)
     remarks += recording.remarks
     remarks += [
         f'{count} messages of {Path(bag).name} could not be read: {why}'

@@ -6,6 +6,7 @@ late.
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -118,13 +119,9 @@ def accept(events: Iterable[Event], robot: Robot, config: EngineConfig = USUAL) 
     counts = Counts()
     intake = Intake(robot, config, counts)
     states: list[State] = []
-    strangers: set[tuple[str, ...]] = set()
-    admitted = []
-    for event in events:
-        if intake.admit(event):
-            admitted.append(event)
-        elif isinstance(event, JointSample):
-            strangers.add(event.names)
+    events = list(events)
+    require_joints(events, robot)
+    admitted = [event for event in events if intake.admit(event)]
     for event in in_order(admitted):
         if isinstance(event, CommandSample):
             intake.take_command(event)
@@ -132,7 +129,7 @@ def accept(events: Iterable[Event], robot: Robot, config: EngineConfig = USUAL) 
             state = intake.take_state(event)
             states += [] if state is None else [state]
     if not states:
-        raise _none_accepted(robot, config, counts, strangers)
+        raise _none_accepted(robot, config, counts)
     return _table(states, intake, counts)
 
 
@@ -201,21 +198,48 @@ def _table(states: list[State], intake: Intake, counts: Counts) -> Accepted:
     )
 
 
-def _none_accepted(
-    robot: Robot, config: EngineConfig, counts: Counts, strangers: set[tuple[str, ...]]
-) -> RecordingError:
+def _none_accepted(robot: Robot, config: EngineConfig, counts: Counts) -> RecordingError:
     if counts.refused['unpaired']:
         return RecordingError(
             f'no state with an effort among {counts.read}, effort source {config.effort_source!r}',
             'an effort in the states, or commands before them',
-            'give the topic of the commands with --command, or another --effort',
+            'give the topic of the commands with --command, or another --effort; joints without a '
+            'motor are named under `passive` in a robot YAML',
         )
     reasons = [f'{count} {reason}' for reason, count in counts.refused.items() if count]
-    seen = next((list(n) for n in sorted(strangers) if not {*robot.joint_names} <= {*n}), None)
     return RecordingError(
-        f'no usable state of robot {robot.name}: {", ".join(reasons or ["there is none"])}'
-        + (f', the joints are {seen}' if seen else ''),
+        f'no usable state of robot {robot.name}: {", ".join(reasons or ["there is none"])}',
         f'states of the joints {list(robot.joint_names)}',
+        'look at what was refused, or take another recording',
+    )
+
+
+def require_joints(
+    events: Iterable[Event], robot: Robot, recording: str = 'the recording'
+) -> None:
+    """Refuse states of other joints before anything else is said.
+
+    Args:
+        events: of a recording.
+        robot: whose joints are taken.
+        recording: its name.
+
+    Raises:
+        RecordingError: no message names all joints of the robot; it says which come nearest.
+    """
+    names = {event.names for event in events if isinstance(event, JointSample)}
+    wanted = robot.joint_names
+    if not names or any(set(wanted) <= set(seen) for seen in names):
+        return
+    shown = sorted({name for seen in names for name in seen})
+    missing = [name for name in wanted if name not in shown]
+    near = {name: difflib.get_close_matches(name, shown, 1, 0.0) for name in missing}
+    pairs = ', '.join(f'{name} is nearest to {found[0]}' for name, found in near.items())
+    raise RecordingError(
+        f'{recording} shows the joints {shown}'
+        if missing
+        else f'no message of {recording} names all joints together; there are {shown}',
+        f'states of the joints {list(wanted)} of {robot.name}' + (f' ({pairs})' if pairs else ''),
         'name the joints in a robot file, or take the robot of this recording',
     )
 

@@ -19,6 +19,9 @@ from sgp_ros.engine.weak_form import WeakForm
 from sgp_ros.physics.drive import WindowDrive
 from sgp_ros.robots.robot import Robot
 
+_GREATEST = 1e150
+"""From here on a number has no square, so nothing can be computed of it."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
@@ -226,13 +229,15 @@ class Intake:
         order = self._order(sample.names)
         if order is None:
             return 'unknown_joint'
-        if not np.isfinite(sample.position[order]).all():
+        if not _is_usable(sample.position[order]).all():
             return 'nonfinite'
         velocity, effort = _chosen(sample.velocity, order), _chosen(sample.effort, order)
-        if velocity is not None and np.isinf(velocity).any():
+        if velocity is not None and not (np.isnan(velocity) | _is_usable(velocity)).all():
             return 'nonfinite'
-        if effort is not None and np.isinf(effort[self._actuated]).any():
-            return 'nonfinite'
+        if effort is not None:
+            own = effort[self._actuated]
+            if not (np.isnan(own) | _is_usable(own)).all():
+                return 'nonfinite'
         is_missing = velocity is None or np.isnan(velocity).any()
         if self._config.filter_velocity == 'measured' and is_missing:
             return 'nonfinite'
@@ -255,10 +260,15 @@ class Intake:
             return 'wrong_length'
         if command.names and not set(command.names) & set(self._robot.joint_names):
             return 'unknown_joint'
-        if not np.all(np.isfinite(command.effort)):
+        if not _is_usable(command.effort).all():
             return 'nonfinite'
         return None
 
 
 def _chosen(values: np.ndarray | None, order: np.ndarray | None) -> np.ndarray | None:
     return None if values is None else values[order]
+
+
+def _is_usable(values: np.ndarray) -> np.ndarray:
+    """Return which numbers are finite and have a square, (n,) of bool."""
+    return np.abs(values) < _GREATEST

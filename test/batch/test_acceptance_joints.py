@@ -1,0 +1,33 @@
+"""Joints of a recording that are not those of the robot."""
+
+from __future__ import annotations
+
+import pytest
+
+from sgp_ros.batch.acceptance import require_joints
+from sgp_ros.engine.samples import JointSample, frozen_array
+from sgp_ros.errors import RecordingError
+from sgp_ros.robots.registry import load_robot
+
+ROBOT = load_robot('double_pendulum')
+
+
+def _state(*names):
+    return JointSample(1, names, frozen_array([0.0] * len(names)), None, None)
+
+
+def test_other_joints_are_named_with_the_nearest_of_each():
+    other = _state('fer_shoulder', 'fer_elbow')
+    with pytest.raises(RecordingError) as caught:
+        require_joints([other], ROBOT, 'a.mcap')
+    text = str(caught.value)
+    assert "a.mcap shows the joints ['fer_elbow', 'fer_shoulder']" in text
+    assert "the joints ['shoulder', 'elbow'] of double_pendulum" in text
+    assert 'shoulder is nearest to fer_shoulder, elbow is nearest to fer_elbow' in text
+
+
+def test_joints_that_come_apart_are_refused_and_further_ones_are_not():
+    with pytest.raises(RecordingError, match='no message of x names all joints together'):
+        require_joints([_state('shoulder'), _state('elbow')], ROBOT, 'x')
+    require_joints([_state('gripper'), _state('elbow', 'gripper', 'shoulder')], ROBOT)
+    require_joints([], ROBOT)
