@@ -86,7 +86,12 @@ MOST_CERTAIN = 0.99
 """Greatest probability that is ever stated [1]. Drawn worlds."""
 
 DOUBTED = 0.4
-"""Greatest probability where the final model is worse than a constant [1]. Convention."""
+"""Greatest probability where the final model is worse than a constant [1]. Convention.
+
+So too of a finding whose size may be none.
+"""
+INTERVAL = 1.96
+"""Half the width of an interval of 95 %, in standard deviations [1]. Convention."""
 
 NUMBER_ERROR = 0.003
 """Relative standard deviation that approximations of the signals add to numbers [1]. Practice."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations, joint_name
 from sgp_ros.diagnosis.compare.velocity_sensor import SensorLag
-from sgp_ros.diagnosis.criteria import NUMBER_ERROR, REGION_ENERGY
+from sgp_ros.diagnosis.criteria import DOUBTED, INTERVAL, NUMBER_ERROR, REGION_ENERGY
 from sgp_ros.diagnosis.decide.certainty import Probabilities
 from sgp_ros.diagnosis.decide.decision import Decision
 from sgp_ros.diagnosis.decide.differences import Several
@@ -50,7 +50,10 @@ def asserted(
     forces = [model.forces[i] for i in common]
     if decision.verdict == 'missing_physics':
         std = reported_std(model, Columns(equations))
-        findings = [_finding(decision, model, i, std[i], chances) for i in common]
+        findings = [
+            doubted_if_none(_finding(decision, model, i, std[i], chances), model.effects[i])
+            for i in common
+        ]
     if decision.verdict == 'unexplained':
         findings.append(_unknown(equations, decision, remainders, chances, depends))
     names = equations.motion.tree.joint_names
@@ -100,6 +103,24 @@ def differences(several: Several, names: Sequence[str]) -> tuple[Difference, ...
     return tuple(sorted(found, key=lambda d: -d.probability))
 
 
+def doubted_if_none(finding: Finding, effect: EffectAt) -> Finding:
+    """Return a finding that is doubted where the 95 % interval of its size includes none at all.
+
+    Of several numbers that say how large it is one is enough; none where a bound hides them all.
+    """
+    known = [(finding.parameters[q.name], q.neutral) for q in effect.sizes]
+    away = [
+        abs(float(p.value) - neutral) > INTERVAL * p.std
+        for p, neutral in known if p.std is not None
+    ]  # fmt: skip
+    if any(away) or not away:
+        return finding
+    return replace(
+        finding, probability=min(finding.probability, DOUBTED),
+        why='the 95 % interval of its size includes that there is none',
+    )  # fmt: skip
+
+
 def alternatives(decision: Decision, chances: Probabilities) -> tuple[Finding, ...]:
     """Return the rivals of the asserted findings, best first."""
     taken = {s.key for s in decision.model.effects}
@@ -140,16 +161,38 @@ def _parameters(
     prismatic = joint >= 0 and bool(motion.tree.is_prismatic[joint])
     known = effect.effect.stated_quantities(effect.kind)
     units = {q.name: q.unit_on(is_prismatic=prismatic) for q in known}
+    at_bounds = effect.at_bounds(motion)
     found = {}
     for name, value in effect.report(motion).items():
         spread = std.get(name)
         if isinstance(value, str):
             found[name] = Parameter(value)
             continue
+        if name in at_bounds:
+            spread = None
         if spread is not None:
             spread = float(np.hypot(spread, NUMBER_ERROR * abs(value)))
         found[name] = Parameter(value, spread, units[name])
     return found
+
+
+def bound_remarks(decision: Decision) -> tuple[str, ...]:
+    """Say which numbers of asserted effects are where their search ends."""
+    if decision.verdict != 'missing_physics':
+        return ()
+    motion = decision.model.frame.equations.motion
+    remarks = []
+    for s in decision.model.effects:
+        names = [
+            name.replace('_', ' ') for name in s.report(motion) if name in s.at_bounds(motion)
+        ]
+        if names:
+            where = joint_name(motion, s.place.joint)
+            remarks.append(
+                f'{", ".join(names)} of {s.effect.words} ({where}): at the end of the range that '
+                'this recording can tell, so without an interval; the value may lie beyond'
+            )
+    return tuple(remarks)
 
 
 def _unknown(

@@ -23,7 +23,13 @@ from sgp_ros.diagnosis.decide.equivalence import Contrasts, equivalents
 from sgp_ros.diagnosis.decide.visibility import visibility
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.findings import alternatives, asserted, differences, parameter_errors
+from sgp_ros.diagnosis.findings import (
+    alternatives,
+    asserted,
+    bound_remarks,
+    differences,
+    parameter_errors,
+)
 from sgp_ros.diagnosis.locate.bands import bands
 from sgp_ros.diagnosis.locate.dependence import dependences
 from sgp_ros.diagnosis.locate.remainder import Remainder, learn_remainder
@@ -190,7 +196,7 @@ def _diagnosed(
         rate_hz=1.0 / (raw.step * equations.filter.decimation),
         rows=len(equations.d),
         refused={reason: count for reason, count in raw.refused.items() if count},
-        remarks=(*raw.remarks, *recordings.remarks, *on_z, *doubts),
+        remarks=(*raw.remarks, *recordings.remarks, *bound_remarks(decision), *on_z, *doubts),
         bodies=diagnosed_bodies(whole, model, recordings.unstated),
         equivalents=equivalents(equations, comparison, decision, contrasts),
         recordings=names if len(names) > 1 else (),

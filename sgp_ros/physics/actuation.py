@@ -52,7 +52,7 @@ class TorqueGain(Effect):
     formula = 'motor torque = gain x command'
     source = _MECHATRONICS
     appearance = 'the effort that is left is proportional to the effort'
-    quantities = (Quantity('gain', '1', is_positive=True),)
+    quantities = (Quantity('gain', '1', is_positive=True, neutral=1.0),)
     linear = ('gain',)
     site = MOTOR
     drawn_over = 'effort'

@@ -9,7 +9,10 @@ import numpy as np
 
 from sgp_ros.physics.effect import EMPTY, Effect, Numbers
 from sgp_ros.physics.motion import SeenMotion, Structure
-from sgp_ros.physics.parts import NOWHERE, PLACES, Place, Value
+from sgp_ros.physics.parts import NOWHERE, PLACES, Place, Quantity, Value
+
+_AT_BOUND = 1e-6
+"""Distance from a bound, in scales of the search, within which a number is at it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,6 +131,33 @@ class EffectAt:
     def is_possible(self, motion: SeenMotion) -> bool:
         """Return whether coefficients and shape have physical signs and sizes."""
         return self.effect.is_possible(self, motion)
+
+    def at_bounds(self, motion: SeenMotion) -> frozenset[str]:
+        """Return the reported numbers that a search left at a bound: they are no estimates."""
+        if not len(self.shape):
+            return frozenset()
+        low, high = self.effect.bounds(motion, self.place)
+        scales = self.effect.scales(motion, self.place, self.shape)
+        inward = np.where(self.shape - low < _AT_BOUND * scales, 1.0, 0.0)
+        inward -= np.where(high - self.shape < _AT_BOUND * scales, 1.0, 0.0)
+        here = self.report(motion)
+        found: set[str] = set()
+        for i in np.flatnonzero(inward):
+            shape = self.shape.copy()
+            shape[i] += 1e-3 * inward[i] * scales[i]
+            there = self.with_shape(shape).report(motion)
+            found |= {name for name, x in here.items() if x != there[name]}
+        return frozenset(found)
+
+    @property
+    def sizes(self) -> tuple[Quantity, ...]:
+        """The numbers that say how large it is: coefficients, else those of the first unit."""
+        law, known = self.effect, self.effect.stated_quantities(self.kind)
+        if law.size:
+            return tuple(q for q in known if q.name == law.size)
+        if law.linear:
+            return tuple(q for q in known if q.name in law.linear and q.unit != 'rad')
+        return tuple(q for q in known if q.unit == known[0].unit)
 
     def with_shape(self, shape: np.ndarray) -> EffectAt:
         """Return the same with another shape."""

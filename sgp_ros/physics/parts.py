@@ -119,6 +119,7 @@ class Quantity:
         is_scored: whether estimates are compared with the truth where worlds are drawn.
         kinds: the kind of the effect that it belongs to; empty for all.
         is_sought: whether a diagnosis states the least of it that the recording would show.
+        neutral: value with which the effect is none, where the number says how large it is.
     """
 
     name: str
@@ -129,6 +130,7 @@ class Quantity:
     is_scored: bool = True
     kinds: tuple[str, ...] = ()
     is_sought: bool = False
+    neutral: float = 0.0
 
     def of_kind(self, kind: str) -> Quantity:
         """Return the quantity of a kind of the effect: viscous levels are per velocity."""

@@ -175,6 +175,28 @@ def test_without_commands_nothing_is_said_of_the_drive(name):
     assert EFFECTS[name].places(_motion(drive=False)) == []
 
 
+@pytest.mark.parametrize(('effect', 'place'), SHAPED)
+def test_a_number_at_the_end_of_its_range_is_known_as_such(effect, place):
+    """At either end, and in no place between."""
+    low, high = effect.bounds(MOTION, place)
+    middle = _starts(effect, place)[0]
+    m = effect.columns(MOTION, place, middle).shape[-1]
+    inside = np.clip(middle, low + 1e-3 * (high - low), high - 1e-3 * (high - low))
+    found = EffectAt(effect, place, inside, np.linspace(0.5, 0.8, m))
+    assert found.at_bounds(MOTION) == frozenset()
+    named = {q.name for q in effect.stated_quantities(place.kind)}
+    for end in (low, high):
+        for i in range(len(end)):
+            shape = inside.copy()
+            shape[i] = end[i]
+            at_end = found.with_shape(shape).at_bounds(MOTION)
+            # the motor of a backlash has a share of the link's inertia: another bound
+            assert at_end or effect.name == 'backlash'
+            assert at_end <= named
+    assert {q.name for q in found.sizes} <= named
+    assert found.sizes
+
+
 def test_limits_are_where_the_urdf_has_them():
     """The continuous joint has none; a stop can be anywhere."""
     assert {(p.joint, p.side) for p in EFFECTS['limit_friction'].places(MOTION)} == {

@@ -84,6 +84,10 @@ class InRecording(Effect):
         """Return those of the law."""
         return self.law.bounds(motion, place)
 
+    def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        """Return those of the law."""
+        return self.law.scales(motion, place, shape)
+
 
 def may_differ(law: Effect) -> bool:
     """Return whether a law is looked for in single recordings.
