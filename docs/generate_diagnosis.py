@@ -27,6 +27,7 @@ RESULTS = {
 }
 NULLS = [ROOT / f'sgp_proof/results/nulls_{tier}.json' for tier in ('a', 'b')]
 LISTED, UNLISTED = 'one effect of the list', 'unlisted effect'
+MACHINES = ROOT / 'sgp_proof/results/concealed_c.json'
 PAPER = ROOT / 'sgp_proof/results/concealed_paper.json'
 TEMPLATE = Path(__file__).parent / 'templates' / 'diagnosis.txt'
 
@@ -115,6 +116,50 @@ def _cases(cases):
     return (
         ', '.join(f'{case.removeprefix("case_")} {what}' for case, what in cases.items()) or 'none'
     )
+
+
+def _machines(report):
+    """Return what is said of machines with many effects, the wrong worlds first."""
+    s = report['summary']
+    wrong = [case for case in report['cases'] if not case['right']]
+    lines = [
+        f'{s["worlds"]} worlds, seeds {report["seeds"]}; {len(wrong)} of them are not fully right:\n',
+        '| world | asked for | missed | wrongly asserted | verdict |', '|---|---|---|---|---|',
+    ]  # fmt: skip
+    for case in wrong:
+        spurious = [f'{e} of {j} ({p:.2f})' for e, j, p in case['wrong'] + case['unexplained']]
+        missed = [f'{e} of {j}' for e, j in case['missed']]
+        lines.append(
+            f'| {case["case"].removeprefix("case_")} {case["key"].removeprefix("C_")} | '
+            f'{len(case["named"]) + len(missed)} | {", ".join(missed) or "none"} | '
+            f'{", ".join(spurious) or "none"} | {case["said"]} |'
+        )
+    held_out = s['held_out_of_oracle']
+    rows = {
+        'worlds fully right': _percent(s['right']),
+        'the same, many effects concealed': _percent(s['right_hidden']),
+        'the same, an unlisted law on top': _percent(s['right_unlisted']),
+        'the same, no physics concealed': _percent(s['right_calm']),
+        'false alarms where no physics is concealed': _percent(s['false_alarms']),
+        'worlds with a wrong law asserted': _percent(s['confidently_wrong']),
+        'worlds called unexplained though the list explains them': _percent(
+            s['called_unexplained']
+        ),
+        'effects asked for that are named (recall)': _percent(s['recall']),
+        'findings asserted that are right (precision)': _percent(s['precision']),
+        'effects asked for in a world, median': _number(s['effects_asked_median']),
+        'truth within two standard deviations': _percent(s['within_two_std']),
+        'parameter error, median': _number(s['parameter_error_median'], 100, ' %'),
+        'nMSE of the effort held out, relative to the true structure: median, largest': (
+            f'{_number(held_out["median"])}, {_number(held_out["largest"])} of '
+            f'{held_out["joints"]} joints'
+        ),
+        'joints within 1.3 times of it': _percent(held_out['within_1.3']),
+        'seconds per world on a busy machine, median': _number(s['seconds_median']),
+        'commands that failed': str(s['failed']),
+    }
+    lines += ['\n| | |', '|---|---|', *(f'| {what} | {cell} |' for what, cell in rows.items())]
+    return '\n'.join(lines) + '\n'
 
 
 PAPER_COLUMNS = (
@@ -235,6 +280,7 @@ def text():
     nulls = [w for path in NULLS for w in json.loads(path.read_text(encoding='utf-8'))['worlds']]
     parts = {
         'tiers': ''.join(map(_tier, reports)),
+        'machines': _machines(json.loads(MACHINES.read_text(encoding='utf-8'))),
         'paper': _paper(json.loads(PAPER.read_text(encoding='utf-8'))),
         'nulls': _nulls(nulls),
         'effects': '\n'.join(_effects(nulls)),

@@ -108,8 +108,9 @@ def _extras(rng, bodies, loads, motion):
         unit = 1.0 if bodies[j].is_prismatic else 2.0 * np.pi
         periods = float(np.ceil(max(3.0, unit * least) * rng.uniform(1.0, 5.0)))
         found.append(_fixed(
-            EFFECTS[Cogging.name], bodies[j].joint, j, amplitude=loads[j] * rng.uniform(0.15, 0.35),
-            periods=periods, phase=rng.uniform(-3.0, 3.0),
+            EFFECTS[Cogging.name], bodies[j].joint, j,
+            amplitude=loads[j] * rng.uniform(0.15, 0.35), periods=periods,
+            phase=rng.uniform(-3.0, 3.0),
         ))  # fmt: skip
     return found
 

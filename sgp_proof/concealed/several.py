@@ -195,7 +195,7 @@ def summary(rows):
         'right_calm': scoring.rate(r['right'] for r in calm),
         'false_alarms': scoring.rate(r['alarm'] for r in calm),
         'confidently_wrong': scoring.rate(bool(r['wrong']) for r in rows),
-        'recall': scoring.rate(_flags(done, 'named', 'missed')),
+        'recall': scoring.rate(_flags(rows, 'named', 'missed')),
         'precision': scoring.rate(
             flag for r in done
             for flag in [True] * r['right_findings'] + [False] * len(r['wrong'] + r['unexplained'])
