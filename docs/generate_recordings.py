@@ -132,11 +132,47 @@ def _live(recordings):
     return '\n'.join(lines)
 
 
+def _coverage(recordings):
+    """Return scores of every joint, live and frozen."""
+    titles = ('recording', 'joint', 'effort', 'physics alone', 'weight of Z', 'coverage', 'width')
+    titles += ('acceleration', 'coverage', 'width')
+    lines = [f'| {" | ".join(titles)} |', '|---' * len(titles) + '|']
+    for name, found in recordings.items():
+        for mode in ('live', 'frozen'):
+            for joint, scores in found[mode].items():
+                effort, acceleration = (
+                    (
+                        f'{s["nmse"]:.2g}',
+                        f'{_percent(s["coverage95"])} ({_percent(s["raw_coverage95"])})',
+                        f'{s["width_ratio"]:.2f}',
+                    )
+                    for s in (scores['effort'], scores['acceleration'])
+                )
+                beside = f'{scores["physics_alone"]:.2g}', f'{scores["process_weight"]:.2f}'
+                cells = (f'{name}, {mode}', joint, effort[0], *beside, *effort[1:], *acceleration)
+                lines.append(f'| {" | ".join(cells)} |')
+    return '\n'.join(lines)
+
+
+def _coverage_counts(recordings):
+    """Return in how many of all cells, joints live and frozen, each aim is met."""
+    joints = [s for r in recordings.values() for m in ('live', 'frozen') for s in r[m].values()]
+    found = {'cells': str(len(joints))}
+    for channel in ('effort', 'acceleration'):
+        scores = [joint[channel] for joint in joints]
+        found[f'{channel}_covered'] = str(sum(0.93 <= s['coverage95'] <= 0.97 for s in scores))
+        found[f'{channel}_narrow'] = str(sum(s['width_ratio'] <= 1.3 for s in scores))
+    found['effort_no_worse'] = str(sum(s['effort']['nmse'] <= s['physics_alone'] for s in joints))
+    found['acceleration_worst'] = f'{max(s["acceleration"]["nmse"] for s in joints):.2g}'
+    found['acceleration_below'] = str(sum(s['acceleration']['nmse'] < 0.3 for s in joints))
+    return found
+
+
 def _evidence():
     """Return what the page says of residuals and of the live runs."""
-    residuals, live = (
+    residuals, live, coverage = (
         json.loads((RESULTS / f'{name}.json').read_text(encoding='utf-8'))
-        for name in ('residuals', 'live_recordings')
+        for name in ('residuals', 'live_recordings', 'coverage')
     )
     panda, tiago = residuals['arms']['panda'], residuals['arms']['tiago']
     sessions = residuals['emps_sessions']
@@ -169,6 +205,8 @@ def _evidence():
         'tiago_best': f'{tiago["inputs"]["own position, direction"]["held_out"]["stacked"]:.3f}',
         'wall': f'{live["wall_s"]:g}',
         'live': _live(live['recordings']),
+        'coverage': _coverage(coverage['recordings']),
+        **_coverage_counts(coverage['recordings']),
     }  # fmt: skip
 
 

@@ -15,7 +15,10 @@ import numpy as np
 
 ORDER = 2
 FIRST = 8
-"""Values before there is a prior: more than twice the coefficients of one signal."""
+"""Values before their mean and covariance are a prior."""
+ENOUGH = 30
+"""Values before the autoregression is one: ten for each coefficient of one signal. With eight, one
+early error of an arm widened its prior for hundreds of values."""
 MEMORY = 100
 """Values over which the covariance of the errors fades."""
 _RIDGE = 1e-9
@@ -64,7 +67,7 @@ class Autoregression:
         """Return mean (k,) and covariance (k, k) of the next values; None before `FIRST`."""
         if self.n < FIRST:
             return None
-        if len(self.past) < ORDER or self.errors < FIRST // 2:
+        if len(self.past) < ORDER or self.errors < ORDER + 1:
             return self.mean, self.covariance
         return (self._rows() * self.coefficients).sum(axis=1), self.error_covariance
 
@@ -72,7 +75,7 @@ class Autoregression:
         """Take the next values (k,)."""
         if len(self.past) == ORDER:
             rows = self._rows()  # (k, 3)
-            if self.n >= FIRST:  # before, coefficients follow the values themselves
+            if self.n >= ENOUGH:  # before, coefficients follow the values themselves
                 error = x - (rows * self.coefficients).sum(axis=1)
                 self.errors += 1
                 share = 1.0 / min(self.errors, MEMORY)
