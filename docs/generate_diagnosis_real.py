@@ -13,7 +13,6 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from sgp_ros.diagnosis.criteria import LEAST_SHARE
 from sgp_ros.diagnosis.result import Equivalent
-from sgp_ros.physics.catalogue import ASYMMETRIC_COULOMB, COULOMB_FRICTION, HYSTERESIS
 from sgp_ros.report.diagnosis_text import equivalence_sentence, percent, plain_name
 
 ROOT = Path(__file__).parents[1]
@@ -23,10 +22,26 @@ TITLES = {
     'emps': 'EMPS',
     'simple_pendulum_1kg': 'Simple pendulum, heavier weight',
     'simple_pendulum': 'Simple pendulum',
-    'double_pendulum': 'Double pendulum',
+    'double_pendulum': 'Double pendulum, design A.0',
+    'double_pendulum_c0': 'Double pendulum, design C.0',
     'panda': 'Panda',
     'tiago': 'TIAGo',
+    'staubli_tx40': 'Staubli TX40',
+    'tflex': 'T-Flex',
+    'laas_settled': 'LAAS motor, settled points',
+    'laas_speed': 'LAAS motor, speed control',
 }
+CAPTIONS = {
+    'location': 'The discrepancy from the nominal robot over the state, before and after.',
+    'others': 'The other joints on one scale, relative to their own effort.',
+    'time': 'The discrepancy over time (grey), what was found of it, and the residual (orange).',
+    'bands': 'The process Z over each variable, with its band of 95 %.',
+    'dependence': 'The share of the discrepancy that each variable predicts on held-out stretches.',
+    'law': 'The laws that were found, over what they depend on, and what was measured.',
+    'shape': 'What other inertial parameters alone leave.',
+    'proof': 'Errors of efforts and roll-outs before and after.',
+}
+GRADES = ('right', 'partly', 'wrong')
 HALF_WIDTH = 1.96
 ERRORS = {'nmse': 'effort', 'rollout_nmse': 'roll-outs'}
 
@@ -101,7 +116,7 @@ def equivalents(machine):
 def scores(machine):
     """Return the table of errors before and after, with the 95 % interval of those after."""
     columns = [(f'{what}, {name}', part, key) for name, part in parts(machine).items()
-               for key, what in ERRORS.items() if f'{key}_before' in part]  # fmt: skip
+               for key, what in ERRORS.items() if part.get(f'{key}_before')]  # fmt: skip
     lines = [f'| nMSE | {" | ".join(title for title, *_ in columns)} |']
     lines.append('|---' * (len(columns) + 1) + '|')
     for joint in parts(machine)['learned from']['nmse_before']:
@@ -148,15 +163,18 @@ def of(machine, joint, effect, kind='findings'):
     )
 
 
-def dry_level(machine, joint):
-    """Return dry friction of a joint [N m], mean of both directions; None where none was found."""
-    for f in machine['findings']:
-        values = {k: p['value'] for k, p in f['parameters'].items()}
-        if f['joint'] == joint and f['effect'] == ASYMMETRIC_COULOMB.name:
-            return 0.5 * (values['level_pos'] + values['level_neg'])
-        if f['joint'] == joint and f['effect'] in {COULOMB_FRICTION.name, HYSTERESIS.name}:
-            return values['level']
-    return None
+def judgement(machine):
+    """Return how far a diagnosis meets what was expected, and why not wholly."""
+    judged = machine['judged']
+    why = ''.join(f'\n* {reason}' for reason in judged['reasons'])
+    return f'Judged **{judged["grade"]}** (expected from: {machine["source"]}).{why}'
+
+
+def tally(machines):
+    """Return how many recordings are judged right, partly right and wrong."""
+    grades = [m['judged']['grade'] for m in machines.values()]
+    counts = ', '.join(f'{grades.count(grade)} {grade}' for grade in GRADES)
+    return f'Of {len(grades)} recordings: {counts}.'
 
 
 def pages():
@@ -173,9 +191,9 @@ def pages():
         f.__name__: f
         for f in (percent, quantity, parts, worst, named, effects, bodies, equivalents, scores,
                   settings,
-                  nearest, of, dry_level)
+                  nearest, of, judgement, tally)
     }  # fmt: skip
-    templates.globals |= {'titles': TITLES, 'least_share': LEAST_SHARE}
+    templates.globals |= {'titles': TITLES, 'captions': CAPTIONS, 'least_share': LEAST_SHARE}
     versions = ', '.join(f'{k} {v}' for k, v in result['versions'].items())
     place, machines = result['environment'], result['machines']
     environment = f'{place["cores"]} cores of {place["processor"]}, {versions}'

@@ -1,9 +1,10 @@
-"""Diagnoses of real machines whose friction, or load, is withheld from the model.
+"""Diagnoses of all recordings of real machines, judged by what an expert expects of them.
 
     python -m sgp_proof.real.diagnosis [NAME ...]
 
 Each machine is a list of commands as a user would give them, run in one folder in which `data` and
-`config` stand for the recordings and the configuration of this repository.
+`config` stand for the recordings and the configuration of this repository. `expected` says how a
+diagnosis is judged; misses stay in the table.
 """
 
 from __future__ import annotations
@@ -18,21 +19,19 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from sgp_proof.real.expected import judge, read_expected
 from sgp_proof.real.recordings import DATA, DOUBLE, SIMPLE, UNDISTURBED_S
 from sgp_proof.real.recordings import main as withheld
 from sgp_proof.result_files import ROOT, make_parser, read_result, write_result
+from sgp_ros.cli import BAD_INPUT
 from sgp_ros.cli import main as sgp
 from sgp_ros.report.metrics import versions
 
 IMAGES = ROOT / 'docs' / 'images' / 'real_machines'
 SHOWN_RIVALS = 4
-_DOUBLE = {
-    part: ' '.join('data/' + DOUBLE.format('A.0__20220815', i) for i in runs)
-    for part, runs in (
-        ('learn', ('00', '02', '04', '11', '13')),
-        ('test', ('01', '03', '05', '12')),
-    )
-}
+
+
+_REAL, _TX40 = 'python -m sgp_proof.real.recordings', 'data/staubli_tx40/tx40_joint'
 
 
 def _imported(name: str, *files: str) -> tuple[str, ...]:
@@ -44,6 +43,20 @@ def _pendulum(name: str) -> tuple[str, ...]:
     return (
         f'{cut} --to {UNDISTURBED_S[name]:g}',
         *_imported('dfki_simple_pendulum', f'out/{name}.csv'),
+    )
+
+
+def _double(design: str, robot: str, learn: str, test: str) -> tuple[str, ...]:
+    """Join runs of a design of the double pendulum to one recording, and others to the test."""
+    runs = {part: ' '.join('data/' + DOUBLE.format(design, i) for i in which.split())
+            for part, which in (('learn', learn), ('test', test))}  # fmt: skip
+    return (
+        *(f'python -m sgp_proof.real.recordings join out/{p}.npz {x}' for p, x in runs.items()),
+        *_imported('dfki_double_pendulum', 'out/learn.npz', 'out/test.npz'),
+        (
+            f'sgp diagnose out/learn.mcap --robot config/robots/{robot}.urdf'
+            ' --test out/test.mcap --out out/diagnosis'
+        ),
     )
 
 
@@ -85,17 +98,49 @@ MACHINES = {
             ' --test out/sac.mcap --out out/diagnosis'
         ),
     ),
-    'double_pendulum': (
-        f'python -m sgp_proof.real.recordings join out/learn.npz {_DOUBLE["learn"]}',
-        f'python -m sgp_proof.real.recordings join out/test.npz {_DOUBLE["test"]}',
-        *_imported('dfki_double_pendulum', 'out/learn.npz', 'out/test.npz'),
-        (
-            'sgp diagnose out/learn.mcap --robot config/robots/double_pendulum_a0.urdf'
-            ' --test out/test.mcap --out out/diagnosis'
-        ),
+    'double_pendulum': _double(
+        'A.0__20220815', 'double_pendulum_a0', '00 02 04 11 13', '01 03 05 12'
+    ),
+    'double_pendulum_c0': _double(
+        'C.0__20220914', 'double_pendulum_c0', '00 02 04 06 12', '01 03 05 13'
     ),
     'panda': _arm('panda', 'panda_exciting', 'panda', 12.6),
     'tiago': _arm('tiago', 'tiago_dynamic', 'tiago_arm', 48.0),
+    'staubli_tx40': (
+        *_imported('tx40', *(f'{_TX40}_{part}.npz' for part in ('train', 'test'))),
+        (
+            'sgp diagnose out/tx40_joint_train.mcap'
+            ' --robot data/staubli_tx40/tx40_mdh_modified.urdf'
+            ' --test out/tx40_joint_test.mcap --out out/diagnosis'
+        ),
+    ),
+    'tflex': (
+        *(f'{_REAL} cut out/{part}.npz data/tflex/tflex_random.npz {span}'
+          for part, span in (('learn', '--to 78'), ('test', '--from 78'))),
+        *_imported('tflex', 'out/learn.npz', 'out/test.npz'),
+        (
+            'sgp diagnose out/learn.mcap --robot config/robots/revolute_axis.urdf'
+            ' --test out/test.mcap --out out/diagnosis'
+        ),
+    ),
+    'laas_settled': (
+        *_imported('laas_settled', 'data/laas_cogging/settled_points.npz'),
+        (
+            'sgp diagnose out/settled_points.mcap --static'
+            ' --robot config/robots/revolute_axis.urdf --out out/diagnosis'
+        ),
+    ),
+    'laas_speed': (
+        (
+            'python -m sgp_proof.real.recordings cut out/constant_speed.npz'
+            ' data/laas_cogging/constant_speed.npz --to 15'
+        ),
+        *_imported('laas_speed', 'out/constant_speed.npz'),
+        (
+            'sgp diagnose out/constant_speed.mcap --robot config/robots/revolute_axis.urdf'
+            ' --out out/diagnosis'
+        ),
+    ),
 }  # fmt: skip
 """Commands from the authors' files to the diagnosis, which is the last one."""
 
@@ -111,6 +156,10 @@ STEPS = {
 """Further diagnoses of a machine, of models that lack less."""
 
 
+class RefusedError(Exception):
+    """A command that ended with a complaint."""
+
+
 def execute(command: str, folder: Path) -> str:
     """Run one command line in a folder and return what it printed."""
     program, *words = command.split()
@@ -120,11 +169,13 @@ def execute(command: str, folder: Path) -> str:
     if program == 'python':
         withheld(words[2:])
         return ''
-    printed = io.StringIO()
-    with contextlib.redirect_stdout(printed):
+    printed, complained = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(complained):
         status = sgp(words)
-    if status:
+    if status not in {0, BAD_INPUT}:
         raise SystemExit(f'{command}: status {status}')
+    if status:
+        raise RefusedError(complained.getvalue().strip() or f'{command}: status {status}')
     return printed.getvalue()
 
 
@@ -154,19 +205,26 @@ def inside(folder: Path) -> Iterator[None]:
 
 def run(name: str, folder: Path, images: Path) -> dict:
     """Carry out the commands of a machine and return what its diagnosis says."""
-    seconds = {}
+    seconds, expected = {}, read_expected()[name]
+    begin = {'commands': MACHINES[name], 'source': expected['source'], 'revision': ''}
     with inside(folder):
-        for command in MACHINES[name]:
-            began = time.perf_counter()
-            printed = execute(command, folder)
-            if command.startswith(('sgp identify', 'sgp diagnose')):
-                seconds[command.split()[1]] = round(time.perf_counter() - began, 1)
+        try:
+            for command in MACHINES[name]:
+                began = time.perf_counter()
+                printed = execute(command, folder)
+                if command.startswith(('sgp identify', 'sgp diagnose')):
+                    seconds[command.split()[1]] = round(time.perf_counter() - began, 1)
+        except RefusedError as refusal:
+            found = {'sentence': str(refusal), 'pictures': [], 'verdict': 'refused'}
+            return begin | found | {'judged': judge(expected, {'refused': str(refusal)})}
         steps = [step(command, folder) for command in STEPS.get(name, ())]
     out = folder / 'out' / 'diagnosis'
+    found = read(out, printed)
     return {
-        'commands': MACHINES[name],
+        **begin,
         'pictures': take_pictures(out, images / name),
-        **read(out, printed),
+        **found,
+        'judged': judge(expected, found),
         'seconds': seconds,
         'steps': steps,
     }
@@ -208,7 +266,9 @@ def main() -> None:
             'machines': {key: machines[key] for key in MACHINES if key in machines},
         }
         write_result(arguments.out, result)
-        print(name, machines[name]['sentence'])
+        judged = machines[name]['judged']
+        print(f'{name}: {judged["grade"]}. {machines[name]["sentence"]}')
+        print(*(f'    {reason}' for reason in judged['reasons']), sep='\n', flush=True)
 
 
 if __name__ == '__main__':
