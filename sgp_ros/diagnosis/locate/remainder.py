@@ -13,6 +13,7 @@ in blocks, for rows that are correlated in time (Burman, Chow and Nolan 1994).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +22,7 @@ from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import REGION_ENERGY, REGION_LEAST_ROWS, REGION_ROWS
 from sgp_ros.diagnosis.locate.dependence import own_variables
 from sgp_ros.diagnosis.result import Location
+from sgp_ros.errors import NumericalError
 from sgp_ros.gp.model import CoefficientPrior, Observations
 from sgp_ros.gp.model import Model as Hyperparameters
 from sgp_ros.gp.posterior import Posterior
@@ -175,9 +177,13 @@ def explained_share(
 ) -> float:
     """Return the share of r (N,) that Z at inputs U (N, d) explains on parts left out.
 
-    Negative where it makes things worse. `part` (N,) is the part of each row.
+    Negative where it makes things worse, or where its noise is so small beside its signal that
+    the covariance has no factor. `part` (N,) is the part of each row.
     """
-    error = sum(_error(model, U, r, part == i) for i in range(PARTS))
+    try:
+        error = sum(_error(model, U, r, part == i) for i in range(PARTS))
+    except NumericalError:
+        return -math.inf
     return 1.0 - error / max(float(r @ r), 1e-300)
 
 

@@ -10,7 +10,17 @@ from scipy import signal
 
 from sgp_ros.diagnosis.criteria import REGION_ROWS
 from sgp_ros.diagnosis.locate.dependence import dependences, own_variables
-from sgp_ros.diagnosis.locate.remainder import confined, learn_remainder, process_inputs, region
+from sgp_ros.diagnosis.locate.remainder import (
+    confined,
+    explained_share,
+    learn_remainder,
+    parts_of,
+    process_inputs,
+    region,
+)
+from sgp_ros.gp.model import CoefficientPrior, Observations
+from sgp_ros.gp.model import Model as Hyperparameters
+from sgp_ros.gp.selection import select_inputs
 from test.diagnosis.worlds import CHAINS, simulate
 
 
@@ -164,3 +174,14 @@ def test_what_happens_once_is_no_process_of_the_motion(equations_for, perfect):
         return np.sin(25.0 * t) * np.exp(-((2.0 * t) ** 2))
 
     assert learn_remainder(equations, _planted(equations, burst), 1) is None
+
+
+def test_a_process_without_noise_explains_nothing_where_states_repeat():
+    """Its covariance has no factor; a diagnosis goes on without it."""
+    rng = np.random.default_rng(2)
+    U, r = rng.normal(size=(300, 1)), rng.normal(size=300)
+    U = np.repeat(U[:30], 10, axis=0)
+    data = Observations(U, np.zeros((300, 1, 0)), np.sin(3.0 * U))
+    found = select_inputs(data, CoefficientPrior.flat(0), 0, (0,), 100)
+    model = Hyperparameters((found.kernel,), (1e-300,))
+    assert explained_share(model, U, r, parts_of(300)) == -np.inf
