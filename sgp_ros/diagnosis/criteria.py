@@ -32,6 +32,11 @@ LEAST_ROWS = 20
 Of drawn worlds with fewer rows 11 in 28 get a wrong verdict, from here on one in fifteen.
 """
 
+UNSIGNED_SHARE = 0.1
+"""Time in which a joint moves either way, to judge the sign of its effort [1]. Convention."""
+UNSIGNED_ZERO, UNSIGNED_LOW = 0.1, 0.02
+"""Effort near zero, of its root mean square, and how often a fold is there [1]. Convention."""
+
 SENSOR_REST = 0.2
 """Greatest part of the velocity's error that a lag of the sensor may leave [1]. Convention."""
 

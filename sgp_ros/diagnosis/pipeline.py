@@ -12,7 +12,12 @@ from sgp_ros.diagnosis.compare.equations import Equations, make_equations
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies, open_remark, with_open_bodies
 from sgp_ros.diagnosis.compare.settled import collect_settled
 from sgp_ros.diagnosis.compare.several import join
-from sgp_ros.diagnosis.compare.sufficiency import at_rest, require_motion, require_rows
+from sgp_ros.diagnosis.compare.sufficiency import (
+    at_rest,
+    require_motion,
+    require_rows,
+    require_signed,
+)
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory, choose_bandwidth, collect
 from sgp_ros.diagnosis.compare.velocity_sensor import sensor_lags
 from sgp_ros.diagnosis.criteria import DOUBTED, REMAINDER_SHARE
@@ -85,6 +90,7 @@ def diagnose(
     learned, kept, remarks = _kept_back(raws) if holds_out else (join(raws), {}, ())
     if still:
         remarks += (f'Nothing can be said of joints that do not move: {", ".join(still)}.',)
+    require_signed(learned, tree.moving_names)
     tree = with_open_bodies(learned, tree, unstated)
     remarks += open_remark(tree, unstated)
     recordings = _Recordings(tuple(several), learned, kept, held, still, remarks, unstated)

@@ -19,7 +19,13 @@ from sgp_ros.diagnosis.compare.trajectory import (
     noise_density,
     parallel_filter,
 )
-from sgp_ros.diagnosis.criteria import LEAST_MOTION, LEAST_ROWS
+from sgp_ros.diagnosis.criteria import (
+    LEAST_MOTION,
+    LEAST_ROWS,
+    UNSIGNED_LOW,
+    UNSIGNED_SHARE,
+    UNSIGNED_ZERO,
+)
 from sgp_ros.engine.samples import Event, JointSample
 from sgp_ros.errors import RecordingError
 
@@ -99,6 +105,37 @@ def at_rest(raw: RawTrajectory, is_still: np.ndarray) -> RawTrajectory:
     """
     rest = np.median(raw.position, axis=0)
     return replace(raw, position=np.where(is_still, rest, raw.position))
+
+
+def require_signed(raw: RawTrajectory, names: Sequence[str]) -> None:
+    """Refuse measured efforts that have lost their sign, |tau| in place of tau.
+
+    It is never negative while the joint moves to and fro, and yet comes down to zero again and
+    again: a load that is always positive keeps away from it, a fold does not.
+
+    Args:
+        raw: the recording.
+        names: of the joints.
+
+    Raises:
+        RecordingError: with the joints.
+    """
+    if raw.effort is None or raw.drive is not None or raw.approach is not None:
+        return
+    found = []
+    for j, name in enumerate(names):
+        effort, steps = raw.effort[:, j], np.diff(raw.position[:, j])
+        size = float(np.sqrt((effort**2).mean()))
+        turns = min(float((steps > 0.0).mean()), float((steps < 0.0).mean()))
+        low = float((effort < UNSIGNED_ZERO * size).mean())
+        if effort.min() >= 0.0 and turns >= UNSIGNED_SHARE and low >= UNSIGNED_LOW:
+            found.append(name)
+    if found:
+        raise RecordingError(
+            f'the effort of {", ".join(found)} is never negative, whichever way it moves',
+            'efforts with their sign',
+            'record signed efforts, or lock these joints in a robot YAML',
+        )  # fmt: skip
 
 
 def require_rows(raw: RawTrajectory, bandwidth: Bandwidth) -> None:

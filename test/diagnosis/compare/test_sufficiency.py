@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.compare.sufficiency import motion_to_noise, still_joints
+from sgp_ros.diagnosis.compare.sufficiency import motion_to_noise, require_signed, still_joints
+from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.criteria import LEAST_MOTION, LEAST_ROWS
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.engine.samples import JointSample, frozen_array
@@ -122,3 +123,15 @@ def test_the_measure_of_motion_has_no_unit(rows):
     q = np.random.default_rng(rows).normal(size=rows).cumsum()
     assert motion_to_noise(1e-3 * q + 7.0) == pytest.approx(motion_to_noise(q), rel=1e-6)
     assert motion_to_noise(np.full(rows, 0.1)) == 0.0
+
+
+def test_efforts_without_their_sign_are_refused_and_a_positive_load_is_not(robots):
+    """A fold comes down to zero at each reversal; a load that is always positive does not."""
+    robot, tree = robots[1]
+    world = simulate(CHAINS[1], 11, 3.0)
+    folded = events_of(world, effort=np.abs(world.command), commands=False)
+    with pytest.raises(RecordingError, match='the effort of joint0 is never negative'):
+        diagnose(folded, robot, tree, {})
+    lifted = world.command - world.command.min() + 1.0
+    raw = collect(events_of(world, effort=lifted, commands=False), robot)
+    require_signed(raw, tree.moving_names)
