@@ -16,17 +16,13 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.intake import Intake, State
 from sgp_ros.engine.ordering import in_order
 from sgp_ros.engine.results import Counts
-from sgp_ros.engine.samples import CommandSample, Event, JointSample
+from sgp_ros.engine.samples import EFFORT, CommandSample, Event, JointSample
 from sgp_ros.errors import RecordingError
 from sgp_ros.robots.robot import Robot
 
 USUAL = EngineConfig()
 """Settings of the intake where none are given: those of the engine."""
 _COMMON_SHARE = 0.5
-_LONGEST_LAG_S, _LAGS = 0.2, 41
-_LEAST_EXPLAINED = 0.5
-_GAINS = (0.25, 1.5)
-"""Of a measured effort on an effort commanded: dead zone and saturation lower it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,7 +31,7 @@ class HeldCommands:
 
     Attributes:
         stamps_ns: (c,) int64, from which each holds, strictly increasing [ns].
-        effort: (c, k) [unit of the commands].
+        effort: (c, k) [unit of the commands]; targets of position and velocity are (c, 2 k).
     """
 
     stamps_ns: np.ndarray
@@ -105,19 +101,25 @@ class Accepted:
         return np.split(np.arange(len(self.stamps_ns)), np.flatnonzero(ends) + 1)
 
 
-def accept(events: Iterable[Event], robot: Robot, config: EngineConfig = USUAL) -> Accepted:
+def accept(
+    events: Iterable[Event],
+    robot: Robot,
+    config: EngineConfig = USUAL,
+    commands_are: str = EFFORT,
+) -> Accepted:
     """Return what the intake of the engine accepts of a recording.
 
     Args:
         events: in any order.
         robot: whose joints are taken, in its order.
         config: settings of the intake.
+        commands_are: what commands ask for, see `Intake`.
 
     Raises:
         RecordingError: no state is accepted.
     """
     counts = Counts()
-    intake = Intake(robot, config, counts)
+    intake = Intake(robot, config, counts, commands_are)
     states: list[State] = []
     events = list(events)
     require_joints(events, robot)
@@ -129,55 +131,8 @@ def accept(events: Iterable[Event], robot: Robot, config: EngineConfig = USUAL) 
             state = intake.take_state(event)
             states += [] if state is None else [state]
     if not states:
-        raise _none_accepted(robot, config, counts)
+        raise _none_accepted(robot, config, counts, commands_are)
     return _table(states, intake, counts)
-
-
-def are_efforts(accepted: Accepted, robot: Robot) -> bool:
-    """Return whether the measured efforts follow the commands as a drive lets them follow.
-
-    On most of the actuated joints a straight line on the command, delayed by at most 0.2 s, must
-    explain half of the variance of the measured effort, with a slope of about one, and more than
-    it explains of the variance of the position, which is what a commanded position would do.
-    Delay, lag, dead zone and saturation of a drive leave that much.
-
-    Args:
-        accepted: with commands, and measured efforts in some states.
-        robot: whose joints they are.
-    """
-    rows = np.flatnonzero(accepted.is_measured)
-    assert accepted.commands is not None
-    stamps, effort, position = (
-        x[rows] for x in (accepted.stamps_ns, accepted.effort, accepted.position)
-    )
-    delays = np.round(np.linspace(0.0, _LONGEST_LAG_S * 1e9, _LAGS)).astype(np.int64)
-    commands = np.array([accepted.commands.at(stamps - delay) for delay in delays])
-    follows = []
-    for j, joint in enumerate(robot.joints):
-        u = commands[:, :, j]
-        if joint.is_actuated and (np.ptp(u) > 0.0 or np.ptp(effort[:, j]) > 0.0):
-            explained, slope = _best_line(u, effort[:, j])
-            rival, _ = _best_line(u, position[:, j])
-            is_unit = _GAINS[0] <= slope <= _GAINS[1]
-            follows.append(is_unit and explained > max(_LEAST_EXPLAINED, rival))
-    return bool(follows) and float(np.mean(follows)) > _COMMON_SHARE
-
-
-def _best_line(u: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Return the share of the variance of y (n,) that a line on a row of u (m, n) explains.
-
-    The best row is taken, and its slope returned.
-    """
-    du, dy = u - u.mean(axis=1, keepdims=True), y - y.mean()
-    powers, power = (du * du).sum(axis=1), float(dy @ dy)
-    products = du @ dy
-    valid = powers > 0.0
-    if power == 0.0 or not valid.any():
-        return 0.0, 0.0
-    slopes = products[valid] / powers[valid]
-    shares = slopes * products[valid] / power
-    best = int(shares.argmax())
-    return float(shares[best]), float(slopes[best])
 
 
 def _table(states: list[State], intake: Intake, counts: Counts) -> Accepted:
@@ -198,7 +153,16 @@ def _table(states: list[State], intake: Intake, counts: Counts) -> Accepted:
     )
 
 
-def _none_accepted(robot: Robot, config: EngineConfig, counts: Counts) -> RecordingError:
+def _none_accepted(
+    robot: Robot, config: EngineConfig, counts: Counts, commands_are: str
+) -> RecordingError:
+    if counts.commands_refused['wrong_kind']:
+        kind = 'efforts' if commands_are == EFFORT else 'positions'
+        return RecordingError(
+            f'no state with an effort: the commands are no {kind}', kind,
+            'give the gains of the drives with --gains gains.yaml' if commands_are == EFFORT
+            else 'leave --gains out',
+        )  # fmt: skip
     if counts.refused['unpaired']:
         return RecordingError(
             f'no state with an effort among {counts.read}, effort source {config.effort_source!r}',

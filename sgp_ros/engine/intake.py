@@ -14,7 +14,7 @@ import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.results import Counts
-from sgp_ros.engine.samples import CommandSample, Event, JointSample
+from sgp_ros.engine.samples import EFFORT, POSITION, CommandSample, Event, JointSample
 from sgp_ros.engine.weak_form import WeakForm
 from sgp_ros.physics.drive import WindowDrive
 from sgp_ros.robots.robot import Robot
@@ -124,6 +124,8 @@ class Intake:
         robot: whose joints are taken, in its order.
         config: settings of the intake.
         counts: where reads and refusals are counted.
+        commands_are: what commands ask for, `EFFORT` or `POSITION`; with the latter targets of
+            position and velocity, (2 k,), are held instead of efforts.
 
     Attributes:
         commands: those taken.
@@ -131,8 +133,11 @@ class Intake:
         is_measured: whether a state with a measured effort has been accepted.
     """
 
-    def __init__(self, robot: Robot, config: EngineConfig, counts: Counts) -> None:
+    def __init__(
+        self, robot: Robot, config: EngineConfig, counts: Counts, commands_are: str = EFFORT
+    ) -> None:
         self._robot = robot
+        self._commands_are = commands_are
         self._counts = counts
         self._actuated = np.array([joint.is_actuated for joint in robot.joints])
         self._gains = np.array([joint.effort_gain for joint in robot.joints])
@@ -180,12 +185,18 @@ class Intake:
     def take_command(self, command: CommandSample) -> None:
         """Let a command hold from its stamp on; joints it leaves out keep theirs."""
         names = command.names or self._command_joints
-        held = self.commands.efforts
-        effort = held[-1].copy() if held else np.zeros(len(self._robot.joints))
-        for name, value in zip(names, command.effort, strict=True):
-            if name in self._robot.joint_names:
-                joint = self._robot.joint_names.index(name)
-                effort[joint] = value * self._gains[joint]
+        held, k = self.commands.efforts, len(self._robot.joints)
+        is_target = self._commands_are == POSITION
+        effort = held[-1].copy() if held else np.zeros(2 * k if is_target else k)
+        for i, name in enumerate(names):
+            if name not in self._robot.joint_names:
+                continue
+            joint = self._robot.joint_names.index(name)
+            if is_target:
+                effort[joint] = command.effort[i]
+                effort[k + joint] = 0.0 if command.velocity is None else command.velocity[i]
+            else:
+                effort[joint] = command.effort[i] * self._gains[joint]
         self.commands.add(command.stamp_ns, effort)
 
     def take_state(self, sample: JointSample) -> State | None:
@@ -256,6 +267,8 @@ class Intake:
         return self._last_order[1]
 
     def _command_problem(self, command: CommandSample) -> str | None:
+        if command.names is not None and command.kind != self._commands_are:
+            return 'wrong_kind'
         if len(command.effort) != len(command.names or self._command_joints):
             return 'wrong_length'
         if command.names and not set(command.names) & set(self._robot.joint_names):

@@ -16,7 +16,7 @@ from sgp_ros.robots.robot import Robot
 REFUSALS = ('late', 'duplicate', 'nonfinite', 'unpaired', 'unknown_joint', 'gap')
 """Reasons for which a state is refused; each refused state has exactly one."""
 
-COMMAND_REFUSALS = ('late', 'nonfinite', 'unknown_joint', 'wrong_length')
+COMMAND_REFUSALS = ('late', 'nonfinite', 'unknown_joint', 'wrong_kind', 'wrong_length')
 """Reasons for which a command is refused."""
 
 REFIT_REFUSALS = ('diverged', 'no_better', 'no_factor')

@@ -11,6 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+EFFORT, POSITION = 'effort', 'position'
+"""What a command asks for."""
+
 SettingValue = bool | int | float | str | tuple[float, ...] | tuple[str, ...]
 
 
@@ -50,11 +53,15 @@ class CommandSample:
         effort: (m,) commanded effort [N m], [N] or the unit the robot's description states.
         names: the joints the numbers belong to; None for an array without names, whose order is
             the setting `command.joints`.
+        kind: what the numbers are, `EFFORT` or `POSITION`; numbers without names may be either.
+        velocity: (m,) target of the velocity beside one of the position; None without.
     """
 
     stamp_ns: int
     effort: np.ndarray
     names: tuple[str, ...] | None = None
+    kind: str = EFFORT
+    velocity: np.ndarray | None = None
 
 
 @dataclass(frozen=True, slots=True)

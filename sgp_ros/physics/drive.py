@@ -11,10 +11,12 @@ place of the hat.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
+
+from sgp_ros.physics.motion import RecordedCommands
 
 _SHARPEN = (1.0, -1 / 12, 1 / 90)
 
@@ -59,6 +61,10 @@ class Drive:
             _averaged(times, u, time_constant, start, self.step, n) for start, n in self.grids
         ]
         return np.concatenate(parts)
+
+    def changed(self, change: Callable[[np.ndarray], np.ndarray], later: float) -> Drive:
+        """Return other commands (c, k), some time later [s]."""
+        return replace(self, times=self.times + later, values=change(self.values))
 
     def at(
         self, joint: int, times: np.ndarray, *, delay: float = 0.0, time_constant: float = 0.0,
@@ -126,6 +132,62 @@ class WindowDrive:
         behind = (y[i] - u[i]) * np.exp(-np.maximum(start - knots[i], 0.0) / T)
         E = -np.expm1(-h / T)
         return np.array([held + float(behind @ (T * (a * E + b * (T * E - h * (1.0 - E)))))])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Servo:
+    """A drive that holds position targets: `tau = kp (q_des - q) + kd (dq_des - dq) + tau_ff`.
+
+    It is computed in the drive on its own fresh measurements, so a delay is one of the targets.
+
+    Attributes:
+        targets: positions, then velocities, of all joints, (c, 2 k) [rad or m].
+        step: of the grids [s].
+        starts: rows at which the grids begin.
+        kp, kd: (k,) gains [N m/rad, N m s/rad].
+        position, velocity: (n, k) on the grids.
+        feedforward: (n, k) [N m or N].
+    """
+
+    targets: RecordedCommands
+    step: float
+    starts: tuple[int, ...]
+    kp: np.ndarray
+    kd: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    feedforward: np.ndarray
+
+    @property
+    def values(self) -> np.ndarray:
+        """Efforts on the grids, (n, k) [N m or N]."""
+        return np.column_stack([self.effort(j) for j in range(len(self.kp))])
+
+    def effort(
+        self, joint: int, *, delay: float = 0.0, time_constant: float = 0.0,
+        characteristic: Callable[[np.ndarray], np.ndarray] | None = None,
+    ) -> np.ndarray:  # fmt: skip
+        """Return the effort of one joint on the grids, as `Drive.effort`."""
+        proportional, damping = self.parts(joint, delay)
+        u = proportional + damping + self.feedforward[:, joint]
+        if characteristic is not None:
+            u = characteristic(u)
+        if time_constant <= 0.0:
+            return u
+        parts = [_lagged(self.step * np.arange(len(x)), x, time_constant)
+                 for x in np.split(u, self.starts[1:])]  # fmt: skip
+        return np.concatenate(parts)
+
+    def changed(self, change: Callable[[np.ndarray], np.ndarray], later: float) -> Servo:
+        """Return the drive with other targets, some time later [s]."""
+        return replace(self, targets=self.targets.changed(change, later))
+
+    def parts(self, joint: int, delay: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return what kp and kd make of one joint, (n,) each [N m or N]."""
+        k = len(self.kp)
+        error = self.targets.effort(joint, delay=delay) - self.position[:, joint]
+        rate = self.targets.effort(k + joint, delay=delay) - self.velocity[:, joint]
+        return self.kp[joint] * error, self.kd[joint] * rate
 
 
 def _averaged(

@@ -95,6 +95,15 @@ class Commands(Protocol):
         """Return the effort of a joint behind delay, characteristic and lag, (n,) [N m or N]."""
 
 
+class RecordedCommands(Commands, Protocol):
+    """Commands of whole recordings, which can be exchanged for others."""
+
+    def changed(
+        self, change: Callable[[np.ndarray], np.ndarray], later: float
+    ) -> RecordedCommands:
+        """Return other commands (c, k), some time later [s]."""
+
+
 class SeenMotion(Protocol):
     """n rows of the k joints of a robot on a uniform grid, as a law sees them."""
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sgp_ros.engine.samples import CommandSample, frozen_array
+from sgp_ros.engine.samples import POSITION, CommandSample, frozen_array
 from sgp_ros.errors import MessageError
 from sgp_ros.recordings.messages import (
     JOINT_STATE,
@@ -107,33 +107,49 @@ def _encode_number(make: Make, command: CommandSample) -> Message:
 
 def _decode_joint_state(message: Message, receipt_ns: int) -> CommandSample:
     names = joint_names(message.name)
-    effort = matching(message.effort, names, 'effort')
-    return CommandSample(stamp_ns(message, receipt_ns), effort, names)
+    stamp = stamp_ns(message, receipt_ns)
+    if len(message.effort) or not len(message.position):
+        return CommandSample(stamp, matching(message.effort, names, 'effort'), names)
+    position = matching(message.position, names, 'position')
+    velocity = matching(message.velocity, names, 'velocity') if len(message.velocity) else None
+    return CommandSample(stamp, position, names, POSITION, velocity)
 
 
 def _encode_joint_state(make: Make, command: CommandSample) -> Message:
     none = np.zeros(0)
+    is_target = command.kind == POSITION
     return make(
         JOINT_STATE,
         header=header(make, command.stamp_ns),
         name=list(command.names or ()),
-        position=none,
-        velocity=none,
-        effort=command.effort,
+        position=command.effort if is_target else none,
+        velocity=none if command.velocity is None else command.velocity,
+        effort=none if is_target else command.effort,
     )
 
 
 def _decode_trajectory(message: Message, receipt_ns: int) -> CommandSample:
-    """Return the first point; it counts from the stamp on."""
+    """Return the first point, its efforts or else its positions; it counts from the stamp on."""
     names = joint_names(message.joint_names)
     if not len(message.points):
-        raise MessageError('trajectory without a point', 'effort in its first point')
-    effort = matching(message.points[0].effort, names, 'effort of the first point')
-    return CommandSample(stamp_ns(message, receipt_ns), effort, names)
+        raise MessageError('trajectory without a point', 'efforts or positions in its first point')
+    point, stamp = message.points[0], stamp_ns(message, receipt_ns)
+    if len(point.effort) or not len(point.positions):
+        effort = matching(point.effort, names, 'effort of the first point')
+        return CommandSample(stamp, effort, names)
+    position = matching(point.positions, names, 'positions of the first point')
+    velocity = None
+    if len(point.velocities):
+        velocity = matching(point.velocities, names, 'velocities of the first point')
+    return CommandSample(stamp, position, names, POSITION, velocity)
 
 
 def _encode_trajectory(make: Make, command: CommandSample) -> Message:
-    point = Point(effort=command.effort)
+    if command.kind == POSITION:
+        velocity = np.zeros(0) if command.velocity is None else command.velocity
+        point = Point(positions=command.effort, velocities=velocity)
+    else:
+        point = Point(effort=command.effort)
     return trajectory_message(make, command.stamp_ns, command.names or (), point)
 
 

@@ -90,7 +90,7 @@ def choose_command(topics: Sequence[Topic], states: Topic, wanted: str | None) -
         topics: all topics of the recording.
         states: the topic of the joint states.
         wanted: its name, or `none`. None chooses the one called `command` or `commands`, else the
-            only topic of a type without joint names.
+            only topic of a type without joint names, else the only one of no JointState.
 
     Raises:
         RecordingError: the named one does not exist, or several are equally likely.
@@ -108,7 +108,10 @@ def choose_command(topics: Sequence[Topic], states: Topic, wanted: str | None) -
     if likely:
         return _only(likely, likely, '/command', '--command')
     plain = [topic for topic in candidates if not COMMAND_TYPES[topic.type].has_names]
-    return plain[0] if len(plain) == 1 else None
+    for group in (plain, [topic for topic in candidates if topic.type != JOINT_STATE]):
+        if len(group) == 1:
+            return group[0]
+    return None
 
 
 def _only(candidates: list[Topic], likely: list[Topic], preferred: str, option: str) -> Topic:

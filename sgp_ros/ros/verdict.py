@@ -109,6 +109,7 @@ def _state_remedy(reason: str, arrivals: Arrivals) -> str:
 
 def _command_remedy(reason: str, arrivals: Arrivals) -> str:
     return {
+        'wrong_kind': 'wrong_kind: efforts are wanted, the commands are positions',
         'wrong_length': 'wrong_length: one number per joint of command.joints is wanted',
         'unknown_joint': f'unknown_joint: the robot has {list(arrivals.robot_joints)}',
         'late': 'late: older than reorder_window when they came; check the clocks',

@@ -113,7 +113,7 @@ def test_rclpy_and_rosbags_messages_give_the_same_sample(kind):
     ('kind', 'message'),
     [
         ('std_msgs/Float64MultiArray', Float64MultiArray()),
-        ('sensor_msgs/JointState', _state()),
+        ('sensor_msgs/JointState', _state(position=())),
         ('sensor_msgs/JointState', _state(effort=(1.0,))),
         ('trajectory_msgs/JointTrajectory', _trajectory(effort=())),
         ('trajectory_msgs/JointTrajectory', JointTrajectory(joint_names=['a'])),

@@ -69,10 +69,11 @@ def test_named_topic_must_exist_with_the_right_type(wanted):
         ({'torque': NUMBER, 'temperature': NUMBER}, None),
         ({'arm__commands': ARRAY, 'command': ARRAY}, '/command'),
         ({'sgp__prediction': TRAJECTORY, 'sgp__prediction_variance': TRAJECTORY}, None),
-        ({'arm__joint_trajectory': TRAJECTORY}, None),
+        ({'arm__joint_trajectory': TRAJECTORY}, '/arm/joint_trajectory'),
+        ({'arm__joint_trajectory': TRAJECTORY, 'hand__joint_trajectory': TRAJECTORY}, None),
     ],
 )
-def test_command_is_chosen_by_name_or_as_the_only_array_or_number(others, chosen):
+def test_command_is_chosen_by_name_or_as_the_only_one_of_its_kind(others, chosen):
     assert _command(_topics(joint_states=STATE, **others)) == chosen
 
 

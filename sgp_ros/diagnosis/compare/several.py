@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
-from sgp_ros.physics.motion import Commands
+from sgp_ros.physics.motion import RecordedCommands
 
 _NO_COMMANDS = (
     'Only some of the recordings have commands that act: the efforts are taken as measured, and '
@@ -30,7 +30,7 @@ class SeveralDrives:
         parts: of each recording.
     """
 
-    parts: tuple[Commands, ...]
+    parts: tuple[RecordedCommands, ...]
 
     @property
     def values(self) -> np.ndarray:
@@ -49,6 +49,10 @@ class SeveralDrives:
                 for part in self.parts
             ]
         )  # fmt: skip
+
+    def changed(self, change: Callable[[np.ndarray], np.ndarray], later: float) -> SeveralDrives:
+        """Return other commands, some time later [s]."""
+        return SeveralDrives(tuple(part.changed(change, later) for part in self.parts))
 
 
 def join(raws: Sequence[RawTrajectory]) -> RawTrajectory:
@@ -86,14 +90,15 @@ def join(raws: Sequence[RawTrajectory]) -> RawTrajectory:
         SeveralDrives(drives) if is_driven else None,
         segments, dict(refused), np.max([raw.noise_density for raw in raws], axis=0),
         first.start_ns, first.stated, tuple(dict.fromkeys(remarks)),
-        np.repeat(np.arange(len(raws)), np.diff(starts)),
-        _joined([raw.approach for raw in raws]),
+        recording=np.repeat(np.arange(len(raws)), np.diff(starts)),
+        approach=_joined([raw.approach for raw in raws]),
+        gains=first.gains if is_driven else None,
     )  # fmt: skip
 
 
 def _efforts(raw: RawTrajectory) -> np.ndarray | None:
     """Return the efforts that act, (n, k); None without any."""
-    if raw.drive is None or raw.effort is not None:
+    if raw.drive is None or raw.effort is not None or raw.gains is not None:
         return raw.effort
     k = raw.position.shape[1]
     return np.column_stack([raw.drive.effort(j) for j in range(k)])

@@ -13,10 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.grid import noise_density
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
     RawTrajectory,
-    noise_density,
     parallel_filter,
 )
 from sgp_ros.diagnosis.criteria import (

@@ -10,21 +10,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import interpolate
 
-from sgp_ros.batch.acceptance import USUAL, Accepted, HeldCommands, accept, are_efforts
+from sgp_ros.batch.acceptance import USUAL, Accepted, HeldCommands, accept
+from sgp_ros.batch.command_kinds import are_efforts, are_positions
 from sgp_ros.batch.zero_phase import ZeroPhase
+from sgp_ros.diagnosis.compare.grid import Stretch, noise_density
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.engine.config import EngineConfig
-from sgp_ros.engine.samples import Event, JointSample
+from sgp_ros.engine.samples import EFFORT, POSITION, Event, JointSample
 from sgp_ros.errors import RecordingError
-from sgp_ros.physics.drive import Drive
+from sgp_ros.physics.drive import Drive, Servo
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.motion import Commands
+from sgp_ros.physics.motion import RecordedCommands
 from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.observed_motion import ObservedMotion
 from sgp_ros.robots.robot import Robot
 
@@ -51,13 +53,15 @@ class RawTrajectory:
         position: (n, k) [rad or m].
         velocity: (n, k) measured; None without.
         effort: (n, k) measured; None without.
-        drive: commands; None without.
+        drive: commands, of efforts or, with gains, targets (c, 2 k) of position and velocity; None
+            without.
         segments: stretches without a pause.
         refused: states by reason.
         noise_density: (k,) of the positions, one-sided [rad^2/Hz or m^2/Hz].
         start_ns: stamp of the first state of the recording.
         stated: effects that the nominal robot has, beside those of its tree.
         remarks: what is odd about the efforts.
+        gains: of drives that hold position targets; None where commands are efforts.
         recording: (n,) index of the recording of each row, of several; None of one.
         approach: (n, k) direction from which each settled point was approached; None of motion.
     """
@@ -67,13 +71,14 @@ class RawTrajectory:
     position: np.ndarray
     velocity: np.ndarray | None
     effort: np.ndarray | None
-    drive: Commands | None
+    drive: RecordedCommands | None
     segments: tuple[slice, ...]
     refused: dict[str, int]
     noise_density: np.ndarray
     start_ns: int
     stated: tuple[EffectAt, ...] = ()
     remarks: tuple[str, ...] = ()
+    gains: Gains | None = None
     recording: np.ndarray | None = None
     approach: np.ndarray | None = None
 
@@ -83,6 +88,7 @@ def collect(
     robot: Robot,
     stated: tuple[EffectAt, ...] = (),
     config: EngineConfig = USUAL,
+    gains: Gains | None = None,
     least_step: float = 0.0,
 ) -> RawTrajectory:
     """Bring a recording to its uniform grid.
@@ -96,13 +102,14 @@ def collect(
         robot: names, actuated joints and gains.
         stated: effects that the nominal robot has, beside those of its tree.
         config: settings of the intake.
+        gains: of drives that hold position targets; None where commands are efforts.
         least_step: of the grid, which is otherwise that of the states [s].
 
     Raises:
         RecordingError: too little is left.
     """
     known_events = list(events)
-    accepted = accept(known_events, robot, config)
+    accepted = accept(known_events, robot, config, EFFORT if gains is None else POSITION)
     start_ns = min(e.stamp_ns for e in known_events if isinstance(e, JointSample))
     seconds = (accepted.stamps_ns - start_ns) * 1e-9
     measured = bool(accepted.is_measured.mean() > _COMMON_SHARE)
@@ -118,12 +125,12 @@ def collect(
         )  # fmt: skip
     own_step = float(np.median(np.concatenate([np.diff(seconds[rows]) for rows in stretches])))
     step = max(own_step, least_step)
-    parts = [_Stretch.of(accepted, rows, seconds, step) for rows in stretches]
+    parts = [Stretch.of(accepted, rows, seconds, step) for rows in stretches]
     ends = np.cumsum([len(part.time) for part in parts])
     segments = tuple(
         slice(int(end) - len(part.time), int(end)) for end, part in zip(ends, parts, strict=True)
     )
-    drive, remarks = _drive(accepted, robot, config, measured=measured)
+    drive, remarks = _drive(accepted, robot, config, gains, measured=measured)
     position = np.concatenate([part.position for part in parts])
     return RawTrajectory(
         np.concatenate([part.time for part in parts]), step, position,
@@ -133,41 +140,8 @@ def collect(
             tuple((float(part.time[0]), len(part.time)) for part in parts), step,
         ),
         segments, dict(accepted.counts.refused), noise_density(position, segments, step),
-        start_ns, stated, remarks,
+        start_ns, stated, remarks, gains=None if drive is None else gains,
     )  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class _Stretch:
-    """The arrays of `RawTrajectory` for one stretch."""
-
-    time: np.ndarray
-    position: np.ndarray
-    velocity: np.ndarray | None
-    effort: np.ndarray | None
-
-    @classmethod
-    def of(
-        cls, accepted: Accepted, rows: np.ndarray, seconds: np.ndarray, step: float
-    ) -> _Stretch:
-        known = seconds[rows]
-        n = int((known[-1] - known[0]) / step + 1e-6) + 1
-        t = known[0] + step * np.arange(n)
-        inner = np.minimum(t, known[-1])
-        path = interpolate.CubicSpline(known, accepted.position[rows])
-        velocity, effort = None, None
-        if accepted.velocity is not None:
-            velocity = path(inner, 1)
-            has = np.isfinite(accepted.velocity[rows]).all(axis=1)
-            if has.any():
-                velocity = _lines(inner, known[has], accepted.velocity[rows][has])
-        if accepted.is_measured[rows[0]]:
-            effort = _lines(inner, known, accepted.effort[rows])
-        return cls(t, path(inner), velocity, effort)
-
-
-def _lines(t: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
-    return np.column_stack([np.interp(t, known, column) for column in values.T])
 
 
 def _joined(parts: Sequence[np.ndarray | None]) -> np.ndarray | None:
@@ -176,34 +150,20 @@ def _joined(parts: Sequence[np.ndarray | None]) -> np.ndarray | None:
 
 
 def _drive(
-    accepted: Accepted, robot: Robot, config: EngineConfig, *, measured: bool
+    accepted: Accepted, robot: Robot, config: EngineConfig, gains: Gains | None, *, measured: bool
 ) -> tuple[HeldCommands | None, tuple[str, ...]]:
     """Return the commands that act, None where the measured effort does; and what to remark."""
     commands = accepted.commands
     if commands is None or len(commands.stamps_ns) <= 1 or config.effort_source == 'state':
         return None, ()
-    if not measured or are_efforts(accepted, robot):
+    if not measured and gains is None and are_positions(accepted, robot):
+        raise RecordingError(
+            'commands that the positions follow', 'commanded efforts, or targets with their gains',
+            'give the gains of the drives with --gains gains.yaml',
+        )  # fmt: skip
+    if not measured or (gains is None and are_efforts(accepted, robot)):
         return commands, ()
-    return None, (_NO_EFFORTS,)
-
-
-def noise_density(position: np.ndarray, segments: Sequence[slice], step: float) -> np.ndarray:
-    """Return the level of the spectra where no robot moves: the upper third, (k,).
-
-    Args:
-        position: (n, k) [rad or m].
-        segments: stretches of rows without a pause; the longest is looked at.
-        step: of the grid [s].
-    """
-    longest = max(segments, key=lambda s: s.stop - s.start)
-    q = position[longest]
-    window = np.hanning(len(q))[:, None]
-    spectrum = np.abs(np.fft.rfft((q - q.mean(axis=0)) * window, axis=0)) ** 2
-    density = 2.0 * spectrum * step / np.sum(window**2)
-    frequency = np.fft.rfftfreq(len(q), step)
-    upper = (frequency > 0.3 / step) & (frequency < 0.48 / step)
-    # the median of an exponential variable is ln 2 of its mean
-    return np.asarray(np.median(density[upper], axis=0) / math.log(2.0))
+    return None, () if gains is not None else (_NO_EFFORTS,)
 
 
 @dataclass(frozen=True)
@@ -260,32 +220,30 @@ def observe(raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth) -> ObservedMot
     light = ZeroPhase(1.0 / raw.step, bandwidth.state_cutoff)
     states = [light.states(raw.position[s]) for s in raw.segments]
     position, velocity, acceleration = (np.concatenate(x) for x in zip(*states, strict=True))
-    k = tree.size
-    if raw.drive is not None:
-        effort = np.column_stack(
-            [
-                raw.drive.effort(j) if tree.is_actuated[j] else np.zeros(len(raw.time))
-                for j in range(k)
-            ]
-        )
+    motion = ObservedMotion(
+        tree, raw.time, raw.step, position, velocity, acceleration, np.zeros_like(position), None,
+        tuple(s.start for s in raw.segments), raw.stated, raw.recording,
+    )  # fmt: skip
+    drive = raw.drive
+    if raw.drive is not None and raw.gains is not None:
+        drive = _servo(raw.drive, raw.gains, motion)
+    driven = tree.is_actuated[: tree.size]
+    effort = np.zeros_like(position)
+    if drive is not None:
+        for j in np.flatnonzero(driven):
+            effort[:, j] = drive.effort(int(j))
     elif raw.effort is not None:
-        effort = np.where(tree.is_actuated[:k], raw.effort, 0.0)
-    else:
-        effort = np.zeros((len(raw.time), k))
-    starts = tuple(s.start for s in raw.segments)
-    return ObservedMotion(
-        tree,
-        raw.time,
-        raw.step,
-        position,
-        velocity,
-        acceleration,
-        effort,
-        raw.drive,
-        starts,
-        raw.stated,
-        raw.recording,
-    )
+        effort = np.where(driven, raw.effort, 0.0)
+    return replace(motion, effort=effort, drive=drive)
+
+
+def _servo(targets: RecordedCommands, gains: Gains, motion: ObservedMotion) -> Servo:
+    still = np.zeros_like(motion.position)
+    held = motion.effort_for(motion.position, still, still) if gains.holds_gravity else still
+    return Servo(
+        targets, motion.step, motion.starts, gains.kp, gains.kd, motion.position,
+        motion.velocity, held,
+    )  # fmt: skip
 
 
 def parallel_filter(raw: RawTrajectory, bandwidth: Bandwidth) -> ParallelFilter:

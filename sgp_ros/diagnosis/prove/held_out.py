@@ -12,8 +12,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.grid import noise_density
 from sgp_ros.diagnosis.compare.settled import HELD_BACK, every_fourth
-from sgp_ros.diagnosis.compare.trajectory import SHORTEST_ROWS, RawTrajectory, noise_density
+from sgp_ros.diagnosis.compare.trajectory import (
+    SHORTEST_ROWS,
+    RawTrajectory,
+)
 from sgp_ros.physics.drive import Drive
 
 HELD_OUT = 'held_out'

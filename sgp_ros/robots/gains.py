@@ -1,0 +1,88 @@
+"""Gains of drives that hold position targets, from a file.
+
+    kp: {shoulder: 300.0, elbow: 25.0}   # N m/rad or N/m
+    kd: {shoulder: 10.0, elbow: 0.9}     # N m s/rad or N s/m
+    feedforward: gravity                 # none unless stated
+
+`tau = kp (q_des - q) + kd (dq_des - dq) + tau_ff`, tau_ff the nominal torque against gravity.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from sgp_ros.errors import ConfigError
+
+_KEYS = ('kp', 'kd', 'feedforward')
+_FEEDFORWARD = ('none', 'gravity')
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gains:
+    """Gains of k joints; those of joints without a drive are 0.
+
+    Attributes:
+        kp: (k,) [N m/rad or N/m].
+        kd: (k,) [N m s/rad or N s/m].
+        holds_gravity: whether the drives add what the nominal robot takes against gravity.
+    """
+
+    kp: np.ndarray
+    kd: np.ndarray
+    holds_gravity: bool = False
+
+    def scaled(self, kp: np.ndarray, kd: np.ndarray) -> Gains:
+        """Return the gains times factors, (k,) each."""
+        return Gains(self.kp * kp, self.kd * kd, self.holds_gravity)
+
+
+def read_gains(path: Path, joints: Sequence[str], actuated: Sequence[str]) -> Gains:
+    """Return the gains that a file states.
+
+    Args:
+        path: YAML file.
+        joints: names of all joints, in the order of the result.
+        actuated: joints that have a drive; each must have both gains.
+
+    Raises:
+        ConfigError: no such file, or not one number of each kind for each drive.
+    """
+    try:
+        content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        reason = str(error).splitlines()[0]
+        raise ConfigError(
+            f'{path.name}: {reason}', 'a YAML file with kp and kd by joint'
+        ) from None
+    if not isinstance(content, dict) or not set(content) <= set(_KEYS):
+        raise ConfigError(f'{path.name}: {_told(content)}', f'the keys {", ".join(_KEYS)}')
+    feedforward = content.get('feedforward', 'none')
+    if feedforward not in _FEEDFORWARD:
+        raise ConfigError(f'{path.name}: feedforward {feedforward!r}', ' or '.join(_FEEDFORWARD))
+    kp, kd = (_column(path, content.get(key), key, joints, actuated) for key in ('kp', 'kd'))
+    return Gains(kp, kd, feedforward == 'gravity')
+
+
+def _column(
+    path: Path, found: Any, key: str, joints: Sequence[str], actuated: Sequence[str]
+) -> np.ndarray:
+    table = found if isinstance(found, Mapping) else {}
+    if set(table) != set(actuated):
+        raise ConfigError(f'{path.name}: {key} of {sorted(map(str, table))}',
+                          f'one number for each of {sorted(actuated)}')  # fmt: skip
+    for joint, x in table.items():
+        is_number = isinstance(x, int | float) and not isinstance(x, bool)
+        if not is_number or not math.isfinite(x) or x < 0.0:
+            raise ConfigError(f'{path.name}: {key} of {joint} is {x!r}', 'a number of at least 0')
+    return np.array([float(table.get(joint, 0.0)) for joint in joints])
+
+
+def _told(content: Any) -> str:
+    return f'the keys {sorted(map(str, content))}' if isinstance(content, dict) else 'no mapping'
