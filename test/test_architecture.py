@@ -66,13 +66,14 @@ PROOF_ROOMS = {
     'streams': {'result_files', 'paper', 'real'},
     'numerics': {'result_files', 'bench', 'streams'},
     'concealed': {'result_files', 'paper'},
+    'connection': {'result_files', 'concealed'},
 }
 """Room of the proof to the other ones that it may import, beside every layer of the product."""
 
 SUB_ROOMS = {
     'diagnosis': (
-        'criteria', 'result', 'compare', 'explain', 'locate', 'decide', 'findings',
-        'prove', 'mapping', 'pipeline',
+        'criteria', 'shown', 'result', 'compare', 'setup', 'explain', 'locate', 'decide',
+        'findings', 'prove', 'mapping', 'gathered', 'connected', 'pipeline',
     ),
 }  # fmt: skip
 """Layer to its sub-rooms in their order: each imports itself and those that stand before it."""

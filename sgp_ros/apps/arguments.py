@@ -155,6 +155,9 @@ def _add_diagnose(add: AddCommand) -> None:
     parser.add_argument('--test', dest='tests', action='append', default=[], metavar='BAG',
                         help='held-out recording for the proof; may be repeated; without any, '
                         'a quarter of REAL is held out')  # fmt: skip
+    parser.add_argument(
+        '--gains', metavar='YAML', help='kp and kd by joint: commands are then position targets'
+    )
     parser.add_argument('--static', action='store_true',
                         help='rows are settled points, one a pose, without clock')  # fmt: skip
     parser.add_argument('--bodies', metavar='YAML',

@@ -14,7 +14,7 @@ from sgp_ros.diagnosis.compare.equations import disagreement, nominal_shares
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
-from sgp_ros.diagnosis.result import Diagnosis, Proof
+from sgp_ros.diagnosis.result import Diagnosis, Finding, Proof
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
 from sgp_ros.engine.setting import EFFORT_SOURCES
@@ -32,6 +32,8 @@ from sgp_ros.report.diagnosis_text import (
     why_it_lost,
 )
 from sgp_ros.report.files import replacing_results, write_text
+from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.gains import Gains, read_gains
 from sgp_ros.robots.given_bodies import with_bodies
 from sgp_ros.robots.nominal import Nominal, nominal_model
 from sgp_ros.robots.registry import load_robot
@@ -50,6 +52,7 @@ class DiagnoseOptions:
         joint_states: topic of the states; None for the one there is.
         command: topic of the commands; None for the one there is.
         effort: the effort that acts, a key of `EFFORT_SOURCES`; the simulation is read as `auto`.
+        gains: YAML file of the gains of drives whose commands are positions; None for efforts.
         bodies: YAML file of bodies that the robot's file lacks; None for none.
         static: whether the recordings hold settled points, one row a pose.
     """
@@ -60,6 +63,7 @@ class DiagnoseOptions:
     command: str | None = None
     effort: str = 'auto'
     bodies: str | None = None
+    gains: str | None = None
     static: bool = False
 
 
@@ -88,17 +92,28 @@ def run_diagnose(
     remarks = list(nominal.remarks)
     events = _read([bag] if isinstance(bag, str) else bag, model, chosen, remarks)
     tests = _read(chosen.tests, model, chosen, remarks, taken=('train', *events))
+    gains = _gains(chosen, tree)
     simulation = _simulation(nominal, chosen, remarks)
     found = diagnose(
         events, model, tree, tests, stated=nominal.stated, holds_out=not chosen.tests,
-        is_static=chosen.static, progress=progress,
+        is_static=chosen.static, gains=gains, progress=progress,
         config=EngineConfig(effort_source=EFFORT_SOURCES[chosen.effort]),
     )  # fmt: skip
     remarks = [*found.remarks, *remarks, *_refusals(found)]
     found = replace(found, simulation=simulation, remarks=tuple(remarks))
-    # a node meets one recording of a motion; settled points are none
-    first = [] if chosen.static else next(iter(events.values()))
+    # a node meets one recording of a motion, as it is; settled points are none
+    is_met = gains is None and not chosen.static and not found.setup
+    first = next(iter(events.values())) if is_met else []
     return _written(out, nominal, found, first, EFFORT_SOURCES[chosen.effort])
+
+
+def _gains(options: DiagnoseOptions, tree: Tree) -> Gains | None:
+    """Return the gains of drives that hold position targets, where they are stated."""
+    if options.gains is None:
+        return None
+    names = tree.moving_names
+    driven = [name for name, on in zip(names, tree.is_actuated, strict=False) if on]
+    return read_gains(Path(options.gains), names, driven)
 
 
 def _refusals(found: Diagnosis) -> list[str]:
@@ -169,11 +184,8 @@ def _written(
 def print_diagnosis(found: Diagnosis) -> None:
     """Print the verdict, the findings, their nearest rivals and the proof; `+-` is for 95 %."""
     print(verdict_sentence(found))
-    for f in found.findings:
-        where = f'{f.joint}: {phrase(f)}'
-        print(f'  found     p {f.probability:.2f}  {where}{f"; {f.why}" if f.why else ""}')
-        if f.formula:
-            print(f'                    {f.formula}')
+    _print_findings('set-up', found.setup)
+    _print_findings('found', found.findings)
     is_missing = found.verdict == 'missing_physics' and bool(found.findings)
     best = found.findings[0] if is_missing else None
     if found.findings:
@@ -193,6 +205,14 @@ def print_diagnosis(found: Diagnosis) -> None:
         _print_proof(stem, proof)
     for remark in found.remarks:
         print(f'  remark    {remark}')
+
+
+def _print_findings(kind: str, findings: Sequence[Finding]) -> None:
+    for f in findings:
+        where = f'{f.joint}: {phrase(f)}'
+        print(f'  {kind:9s} p {f.probability:.2f}  {where}{f"; {f.why}" if f.why else ""}')
+        if f.formula:
+            print(f'                    {f.formula}')
 
 
 def _print_proof(stem: str, proof: Proof) -> None:

@@ -19,13 +19,13 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.locate.remainder import Remainder, region
 from sgp_ros.diagnosis.result import (
-    Dependence,
     Difference,
     Finding,
     Location,
     Parameter,
     ParameterError,
 )
+from sgp_ros.diagnosis.shown import Dependence
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.robots.observed_motion import ObservedMotion

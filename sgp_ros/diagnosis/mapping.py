@@ -18,6 +18,7 @@ def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
         'schema': 2,
         'verdict': found.verdict,
         'certainty': _finite(found.certainty),
+        'setup': [_finding(f) for f in found.setup],
         'findings': [_finding(f) for f in found.findings],
         'alternatives': [_finding(f) for f in found.alternatives],
         'equivalents': [

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from sgp_ros.batch.acceptance import USUAL
-from sgp_ros.diagnosis.compare.equations import Equations, make_equations
+from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies, open_remark, with_open_bodies
-from sgp_ros.diagnosis.compare.settled import collect_settled
-from sgp_ros.diagnosis.compare.several import join
-from sgp_ros.diagnosis.compare.sufficiency import (
-    at_rest,
-    require_motion,
-    require_rows,
-    require_signed,
-)
-from sgp_ros.diagnosis.compare.trajectory import RawTrajectory, choose_bandwidth, collect
+from sgp_ros.diagnosis.compare.sufficiency import require_signed
+from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.diagnosis.compare.velocity_sensor import sensor_lags
+from sgp_ros.diagnosis.connected import Connected, connect
 from sgp_ros.diagnosis.criteria import DOUBTED, REMAINDER_SHARE
 from sgp_ros.diagnosis.decide.certainty import certainty_of, probabilities
 from sgp_ros.diagnosis.decide.decision import Decision
-from sgp_ros.diagnosis.decide.differences import Several, decide_several
+from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, equivalents
 from sgp_ros.diagnosis.decide.visibility import visibility
 from sgp_ros.diagnosis.explain.comparison import Comparison
@@ -35,19 +29,21 @@ from sgp_ros.diagnosis.findings import (
     differences,
     parameter_errors,
 )
+from sgp_ros.diagnosis.gathered import Knowledge, gather
 from sgp_ros.diagnosis.locate.bands import bands
 from sgp_ros.diagnosis.locate.dependence import dependences
 from sgp_ros.diagnosis.locate.remainder import Remainder, learn_remainder
-from sgp_ros.diagnosis.prove.held_out import HELD_OUT, keep_back
 from sgp_ros.diagnosis.prove.prediction import FinalModel, diagnosed_bodies
 from sgp_ros.diagnosis.prove.processes import harm, kept_processes
 from sgp_ros.diagnosis.prove.proof import prove, reasons_to_doubt
-from sgp_ros.diagnosis.result import Diagnosis, Predictions, Proof, Traces
+from sgp_ros.diagnosis.result import Diagnosis, Proof
+from sgp_ros.diagnosis.shown import Predictions, Traces
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import NumericalError
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.robot import Robot
 
 
@@ -61,6 +57,7 @@ def diagnose(
     holds_out: bool = False,
     is_static: bool = False,
     config: EngineConfig = USUAL,
+    gains: Gains | None = None,
     progress: Callable[[float], None] = lambda _share: None,
 ) -> Diagnosis:
     """Say what a recording has that the nominal robot lacks.
@@ -75,6 +72,7 @@ def diagnose(
             `held_out`; everything is then learned from the rest.
         is_static: whether the recordings hold settled points, one row a pose.
         config: settings of the intake.
+        gains: of drives that hold position targets; None where commands are efforts.
         progress: called with the share that is done.
 
     Raises:
@@ -84,89 +82,29 @@ def diagnose(
     """
     unstated = open_bodies(robot.name, tree)
     several = dict(events) if isinstance(events, Mapping) else {'': events}
-    raws, still = _collected(several, robot, tree, stated, config, is_static=is_static)
-    read = collect_settled if is_static else collect
-    held = {stem: read(test, robot, stated, config) for stem, test in tests.items()}
-    learned, kept, remarks = _kept_back(raws) if holds_out else (join(raws), {}, ())
-    if still:
-        remarks += (f'Nothing can be said of joints that do not move: {", ".join(still)}.',)
-    require_signed(learned, tree.moving_names)
-    tree = with_open_bodies(learned, tree, unstated)
-    remarks += open_remark(tree, unstated)
-    recordings = _Recordings(tuple(several), learned, kept, held, still, remarks, unstated)
-    bandwidth = choose_bandwidth(learned, tree)
-    require_rows(learned, bandwidth)
+    known = Knowledge(robot, stated, config, gains, is_static=is_static)
+    recordings = gather(several, tests, tree, known, holds_out=holds_out)
+    require_signed(recordings.learned, tree.moving_names)
+    tree = with_open_bodies(recordings.learned, tree, unstated)
+    recordings = replace(
+        recordings, unstated=unstated,
+        remarks=(*recordings.remarks, *open_remark(tree, unstated)),
+    )  # fmt: skip
     try:
-        return _diagnosed(recordings, make_equations(learned, tree, bandwidth, unstated),
-                          robot.name, progress)  # fmt: skip
+        connected = connect(recordings, tree, lambda x: progress(0.05 + 0.85 * x))
+        return _diagnosed(connected, robot.name, progress)
     except np.linalg.LinAlgError as error:
         raise NumericalError(
             f'the equations of the recording have no solution ({error})',
             'motion of every joint',
-            f'joints that do not move: {", ".join(still) or "none"}',
+            f'joints that do not move: {", ".join(recordings.still) or "none"}',
         ) from error
 
 
-@dataclass(frozen=True, eq=False)
-class _Recordings:
-    """What is learned from, kept back and held out, with still joints, remarks, open bodies."""
-
-    names: tuple[str, ...]
-    learned: RawTrajectory
-    kept: Mapping[str, RawTrajectory]
-    held: Mapping[str, RawTrajectory]
-    still: tuple[str, ...]
-    remarks: tuple[str, ...]
-    unstated: tuple[int, ...] = ()
-
-
-def _collected(
-    several: Mapping[str, Iterable[Event]],
-    robot: Robot,
-    tree: Tree,
-    stated: tuple[EffectAt, ...],
-    config: EngineConfig,
-    *,
-    is_static: bool,
-) -> tuple[list[RawTrajectory], tuple[str, ...]]:
-    """Return the recordings on grids of one step, and the joints that are still in all."""
-    if is_static:
-        return [collect_settled(x, robot, stated, config) for x in several.values()], ()
-    known = [list(events) for events in several.values()]
-    still = [require_motion(events, robot.name, tree.moving_names) for events in known]
-    raws = [collect(events, robot, stated, config) for events in known]
-    step = max(raw.step for raw in raws)
-    raws = [
-        raw if raw.step == step else collect(events, robot, stated, config, least_step=step)
-        for raw, events in zip(raws, known, strict=True)
-    ]
-    raws = [
-        at_rest(raw, np.isin(tree.moving_names, names))
-        for raw, names in zip(raws, still, strict=True)
-    ]
-    return raws, tuple(name for name in still[0] if all(name in names for names in still))
-
-
-def _kept_back(
-    raws: Sequence[RawTrajectory],
-) -> tuple[RawTrajectory, dict[str, RawTrajectory], tuple[str, ...]]:
-    """Return what to learn from, what is held out of it by name, and what is to be said."""
-    parts = [keep_back(raw) for raw in raws]
-    kept = [held[HELD_OUT] for _, held, _ in parts if held]
-    said = dict.fromkeys(remark for _, _, remarks in parts for remark in remarks)
-    learned = join([part for part, _, _ in parts])
-    return learned, {HELD_OUT: join(kept)} if kept else {}, tuple(said)
-
-
-def _diagnosed(
-    recordings: _Recordings,
-    equations: Equations,
-    robot: str,
-    progress: Callable[[float], None],
-) -> Diagnosis:
-    raw, tree, names = recordings.learned, equations.motion.tree, recordings.names
-    several = decide_several(equations, len(names), lambda x: progress(0.05 + 0.85 * x))
-    whole, equations = equations, several.equations
+def _diagnosed(connected: Connected, robot: str, progress: Callable[[float], None]) -> Diagnosis:
+    recordings, whole, several = connected.recordings, connected.equations, connected.several
+    raw, tree, names = recordings.learned, whole.motion.tree, recordings.names
+    equations = several.equations
     comparison, decision, model = several.comparison, several.decision, several.model
     depends = dependences(equations, comparison.base.residual)
     lags = [lag for lag in sensor_lags(raw, equations) if lag.is_physics]
@@ -188,13 +126,13 @@ def _diagnosed(
         robot=robot,
         joints=tree.moving_names,
         units=tuple('N' if p else 'N m' for p in tree.is_prismatic[: tree.size]),
-        verdict=_verdict(decision, is_missing=bool(lags or differ)),
-        certainty=min(certainty, DOUBTED) if doubts else certainty,
+        verdict=_verdict(decision, connected, is_missing=bool(lags or differ)),
+        certainty=_certainty(certainty, connected, is_doubted=bool(doubts)),
         findings=findings,
         alternatives=alternatives(decision, chances),
         parameter_errors=parameter_errors(whole, model, recordings.unstated),
         proofs=proofs,
-        predictions=_predictions(final, recordings.held, tree),
+        predictions=_predictions(final, connected, tree),
         dependences=depends,
         bands=bands(equations, comparison.base.residual, depends),
         traces=_traces(whole, comparison, model, final.remainders, forces),
@@ -202,17 +140,29 @@ def _diagnosed(
         rate_hz=1.0 / (raw.step * equations.filter.decimation),
         rows=len(equations.d),
         refused={reason: count for reason, count in raw.refused.items() if count},
-        remarks=(*raw.remarks, *recordings.remarks, *bound_remarks(decision), *on_z, *doubts),
+        remarks=(*connected.remarks, *raw.remarks, *bound_remarks(decision), *on_z, *doubts),
         bodies=diagnosed_bodies(whole, model, recordings.unstated),
-        equivalents=equivalents(equations, comparison, decision, contrasts),
+        equivalents=(
+            *connected.equivalents,
+            *equivalents(equations, comparison, decision, contrasts),
+        ),
         recordings=names if len(names) > 1 else (),
         differences=differ,
+        setup=connected.findings,
         visibility=visibility(equations, comparison, decision),
     )
 
 
-def _verdict(decision: Decision, *, is_missing: bool) -> str:
+def _certainty(certainty: float, connected: Connected, *, is_doubted: bool) -> float:
+    """Return the least of what the verdict rests on."""
+    rests_on = [certainty, *(f.probability for f in connected.findings)]
+    return min([*rests_on, DOUBTED] if is_doubted else rests_on)
+
+
+def _verdict(decision: Decision, connected: Connected, *, is_missing: bool) -> str:
     is_calm = decision.verdict in {'no_mismatch', 'parameters_only'}
+    if is_calm and connected.findings and not is_missing:
+        return 'setup_error'
     return 'missing_physics' if is_missing and is_calm else decision.verdict
 
 
@@ -235,12 +185,11 @@ def _remainders(equations: Equations, decision: Decision) -> tuple[Remainder, ..
     return tuple(r for r in found if r is not None)
 
 
-def _predictions(
-    final: FinalModel, held: Mapping[str, RawTrajectory], tree: Tree
-) -> dict[str, Predictions]:
+def _predictions(final: FinalModel, connected: Connected, tree: Tree) -> dict[str, Predictions]:
     """Return the accelerations of held-out recordings; settled points have none."""
+    held = connected.recordings.held
     moved = {stem: part for stem, part in held.items() if part.approach is None}
-    return {stem: final.predict(part, tree) for stem, part in moved.items()}
+    return {stem: connected.recorded(final.predict(part, tree)) for stem, part in moved.items()}
 
 
 def _harm(

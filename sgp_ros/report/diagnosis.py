@@ -9,7 +9,8 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from sgp_ros.diagnosis.prove.held_out import HELD_OUT
-from sgp_ros.diagnosis.result import Diagnosis, Finding, ParameterError, Predictions
+from sgp_ros.diagnosis.result import Diagnosis, Finding, ParameterError
+from sgp_ros.diagnosis.shown import Predictions
 from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.report.diagnosis_figures import draw_diagnosis
@@ -45,6 +46,7 @@ _VERDICTS = {
     'parameters_only': 'Only parameters are wrong',
     'no_mismatch': 'No mismatch',
     'unexplained': 'Unexplained',
+    'setup_error': 'Connected wrongly',
 }
 
 

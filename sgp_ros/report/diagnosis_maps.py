@@ -10,7 +10,8 @@ from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
 from sgp_ros.diagnosis.criteria import LEAST_SHARE
-from sgp_ros.diagnosis.result import Band, Dependence, Diagnosis
+from sgp_ros.diagnosis.result import Diagnosis
+from sgp_ros.diagnosis.shown import Band, Dependence
 from sgp_ros.report.diagnosis_text import scored_joints, worst_joint
 from sgp_ros.report.figures import GREY, PREDICTED
 

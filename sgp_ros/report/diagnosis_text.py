@@ -34,6 +34,11 @@ _MOST_ERRORS, _MOST_VARIABLES = 3, 2
 
 def verdict_sentence(found: Diagnosis) -> str:
     """Return the finding in one sentence; `+-` is half of a 95 % interval."""
+    if found.setup:
+        each = [f'{place(f)}: {phrase(f)} (probability {f.probability:.2f})' for f in found.setup]
+        head = f'The recording and the robot file do not fit together: {"; ".join(each)}.'
+        rest = verdict_sentence(replace(found, setup=()))
+        return head if found.verdict == 'setup_error' else f'{head} Beside that: {rest}'
     if found.verdict == 'missing_physics':
         return _missing(found)
     if found.verdict == 'parameters_only':

@@ -7,16 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from sgp_ros.diagnosis.result import (
-    Band,
-    Dependence,
     Diagnosis,
     Finding,
     Location,
     Parameter,
     ParameterError,
     Proof,
-    Traces,
 )
+from sgp_ros.diagnosis.shown import Band, Dependence, Traces
 
 LEVEL, NOISE, N = 0.317, 0.004, 600
 COULOMB = Finding(

@@ -33,7 +33,7 @@ from scipy import linalg, optimize
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import REGION_LEAST_ROWS, SIGNIFICANT
 from sgp_ros.diagnosis.locate.dependence import own_variables
-from sgp_ros.diagnosis.result import Band, Dependence
+from sgp_ros.diagnosis.shown import Band, Dependence
 
 CELLS, LEAST_ROWS = 32, 8
 """Greatest number of cells in each direction; rows per cell, at least, on average."""

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.result import Dependence
+from sgp_ros.diagnosis.shown import Dependence
 
 
 def surrogates(residual: np.ndarray, count: int) -> Iterator[np.ndarray]:

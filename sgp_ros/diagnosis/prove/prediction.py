@@ -16,7 +16,7 @@ from sgp_ros.diagnosis.compare.equations import Equations, resting
 from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, observe
 from sgp_ros.diagnosis.explain.fitted_model import Model, extra_force, held_joints, imbalance
 from sgp_ros.diagnosis.locate.remainder import Remainder
-from sgp_ros.diagnosis.result import Predictions
+from sgp_ros.diagnosis.shown import Predictions
 from sgp_ros.errors import NumericalError
 from sgp_ros.rigid.consistent import project_information
 from sgp_ros.rigid.pseudo_inertia import is_consistent

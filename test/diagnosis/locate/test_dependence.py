@@ -13,7 +13,7 @@ from sgp_ros.diagnosis.locate.dependence import (
     own_variables,
     surrogates,
 )
-from sgp_ros.diagnosis.result import Dependence
+from sgp_ros.diagnosis.shown import Dependence
 from test.diagnosis.locate.nulls import disturbance
 from test.diagnosis.worlds import CHAINS, simulate
 

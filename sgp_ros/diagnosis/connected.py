@@ -1,0 +1,159 @@
+"""Whether a recording is better explained by an error of its connection than by the robot.
+
+The usual comparison of models is made on the recording as it is. Where the search for errors of
+the connection proposes some, it is made again on the corrected recording, and the errors are
+asserted only where they, with whatever physics is left, are worth more than all physics without.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sgp_ros.diagnosis.compare.equations import Equations, make_equations
+from sgp_ros.diagnosis.compare.sufficiency import require_rows
+from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth
+from sgp_ros.diagnosis.criteria import (
+    ALIKE,
+    INDEPENDENT_ROWS,
+    MOST_CERTAIN,
+    PER_EFFECT,
+    PER_PARAMETER,
+    TEMPER,
+)
+from sgp_ros.diagnosis.decide.decision import Scale
+from sgp_ros.diagnosis.decide.differences import Several, decide_several
+from sgp_ros.diagnosis.gathered import Recordings
+from sgp_ros.diagnosis.result import Equivalent, Finding, Location, Parameter
+from sgp_ros.diagnosis.setup.correction import Correction
+from sgp_ros.diagnosis.setup.evidence import Probe
+from sgp_ros.diagnosis.setup.search import Connection, search
+from sgp_ros.diagnosis.shown import Predictions
+from sgp_ros.rigid.tree import Tree
+
+
+@dataclass(frozen=True, eq=False)
+class Connected:
+    """Recordings as they were, with the models that were compared on them.
+
+    Attributes:
+        recordings: corrected where an error of the connection is asserted.
+        equations: of what is learned from.
+        several: the comparison of models on these.
+        correction: what was undone; None for nothing.
+        findings: errors of the connection.
+        equivalents: errors that the recording cannot tell from these.
+        remarks: what is to be done about them.
+    """
+
+    recordings: Recordings
+    equations: Equations
+    several: Several
+    correction: Correction | None = None
+    findings: tuple[Finding, ...] = ()
+    equivalents: tuple[Equivalent, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def scale(self) -> Scale:
+        """What mean squares are measured against."""
+        return Scale.of(self.equations, self.several.comparison)
+
+    def worth(self, nominal: np.ndarray) -> float:
+        """Return the worth of what is decided on the recording as it was recorded [nats].
+
+        Args:
+            nominal: (k,) shares of the discrepancy whose shape is only nearly right; the same
+                for all that are compared.
+        """
+        scale = replace(self.scale, nominal=nominal)
+        worth = scale.worth(self.several.decision.model)
+        if self.correction is None:
+            return worth
+        driven = self.equations.motion.tree.is_actuated[: len(self.correction.scale)]
+        rows = min(INDEPENDENT_ROWS, len(self.equations.d))
+        return worth + rows * self.correction.log_volume(driven)
+
+    def recorded(self, found: Predictions) -> Predictions:
+        """Return accelerations as the recording shows them."""
+        if self.correction is None:
+            return found
+        shown = np.empty_like(found.acceleration)
+        shown[:, self.correction.order] = found.acceleration * self.correction.scale
+        return replace(found, acceleration=shown)
+
+
+def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None]) -> Connected:
+    """Return the recordings with the best explanation, corrected or not.
+
+    Args:
+        recordings: as they are.
+        tree: nominal robot.
+        progress: called with the share that is done.
+
+    Raises:
+        RecordingError: too little is left to decide.
+    """
+    plain = _compared(recordings, tree, progress)
+    is_static = recordings.learned.approach is not None  # inertia is what tells units apart
+    if is_static or plain.several.decision.verdict == 'no_mismatch':
+        return plain
+    bandwidth = choose_bandwidth(recordings.learned, tree)
+    found = search(Probe(recordings.learned, tree, bandwidth))
+    if not found.errors:
+        return plain
+    correction = found.errors[-1].correction
+    corrected = replace(
+        _compared(recordings.corrected(correction), correction.tree(tree), progress),
+        correction=correction,
+    )
+    numbers = sum(len(e.numbers) for e in found.errors)
+    price = PER_EFFECT * len(found.errors) + PER_PARAMETER * numbers
+    nominal = np.minimum(plain.scale.nominal, corrected.scale.nominal)
+    gain = corrected.worth(nominal) - price - plain.worth(nominal)
+    if gain < PER_EFFECT:
+        return plain
+    return replace(
+        corrected,
+        findings=tuple(_finding(found, i, gain) for i in range(len(found.errors))),
+        equivalents=_equal(found),
+        remarks=(*(e.remedy for e in found.errors), *recordings.remarks),
+    )
+
+
+def _compared(recordings: Recordings, tree: Tree, progress: Callable[[float], None]) -> Connected:
+    bandwidth = choose_bandwidth(recordings.learned, tree)
+    require_rows(recordings.learned, bandwidth)
+    equations = make_equations(recordings.learned, tree, bandwidth, recordings.unstated)
+    several = decide_several(equations, len(recordings.names), progress)
+    return Connected(recordings, equations, several, remarks=recordings.remarks)
+
+
+def _finding(found: Connection, number: int, gain: float) -> Finding:
+    """Return an error with its probability against its rivals and against none."""
+    e = found.errors[number]
+    rivals = [r.worth - e.worth for r in found.rivals[number]]
+    odds = math.exp(-TEMPER * gain) + sum(math.exp(min(TEMPER * r, 50.0)) for r in rivals)
+    numbers: dict[str, Parameter] = {
+        name: Parameter(float(x), float(s) if math.isfinite(s) and s > 0.0 else None, unit)
+        for name, x, s, unit in zip(
+            e.hypothesis.names, e.numbers, e.std, e.hypothesis.units, strict=True
+        )
+    }
+    words = {name: Parameter(word) for name, word in e.hypothesis.words.items()}
+    return Finding(
+        e.hypothesis.joint, e.hypothesis.effect, {**numbers, **words}, Location(), gain,
+        min(1.0 / (1.0 + odds), MOST_CERTAIN), 1.0,
+    )  # fmt: skip
+
+
+def _equal(found: Connection) -> tuple[Equivalent, ...]:
+    return tuple(
+        Equivalent(((r.hypothesis.joint, r.hypothesis.effect),), '', 1.0)
+        for e, rivals in zip(found.errors, found.rivals, strict=True)
+        for r in rivals
+        if e.worth - r.worth < ALIKE and math.isfinite(r.worth)
+    )

@@ -1,0 +1,140 @@
+"""All recordings of a diagnosis on their grids: learned from, kept back, held out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sgp_ros.diagnosis.compare.settled import collect_settled
+from sgp_ros.diagnosis.compare.several import join
+from sgp_ros.diagnosis.compare.sufficiency import at_rest, require_motion
+from sgp_ros.diagnosis.compare.trajectory import RawTrajectory, collect
+from sgp_ros.diagnosis.prove.held_out import HELD_OUT, keep_back
+from sgp_ros.diagnosis.setup.correction import Correction
+from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.samples import Event
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.gains import Gains
+from sgp_ros.robots.robot import Robot
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Knowledge:
+    """What is known of the machine beside its bodies.
+
+    Attributes:
+        robot: names, actuated joints and gains.
+        stated: effects that the nominal robot has, beside those of its tree.
+        config: settings of the intake.
+        gains: of drives that hold position targets; None where commands are efforts.
+        is_static: whether the recordings hold settled points, one row a pose.
+    """
+
+    robot: Robot
+    stated: tuple[EffectAt, ...]
+    config: EngineConfig
+    gains: Gains | None = None
+    is_static: bool = False
+
+    def collected(self, events: Iterable[Event], least_step: float = 0.0) -> RawTrajectory:
+        """Return a recording on its grid."""
+        if self.is_static:
+            return collect_settled(events, self.robot, self.stated, self.config)
+        return collect(
+            events, self.robot, self.stated, self.config, least_step=least_step, gains=self.gains
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Recordings:
+    """What is learned from, kept back and held out.
+
+    Attributes:
+        names: stems of what is learned from.
+        learned: all of it.
+        kept: blocks of it that are kept back, by name.
+        held: held-out recordings, by stem.
+        still: joints that do not move.
+        remarks: for the user.
+        unstated: bodies that the robot's file leaves open.
+    """
+
+    names: tuple[str, ...]
+    learned: RawTrajectory
+    kept: Mapping[str, RawTrajectory]
+    held: Mapping[str, RawTrajectory]
+    still: tuple[str, ...]
+    remarks: tuple[str, ...]
+    unstated: tuple[int, ...] = ()
+
+    def corrected(self, correction: Correction) -> Recordings:
+        """Return the recordings as they were."""
+        return replace(
+            self,
+            learned=correction.recording(self.learned),
+            kept={name: correction.recording(raw) for name, raw in self.kept.items()},
+            held={stem: correction.recording(raw) for stem, raw in self.held.items()},
+        )
+
+
+def gather(
+    several: Mapping[str, Iterable[Event]],
+    tests: Mapping[str, Iterable[Event]],
+    tree: Tree,
+    known: Knowledge,
+    *,
+    holds_out: bool,
+) -> Recordings:
+    """Return recordings on grids of one step.
+
+    Args:
+        several: events to learn from, by stem.
+        tests: events of held-out recordings, by stem.
+        tree: nominal robot.
+        known: what is known beside it.
+        holds_out: whether blocks of the recordings are kept back for the proof.
+
+    Raises:
+        RecordingError: nothing can be used, or nothing moves.
+    """
+    raws, still = _collected(several, tree, known)
+    held = {stem: known.collected(test) for stem, test in tests.items()}
+    learned, kept, remarks = _kept_back(raws) if holds_out else (join(raws), {}, ())
+    if still:
+        remarks += (f'Nothing can be said of joints that do not move: {", ".join(still)}.',)
+    return Recordings(tuple(several), learned, kept, held, still, remarks)
+
+
+def _collected(
+    several: Mapping[str, Iterable[Event]], tree: Tree, known: Knowledge
+) -> tuple[list[RawTrajectory], tuple[str, ...]]:
+    """Return the recordings on grids of one step, and the joints that are still in all."""
+    if known.is_static:
+        return [known.collected(events) for events in several.values()], ()
+    parts = [list(events) for events in several.values()]
+    still = [require_motion(events, known.robot.name, tree.moving_names) for events in parts]
+    raws = [known.collected(events) for events in parts]
+    step = max(raw.step for raw in raws)
+    raws = [
+        raw if raw.step == step else known.collected(events, step)
+        for raw, events in zip(raws, parts, strict=True)
+    ]
+    raws = [
+        at_rest(raw, np.isin(tree.moving_names, names))
+        for raw, names in zip(raws, still, strict=True)
+    ]
+    return raws, tuple(name for name in still[0] if all(name in names for names in still))
+
+
+def _kept_back(
+    raws: Sequence[RawTrajectory],
+) -> tuple[RawTrajectory, dict[str, RawTrajectory], tuple[str, ...]]:
+    """Return what to learn from, what is held out of it by name, and what is to be said."""
+    parts = [keep_back(raw) for raw in raws]
+    kept = [held[HELD_OUT] for _, held, _ in parts if held]
+    said = dict.fromkeys(remark for _, _, remarks in parts for remark in remarks)
+    learned = join([part for part, _, _ in parts])
+    return learned, {HELD_OUT: join(kept)} if kept else {}, tuple(said)

@@ -1,0 +1,1 @@
+"""Errors of how a robot was connected, before any physics."""

@@ -1,0 +1,196 @@
+"""Search for errors of the connection, one after the other, as long as each is worth its price."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import optimize
+
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, PER_EFFECT, PER_PARAMETER
+from sgp_ros.diagnosis.setup.correction import Correction
+from sgp_ros.diagnosis.setup.errors import Hypothesis, hypotheses
+from sgp_ros.diagnosis.setup.evidence import Agreement, Probe
+
+_REFINED = 6
+"""Hypotheses of which the numbers are searched to the end."""
+_MOST = 4
+_FLAT = 1e-3
+"""Evidence below which a number changes nothing [nats]."""
+_FAR = 300.0
+"""Evidence that a start may lack and still be looked at [nats]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A hypothesis with its numbers.
+
+    Attributes:
+        hypothesis: what is wrong.
+        numbers: (m,) [units of the hypothesis].
+        std: (m,) standard deviations.
+        correction: that undoes it, and what was found before it.
+        agreement: of the recording that is corrected so.
+    """
+
+    hypothesis: Hypothesis
+    numbers: np.ndarray
+    std: np.ndarray
+    correction: Correction
+    agreement: Agreement
+
+    @property
+    def remedy(self) -> str:
+        """What to do about the error."""
+        values = dict(zip(self.hypothesis.names, map(float, self.numbers), strict=True))
+        return self.hypothesis.remedy(values)
+
+    @property
+    def worth(self) -> float:
+        """Evidence less the price of the hypothesis [nats]."""
+        return self.agreement.evidence - PER_EFFECT - PER_PARAMETER * len(self.numbers)
+
+
+@dataclass(frozen=True, eq=False)
+class Connection:
+    """What is wrong with the connection.
+
+    Attributes:
+        errors: in the order in which they were found.
+        rivals: of each, best first.
+        start: agreement of the recording as it is.
+    """
+
+    errors: tuple[Tried, ...]
+    rivals: tuple[tuple[Tried, ...], ...]
+    start: Agreement
+
+
+def search(probe: Probe) -> Connection:
+    """Return the errors that explain what bodies and everyday friction do not."""
+    none = Correction.none(probe.motion.tree.size)
+    start = now = probe.agreement(none)
+    errors: list[Tried] = []
+    rivals: list[tuple[Tried, ...]] = []
+    correction = none
+    for _ in range(_MOST):
+        known = [e.hypothesis.key for e in errors]
+        ranked = _ranked(probe, correction, now, known)
+        if not ranked or ranked[0].worth < now.evidence + PER_EFFECT:
+            break
+        errors.append(ranked[0])
+        rivals.append(tuple(ranked[1:]))
+        if len(errors) > 1:
+            errors = _together(probe, errors)
+        correction, now = errors[-1].correction, errors[-1].agreement
+    return Connection(tuple(errors), tuple(rivals), start)
+
+
+def _together(probe: Probe, errors: list[Tried]) -> list[Tried]:
+    """Return errors whose numbers are searched anew, each beside all others; the last has all.
+
+    One that the others make superfluous is left out.
+    """
+    none = Correction.none(probe.motion.tree.size)
+    numbers = [e.numbers for e in errors]
+    for i in range(len(errors)):
+        others = none
+        for j, e in enumerate(errors):
+            others = others if j == i else e.hypothesis.applied(others, numbers[j])
+        found = _refined(probe, others, errors[i].hypothesis, numbers[i])
+        without = probe.agreement(others).evidence
+        if found.worth < without:
+            return _chain(probe, [e for j, e in enumerate(errors) if j != i])
+        numbers[i] = found.numbers
+        errors[i] = replace(errors[i], numbers=found.numbers, std=found.std)
+    return _chain(probe, errors)
+
+
+def _chain(probe: Probe, errors: list[Tried]) -> list[Tried]:
+    """Return errors with the corrections that undo them one after the other."""
+    correction = Correction.none(probe.motion.tree.size)
+    chain = []
+    for e in errors:
+        correction = e.hypothesis.applied(correction, e.numbers)
+        chain.append(replace(e, correction=correction, agreement=probe.agreement(correction)))
+    return chain
+
+
+def _ranked(
+    probe: Probe, base: Correction, now: Agreement, known: list[tuple[str, str, tuple[str, ...]]]
+) -> list[Tried]:
+    """Return the hypotheses that are worth most on top of a correction, best first.
+
+    What makes less than counts as physics is none.
+    """
+    screened = []
+    for h in hypotheses(probe.full):
+        if h.key in known:
+            continue
+        values = [_value(probe, base, h, x) for x in h.starts]
+        best = int(np.argmax(values))
+        value, x = values[best], h.starts[best]
+        if len(x) and value > now.evidence - _FAR:
+            x = _parabola(probe, base, h, x)
+            value = max(value, _value(probe, base, h, x))
+        screened.append((value, h, x))
+    screened.sort(key=lambda s: -s[0])
+    found = [_refined(probe, base, h, x) for _, h, x in screened[:_REFINED]]
+    found = [t for t in found if t.agreement.distance(now) > COUNTED_SHARE]
+    return sorted(found, key=lambda t: -t.worth)
+
+
+def _value(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> float:
+    if not h.is_possible(x):
+        return -np.inf
+    return probe.agreement(h.applied(base, x)).evidence
+
+
+def _parabola(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> np.ndarray:
+    """Return x after one step to the vertex along each number, where that is better."""
+    x = x.copy()
+    for i, step in enumerate(_steps(h, x)):
+        e = np.zeros(len(x))
+        e[i] = step
+        low, mid, high = (_value(probe, base, h, x + s * e) for s in (-1.0, 0.0, 1.0))
+        bend = low - 2.0 * mid + high
+        move = 0.5 * (low - high) / bend if bend < 0.0 else float(np.sign(high - low))
+        trial = x + np.clip(move, -3.0, 3.0) * e
+        if _value(probe, base, h, trial) > mid:
+            x = trial
+    return x
+
+
+def _steps(h: Hypothesis, x: np.ndarray) -> np.ndarray:
+    """Return steps of a search; a factor is searched in steps relative to itself."""
+    return h.steps * np.abs(x) if 'scale' in h.names else h.steps
+
+
+def _refined(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> Tried:
+    """Return a hypothesis with the numbers that agree best; one that changes nothing is 0."""
+    m = len(x)
+    std = np.zeros(m)
+    if m:
+        simplex = np.concatenate([x[None], x + np.diag(_steps(h, x))])
+        found = optimize.minimize(
+            lambda y: -_value(probe, base, h, y), x, method='Nelder-Mead',
+            options={'initial_simplex': simplex, 'maxfev': 45 * m, 'xatol': 1e-6, 'fatol': 0.02},
+        )  # fmt: skip
+        x = h.canonical(found.x)
+        std = _spread(probe, base, h, x)
+        x = np.where(np.isfinite(std), x, h.neutral)
+    correction = h.applied(base, x)
+    return Tried(h, x, std, correction, probe.agreement(correction))
+
+
+def _spread(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> np.ndarray:
+    """Return the standard deviations of numbers from the curvature of the evidence, (m,)."""
+    std = np.full(len(x), np.inf)
+    centre = _value(probe, base, h, x)
+    for i, step in enumerate(_steps(h, x)):
+        e = np.zeros(len(x))
+        e[i] = 0.3 * step
+        bend = 2.0 * centre - _value(probe, base, h, x - e) - _value(probe, base, h, x + e)
+        if bend > _FLAT:
+            std[i] = e[i] / np.sqrt(bend)
+    return std

@@ -1,0 +1,93 @@
+"""Signals and dependences that a diagnosis shows in pictures and files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sgp_ros.diagnosis.criteria import SIGNIFICANT
+
+
+@dataclass(frozen=True, slots=True)
+class Dependence:
+    """What the discrepancy of a joint depends on.
+
+    Attributes:
+        joint: name.
+        share: of the mean squared effort that the nominal robot leaves.
+        scores: share of what is left that each variable explains on held-out stretches, by name.
+        p_values: chance that a disturbance of the same spectra, which knows nothing of the
+            motion, has a score as remarkable for any joint and variable, by name.
+    """
+
+    joint: str
+    share: float
+    scores: Mapping[str, float]
+    p_values: Mapping[str, float] = field(default_factory=dict)
+
+    def is_significant(self, variable: str) -> bool:
+        """Return whether a variable explains something, and more than chance would."""
+        return self.scores[variable] > 0.0 and self.p_values.get(variable, 1.0) <= SIGNIFICANT
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Band:
+    """Z of one joint over one variable, backward and forward, at m values.
+
+    Attributes:
+        joint: name.
+        variable: `position`, `velocity`, `effort` or `time`.
+        x: (m,) values, in the units of the variable.
+        mean: (m, 2) of Z, backward and forward [N m or N]; NaN where the joint never moved so.
+        half: (m, 2) half width of the band that holds everywhere at once [N m or N].
+        regions: intervals of x where the mean leaves the band.
+        rows: share of the rows that lie in them.
+    """
+
+    joint: str
+    variable: str
+    x: np.ndarray
+    mean: np.ndarray
+    half: np.ndarray
+    regions: tuple[tuple[float, float], ...]
+    rows: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Traces:
+    """Filtered signals of the training recording, for pictures.
+
+    Attributes:
+        time: (N,) [s].
+        position, velocity, effort: (N, k).
+        before: (N, k) what the nominal robot leaves of the effort [N m or N].
+        parameters: (N, k) what wrong inertial parameters alone leave.
+        after: (N, k) what the final model leaves.
+        noise: (k,) expected from the encoders.
+        forces: by finding, (N, k) force on each joint.
+    """
+
+    time: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    effort: np.ndarray
+    before: np.ndarray
+    parameters: np.ndarray
+    after: np.ndarray
+    noise: np.ndarray
+    forces: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Predictions:
+    """Accelerations that the final model predicts on a recording.
+
+    Attributes:
+        time: (n,) since the first state [s].
+        acceleration: (n, k) [rad/s^2 or m/s^2].
+    """
+
+    time: np.ndarray
+    acceleration: np.ndarray

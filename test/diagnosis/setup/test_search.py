@@ -1,0 +1,84 @@
+"""Errors of how a robot was connected are found, with their numbers, before any physics."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.setup.correction import Correction
+from sgp_ros.diagnosis.setup.errors import hypotheses
+from sgp_ros.diagnosis.setup.evidence import Probe
+from sgp_ros.diagnosis.setup.search import search
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.robots.gains import read_gains
+from sgp_ros.robots.nominal import nominal_model
+from sgp_ros.robots.registry import load_robot
+
+SHARED = Path(__file__).parents[4] / 'shared'
+CASES = SHARED / 'practice2' / 'cases'
+
+pytestmark = pytest.mark.skipif(not CASES.is_dir(), reason='shared recordings are elsewhere')
+
+
+def _raw(case):
+    nominal = nominal_model(load_robot(str(case / 'robot.urdf')))
+    tree, gains = nominal.tree, None
+    if (case / 'gains.yaml').exists():
+        gains = read_gains(case / 'gains.yaml', tree.moving_names, tree.moving_names)
+    events = open_recording(str(case / 'real.mcap')).events(None, None)
+    return collect(events, nominal.robot, nominal.stated, gains=gains), tree
+
+
+def _found(raw, tree):
+    return search(Probe(raw, tree, choose_bandwidth(raw, tree))).errors
+
+
+@pytest.mark.parametrize(
+    ('case', 'key', 'numbers'),
+    [
+        ('case_02', ('position_scale', 'elbow', ()), [1.06]),
+        ('case_03', ('clock_offset', 'all', ()), [0.03]),
+        ('case_04', ('base_orientation', 'base', ()), [0.0, np.pi / 2]),
+        ('case_08', ('gain_scale', 'shoulder', ()), [0.8, 1.0]),
+    ],
+)
+def test_an_error_of_the_connection_is_found_with_its_numbers(case, key, numbers):
+    (error,) = _found(*_raw(CASES / case))
+    assert error.hypothesis.key == key
+    assert error.numbers == pytest.approx(numbers, abs=0.02)
+    assert error.remedy
+
+
+@pytest.mark.parametrize('folder', ['practice2/cases/case_05', 'practice/cases/case_05'])
+def test_friction_is_no_error_of_the_connection(folder):
+    assert not _found(*_raw(SHARED / folder))
+
+
+def test_a_delay_of_targets_is_physics_and_not_a_clock():
+    assert not _found(*_raw(CASES / 'case_09'))
+
+
+def test_what_corrects_an_error_makes_the_recording_agree():
+    raw, tree = _raw(CASES / 'case_06')
+    wrong = Correction.none(tree.size)
+    wrong.offset[1], wrong.effort_scale[2] = 0.1, -1.0
+    shown = wrong.recording(raw)
+    undone = wrong.recording(shown)
+    assert undone.position[:, 0] == pytest.approx(raw.position[:, 0])
+    assert shown.position[:, 1] == pytest.approx(raw.position[:, 1] - 0.1)
+    assert undone.drive.values == pytest.approx(raw.drive.values)
+
+
+def test_every_hypothesis_proposes_a_change_that_its_neutral_numbers_do_not_make():
+    raw, tree = _raw(CASES / 'case_02')
+    probe = Probe(raw, tree, choose_bandwidth(raw, tree))
+    none = Correction.none(tree.size)
+    plain = probe.agreement(none)
+    for h in hypotheses(probe.full):
+        neutral = probe.agreement(h.applied(none, h.neutral))
+        changed = probe.agreement(h.applied(none, h.starts[0] if len(h.names) else h.neutral))
+        if h.names:
+            assert neutral.distance(plain) == pytest.approx(0.0, abs=1e-12), h.key
+        elif h.key[:2] != ('joint_sign', 'waist'):  # about gravity, a turn is as good as another
+            assert changed.distance(plain) > 0.0, h.key
