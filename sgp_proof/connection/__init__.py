@@ -1,0 +1,1 @@
+"""Robots that are connected or described wrongly: drawn, diagnosed, scored."""
