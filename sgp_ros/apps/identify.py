@@ -174,6 +174,7 @@ def read_signals(bag: str, robot: Robot, options: IdentifyOptions, remarks: list
         f'{bag}: {count} messages could not be read: {why}'
         for why, count in recording.unreadable.items()
     ]
+    remarks += [f'{bag}: {remark}' for remark in signals.remarks]
     return signals
 
 

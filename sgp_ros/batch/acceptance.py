@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sgp_ros.batch.continuity import jumps, unwrapped
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.intake import Intake, State
 from sgp_ros.engine.ordering import in_order
@@ -23,6 +24,7 @@ from sgp_ros.robots.robot import Robot
 USUAL = EngineConfig()
 """Settings of the intake where none are given: those of the engine."""
 _COMMON_SHARE = 0.5
+_SHOWN_JUMPS = 5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,10 +97,36 @@ class Accepted:
     counts: Counts
 
     def stretches(self, max_gap: float) -> list[np.ndarray]:
-        """Return the rows of stretches without a pause above `max_gap` [s], of one source each."""
+        """Return the rows of stretches of one source each, without a pause or a jump of positions.
+
+        Args:
+            max_gap: longest time between two states that is no pause [s].
+        """
         ends = np.diff(self.stamps_ns) > max_gap * 1e9
         ends |= np.diff(self.is_measured)
+        ends |= jumps(self.stamps_ns, self.position)
         return np.split(np.arange(len(self.stamps_ns)), np.flatnonzero(ends) + 1)
+
+    def jump_remarks(self, max_gap: float, start_ns: int) -> tuple[str, ...]:
+        """Say where the positions jump though the stamps go on, counted from `start_ns`."""
+        found = jumps(self.stamps_ns, self.position)
+        found &= np.diff(self.stamps_ns) <= max_gap * 1e9
+        times = 1e-9 * (self.stamps_ns[1:][found] - start_ns)
+        if not len(times):
+            return ()
+        shown = ', '.join(f'{t:.6g}' for t in times[:_SHOWN_JUMPS])
+        more = f' and {len(times) - _SHOWN_JUMPS} more' if len(times) > _SHOWN_JUMPS else ''
+        return (f'Positions jump at t = {shown} s{more}: taken as {len(times) + 1} recordings.',)
+
+    def unwrapped(self, robot: Robot) -> Accepted:
+        """Return the states with the turns of the robot's joints without limits counted on."""
+        turning = [
+            j for j, joint in enumerate(robot.joints)
+            if joint.kind == 'revolute' and not np.isfinite([joint.lower, joint.upper]).any()
+        ]  # fmt: skip
+        position = self.position.copy()
+        position[:, turning] = unwrapped(self.stamps_ns, self.position[:, turning])
+        return replace(self, position=position)
 
 
 def accept(

@@ -39,12 +39,13 @@ class Signals:
         velocity: (n, k) measured [rad/s or m/s]; None without.
         effort: (n, k) measured, or commanded as the module says; 0 for a passive joint.
         command: (n, k) mean of the held commands from each row's time to the next; None without.
-        segments: stretches without gaps, as rows.
+        segments: stretches without gaps or jumps of positions, as rows.
         refused: states by reason.
         commands_refused: commands by reason.
         rate: of the grid [Hz].
         start_ns: stamp of the first accepted state [ns].
         left_out: accepted states of stretches too short to be filtered.
+        remarks: where the positions jump.
     """
 
     time: np.ndarray
@@ -58,6 +59,7 @@ class Signals:
     rate: float
     start_ns: int
     left_out: int = 0
+    remarks: tuple[str, ...] = ()
 
 
 def collect_signals(
@@ -73,7 +75,7 @@ def collect_signals(
     Raises:
         RecordingError: nothing usable is left.
     """
-    accepted = accept(events, robot, config)
+    accepted = accept(events, robot, config).unwrapped(robot)
     stretches = accepted.stretches(config.max_gap)
     used = [rows for rows in stretches if len(rows) >= SHORTEST_SEGMENT]
     if not used:
@@ -105,6 +107,7 @@ def collect_signals(
         1.0 / step,
         int(accepted.stamps_ns[0]),
         sum(map(len, stretches)) - sum(map(len, used)),
+        accepted.jump_remarks(config.max_gap, int(accepted.stamps_ns[0])),
     )
 
 

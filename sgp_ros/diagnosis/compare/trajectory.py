@@ -55,12 +55,12 @@ class RawTrajectory:
         effort: (n, k) measured; None without.
         drive: commands, of efforts or, with gains, targets (c, 2 k) of position and velocity; None
             without.
-        segments: stretches without a pause.
+        segments: stretches without a pause or a jump of positions.
         refused: states by reason.
         noise_density: (k,) of the positions, one-sided [rad^2/Hz or m^2/Hz].
         start_ns: stamp of the first state of the recording.
         stated: effects that the nominal robot has, beside those of its tree.
-        remarks: what is odd about the efforts.
+        remarks: what is odd about efforts and positions.
         gains: of drives that hold position targets; None where commands are efforts.
         recording: (n,) index of the recording of each row, of several; None of one.
         approach: (n, k) direction from which each settled point was approached; None of motion.
@@ -110,6 +110,8 @@ def collect(
     """
     known_events = list(events)
     accepted = accept(known_events, robot, config, EFFORT if gains is None else POSITION)
+    if gains is None:  # position targets wrap with the positions
+        accepted = accepted.unwrapped(robot)
     start_ns = min(e.stamp_ns for e in known_events if isinstance(e, JointSample))
     seconds = (accepted.stamps_ns - start_ns) * 1e-9
     measured = bool(accepted.is_measured.mean() > _COMMON_SHARE)
@@ -131,6 +133,7 @@ def collect(
         slice(int(end) - len(part.time), int(end)) for end, part in zip(ends, parts, strict=True)
     )
     drive, remarks = _drive(accepted, robot, config, gains, measured=measured)
+    remarks += accepted.jump_remarks(config.max_gap, start_ns)
     position = np.concatenate([part.position for part in parts])
     return RawTrajectory(
         np.concatenate([part.time for part in parts]), step, position,
