@@ -160,7 +160,7 @@ def test_refused_commands_are_counted_by_reason():
     ]
     signals = collect_signals([*events, *bad], CART, EngineConfig(max_gap=0.1))
     assert signals.commands_refused == {
-        'late': 0, 'wrong_length': 1, 'unknown_joint': 1, 'nonfinite': 1,
+        'late': 0, 'wrong_length': 1, 'unknown_joint': 1, 'wrong_kind': 0, 'nonfinite': 1,
     }  # fmt: skip
     assert signals.effort[3:-3] == pytest.approx(1.0)
 
