@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations, joint_name
+from sgp_ros.diagnosis.compare.settled import shows as may_show
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, PER_EFFECT, PER_PARAMETER
 from sgp_ros.diagnosis.decide.decision import Decision, Scale
 from sgp_ros.diagnosis.explain.candidates import split
@@ -47,7 +48,8 @@ def visibility(
         decision: its final model, or the best one where nothing is adequate.
 
     Returns:
-        By joint, effect and parameter; infinite where no size would show.
+        By joint, effect and parameter; infinite where no size would show. Of settled points only
+        what acts at rest.
     """
     model = decision.tentative or decision.model
     beside = _Beside(Columns(equations), Scale.of(equations, comparison), model)
@@ -55,7 +57,7 @@ def visibility(
     found = {}
     for effect, quantity in _sought():
         for place in effect.places(motion):
-            if place.joint < 0:
+            if place.joint < 0 or not may_show(effect, place, motion):
                 continue
             unit = quantity.unit_on(is_prismatic=bool(motion.tree.is_prismatic[place.joint]))
             value = _least(beside, effect, quantity, place)

@@ -48,6 +48,7 @@ def test_statics_of_a_link_names_friction_and_a_spring_without_a_clock(robots):
     assert named['spring']['rest'] == pytest.approx(REST, abs=0.01)
     assert found.proofs['held_out'].nmse_after['joint0'] < 1e-3
     assert found.proofs['held_out'].acceleration_after == {}
+    assert {effect for _, effect, _ in found.visibility} == {'coulomb_friction'}
 
 
 def test_only_what_shows_at_rest_is_a_candidate(robots):
