@@ -1,0 +1,62 @@
+"""A free swing needs no efforts: where nothing drives a robot they are zero."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.pipeline import diagnose
+from sgp_ros.errors import RecordingError
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.recordings.tables import import_table
+from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.urdf_robot import nominal_tree
+from test.diagnosis.worlds import CHAINS, events_of, shown, simulate, urdf
+
+LEVEL = 0.08
+MAP = {
+    'time': {'column': 't', 'unit': 's'},
+    'joints': {'joint0': {'position': {'column': 'q', 'unit': 'rad'}}},
+}
+
+
+@pytest.fixture(scope='module')
+def passive(tmp_path_factory):
+    """Robot and nominal tree of one link without a motor."""
+    folder = tmp_path_factory.mktemp('passive')
+    (folder / 'chain.urdf').write_text(urdf(CHAINS[1]))
+    (folder / 'robot.yaml').write_text('schema: 1\nurdf: chain.urdf\npassive: [joint0]\n')
+    robot = load_robot(str(folder / 'robot.yaml'))
+    return robot, nominal_tree(robot)
+
+
+def _swing(**forces):
+    return simulate(CHAINS[1], 1, 6.0, motor=lambda _commands, _t: (0.0,), **forces)
+
+
+def test_a_free_swing_without_efforts_is_diagnosed(passive):
+    """Of a perfect model, which nothing is missing from."""
+    events = events_of(_swing(), commands=False)
+    assert all(event.effort is None for event in events)
+    assert diagnose(events, *passive, {}).verdict == 'no_mismatch'
+
+
+def test_a_driven_link_without_efforts_is_refused(robots):
+    events = events_of(_swing(), commands=False)
+    with pytest.raises(RecordingError, match='no state with an effort'):
+        diagnose(events, *robots[1], {})
+
+
+def test_friction_of_a_free_swing_is_found_in_an_imported_table(passive, tmp_path):
+    """A table of times and positions alone is enough."""
+    world = _swing(dry=lambda _t, _q, _s: LEVEL)
+    rows = [f'{t:.6f},{q:.9f}' for t, q in zip(world.time, np.ravel(shown(world.position)),
+                                                    strict=True)]  # fmt: skip
+    (tmp_path / 'swing.csv').write_text('\n'.join(['t,q', *rows]) + '\n')
+    (tmp_path / 'map.yaml').write_text(json.dumps(MAP))
+    bag = import_table(tmp_path / 'swing.csv', tmp_path / 'map.yaml', tmp_path).path
+    found = diagnose(list(open_recording(bag).events(None, None)), *passive, {})
+    assert [f.effect for f in found.findings] == ['coulomb_friction']
+    assert found.findings[0].parameters['level'].value == pytest.approx(LEVEL, rel=0.02)
