@@ -81,7 +81,10 @@ class Contrasts:
             driven = motion.tree.is_actuated[: motion.tree.size]
             inertial = motion.mass_diagonal * motion.acceleration
             power = np.where(driven, (motion.effort**2).mean(axis=0), (inertial**2).mean(axis=0))
-            found[name] = motion, imbalance(self._asserted, self._equations, motion), power
+            lacks = imbalance(self._asserted, self._equations, motion)
+            if motion.is_static:  # the nominal robot may need no effort to hold its poses
+                power = np.maximum(power, (lacks**2).mean(axis=0))
+            found[name] = motion, lacks, power
         return found
 
     def _difference(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,9 @@ from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.engine.samples import JointSample, frozen_array
 from sgp_ros.errors import RecordingError
 from sgp_ros.physics.catalogue import EFFECTS
-from test.diagnosis.worlds import CHAINS, GRAVITY
+from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.urdf_robot import nominal_tree
+from test.diagnosis.worlds import CHAINS, GRAVITY, urdf
 
 LEVEL, STIFF, REST = 0.3, 1.5, 0.4
 
@@ -32,6 +36,12 @@ def _points(n=400):
     ]
 
 
+def _with_friction_alone(point):
+    link, q = CHAINS[1][0], point.position[0]
+    others = link.mass * GRAVITY * link.centre * np.sin(q) + STIFF * (q - REST)
+    return replace(point, effort=frozen_array(point.effort - others))
+
+
 def test_directions_of_approach_ignore_the_flicker_of_an_encoder():
     """Back by one count is no reversal; the turn at the end is."""
     q = 0.1 * np.array([0, 1, 2, 1, 2, 3, 4, 4, 5, 4, 2, 1, 0, 1, 0, -1])
@@ -49,6 +59,17 @@ def test_statics_of_a_link_names_friction_and_a_spring_without_a_clock(robots):
     assert found.proofs['held_out'].nmse_after['joint0'] < 1e-3
     assert found.proofs['held_out'].acceleration_after == {}
     assert {effect for _, effect, _ in found.visibility} == {'coulomb_friction'}
+
+
+def test_efforts_of_an_axis_without_gravity_are_compared_by_their_size(tmp_path):
+    """Two levels that are nearly equal are no other law, though the nominal robot needs none."""
+    path = tmp_path / 'upright.urdf'
+    path.write_text(urdf(CHAINS[1]).replace('axis xyz="0 1 0"', 'axis xyz="0 0 1"'))
+    robot = load_robot(str(path))
+    points = [_with_friction_alone(point) for point in _points()]
+    found = diagnose(points, robot, nominal_tree(robot), {}, holds_out=True, is_static=True)
+    assert [f.effect for f in found.findings] == ['coulomb_friction']
+    assert found.equivalents == ()
 
 
 def test_only_what_shows_at_rest_is_a_candidate(robots):
