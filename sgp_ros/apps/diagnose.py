@@ -10,7 +10,6 @@ from typing import Any
 
 from sgp_ros.apps.diagnosed_robot import replayed, write_diagnosed
 from sgp_ros.batch.acceptance import require_joints
-from sgp_ros.diagnosis.compare.equations import disagreement, nominal_shares
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
@@ -27,11 +26,11 @@ from sgp_ros.report.diagnosis_text import (
     equivalence_sentence,
     parameter_errors_text,
     phrase,
-    verdict_sentence,
     visibility_sentences,
     why_it_lost,
 )
 from sgp_ros.report.files import replacing_results, write_text
+from sgp_ros.report.verdict import simulated, verdict_sentence
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.gains import Gains, read_gains
 from sgp_ros.robots.given_bodies import with_bodies
@@ -47,7 +46,7 @@ class DiagnoseOptions:
     """What is read.
 
     Attributes:
-        sim: recording of the nominal simulation, which the robot is checked with; None without.
+        sim: recording of the simulation that the machine is compared with; None for the robot.
         tests: held-out recordings; a part of the training recording without any.
         joint_states: topic of the states; None for the one there is.
         command: topic of the commands; None for the one there is.
@@ -93,14 +92,14 @@ def run_diagnose(
     events = _read([bag] if isinstance(bag, str) else bag, model, chosen, remarks)
     tests = _read(chosen.tests, model, chosen, remarks, taken=('train', *events))
     gains = _gains(chosen, tree)
-    simulation = _simulation(nominal, chosen, remarks)
+    simulation = None if chosen.sim is None else _events(chosen.sim, model, chosen, remarks)
     found = diagnose(
         events, model, tree, tests, stated=nominal.stated, holds_out=not chosen.tests,
-        is_static=chosen.static, gains=gains, progress=progress,
+        is_static=chosen.static, gains=gains, simulation=simulation, progress=progress,
         config=EngineConfig(effort_source=EFFORT_SOURCES[chosen.effort]),
     )  # fmt: skip
     remarks = [*found.remarks, *remarks, *_refusals(found)]
-    found = replace(found, simulation=simulation, remarks=tuple(remarks))
+    found = replace(found, remarks=tuple(remarks))
     # a node meets one recording of a motion, as it is; settled points are none
     is_met = gains is None and not chosen.static and not found.setup
     first = next(iter(events.values())) if is_met else []
@@ -128,19 +127,6 @@ def _nominal(robot: str, options: DiagnoseOptions) -> Nominal:
     if options.bodies is None:
         return nominal
     return nominal_model(with_bodies(nominal.robot, options.bodies))
-
-
-def _simulation(
-    nominal: Nominal, options: DiagnoseOptions, remarks: list[str]
-) -> dict[str, float]:
-    """Return what the nominal robot leaves of its simulation, by joint; empty without one."""
-    if options.sim is None:
-        return {}
-    events = _events(options.sim, nominal.robot, options, remarks)
-    shares = nominal_shares(events, nominal.robot, nominal.tree, nominal.stated)
-    said = disagreement(shares, Path(options.sim).name)
-    remarks += [said] if said else []
-    return shares
 
 
 def _read(
@@ -186,6 +172,7 @@ def print_diagnosis(found: Diagnosis) -> None:
     print(verdict_sentence(found))
     _print_findings('set-up', found.setup)
     _print_findings('found', found.findings)
+    _print_findings('both', found.shared)
     is_missing = found.verdict == 'missing_physics' and bool(found.findings)
     best = found.findings[0] if is_missing else None
     if found.findings:
@@ -210,6 +197,8 @@ def print_diagnosis(found: Diagnosis) -> None:
 def _print_findings(kind: str, findings: Sequence[Finding]) -> None:
     for f in findings:
         where = f'{f.joint}: {phrase(f)}'
+        if f.in_simulation:
+            where += f' (simulation: {", ".join(simulated(f))})'
         print(f'  {kind:9s} p {f.probability:.2f}  {where}{f"; {f.why}" if f.why else ""}')
         if f.formula:
             print(f'                    {f.formula}')

@@ -97,7 +97,7 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
     Raises:
         RecordingError: too little is left to decide.
     """
-    plain = _compared(recordings, tree, progress)
+    plain = compared(recordings, tree, progress)
     is_static = recordings.learned.approach is not None  # inertia is what tells units apart
     if is_static or plain.several.decision.verdict == 'no_mismatch':
         return plain
@@ -107,7 +107,7 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
         return plain
     correction = found.errors[-1].correction
     corrected = replace(
-        _compared(recordings.corrected(correction), correction.tree(tree), progress),
+        compared(recordings.corrected(correction), correction.tree(tree), progress),
         correction=correction,
     )
     numbers = sum(len(e.numbers) for e in found.errors)
@@ -124,7 +124,8 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
     )
 
 
-def _compared(recordings: Recordings, tree: Tree, progress: Callable[[float], None]) -> Connected:
+def compared(recordings: Recordings, tree: Tree, progress: Callable[[float], None]) -> Connected:
+    """Return the models that are compared on recordings as they are."""
     bandwidth = choose_bandwidth(recordings.learned, tree)
     require_rows(recordings.learned, bandwidth)
     equations = make_equations(recordings.learned, tree, bandwidth, recordings.unstated)

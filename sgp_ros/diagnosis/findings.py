@@ -88,11 +88,11 @@ def differences(several: Several, names: Sequence[str]) -> tuple[Difference, ...
         if not isinstance(s.effect, InRecording):
             continue
         law, force = s.effect.law, model.forces[i][at == s.effect.recording]
-        own = _parameters(s, motion, std[i])
+        own = stated_parameters(s, motion, std[i])
         whole, shared = own, common.get((law.name, s.place))
         if shared is not None and law.linear:
             c = s.coefficients + shared.coefficients
-            whole = _parameters(replace(s, coefficients=c), motion, std[i])
+            whole = stated_parameters(replace(s, coefficients=c), motion, std[i])
         found.append(
             Difference(
                 names[s.effect.recording], joint_name(motion, s.place.joint), law.name,
@@ -148,12 +148,12 @@ def _finding(
     location = Location((inside[0],), {inside[0]: inside[1]}) if inside else Location()
     return Finding(
         joint_name(motion, candidate.place.joint), candidate.name,
-        _parameters(candidate, motion, std), location, float(model.score - decision.against),
+        stated_parameters(candidate, motion, std), location, float(model.score - decision.against),
         chances.of(model, index), model.shares[index], candidate.effect.formula, why,
     )  # fmt: skip
 
 
-def _parameters(
+def stated_parameters(
     effect: EffectAt, motion: ObservedMotion, std: dict[str, float]
 ) -> dict[str, Parameter]:
     """Return the reported numbers with units and standard deviations, and the words."""

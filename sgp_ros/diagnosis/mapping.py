@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from sgp_ros.diagnosis.prove.rollouts import HORIZON_S
-from sgp_ros.diagnosis.result import Diagnosis, Finding, Parameter, Proof
+from sgp_ros.diagnosis.result import Diagnosis, Difference, Finding, Parameter, Proof
 
 
 def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
@@ -18,7 +18,9 @@ def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
         'schema': 2,
         'verdict': found.verdict,
         'certainty': _finite(found.certainty),
+        'reference': found.reference,
         'setup': [_finding(f) for f in found.setup],
+        'shared': [_finding(f) for f in found.shared],
         'findings': [_finding(f) for f in found.findings],
         'alternatives': [_finding(f) for f in found.alternatives],
         'equivalents': [
@@ -26,15 +28,7 @@ def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
              'separating_motion': e.motion, 'contrast': _finite(e.contrast)}
             for e in found.equivalents
         ],
-        'recordings': [
-            {
-                'recording': d.recording, 'effect': d.effect, 'joint': d.joint,
-                'parameters': {name: _parameter(p) for name, p in d.parameters.items()},
-                'difference': {name: _parameter(p) for name, p in d.difference.items()},
-                'probability': _finite(d.probability), 'share': _finite(d.share),
-            }
-            for d in found.differences
-        ],
+        'recordings': [_difference(d) for d in found.differences],
         'parameter_errors': [
             {
                 'link': e.link, 'parameter': e.parameter, 'value': _finite(e.value),
@@ -61,6 +55,15 @@ def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _difference(d: Difference) -> dict[str, Any]:
+    return {
+        'recording': d.recording, 'effect': d.effect, 'joint': d.joint,
+        'parameters': {name: _parameter(p) for name, p in d.parameters.items()},
+        'difference': {name: _parameter(p) for name, p in d.difference.items()},
+        'probability': _finite(d.probability), 'share': _finite(d.share),
+    }  # fmt: skip
+
+
 def _visibility(found: Diagnosis) -> list[dict[str, Any]]:
     return [
         {'joint': joint, 'effect': effect, 'parameter': name, **_parameter(p)}
@@ -83,6 +86,11 @@ def _finding(f: Finding) -> dict[str, Any]:
         'share': _finite(f.share),
         'formula': f.formula,
         'why': f.why,
+        **{
+            side: {name: _parameter(p) for name, p in numbers.items()}
+            for side, numbers in (('in_simulation', f.in_simulation), ('difference', f.difference))
+            if numbers
+        },
     }
 
 

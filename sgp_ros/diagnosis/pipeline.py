@@ -13,7 +13,7 @@ from sgp_ros.diagnosis.compare.open_bodies import open_bodies, open_remark, with
 from sgp_ros.diagnosis.compare.sufficiency import require_signed
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.diagnosis.compare.velocity_sensor import sensor_lags
-from sgp_ros.diagnosis.connected import Connected, connect
+from sgp_ros.diagnosis.connected import Connected, compared, connect
 from sgp_ros.diagnosis.criteria import DOUBTED, REMAINDER_SHARE
 from sgp_ros.diagnosis.decide.certainty import certainty_of, probabilities
 from sgp_ros.diagnosis.decide.decision import Decision
@@ -29,13 +29,14 @@ from sgp_ros.diagnosis.findings import (
     differences,
     parameter_errors,
 )
-from sgp_ros.diagnosis.gathered import Knowledge, gather
+from sgp_ros.diagnosis.gathered import Knowledge, Recordings, gather
 from sgp_ros.diagnosis.locate.bands import bands
 from sgp_ros.diagnosis.locate.dependence import dependences
 from sgp_ros.diagnosis.locate.remainder import Remainder, learn_remainder
 from sgp_ros.diagnosis.prove.prediction import FinalModel, diagnosed_bodies
 from sgp_ros.diagnosis.prove.processes import harm, kept_processes
 from sgp_ros.diagnosis.prove.proof import prove, reasons_to_doubt
+from sgp_ros.diagnosis.reference import against_simulation, disagreement, none_in_simulation
 from sgp_ros.diagnosis.result import Diagnosis, Proof
 from sgp_ros.diagnosis.shown import Predictions, Traces
 from sgp_ros.engine.config import EngineConfig
@@ -45,6 +46,9 @@ from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.robot import Robot
+
+_CALM = ('no_mismatch', 'parameters_only')
+_UNCLEAR = 'What machine and simulation share cannot be said: one of them is unexplained.'
 
 
 def diagnose(
@@ -58,6 +62,7 @@ def diagnose(
     is_static: bool = False,
     config: EngineConfig = USUAL,
     gains: Gains | None = None,
+    simulation: Iterable[Event] | None = None,
     progress: Callable[[float], None] = lambda _share: None,
 ) -> Diagnosis:
     """Say what a recording has that the nominal robot lacks.
@@ -73,6 +78,7 @@ def diagnose(
         is_static: whether the recordings hold settled points, one row a pose.
         config: settings of the intake.
         gains: of drives that hold position targets; None where commands are efforts.
+        simulation: events of the simulation to compare with; None for the robot alone.
         progress: called with the share that is done.
 
     Raises:
@@ -92,7 +98,11 @@ def diagnose(
     )  # fmt: skip
     try:
         connected = connect(recordings, tree, lambda x: progress(0.05 + 0.85 * x))
-        return _diagnosed(connected, robot.name, progress)
+        found = _diagnosed(connected, robot.name, progress)
+        if simulation is None:
+            return found
+        recordings = gather({'': simulation}, {}, tree, known, holds_out=False)
+        return _against(found, connected, replace(recordings, unstated=unstated), tree)
     except np.linalg.LinAlgError as error:
         raise NumericalError(
             f'the equations of the recording have no solution ({error})',
@@ -153,6 +163,32 @@ def _diagnosed(connected: Connected, robot: str, progress: Callable[[float], Non
     )
 
 
+def _against(
+    found: Diagnosis, connected: Connected, simulation: Recordings, tree: Tree
+) -> Diagnosis:
+    """Return the diagnosis against a simulation instead of the robot."""
+    sim = compared(simulation, tree, lambda _share: None)
+    left = sim.several.comparison.nominal.mean_square / sim.equations.power
+    shares = dict(zip(found.joints, map(float, left), strict=True))
+    said = disagreement(shares)
+    found = replace(found, simulation=shares)
+    if not said:  # it simulates the nominal robot
+        findings = tuple(none_in_simulation(f) for f in found.findings)
+        return replace(found, reference='simulation', findings=findings)
+    reference = against_simulation(
+        connected.equations, connected.several, sim.equations, sim.several
+    )
+    if reference is None:
+        return replace(found, remarks=(said, _UNCLEAR, *found.remarks))
+    is_calm = reference.verdict in _CALM
+    return replace(
+        found, reference='simulation', findings=reference.findings, shared=reference.shared,
+        verdict='setup_error' if is_calm and connected.findings else reference.verdict,
+        certainty=_certainty(reference.certainty, connected, is_doubted=False),
+        traces=replace(found.traces, forces=()), remarks=(said, *found.remarks),
+    )  # fmt: skip
+
+
 def _certainty(certainty: float, connected: Connected, *, is_doubted: bool) -> float:
     """Return the least of what the verdict rests on."""
     rests_on = [certainty, *(f.probability for f in connected.findings)]
@@ -160,7 +196,7 @@ def _certainty(certainty: float, connected: Connected, *, is_doubted: bool) -> f
 
 
 def _verdict(decision: Decision, connected: Connected, *, is_missing: bool) -> str:
-    is_calm = decision.verdict in {'no_mismatch', 'parameters_only'}
+    is_calm = decision.verdict in _CALM
     if is_calm and connected.findings and not is_missing:
         return 'setup_error'
     return 'missing_physics' if is_missing and is_calm else decision.verdict

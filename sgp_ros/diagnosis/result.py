@@ -56,6 +56,8 @@ class Finding:
         share: of the mean squared effort of the joint.
         formula: of the effect.
         why: one sentence; for an alternative why it lost, for `unknown` what it depends on.
+        in_simulation: the parameters that the simulation has, where it is the reference.
+        difference: of the machine from the simulation.
     """
 
     joint: str
@@ -67,6 +69,8 @@ class Finding:
     share: float
     formula: str = ''
     why: str = ''
+    in_simulation: Mapping[str, Parameter] = field(default_factory=dict)
+    difference: Mapping[str, Parameter] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,6 +190,8 @@ class Diagnosis:
         bands: Z over each variable of each joint; empty where too few rows were had.
         recordings: stems of several training recordings; empty for one.
         differences: what differs between these, most probable first.
+        reference: `simulation` or `robot`, what the machine is compared with.
+        shared: effects that machine and simulation have alike.
         setup: errors of how the robot was connected or described, undone before all else.
         visibility: least that would show, infinite if nothing would; by joint, effect, parameter.
         bodies: (b, 10) inertial parameters of the final model, of bodies that can exist, in the
@@ -215,5 +221,7 @@ class Diagnosis:
     bands: tuple[Band, ...] = ()
     recordings: tuple[str, ...] = ()
     differences: tuple[Difference, ...] = ()
+    reference: str = 'robot'
+    shared: tuple[Finding, ...] = ()
     setup: tuple[Finding, ...] = ()
     visibility: Mapping[tuple[str, str, str], Parameter] = field(default_factory=dict)

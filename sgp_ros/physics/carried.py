@@ -20,6 +20,10 @@ _STRONGER = 2.0
 """Load over that for which the efforts of the recording would just do."""
 
 
+MOST_TILT = 0.35
+"""Beyond it a base does not stand badly, it is mounted in another orientation [rad]."""
+
+
 class GravityTilt(Effect):
     """A base that is not level: its orientation in the world is `Ry(pitch) Rx(roll)`."""
 
@@ -52,8 +56,8 @@ class GravityTilt(Effect):
         return 0.03 * np.array(ways)
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        """Return every orientation of gravity."""
-        most = np.array([math.pi, 0.5 * math.pi])
+        """Return tilts; a base that is mounted otherwise is stated wrongly, not tilted."""
+        most = np.full(2, MOST_TILT)
         return -most, most
 
     def draw(self, scene: Scene) -> Drawn:

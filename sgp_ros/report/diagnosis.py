@@ -21,12 +21,10 @@ from sgp_ros.report.diagnosis_text import (
     effect_name,
     equivalence_sentence,
     explained,
-    held_out_sentence,
     numbers,
     percent,
     place,
     quantity,
-    verdict_sentence,
     visibility_sentences,
     why_it_lost,
     worst_joint,
@@ -35,6 +33,7 @@ from sgp_ros.report.figures import png
 from sgp_ros.report.files import write_bytes, write_text
 from sgp_ros.report.html import MEANINGS, embedded
 from sgp_ros.report.metrics import versions
+from sgp_ros.report.verdict import held_out_sentence, verdict_sentence
 
 _NAMED = ('kind', 'source_joint')
 """Parameters that are part of the name of an effect."""

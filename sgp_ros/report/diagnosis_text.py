@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -19,8 +18,7 @@ from sgp_ros.diagnosis.result import (
     Proof,
 )
 from sgp_ros.gp.scores import INTERVAL_95
-from sgp_ros.physics.catalogue import exerts_force, words_of
-from sgp_ros.report.diagnosis_proof import recording_name
+from sgp_ros.physics.catalogue import words_of
 
 UNKNOWN = 'unknown'
 """Name of what no effect of the catalogue describes."""
@@ -29,43 +27,7 @@ _ENTRIES = {f'com_{axis}': f'{axis} of the centre' for axis in 'xyz'}
 _MEANINGLESS = 1e6
 """Error over variance that only a constant effort gives."""
 _SIMILAR_NATS = 20.0
-_MOST_ERRORS, _MOST_VARIABLES = 3, 2
-
-
-def verdict_sentence(found: Diagnosis) -> str:
-    """Return the finding in one sentence; `+-` is half of a 95 % interval."""
-    if found.setup:
-        each = [f'{place(f)}: {phrase(f)} (probability {f.probability:.2f})' for f in found.setup]
-        head = f'The recording and the robot file do not fit together: {"; ".join(each)}.'
-        rest = verdict_sentence(replace(found, setup=()))
-        return head if found.verdict == 'setup_error' else f'{head} Beside that: {rest}'
-    if found.verdict == 'missing_physics':
-        return _missing(found)
-    if found.verdict == 'parameters_only':
-        return (
-            'No physics is missing, only parameters of bodies are wrong: '
-            f'{parameter_errors_text(found.parameter_errors)} (certainty {found.certainty:.2f}); '
-            f'correcting them explains {percent(explained(found))} of what the nominal robot '
-            'leaves.'
-        )
-    if found.verdict == 'no_mismatch':
-        return _calm(found)
-    return _unexplained(found)
-
-
-def held_out_sentence(found: Diagnosis) -> str:
-    """Say how the error of the effort changes on recordings that nothing was fitted to."""
-    parts = []
-    for stem, proof in found.proofs.items():
-        if stem == 'train':
-            continue
-        joint = worst_joint(proof)
-        before, after = percent(proof.nmse_before[joint]), percent(proof.nmse_after[joint])
-        change = before if found.verdict == 'no_mismatch' else f'{before} before, {after} after'
-        parts.append(f'{change} on {recording_name(stem)} ({joint})')
-    if not parts:
-        return 'No recording was held out: nothing here shows how far the finding carries.'
-    return 'Left of the variance of the effort on what was held out: ' + '; '.join(parts) + '.'
+_MOST_ERRORS = 3
 
 
 def scored_joints(proof: Proof) -> list[str]:
@@ -231,66 +193,6 @@ def visibility_sentences(found: Diagnosis) -> list[str]:
         parts += [f'of any size on {", ".join(never)}'] if never else []
         sentences.append(f'{plain_name(effect)}, {"; ".join(parts)}')
     return sentences
-
-
-def _missing(found: Diagnosis) -> str:
-    if not found.findings:
-        return (
-            'Nothing is missing that all recordings have in common, but they differ: '
-            f'{"; ".join(differences_text(found))}.'
-        )
-    first = found.findings[0]
-    text = f'Missing {place(first)}: {phrase(first)} (probability {first.probability:.2f})'
-    for previous, f in pairwise(found.findings):
-        where = '' if f.joint == previous.joint else f'{place(f)}: '
-        text += f'; and {where}{phrase(f)} (probability {f.probability:.2f})'
-    if any(exerts_force(f.effect) for f in found.findings):
-        subject = 'it explains' if len(found.findings) == 1 else 'together they explain'
-        if found.parameter_errors:
-            subject = 'with corrected bodies it explains'
-            if len(found.findings) > 1:
-                subject = 'with corrected bodies they explain'
-        text += f'; {subject} {percent(explained(found))} of what the nominal robot leaves'
-    return text + '.'
-
-
-def _calm(found: Diagnosis) -> str:
-    proof = found.proofs['train']
-    name = worst_joint(proof)
-    j = found.joints.index(name)
-    left = float(np.sqrt((found.traces.before[:, j] ** 2).mean()))
-    noise, unit = float(found.traces.noise[j]), found.units[j]
-    text = (
-        f'No mismatch: the nominal robot leaves {percent(proof.nmse_before[name])} of the '
-        f'variance of the effort, {left:.2g} {unit} rms on {name}'
-    )
-    if left <= 2.0 * noise:
-        text += f', as much as the noise of the encoder ({noise:.2g} {unit})'
-    else:
-        text += ', too little to be physics'
-    return f'{text} (certainty {found.certainty:.2f}).'
-
-
-def _unexplained(found: Diagnosis) -> str:
-    named = [f for f in found.findings if f.effect == UNKNOWN]
-    joint = named[0].joint if named else found.joints[0]
-    certainty = named[0].probability if named else found.certainty
-    share = named[0].share if named else explained(found)
-    text = (
-        f'Unexplained on {joint}: {percent(share)} of the mean squared effort '
-        f'(certainty {certainty:.2f})'
-    )
-    of = next((d for d in found.dependences if d.joint == joint), None)
-    scores = {} if of is None else {n: s for n, s in of.scores.items() if of.is_significant(n)}
-    leading = sorted(scores, key=lambda name: -scores[name])[:_MOST_VARIABLES]
-    on = [f'{name} ({percent(scores[name])})' for name in leading if scores[name] > 0.05]
-    text += f'; it depends on {" and ".join(on)}' if on else '; no variable alone explains it'
-    if not found.alternatives:
-        return f'{text}; no effect of the list fits.'
-    top = found.alternatives[0]
-    nearest = [f for f in found.alternatives if f.log_bayes_factor == top.log_bayes_factor]
-    names = ' with '.join(dict.fromkeys(plain_name(f.effect) for f in nearest))
-    return f'{text}; no effect of the list fits: the nearest, {names}, {top.why.split(", ")[0]}.'
 
 
 def _error(e: ParameterError) -> str:

@@ -31,14 +31,13 @@ from sgp_ros.report.diagnosis_text import (
     effect_name,
     equivalence_sentence,
     explained,
-    held_out_sentence,
     percent,
     plain_name,
     quantity,
-    verdict_sentence,
     visibility_sentences,
     why_it_lost,
 )
+from sgp_ros.report.verdict import held_out_sentence, verdict_sentence
 from test.report.diagnoses import (
     ASYMMETRIC,
     COULOMB,

@@ -12,7 +12,7 @@ would no longer be those of the robot that was given. The simulation only checks
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -22,19 +22,13 @@ from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
     RawTrajectory,
-    choose_bandwidth,
-    collect,
     observe,
     parallel_filter,
 )
-from sgp_ros.diagnosis.criteria import LEAST_SHARE
-from sgp_ros.engine.samples import Event
-from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import PLACES
 from sgp_ros.rigid.rigid_body import mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
-from sgp_ros.robots.robot import Robot
 
 SPREAD = 0.25
 """Prior standard deviation of mass and inertia, relative; of the centre, to the radius."""
@@ -265,36 +259,3 @@ def make_equations(
         _smoothing_error(raw, motion, low, bandwidth),
     )  # fmt: skip
     return equations.with_dry_friction(motion.dry_joints)
-
-
-def nominal_shares(
-    events: Iterable[Event], robot: Robot, tree: Tree, stated: tuple[EffectAt, ...] = ()
-) -> dict[str, float]:
-    """Return the share of the mean squared effort that the nominal robot leaves, by joint.
-
-    Args:
-        events: of the simulation.
-        robot: names, actuated joints and gains.
-        tree: nominal robot.
-        stated: effects that the nominal robot has, beside those of its tree.
-
-    Raises:
-        RecordingError: too little motion, or none of the joints.
-    """
-    raw = collect(events, robot, stated)
-    equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
-    shares = (equations.d**2).mean(axis=0) / equations.power
-    return dict(zip(tree.moving_names, map(float, shares), strict=True))
-
-
-def disagreement(shares: Mapping[str, float], recording: str) -> str:
-    """Return a sentence on what the nominal robot leaves of a simulation; empty if little."""
-    worst = max(shares, key=lambda name: shares[name])
-    if shares[worst] < LEAST_SHARE:
-        return ''
-    return (
-        f'The robot does not describe {recording}: it leaves {100.0 * shares[worst]:.2g} % of '
-        f'the mean squared effort of {worst} there, and {100.0 * LEAST_SHARE:.2g} % count as '
-        'physics. What is found is what the real robot has beyond the nominal one; the '
-        'simulation may have some of it too.'
-    )

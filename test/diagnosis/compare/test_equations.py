@@ -9,12 +9,9 @@ import pytest
 
 from sgp_ros.diagnosis.compare.equations import (
     body_directions,
-    disagreement,
     make_equations,
-    nominal_shares,
 )
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
-from sgp_ros.diagnosis.criteria import LEAST_SHARE
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.regression import Columns
@@ -146,19 +143,3 @@ def test_columns_know_whom_they_were_made_for(equations_for, viscous):
     for i in range(450):
         columns.of(replace(tilt, shape=np.array([0.0, 0.001 * i])), equations, w)
     assert len(columns._known) <= 401
-
-
-def test_a_simulation_of_the_nominal_robot_leaves_nothing_to_say(robots, perfect):
-    """Its errors are those of filters and encoders."""
-    shares = nominal_shares(events_of(perfect[2]), *robots[2])
-    assert list(shares) == ['joint0', 'joint1']
-    assert max(shares.values()) < 0.1 * LEAST_SHARE
-    assert disagreement(shares, 'sim.mcap') == ''
-
-
-def test_a_simulation_of_another_robot_is_told_with_its_joint_and_number(robots, heavy):
-    """A last link that is heavier by 30 % shows most in the last joint."""
-    shares = nominal_shares(events_of(heavy[2]), *robots[2])
-    said = disagreement(shares, 'sim.mcap')
-    assert 'sim.mcap' in said
-    assert f'{100.0 * shares["joint1"]:.2g} % of the mean squared effort of joint1' in said

@@ -99,7 +99,7 @@ CASES = [
     *_levels('backlash', 'gap', (0.002, 0.03, 0.4), motor_share=0.3),
     *_levels('payload', 'mass', (0.05, 0.6, 2.8, 12.0), x=0.02, y=0.0, z=-0.25),
     *_levels('payload', 'z', (0.1, -0.5), x=0.05, y=0.03, mass=1.0),
-    *_levels('gravity_tilt', 'roll', (0.02, 0.6, -2.8), pitch=0.1),
+    *_levels('gravity_tilt', 'roll', (0.02, 0.15, -0.3), pitch=0.1),
     *_levels('joint_coupling', 'ratio', (-6.0, 0.2, 3.0), stiffness=0.8, kind='spring'),
     *_levels('coupled_friction', 'ratio', (-6.0, -1.0, 0.2, 3.0), coulomb=0.3, viscous=0.1),
     *_levels('end_stop', 'position', (-0.9, 0.0, 1.2), stiffness=20.0, damping=0.2, side='upper'),

@@ -1,0 +1,189 @@
+"""What a machine has that its simulation has not, and the other way round.
+
+Both recordings are explained by one structure: the effects named on the machine, those named on
+the simulation, or all of them, whichever is worth most on the two together. Each recording then
+gives the numbers of that structure with their errors. An effect differs where the difference is
+beyond its error and its force counts as physics, against the effort that moves: gravity, which
+both carry, would hide it. Bodies are compared by their force in the same way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sgp_ros.diagnosis.compare.equations import Equations, joint_name
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, LEAST_SHARE, MOST_CERTAIN, PER_EFFECT, TEMPER
+from sgp_ros.diagnosis.decide.decision import Scale
+from sgp_ros.diagnosis.decide.differences import Several
+from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.fitted_model import Model, floors
+from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.diagnosis.explain.uncertainty import reported_std
+from sgp_ros.diagnosis.findings import stated_parameters
+from sgp_ros.diagnosis.result import Finding, Location, Parameter
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
+
+_STEPS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """The machine against its simulation.
+
+    Attributes:
+        verdict: one of `VERDICTS`.
+        findings: effects that differ, with their numbers on both.
+        shared: effects that both have alike.
+        certainty: probability that the verdict is right.
+    """
+
+    verdict: str
+    findings: tuple[Finding, ...]
+    shared: tuple[Finding, ...]
+    certainty: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """One recording with its models."""
+
+    equations: Equations
+    scale: Scale
+    columns: Columns
+    named: tuple[EffectAt, ...]
+
+    @classmethod
+    def of(cls, equations: Equations, several: Several) -> _Side:
+        model = several.decision.model
+        scale = Scale.of(equations, several.comparison)
+        return cls(equations, scale, Columns(equations), model.effects)
+
+    def fitted(self, effects: tuple[EffectAt, ...], *, is_free: bool) -> Model:
+        d = self.equations.d
+        start = np.sqrt((d**2).mean(axis=0) + floors(self.equations))
+        return fit(self.columns, effects, start, is_free=is_free, steps=_STEPS)
+
+
+def against_simulation(
+    equations: Equations, several: Several, simulated: Equations, simulation: Several
+) -> Reference | None:
+    """Return what differs; None where either recording is unexplained.
+
+    Args:
+        equations: of the machine.
+        several: its models.
+        simulated: equations of the simulation, for the same nominal robot.
+        simulation: its models.
+    """
+    decisions = several.decision, simulation.decision
+    if any(d.verdict == 'unexplained' for d in decisions):
+        return None
+    real, sim = _Side.of(equations, several), _Side.of(simulated, simulation)
+    is_free = any(d.model.is_free for d in decisions)
+    ours, theirs = _best(real, sim, is_free=is_free)
+    std = reported_std(ours, real.columns), reported_std(theirs, sim.columns)
+    power = _moving_power(equations)
+    findings: list[Finding] = []
+    shared: list[Finding] = []
+    for i, (here, there) in enumerate(zip(ours.effects, theirs.effects, strict=True)):
+        finding = _compared(here, there, (std[0][i], std[1][i]), equations)
+        force = (
+            here.columns(equations.motion) @ here.coefficients
+            - there.columns(equations.motion) @ there.coefficients
+        )
+        joint = here.place.joint
+        share = (force**2).mean(axis=0) / (power if force.ndim == 2 else power[joint])
+        finding = replace(finding, share=float(np.max(share)))
+        is_different = finding.share > COUNTED_SHARE and finding.probability > 0.5
+        (findings if is_different else shared).append(finding)
+    shift = ours.w - theirs.w
+    moved = ((equations.base @ shift) ** 2).mean(axis=0) / power
+    calm = 'parameters_only' if moved.max() > COUNTED_SHARE else 'no_mismatch'
+    findings.sort(key=lambda f: -f.probability)
+    verdict = 'missing_physics' if findings else calm
+    stated = [f.probability for f in findings]
+    stated = stated or [1.0 - f.probability for f in shared if f.share > COUNTED_SHARE]
+    return Reference(verdict, tuple(findings), tuple(shared), min([*stated, MOST_CERTAIN]))
+
+
+def disagreement(shares: Mapping[str, float]) -> str:
+    """Return a sentence on what the nominal robot leaves of a simulation; empty if little.
+
+    Args:
+        shares: of the mean squared effort, by joint.
+    """
+    worst = max(shares, key=lambda name: shares[name])
+    if shares[worst] < LEAST_SHARE:
+        return ''
+    return (
+        f'The robot file does not describe the simulation: it leaves {100.0 * shares[worst]:.2g} '
+        f'% of the mean squared effort of {worst} there. The machine is compared with the '
+        'simulation as it was recorded.'
+    )
+
+
+def none_in_simulation(found: Finding) -> Finding:
+    """Return a finding against a simulation of the nominal robot, which has none of it."""
+    if found.effect not in EFFECTS:
+        return found
+    sizes = EffectAt(EFFECTS[found.effect], Place(0)).sizes
+    ours = {q: found.parameters[q.name] for q in sizes if q.name in found.parameters}
+    none = {q.name: Parameter(q.neutral, None, p.unit) for q, p in ours.items()}
+    apart = {q.name: replace(p, value=float(p.value) - q.neutral) for q, p in ours.items()}
+    return replace(found, in_simulation=none, difference=apart)
+
+
+def _best(real: _Side, sim: _Side, *, is_free: bool) -> tuple[Model, Model]:
+    """Return the models of both in the structure that is worth most on the two together."""
+    union = {s.key: s for s in (*sim.named, *real.named)}
+    structures = {tuple(s.key for s in x): x for x in (real.named, sim.named, union.values())}
+    found = []
+    for effects in structures.values():
+        models = tuple(side.fitted(tuple(effects), is_free=is_free) for side in (real, sim))
+        worth = real.scale.worth(models[0]) + sim.scale.worth(models[1])
+        found.append((worth, models))
+    return max(found, key=lambda x: x[0])[1]  # type: ignore[return-value]  # two of each
+
+
+def _moving_power(equations: Equations) -> np.ndarray:
+    """Return the mean squares of what moves the joints, efforts less those of gravity, (k,)."""
+    motion = equations.motion
+    still = np.zeros_like(motion.position)
+    held = motion.effort_for(motion.position, still, still)
+    k = motion.tree.size
+    driven = motion.tree.is_actuated[:k]
+    moving = ((motion.effort - held) ** 2).mean(axis=0)
+    return np.where(driven & (moving > 0.0), np.minimum(moving, equations.power), equations.power)
+
+
+def _compared(
+    here: EffectAt, there: EffectAt, std: tuple[Mapping[str, float], ...], equations: Equations
+) -> Finding:
+    """Return an effect with its numbers on both sides, and the probability that they differ."""
+    motion = equations.motion
+    ours, theirs = (
+        stated_parameters(s, motion, dict(x)) for s, x in zip((here, there), std, strict=True)
+    )
+    difference: dict[str, Parameter] = {}
+    furthest = 0.0
+    for name, p in ours.items():
+        other = theirs.get(name)
+        if isinstance(p.value, str) or other is None or isinstance(other.value, str):
+            continue
+        error = math.hypot(p.std or 0.0, other.std or 0.0)
+        apart = p.value - other.value
+        difference[name] = Parameter(apart, error or None, p.unit)
+        if error > 0.0:
+            furthest = max(furthest, abs(apart) / error)
+    odds = math.exp(min(TEMPER * (PER_EFFECT - 0.5 * furthest**2), 50.0))
+    return Finding(
+        joint_name(motion, here.place.joint), here.name, ours, Location(), 0.5 * furthest**2,
+        min(1.0 / (1.0 + odds), MOST_CERTAIN), 0.0, here.effect.formula,
+        in_simulation=theirs, difference=difference,
+    )  # fmt: skip
