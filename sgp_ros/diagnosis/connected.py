@@ -47,6 +47,8 @@ class Connected:
         findings: errors of the connection.
         equivalents: errors that the recording cannot tell from these.
         remarks: what is to be done about them.
+        rivals: joints with an error of the connection that would explain as much, not asserted.
+        trust: probability of the physics against these.
     """
 
     recordings: Recordings
@@ -56,6 +58,17 @@ class Connected:
     findings: tuple[Finding, ...] = ()
     equivalents: tuple[Equivalent, ...] = ()
     remarks: tuple[str, ...] = ()
+    rivals: tuple[str, ...] = ()
+    trust: float = 1.0
+
+    def against_rivals(self, finding: Finding) -> Finding:
+        """Return physics with its probability against errors of the connection elsewhere.
+
+        At the same joint the two are one law: a motor of another gain, efforts in another unit.
+        """
+        if not self.rivals or self.rivals == (finding.joint,):
+            return finding
+        return replace(finding, probability=finding.probability * self.trust)
 
     @property
     def scale(self) -> Scale:
@@ -115,13 +128,22 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
     nominal = np.minimum(plain.scale.nominal, corrected.scale.nominal)
     gain = corrected.worth(nominal) - price - plain.worth(nominal)
     if gain < PER_EFFECT:
-        return plain
+        return plain if gain < -ALIKE else _beside(plain, found, gain)
     return replace(
         corrected,
         findings=tuple(_finding(found, i, gain) for i in range(len(found.errors))),
         equivalents=_equal(found),
         remarks=(*(e.remedy for e in found.errors), *recordings.remarks),
     )
+
+
+def _beside(plain: Connected, found: Connection, gain: float) -> Connected:
+    """Return the recording as it is, with errors of the connection that explain as much."""
+    told = tuple((e.hypothesis.joint, e.hypothesis.effect) for e in found.errors)
+    return replace(
+        plain, equivalents=(Equivalent(told, '', 1.0),),
+        rivals=tuple(joint for joint, _ in told), trust=1.0 / (1.0 + math.exp(TEMPER * gain)),
+    )  # fmt: skip
 
 
 def compared(recordings: Recordings, tree: Tree, progress: Callable[[float], None]) -> Connected:

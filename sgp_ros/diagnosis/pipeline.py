@@ -127,6 +127,7 @@ def _diagnosed(connected: Connected, robot: str, progress: Callable[[float], Non
     chances = probabilities(equations, comparison, decision, contrasts)
     on_all = replace(decision, model=model)
     findings, forces = asserted(whole, on_all, lags, learned, chances, depends)
+    findings = tuple(connected.against_rivals(f) for f in findings)
     differ = differences(several, names)
     certainty = certainty_of((*findings, *differ), equations, comparison)
     progress(1.0)
