@@ -13,7 +13,7 @@ _LEAST_EXPLAINED = 0.5
 _GAINS = (0.25, 1.5)
 """Of a measured effort on an effort commanded: dead zone and saturation lower it."""
 
-_UNIT, _NEAR, _MOST_EXPLAINED = (0.8, 1.25), 0.3, 0.95
+_UNIT, _NEAR, _MOST_EXPLAINED = (0.95, 1.05), 0.2, 0.995
 """Slope, distance of the means in standard deviations, and share of a position on its target."""
 
 

@@ -32,6 +32,7 @@ from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.evidence import Probe
 from sgp_ros.diagnosis.setup.search import Connection, search
 from sgp_ros.diagnosis.shown import Predictions
+from sgp_ros.physics.parts import MOTOR
 from sgp_ros.rigid.tree import Tree
 
 
@@ -71,24 +72,36 @@ class Connected:
         return replace(finding, probability=finding.probability * self.trust)
 
     @property
-    def scale(self) -> Scale:
-        """What mean squares are measured against."""
-        return Scale.of(self.equations, self.several.comparison)
+    def nominal(self) -> np.ndarray:
+        """Shares of the discrepancy from the nominal robot, (k,)."""
+        return Scale.of(self.equations, self.several.comparison).nominal
 
-    def worth(self, nominal: np.ndarray) -> float:
-        """Return the worth of what is decided on the recording as it was recorded [nats].
+    def worth(self, nominal: np.ndarray, recorded: np.ndarray) -> float:
+        """Return the worth of what is decided, as the density of the recorded motion [nats].
+
+        Errors are relative to what the motors deliver, be their gain a law of the motor or an
+        error of the connection.
 
         Args:
             nominal: (k,) shares of the discrepancy whose shape is only nearly right; the same
                 for all that are compared.
+            recorded: (k,) mean squared efforts of the recording [N^2 m^2 or N^2].
         """
-        scale = replace(self.scale, nominal=nominal)
-        worth = scale.worth(self.several.decision.model)
-        if self.correction is None:
-            return worth
-        driven = self.equations.motion.tree.is_actuated[: len(self.correction.scale)]
-        rows = min(INDEPENDENT_ROWS, len(self.equations.d))
-        return worth + rows * self.correction.log_volume(driven)
+        model, equations = self.several.decision.model, self.equations
+        delivered = equations.filter(equations.motion.effort)
+        for s, force in zip(model.effects, model.forces, strict=True):
+            if s.effect.site is MOTOR:
+                delivered = delivered + force
+        driven = equations.motion.tree.is_actuated[: delivered.shape[1]]
+        power = np.maximum((delivered**2).mean(axis=0), 1e-12 * equations.power)
+        power = np.where(driven, power, equations.power)
+        scale = Scale.of(equations, self.several.comparison)
+        worth = replace(scale, nominal=nominal, power=power).worth(model)
+        order = range(len(power)) if self.correction is None else self.correction.effort_order
+        volume = 0.5 * float(np.log(recorded[list(order)] / power)[driven].sum())
+        if self.correction is not None:
+            volume -= float(np.log(np.abs(self.correction.scale)).sum())
+        return worth + min(INDEPENDENT_ROWS, len(equations.d)) * volume
 
     def recorded(self, found: Predictions) -> Predictions:
         """Return accelerations as the recording shows them."""
@@ -111,8 +124,9 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
         RecordingError: too little is left to decide.
     """
     plain = compared(recordings, tree, progress)
-    is_static = recordings.learned.approach is not None  # inertia is what tells units apart
-    if is_static or plain.several.decision.verdict == 'no_mismatch':
+    # known inertia is what tells units and signs apart
+    is_open = recordings.learned.approach is not None or bool(recordings.unstated)
+    if is_open or plain.several.decision.verdict == 'no_mismatch':
         return plain
     bandwidth = choose_bandwidth(recordings.learned, tree)
     found = search(Probe(recordings.learned, tree, bandwidth))
@@ -123,10 +137,15 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
         compared(recordings.corrected(correction), correction.tree(tree), progress),
         correction=correction,
     )
+    if corrected.several.decision.verdict == 'unexplained':
+        return _suspected(plain, found)
     numbers = sum(len(e.numbers) for e in found.errors)
     price = PER_EFFECT * len(found.errors) + PER_PARAMETER * numbers
-    nominal = np.minimum(plain.scale.nominal, corrected.scale.nominal)
-    gain = corrected.worth(nominal) - price - plain.worth(nominal)
+    gain = _gain(plain, corrected) - price
+    if gain >= PER_EFFECT and plain.several.decision.verdict != 'unexplained':
+        # on the same band: what is slower has less noise
+        cutoff = corrected.equations.filter.cutoff
+        gain = _gain(compared(recordings, tree, progress, cutoff), corrected) - price
     if gain < PER_EFFECT:
         return plain if gain < -ALIKE else _beside(plain, found, gain)
     return replace(
@@ -135,6 +154,24 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
         equivalents=_equal(found),
         remarks=(*(e.remedy for e in found.errors), *recordings.remarks),
     )
+
+
+def _gain(plain: Connected, corrected: Connected) -> float:
+    """Return by how much the corrected recording is better explained [nats]."""
+    nominal, recorded = np.minimum(plain.nominal, corrected.nominal), plain.equations.power
+    return corrected.worth(nominal, recorded) - plain.worth(nominal, recorded)
+
+
+def _suspected(plain: Connected, found: Connection) -> Connected:
+    """Return the recording as it is, and say what to check: neither way is it explained."""
+    told = ', '.join(
+        f'{e.hypothesis.effect.replace("_", " ")} ({e.hypothesis.joint})' for e in found.errors
+    )
+    said = (
+        f'Check how the robot is connected: {told} would leave less, but not little enough to '
+        'be asserted.'
+    )
+    return replace(plain, remarks=(said, *plain.remarks))
 
 
 def _beside(plain: Connected, found: Connection, gain: float) -> Connected:
@@ -146,9 +183,16 @@ def _beside(plain: Connected, found: Connection, gain: float) -> Connected:
     )  # fmt: skip
 
 
-def compared(recordings: Recordings, tree: Tree, progress: Callable[[float], None]) -> Connected:
-    """Return the models that are compared on recordings as they are."""
+def compared(
+    recordings: Recordings, tree: Tree, progress: Callable[[float], None], most_hz: float = np.inf
+) -> Connected:
+    """Return the models that are compared on recordings as they are, up to a cut-off [Hz]."""
     bandwidth = choose_bandwidth(recordings.learned, tree)
+    if bandwidth.cutoff > most_hz:
+        bandwidth = replace(
+            bandwidth, cutoff=most_hz,
+            state_cutoff=bandwidth.state_cutoff * most_hz / bandwidth.cutoff,
+        )  # fmt: skip
     require_rows(recordings.learned, bandwidth)
     equations = make_equations(recordings.learned, tree, bandwidth, recordings.unstated)
     several = decide_several(equations, len(recordings.names), progress)

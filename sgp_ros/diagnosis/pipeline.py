@@ -154,8 +154,8 @@ def _diagnosed(connected: Connected, robot: str, progress: Callable[[float], Non
         remarks=(*connected.remarks, *raw.remarks, *bound_remarks(decision), *on_z, *doubts),
         bodies=diagnosed_bodies(whole, model, recordings.unstated),
         equivalents=(
-            *connected.equivalents,
             *equivalents(equations, comparison, decision, contrasts),
+            *connected.equivalents,
         ),
         recordings=names if len(names) > 1 else (),
         differences=differ,

@@ -71,7 +71,7 @@ def search(probe: Probe) -> Connection:
     none = Correction.none(probe.motion.tree.size)
     start = now = probe.agreement(none)
     errors: list[Tried] = []
-    rivals: list[tuple[Tried, ...]] = []
+    rivals: dict[tuple[str, str, tuple[str, ...]], tuple[Tried, ...]] = {}
     correction = none
     for _ in range(_MOST):
         known = [e.hypothesis.key for e in errors]
@@ -79,11 +79,13 @@ def search(probe: Probe) -> Connection:
         if not ranked or ranked[0].worth < now.evidence + PER_EFFECT:
             break
         errors.append(ranked[0])
-        rivals.append(tuple(ranked[1:]))
+        rivals[ranked[0].hypothesis.key] = tuple(ranked[1:])
         if len(errors) > 1:
             errors = _together(probe, errors)
+        if errors[-1].agreement.evidence <= now.evidence:
+            break
         correction, now = errors[-1].correction, errors[-1].agreement
-    return Connection(tuple(errors), tuple(rivals), start)
+    return Connection(tuple(errors), tuple(rivals[e.hypothesis.key] for e in errors), start)
 
 
 def _together(probe: Probe, errors: list[Tried]) -> list[Tried]:
