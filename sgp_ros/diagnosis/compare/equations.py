@@ -74,19 +74,16 @@ class Equations:
     rests: np.ndarray
     model_error: np.ndarray
 
-    def filtered(self, columns: np.ndarray, joint: int, *, is_inertial: bool) -> np.ndarray:
-        """Return columns (n, m) of one joint, or (n, k, m), as rows (N, k, m).
+    def compact(self, columns: np.ndarray, joint: int, *, is_inertial: bool) -> np.ndarray:
+        """Return columns (n, m) of one joint as its rows (N, m), or (n, k, m) as (N, k, m).
 
         What acts on a joint that dry friction holds is taken up by it, except inertial forces:
         their smoothed share of the stop belongs to the motion before and after.
         """
-        moving = np.ones_like(self.moving) if is_inertial else self.moving
-        if columns.ndim == 3:
-            return self.filter(columns * moving[:, :, None])
-        x = self.filter(columns * moving[:, joint, None])
-        result = np.zeros((len(x), self.d.shape[1], x.shape[1]))
-        result[:, joint] = x
-        return result
+        if is_inertial:
+            return self.filter(columns)
+        moving = self.moving if columns.ndim == 3 else self.moving[:, joint]
+        return self.filter(columns * moving[..., None])
 
     def with_dry_friction(self, joints: frozenset[int]) -> Equations:
         """Return the equations under the hypothesis that dry friction may hold these joints.

@@ -23,7 +23,7 @@ from sgp_ros.diagnosis.decide.decision import Decision, Scale
 from sgp_ros.diagnosis.explain.candidates import split
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.regression import Columns, Frame
+from sgp_ros.diagnosis.explain.regression import Columns, Frame, on_all_joints
 from sgp_ros.diagnosis.result import Parameter
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
@@ -92,7 +92,8 @@ class _Beside:
         )
         force = candidate.columns(moved) @ candidate.coefficients
         joint = candidate.place.joint
-        own = equations.filtered(force[:, None], joint, is_inertial=candidate.effect.is_inertial)
+        own = equations.compact(force[:, None], joint, is_inertial=candidate.effect.is_inertial)
+        own = on_all_joints(own, joint, len(scale.power))
         z = frame.projected(own)[:, 0]
         others = tuple(s for s in model.effects if not self._is(s, own, equations))
         _, A, _ = split(frame, self.columns, others, model.w)

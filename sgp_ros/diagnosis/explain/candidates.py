@@ -32,6 +32,7 @@ def fit(
     w: np.ndarray | None = None,
     rounds: int = 3,
     steps: int = 12,
+    still: int = 0,
 ) -> Model:
     """Fit shapes, coefficients and inertial parameters; the scale of each joint by iteration.
 
@@ -43,12 +44,14 @@ def fit(
         w: (p,) their change to start from; None for none.
         rounds: iterations.
         steps: of the search in the first.
+        still: so many of the first candidates keep their shapes.
     """
     equations = columns.equations(dry_joints(candidates))
     frame = Frame.of(equations, sigma, is_free=is_free)
     model = None
     for _ in range(rounds):
-        candidates = _searched(frame, columns, candidates, steps, w)
+        moved = _searched(frame, columns, candidates, steps, w, still)
+        candidates = (*candidates[:still], *moved)
         model = _solved(frame, columns, candidates, w)
         w = model.w if is_free else None
         frame = Frame.of(equations, model.sigma, is_free=is_free)
@@ -98,11 +101,15 @@ def _searched(
     candidates: tuple[EffectAt, ...],
     steps: int,
     w: np.ndarray | None,
+    still: int,
 ) -> tuple[EffectAt, ...]:
-    """Improve the shapes by Levenberg-Marquardt within bounds."""
+    """Improve the shapes of candidates after the first ones by Levenberg-Marquardt in bounds."""
+    fixed, candidates = candidates[:still], candidates[still:]
     low, high = shape_bounds(frame.equations, candidates)
     if not len(low):
         return candidates
+    if fixed:
+        frame = frame.beyond(*split(frame, columns, fixed, w)[:2])
     x = np.clip(np.concatenate([s.shape for s in candidates]), low, high)
     span = np.maximum(shape_scales(frame.equations, candidates), 1e-12)
     r = residual_of(frame, columns, with_shapes(candidates, x), w)

@@ -7,23 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sgp_ros.batch.least_squares import correlation_factor
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.compare.settled import shows
-from sgp_ros.diagnosis.criteria import COUNTED_SHARE, EVIDENCE
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
+from sgp_ros.diagnosis.explain.joint_search import by_joint
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
 
 FIRST, SECOND, PARENTS = 12, 5, 6
 """Screened candidates that are fitted alone, as a second effect; effects that get a second."""
 
-THIRD = 3
-"""Candidates that are fitted as a third, fourth, ... effect."""
 EXCHANGES = 2
 """Times that an effect of the best pair is exchanged for another."""
 
@@ -80,8 +76,22 @@ def compare_models(equations: Equations, progress: Callable[[float], None]) -> C
         progress(0.45 + 0.55 * (number + 1) / len(parents))
     ranked = _ranked([*pairs, *_exchanged(columns, _ranked(pairs))])
     best = max([*singles, *ranked], key=lambda m: m.score, default=None)
-    more = [] if best is None else _extended(columns, best)
+    more = _more(columns, best) if best is not None else []
     return Comparison(bases[0], bases[1], tuple(singles), tuple(ranked), tuple(more))
+
+
+def _more(columns: Columns, best: Model) -> list[Model]:
+    """Return models of a search joint by joint, where the best model leaves physics.
+
+    With bodies as the best model has them, and free.
+    """
+    if (best.mean_square / best.frame.equations.power).max() < COUNTED_SHARE:
+        return []
+    found = by_joint(columns, best)
+    if not best.is_free:
+        free = fit(columns, (), best.sigma, is_free=True)
+        found += by_joint(columns, free)
+    return _ranked(m for m in found if len(m.effects) > 2)
 
 
 def _exchanged(columns: Columns, ranked: list[Model]) -> list[Model]:
@@ -110,88 +120,6 @@ def _exchanged(columns: Columns, ranked: list[Model]) -> list[Model]:
         better = _ranked(trials)
         best = better[0] if better and better[0].score > best.score else None
     return found
-
-
-def _extended(columns: Columns, model: Model) -> list[Model]:
-    """Return models with more than two effects, for robots that lack some at several joints.
-
-    As long as a joint has fewer than two and leaves what counts as physics, the best effect on
-    such joints is added. Rows that are correlated in time count as fewer.
-    """
-    found: list[Model] = []
-    power = columns.equations(frozenset()).power
-    k = len(power)
-    while len(model.effects) < 2 * k:
-        held = [sum(s.place.joint == j for s in model.effects) for j in range(k)]
-        left = model.mean_square / power
-        open_ = [j for j in range(k) if left[j] > COUNTED_SHARE and held[j] < 2]
-        if not open_:
-            break
-        second = [s for _, s in screen(columns, model, EFFECTS.values()) if s.place.joint in open_]
-        trials = [
-            fit(columns, (*model.effects, s), model.sigma, is_free=model.is_free, w=model.w,
-                rounds=2, steps=4)
-            for s in second[:THIRD]
-        ]  # fmt: skip
-        gains = _gains(model, _ranked(trials))
-        if not gains or max(gains.values()) < EVIDENCE:
-            break
-        best = max(gains, key=lambda m: gains[m])
-        model = best
-        found.append(model)
-    found = [m for m in found if len(m.effects) > 2]
-    return [*found, *_simpler(columns, found[-1])] if found else []
-
-
-def _simpler(columns: Columns, model: Model) -> list[Model]:
-    """Return a model with a law of one number in place of each richer one, and with all of them.
-
-    What was best while other effects were still missing may have more freedom than it needs.
-    """
-    motion = columns.equations(frozenset()).motion
-    simple = [e for e in EFFECTS.values() if len(e.quantities) == 1 and not e.shape_names()]
-    found: list[Model] = []
-    whole = model
-    for i, candidate in enumerate(model.effects):
-        if len(candidate.effect.quantities) == 1:
-            continue
-        place = Place(candidate.place.joint)
-        others = [
-            EffectAt(e, place)
-            for e in simple
-            if place in e.places(motion) and shows(e, place, motion)
-        ]
-        trials = [_replaced(columns, model, i, s) for s in others if s.key not in model.key]
-        best = _ranked(trials)
-        if best:
-            found.append(best[0])
-            whole = _replaced(columns, whole, i, best[0].effects[i])
-    return _ranked([*found, whole]) if found else []
-
-
-def _replaced(columns: Columns, model: Model, index: int, candidate: EffectAt) -> Model:
-    candidates = (*model.effects[:index], candidate, *model.effects[index + 1 :])
-    return fit(
-        columns, candidates, model.sigma, is_free=model.is_free, w=model.w, rounds=2, steps=4
-    )
-
-
-def _gains(model: Model, trials: list[Model]) -> dict[Model, float]:
-    """Return what each trial gains on a model with one effect less [nats].
-
-    The residual of real robots is correlated in time. Only the trial that leaves least tells how
-    much, for what is missing is correlated too.
-    """
-    factors: dict[int, float] = {}
-    for trial in trials:
-        j = max(trial.effects[-1].place.joint, 0)
-        factors[j] = min(factors.get(j, np.inf), correlation_factor(trial.residual[:, j]))
-    return {
-        trial: (trial.likelihood - model.likelihood)
-        / factors[max(trial.effects[-1].place.joint, 0)]
-        - trial.cost + model.cost
-        for trial in trials
-    }  # fmt: skip
 
 
 def _varied(singles: list[Model]) -> list[Model]:

@@ -16,6 +16,9 @@ from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.robots.observed_motion import ObservedMotion
 
+MOST_HELD = 30_000_000
+"""Numbers that are remembered before all are forgotten: 240 MB."""
+
 
 class Columns:
     """Filtered columns of candidates, remembered."""
@@ -24,6 +27,7 @@ class Columns:
         self._equations = {frozenset[int](): equations}
         self._known: dict[tuple[object, ...], np.ndarray] = {}
         self._motions: dict[bytes, ObservedMotion] = {}
+        self._held = 0
 
     def equations(self, dry: frozenset[int]) -> Equations:
         """Return the equations in which dry friction may hold some joints."""
@@ -51,17 +55,37 @@ class Columns:
     ) -> np.ndarray:
         """Return the filtered columns, (N, k, m), for bodies that differ by w (p,)."""
         bodies = w if candidate.effect.uses_bodies else None
-        tail = b'' if bodies is None else bodies.tobytes()
-        key = (*candidate.key, candidate.shape.tobytes(), equations, tail)
-        if key not in self._known:
-            if len(self._known) > 400:
-                self._known.clear()
-            motion = self.corrected(bodies)
-            raw = candidate.columns(motion)
-            self._known[key] = equations.filtered(
-                raw, candidate.place.joint, is_inertial=candidate.effect.is_inertial
-            )
-        return self._known[key]
+        x = self.local(candidate, equations, self.corrected(bodies))
+        return on_all_joints(x, candidate.place.joint, equations.d.shape[1])
+
+    def local(
+        self, candidate: EffectAt, equations: Equations, motion: ObservedMotion
+    ) -> np.ndarray:
+        """Return the filtered columns of the place, (N, m), or (N, k, m), in a motion."""
+        joint = candidate.place.joint
+        key = (*candidate.key, candidate.shape.tobytes(), motion)
+        # what acts on one joint depends on whether that one is held, on no other
+        keys = (*key, bool(equations.moving[:, max(joint, 0)].all())), (*key, equations)
+        for known in keys:
+            if known in self._known:
+                return self._known[known]
+        raw = candidate.columns(motion)
+        x = equations.compact(raw, joint, is_inertial=candidate.effect.is_inertial)
+        if self._held > MOST_HELD:
+            self._known.clear()
+            self._held = 0
+        self._known[keys[raw.ndim == 3]] = x
+        self._held += x.size
+        return x
+
+
+def on_all_joints(x: np.ndarray, joint: int, k: int) -> np.ndarray:
+    """Return rows of one joint (N, m), or of all (N, k, m), as those of all, (N, k, m)."""
+    if x.ndim == 3:
+        return x
+    result = np.zeros((len(x), k, x.shape[1]))
+    result[:, joint] = x
+    return result
 
 
 def dry_joints(candidates: tuple[EffectAt, ...]) -> frozenset[int]:
@@ -135,10 +159,23 @@ class Frame:
     def projected(self, columns: np.ndarray) -> np.ndarray:
         """Return what inertial parameters leave of filtered columns (N, k, m), (N k + p, m)."""
         N, k, m = columns.shape
-        p = self.Q.shape[1]
-        x = np.zeros((N * k + p, m))
+        x = np.zeros((len(self.Q), m))
         x[: N * k] = (columns / self.sigma[:, None]).reshape(N * k, m)
         return x - self.Q @ (self.Q.T @ x)
+
+    def beyond(self, y: np.ndarray, A: np.ndarray) -> Frame:
+        """Return the frame that also projects out columns A (N k + p, m), which this one did.
+
+        For searches beside effects that keep their shapes; `R` stays that of the bodies.
+
+        Args:
+            y: (N k + p,) target, less forces that are given.
+            A: columns.
+        """
+        if not A.shape[1]:
+            return replace(self, y=y)
+        own = np.linalg.qr(A / np.sqrt((A * A).sum(axis=0) + 1e-300))[0]
+        return replace(self, Q=np.concatenate([self.Q, own], axis=1), y=y - own @ (own.T @ y))
 
     def by_joint(self, residual: np.ndarray) -> np.ndarray:
         """Return the mean squares of a residual (N k + p,) per joint, unscaled, (k,)."""

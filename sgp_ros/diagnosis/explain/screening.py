@@ -1,8 +1,15 @@
-"""A quick look at every effect, place and shape, given the model so far."""
+"""A quick look at every effect, place and shape, given the model so far.
+
+A trial costs a few products: with B an orthonormal basis of what bodies and effects explain, r
+what they leave, and x the columns of the trial, of which only the rows of one joint differ from
+zero, `|r - (x - B B^T x) c|^2` follows for each joint from `x^T x`, `B^T x`, `x^T r` and the
+products of B with itself and with r, joint by joint. O(N P) per column for P columns of B,
+instead of O(N k P).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,21 +29,36 @@ TRIALS = 2
 _WIDEST = 0.75
 """Widest interval of position, as a share of the range: wider ones are no region."""
 
+_UNSEEN = 1e-13
+"""Part of a column's square below which it counts as explained."""
+
 Trial = tuple[float, EffectAt]
 
 
-def screen(columns: Columns, model: Model, effects: Iterable[Effect]) -> list[Trial]:
-    """Return candidates with the gain in score they promise, best first."""
+def screen(
+    columns: Columns,
+    model: Model,
+    effects: Iterable[Effect],
+    joints: Collection[int] | None = None,
+) -> list[Trial]:
+    """Return candidates with the gain in score they promise, best first.
+
+    Args:
+        columns: of the recording.
+        model: so far.
+        effects: that could be added.
+        joints: indices of the places that are looked at; None for all.
+    """
     held = dry_joints(model.effects)
     rests = {held: _Rest.of(columns, model, held)}
-    before = rests[held].frame.by_joint(rests[held].y)
+    before = rests[held].left
     known = {s.key for s in model.effects}
     found: list[Trial] = []
     for effect in effects:
         if effect.is_body and model.is_free:
             continue
         for place in effect.places(columns.equations(held).motion):
-            if (effect.name, place) in known:
+            if (effect.name, place) in known or (joints is not None and place.joint not in joints):
                 continue
             if not shows(effect, place, columns.equations(held).motion):
                 continue
@@ -44,55 +66,125 @@ def screen(columns: Columns, model: Model, effects: Iterable[Effect]) -> list[Tr
             if dry not in rests:
                 rests[dry] = _Rest.of(columns, model, dry)
             motion = columns.corrected(model.w if effect.uses_bodies else None)
-            trials = _trials(rests[dry], effect, place, motion, before)
+            trials = _trials(_Look(columns, rests[dry], before), effect, place, motion)
             found += sorted(trials, key=lambda t: -t[0])[:TRIALS]
     return sorted(found, key=lambda t: -t[0])
 
 
 @dataclass(frozen=True, eq=False)
 class _Rest:
-    """What a model leaves, in one frame: the residual and an orthonormal basis of its columns."""
+    """What a model leaves, in one frame, with products of the basis B of what it explains.
+
+    Attributes:
+        frame: scaled equations.
+        r: (N, k) residual.
+        B: (N, k, P) orthonormal together with the rows of the prior.
+        BB: (k, P, P) products of the basis with itself, joint by joint.
+        Br: (k, P) products of the basis and the residual, joint by joint.
+    """
 
     frame: Frame
-    y: np.ndarray
-    basis: np.ndarray | None
+    r: np.ndarray
+    B: np.ndarray
+    BB: np.ndarray
+    Br: np.ndarray
 
     @classmethod
     def of(cls, columns: Columns, model: Model, dry: frozenset[int]) -> _Rest:
         frame = Frame.of(columns.equations(dry), model.sigma, is_free=model.is_free)
         y, A, _ = split(frame, columns, model.effects, model.w)
-        if not A.shape[1]:
-            return cls(frame, y, None)
-        basis = np.linalg.qr(A / np.sqrt((A * A).sum(axis=0) + 1e-300))[0]
-        return cls(frame, y - basis @ (basis.T @ y), basis)
+        basis = frame.Q
+        if A.shape[1]:
+            own = np.linalg.qr(A / np.sqrt((A * A).sum(axis=0) + 1e-300))[0]
+            y = y - own @ (own.T @ y)
+            basis = np.concatenate([basis, own], axis=1)
+        N, k = frame.equations.d.shape
+        r, B = y[: N * k].reshape(N, k), basis[: N * k].reshape(N, k, -1)
+        BB = np.stack([B[:, j].T @ B[:, j] for j in range(k)])
+        return cls(frame, r, B, BB, np.einsum('nkp,nk->kp', B, r))
 
     @property
     def equations(self) -> Equations:
         return self.frame.equations
 
-    def apart(self, raw: np.ndarray, place: Place, *, is_inertial: bool = False) -> np.ndarray:
-        """Return what the model so far leaves of columns at the full rate, (N k + p, m)."""
-        filtered = self.equations.filtered(raw, place.joint, is_inertial=is_inertial)
-        x = self.frame.projected(filtered)
-        return x if self.basis is None else x - self.basis @ (self.basis.T @ x)
+    @property
+    def left(self) -> np.ndarray:
+        """Mean squares of the residual, (k,) [N^2 m^2 or N^2]."""
+        return np.asarray((self.r**2).mean(axis=0) * self.frame.sigma**2)
 
-    def gain(self, residual: np.ndarray, before: np.ndarray, size: int) -> float:
-        """Return how much better a residual is than the mean squares `before` (k,) [nats]."""
-        N = len(self.equations.d)
-        floor = floors(self.equations)
-        ratio = (before + floor) / (self.frame.by_joint(residual) + floor)
+
+@dataclass(frozen=True, eq=False)
+class _Products:
+    """Products of columns, less what the model explains of them, with themselves and the residual.
+
+    Attributes:
+        own: (k, m, m), joint by joint.
+        cross: (k, m) with the residual, joint by joint.
+        G: (m, m) over all rows.
+        b: (m,) with the residual over all rows.
+    """
+
+    own: np.ndarray
+    cross: np.ndarray
+    G: np.ndarray
+    b: np.ndarray
+
+    @classmethod
+    def of(cls, rest: _Rest, filtered: np.ndarray, joint: int) -> _Products:
+        """Return those of filtered columns (N, m) of one joint, or (N, k, m)."""
+        sigma, N, m = rest.frame.sigma, len(filtered), filtered.shape[-1]
+        k, P = rest.Br.shape
+        Bx, xx, xr = np.zeros((k, P, m)), np.zeros((k, m, m)), np.zeros((k, m))
+        for j in range(k) if filtered.ndim == 3 else (joint,):
+            x = (filtered.reshape(N, -1, m)[:, j if filtered.ndim == 3 else 0]) / sigma[j]
+            Bx[j], xx[j], xr[j] = rest.B[:, j].T @ x, x.T @ x, x.T @ rest.r[:, j]
+        u = Bx.sum(axis=0)  # (P, m)
+        shared = np.einsum('kpm,pl->kml', Bx, u)
+        own = xx - shared - shared.transpose(0, 2, 1) + np.einsum('pm,kpq,ql->kml', u, rest.BB, u)
+        G = xx.sum(axis=0) - u.T @ u
+        G[np.diag_indices(m)] = np.where(
+            np.diag(G) > _UNSEEN * np.diag(xx.sum(axis=0)), np.diag(G), np.inf
+        )
+        return cls(own, xr - rest.Br @ u, G, xr.sum(axis=0))
+
+    def coefficients(self) -> np.ndarray:
+        """Return the least squares (m,); zero for columns that are explained already."""
+        size = np.sqrt(np.diag(self.G))
+        G = np.where(np.isfinite(self.G), self.G, 0.0) / np.outer(size, size)
+        G[np.diag_indices(len(size))] = np.isfinite(size)
+        return np.asarray(np.linalg.lstsq(G, self.b / size, rcond=_UNSEEN)[0] / size)
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """Trials beside a model that leaves the mean squares `before` (k,)."""
+
+    columns: Columns
+    rest: _Rest
+    before: np.ndarray
+
+    def products(self, candidate: EffectAt, motion: ObservedMotion) -> _Products | None:
+        """Return those of a candidate's columns; None where it has none."""
+        x = self.columns.local(candidate, self.rest.equations, motion)
+        return _Products.of(self.rest, x, candidate.place.joint) if x.shape[-1] else None
+
+    def gain(self, found: _Products, c: np.ndarray, size: int) -> float:
+        """Return how much better columns with coefficients c (m,) leave it [nats]."""
+        rest = self.rest
+        N, floor = len(rest.r), floors(rest.equations)
+        change = np.einsum('m,kml,l->k', c, found.own, c) - 2.0 * found.cross @ c
+        after = np.maximum(rest.left + change / N * rest.frame.sigma**2, 0.0)
+        ratio = (self.before + floor) / (after + floor)
         return 0.5 * N * float(np.log(ratio).sum()) - 0.5 * size * float(np.log(N))
 
 
-def _trials(
-    rest: _Rest, effect: Effect, place: Place, motion: ObservedMotion, before: np.ndarray
-) -> Iterator[Trial]:
-    bins = effect.bins(rest.equations.motion, place)
+def _trials(look: _Look, effect: Effect, place: Place, motion: ObservedMotion) -> Iterator[Trial]:
+    bins = effect.bins(look.rest.equations.motion, place)
     if bins is not None:
-        yield from _intervals(rest, EffectAt(effect, place), bins, before)
+        yield from _intervals(look, EffectAt(effect, place), bins)
         return
-    for shape in _starts(rest, effect, place):
-        trial = _trial(rest, EffectAt(effect, place, shape), motion, before)
+    for shape in _starts(look.rest, effect, place):
+        trial = _trial(look, EffectAt(effect, place, shape), motion)
         if trial is not None:
             yield trial
 
@@ -103,66 +195,66 @@ def _starts(rest: _Rest, effect: Effect, place: Place) -> np.ndarray:
     wave = effect.wave(equations.motion, place)
     if wave is None:
         return effect.starts(equations.motion, place)
-    residual = rest.y[: equations.d.size].reshape(equations.d.shape)
-    return wave.strongest(equations.filter.rows, residual, rest.frame.sigma)
+    return wave.strongest(equations.filter.rows, rest.r, rest.frame.sigma)
 
 
-def _trial(
-    rest: _Rest, candidate: EffectAt, motion: ObservedMotion, before: np.ndarray
-) -> Trial | None:
+def _trial(look: _Look, candidate: EffectAt, motion: ObservedMotion) -> Trial | None:
     effect = candidate.effect
     if effect.small is not None:
-        return _small_trial(rest, candidate, effect.small, motion, before)
-    raw = candidate.columns(motion)
-    if raw.shape[-1] == 0:
+        return _small_trial(look, candidate, effect.small, motion)
+    found = look.products(candidate, motion)
+    if found is None:
         return None
-    x = rest.apart(raw, candidate.place, is_inertial=effect.is_inertial)
-    scale = np.sqrt((x * x).sum(axis=0)) + 1e-300
-    c = np.linalg.lstsq(x / scale, rest.y, rcond=1e-7)[0] / scale
+    c = found.coefficients()
     if effect.is_given:
         # a start may have the wrong size, not the wrong sign
         if c[0] <= 0.0:
             return None
     elif not replace(candidate, coefficients=c).is_possible(motion):
         return None
-    return rest.gain(rest.y - x @ c, before, len(c) + len(candidate.shape)), candidate
+    return look.gain(found, c, len(c) + len(candidate.shape)), candidate
 
 
 def _small_trial(
-    rest: _Rest, start: EffectAt, small: SmallEffect, motion: ObservedMotion, before: np.ndarray
+    look: _Look, start: EffectAt, small: SmallEffect, motion: ObservedMotion
 ) -> Trial | None:
     """Return the trial of an effect that is linear in its size while it is small."""
-    x = rest.apart(small.columns(motion, start.place, start.shape), start.place)
-    scale = np.sqrt((x * x).sum(axis=0)) + 1e-300
-    c = np.linalg.lstsq(x / scale, rest.y, rcond=1e-7)[0] / scale
+    raw = small.columns(motion, start.place, start.shape)
+    x = look.rest.equations.compact(raw, start.place.joint, is_inertial=False)
+    found = _Products.of(look.rest, x, start.place.joint)
+    c = found.coefficients()
     shape = small.shape(start.shape, c)
-    found = start.with_shape(shape)
-    if not found.is_possible(motion):
+    placed = start.with_shape(shape)
+    if not placed.is_possible(motion):
         return None
-    return rest.gain(rest.y - x @ c, before, len(shape)), found
+    return look.gain(found, c, len(shape)), placed
 
 
 def _intervals(
-    rest: _Rest, candidate: EffectAt, bins: tuple[np.ndarray, np.ndarray], before: np.ndarray
+    look: _Look, candidate: EffectAt, bins: tuple[np.ndarray, np.ndarray]
 ) -> Iterator[Trial]:
     """Yield the best interval, and the best that is not its neighbour.
 
     With the columns of narrow bins and their Gram matrix every interval costs a few sums.
     """
     columns, edges = bins
-    x = rest.apart(columns, candidate.place)
+    joint = candidate.place.joint
+    x = look.rest.equations.compact(columns, joint, is_inertial=False)
+    found = _Products.of(look.rest, x, joint)
+    G = np.where(np.isfinite(found.G), found.G, 0.0)
     i, j = np.triu_indices(len(edges), 1)
     area = np.zeros((len(edges), len(edges)))
-    area[1:, 1:] = np.cumsum(np.cumsum(x.T @ x, axis=0), axis=1)
+    area[1:, 1:] = np.cumsum(np.cumsum(G, axis=0), axis=1)
     size = area[j, j] - area[i, j] - area[j, i] + area[i, i]
-    sums = np.concatenate([[0.0], np.cumsum(x.T @ rest.y)])
+    sums = np.concatenate([[0.0], np.cumsum(found.b)])
     push = sums[j] - sums[i]
     usable = (push > 0.0) & (j - i <= _WIDEST * columns.shape[1]) & (size > 1e-12 * area[-1, -1])
     gain = np.where(usable, push**2 / np.maximum(size, 1e-300), 0.0)
     order = np.argsort(-gain)
     far = (abs(i[order] - i[order[0]]) > TRIALS * 2) | (abs(j[order] - j[order[0]]) > TRIALS * 2)
-    for c in (order[0], order[int(np.argmax(far))]):
-        if gain[c] > 0.0:
-            column = x[:, i[c] : j[c]].sum(axis=1) * (push[c] / size[c])
-            shape = np.array([edges[i[c]], edges[j[c]]])
-            yield rest.gain(rest.y - column, before, 3), candidate.with_shape(shape)
+    for best in (order[0], order[int(np.argmax(far))]):
+        if gain[best] > 0.0:
+            c = np.zeros(columns.shape[1])
+            c[i[best] : j[best]] = push[best] / size[best]
+            shape = np.array([edges[i[best]], edges[j[best]]])
+            yield look.gain(found, c, 3), candidate.with_shape(shape)

@@ -12,6 +12,7 @@ from sgp_ros.diagnosis.compare.equations import (
     make_equations,
 )
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.explain import regression
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.regression import Columns
@@ -84,8 +85,8 @@ def test_rows_in_which_dry_friction_holds_ask_nothing(equations_for, dry):
     assert inside.any()
     assert held.d[inside].std() < 0.1 * equations.d[inside].std()
     column = np.ones((len(equations.motion.time), 1))
-    assert np.abs(held.filtered(column, 0, is_inertial=False)[inside]).max() < 1e-12
-    assert np.abs(held.filtered(column, 0, is_inertial=True)[inside]).min() > 0.99
+    assert np.abs(held.compact(column, 0, is_inertial=False)[inside]).max() < 1e-12
+    assert np.abs(held.compact(column, 0, is_inertial=True)[inside]).min() > 0.99
 
 
 def test_a_robot_that_never_rests_has_no_held_rows(equations_for, perfect):
@@ -128,7 +129,7 @@ def test_a_joint_that_does_not_move_is_asked_nothing(robots, viscous):
     assert equations.motion.moving_joints == (0,)
 
 
-def test_columns_know_whom_they_were_made_for(equations_for, viscous):
+def test_columns_know_whom_they_were_made_for(equations_for, viscous, monkeypatch):
     """Other bodies, other columns; the same question, the same array."""
     _, equations = equations_for(viscous)
     columns = Columns(equations)
@@ -139,7 +140,11 @@ def test_columns_know_whom_they_were_made_for(equations_for, viscous):
     w[0] = 1.0
     np.testing.assert_allclose(columns.of(tilt, equations, w), 1.25 * nominal, atol=1e-12)
     rub = EffectAt(EFFECTS['viscous_friction'], Place(0), np.zeros(0))
-    assert columns.of(rub, equations, w) is columns.of(rub, equations)
+    plain = columns.of(rub, equations)
+    np.testing.assert_array_equal(columns.of(rub, equations, w), plain)
+    motion = equations.motion
+    assert columns.local(rub, equations, motion) is columns.local(rub, equations, motion)
+    monkeypatch.setattr(regression, 'MOST_HELD', 100 * len(equations.d))
     for i in range(450):
         columns.of(replace(tilt, shape=np.array([0.0, 0.001 * i])), equations, w)
-    assert len(columns._known) <= 401
+    assert len(columns._known) <= 101

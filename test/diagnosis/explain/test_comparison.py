@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sgp_ros.diagnosis.explain import comparison
+from sgp_ros.diagnosis.explain import comparison, joint_search
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
@@ -54,8 +54,8 @@ def test_a_law_of_one_number_is_tried_in_place_of_a_richer_one(equations_for):
     )  # fmt: skip
     _, equations = equations_for(world)
     rich = fitted(equations, 'asymmetric_coulomb', 'viscous_friction')
-    found = comparison._simpler(Columns(equations), rich)
-    assert {'coulomb_friction', 'viscous_friction'} in [_names(m) for m in found]
-    assert all(m.size < rich.size for m in found)
-    plain = fitted(equations, 'coulomb_friction', 'viscous_friction')
-    assert comparison._simpler(Columns(equations), plain) == []
+    (block, *_) = joint_search._blocks(rich)
+    found = joint_search._shrunk(Columns(equations), rich, block)
+    assert _names(found) == {'coulomb_friction', 'viscous_friction'}
+    assert joint_search.gain(found, rich) > 0.0
+    assert joint_search._shrunk(Columns(equations), found, block) is found

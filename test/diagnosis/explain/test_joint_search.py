@@ -1,0 +1,91 @@
+"""Selection of effects joint by joint."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.explain.candidates import fit, residual_of
+from sgp_ros.diagnosis.explain.fitted_model import floors
+from sgp_ros.diagnosis.explain.joint_search import by_joint, gain
+from sgp_ros.diagnosis.explain.regression import Columns, Frame
+from sgp_ros.diagnosis.explain.screening import screen
+from sgp_ros.physics.catalogue import EFFECTS
+from test.diagnosis.worlds import CHAINS, simulate
+
+TRUTH = {('viscous_friction', 0), ('spring', 0), ('viscous_friction', 1)}
+
+
+@pytest.fixture(scope='module')
+def equations(equations_for):
+    """Two joints, of which one lacks two laws and the other one."""
+    world = simulate(
+        CHAINS[2], 7, 10.0,
+        force=lambda t, q, v: (-4.0 * (q[0] - 0.3) - 1.5 * v[0], -0.8 * v[1]),
+    )  # fmt: skip
+    return equations_for(world)[1]
+
+
+def _start(equations):
+    sigma = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
+    columns = Columns(equations)
+    return columns, fit(columns, (), sigma, is_free=True)
+
+
+def _keys(model):
+    return {(s.name, s.place.joint) for s in model.effects}
+
+
+def test_every_joint_gets_the_laws_that_it_lacks(equations):
+    columns, base = _start(equations)
+    found, *rivals = by_joint(columns, base)
+    assert _keys(found) == TRUTH
+    assert all(gain(rival, found) <= 0.0 for rival in rivals)
+    assert any(len(rival.effects) < len(found.effects) for rival in rivals)
+
+
+def test_where_nothing_is_left_nothing_is_sought(equations):
+    columns, base = _start(equations)
+    found, *_ = by_joint(columns, base)
+    again = by_joint(columns, found)
+    assert not again or _keys(again[0]) == _keys(found)
+
+
+def test_a_gain_is_what_the_other_way_loses(equations):
+    columns, base = _start(equations)
+    (_, best), *_ = screen(columns, base, EFFECTS.values())
+    trial = fit(columns, (best,), base.sigma, is_free=True)
+    assert gain(trial, base) == pytest.approx(-gain(base, trial))
+    assert gain(trial, base) > 0.0
+
+
+def test_effects_that_stay_keep_their_shapes_and_are_fitted_with_the_others(equations):
+    columns, base = _start(equations)
+    wrong = [c for _, c in screen(columns, base, [EFFECTS['cogging']])][:2]
+    model = fit(columns, tuple(wrong), base.sigma, is_free=True, still=1)
+    np.testing.assert_array_equal(model.effects[0].shape, wrong[0].shape)
+    assert np.abs(model.effects[1].shape - wrong[1].shape).max() > 0.0
+
+
+def test_a_screened_gain_is_that_of_the_fit(equations):
+    """The products give what least squares with all columns gives."""
+    columns, base = _start(equations)
+    laws = [EFFECTS[n] for n in ('viscous_friction', 'spring', 'joint_coupling')]
+    for promised, candidate in screen(columns, base, laws)[:6]:
+        if len(candidate.shape):
+            continue
+        frame = Frame.of(equations, base.sigma, is_free=True)
+        before, after = (
+            frame.by_joint(r) + floors(equations)
+            for r in (frame.y, residual_of(frame, columns, (candidate,), base.w))
+        )
+        expected = 0.5 * len(equations.d) * np.log(before / after).sum()
+        size = columns.of(candidate, equations).shape[-1]
+        expected -= 0.5 * size * np.log(len(equations.d))
+        assert promised == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_joint_is_screened_alone(equations):
+    columns, base = _start(equations)
+    found = screen(columns, base, EFFECTS.values(), (1,))
+    assert {candidate.place.joint for _, candidate in found} == {1}
