@@ -56,6 +56,12 @@ REMAINDER_SHARE = 0.2
 
 ADEQUATE_REST = 0.025
 """Greatest structured rest of an adequate model, relative to what it explains [1]. Nulls."""
+COLOURED_REST = 0.1
+"""The same of what follows from earlier rows, but not from the motion [1]. Convention.
+
+It does not come back with the motion: no law of the motion can do better, and a law of the list
+that stood for a disturbance in time would leave most of it.
+"""
 SLIGHT_REST = 0.1 * LEAST_SHARE
 """Rest that is adequate in any case, as a share of the mean squared effort [1]. Nulls."""
 INDEPENDENT_ROWS = 100.0
@@ -87,6 +93,8 @@ CLEARER = 2.0
 """Ratio of mean squared differences from which another motion separates models [1]. Convention."""
 CALM_SHARE = 0.002
 """Share left at which "no mismatch" is as likely wrong as right [1]. Half of `LEAST_SHARE`."""
+LEAST_ASSERTED = 0.5
+"""Probability from which a finding is asserted beside others [1]. The schema."""
 MOST_CERTAIN = 0.99
 """Greatest probability that is ever stated [1]. Drawn worlds."""
 

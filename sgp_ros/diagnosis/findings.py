@@ -11,7 +11,7 @@ from sgp_ros.diagnosis.compare.equations import Equations, joint_name
 from sgp_ros.diagnosis.compare.velocity_sensor import SensorLag
 from sgp_ros.diagnosis.criteria import DOUBTED, INTERVAL, NUMBER_ERROR, REGION_ENERGY
 from sgp_ros.diagnosis.decide.certainty import Probabilities
-from sgp_ros.diagnosis.decide.decision import Decision
+from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision
 from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.in_recording import InRecording
@@ -54,8 +54,9 @@ def asserted(
             doubted_if_none(_finding(decision, model, i, std[i], chances), model.effects[i])
             for i in common
         ]
-    if decision.verdict == 'unexplained':
-        findings.append(_unknown(equations, decision, remainders, chances, depends))
+    findings += [
+        _unknown(equations, decision, j, remainders, chances, depends) for j in decision.unknown
+    ]
     names = equations.motion.tree.joint_names
     for lag in lags:
         unit = Parameter(lag.time_constant, max(lag.std, NUMBER_ERROR * lag.time_constant), 's')
@@ -198,26 +199,27 @@ def bound_remarks(decision: Decision) -> tuple[str, ...]:
 def _unknown(
     equations: Equations,
     decision: Decision,
+    joint: int,
     remainders: Sequence[Remainder],
     chances: Probabilities,
     depends: Sequence[Dependence],
 ) -> Finding:
     names = equations.motion.tree.joint_names
-    seen = [r for r in remainders if r.joint == decision.worst]
-    own = depends[decision.worst]
+    seen = [r for r in remainders if r.joint == joint]
+    own = depends[joint]
     on = f'it depends on {", ".join(seen[0].inputs)}' if seen else 'no function of the motion'
     if seen and not any(own.is_significant(name) for name in own.scores):
         on = f'Z follows {", ".join(seen[0].inputs)}, but no variable alone beyond chance'
-    share = float(decision.model.mean_square[decision.worst] / equations.power[decision.worst])
-    where = region(equations, decision.model.residual[:, decision.worst], decision.worst)
+    share = float(decision.model.mean_square[joint] / equations.power[joint])
+    where = region(equations, decision.model.residual[:, joint], joint)
     if where.variables:
         (name,) = where.variables
         ((lo, hi),) = where.intervals.get(name, where.time)
         on += f'; {100 * REGION_ENERGY:.0f} % of it lies where {name} is '
         on += f'between {lo:.3g} and {hi:.3g}'
-    return Finding(
-        names[decision.worst], 'unknown', {}, where, 0.0, chances.unknown, share, '', on
-    )
+    # the joint that comes first is the answer
+    chance = float(min(chances.unknown[joint], chances.unknown[decision.unknown[0]]))
+    return Finding(names[joint], UNKNOWN, {}, where, 0.0, chance, share, '', on)
 
 
 def parameter_errors(

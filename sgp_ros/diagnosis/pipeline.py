@@ -15,7 +15,7 @@ from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.diagnosis.compare.velocity_sensor import sensor_lags
 from sgp_ros.diagnosis.connected import Connected, compared, connect
 from sgp_ros.diagnosis.criteria import DOUBTED, REMAINDER_SHARE
-from sgp_ros.diagnosis.decide.certainty import certainty_of, probabilities
+from sgp_ros.diagnosis.decide.certainty import Probabilities, certainty_of, probabilities, settled
 from sgp_ros.diagnosis.decide.decision import Decision
 from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, equivalents
@@ -114,17 +114,16 @@ def diagnose(
 def _diagnosed(connected: Connected, robot: str, progress: Callable[[float], None]) -> Diagnosis:
     recordings, whole, several = connected.recordings, connected.equations, connected.several
     raw, tree, names = recordings.learned, whole.motion.tree, recordings.names
+    several, contrasts, chances = _settled(several)
     equations = several.equations
     comparison, decision, model = several.comparison, several.decision, several.model
     depends = dependences(equations, comparison.base.residual)
     lags = [lag for lag in sensor_lags(raw, equations) if lag.is_physics]
     final, learned, on_z = _final(several, whole)
-    contrasts = Contrasts(equations, decision.model)
     parts = {'train': raw, **recordings.kept, **recordings.held}
     proofs = {stem: prove(final, part, tree, stem) for stem, part in parts.items()}
     on_z += _harm(final, {k: x for k, x in parts.items() if k != 'train'}, proofs)
     doubts = reasons_to_doubt(proofs, recordings.still)
-    chances = probabilities(equations, comparison, decision, contrasts)
     on_all = replace(decision, model=model)
     findings, forces = asserted(whole, on_all, lags, learned, chances, depends)
     findings = tuple(connected.against_rivals(f) for f in findings)
@@ -196,6 +195,16 @@ def _certainty(certainty: float, connected: Connected, *, is_doubted: bool) -> f
     return min([*rests_on, DOUBTED] if is_doubted else rests_on)
 
 
+def _settled(several: Several) -> tuple[Several, Contrasts, Probabilities]:
+    """Return what is asserted, of one recording without what is improbable, and how certain."""
+    equations, comparison, decision = several.equations, several.comparison, several.decision
+    if several.chances:
+        contrasts = Contrasts(equations, decision.model)
+        return several, contrasts, probabilities(equations, comparison, decision, contrasts)
+    decision, contrasts, chances = settled(equations, comparison, decision)
+    return replace(several, decision=decision, model=decision.model), contrasts, chances
+
+
 def _verdict(decision: Decision, connected: Connected, *, is_missing: bool) -> str:
     is_calm = decision.verdict in _CALM
     if is_calm and connected.findings and not is_missing:
@@ -214,11 +223,12 @@ def _final(
 
 
 def _remainders(equations: Equations, decision: Decision) -> tuple[Remainder, ...]:
-    if decision.verdict != 'unexplained':
-        return ()
-    left = decision.model.mean_square / equations.power
-    joints = [j for j in np.argsort(-left) if left[j] > REMAINDER_SHARE * left.max()]
-    found = [learn_remainder(equations, decision.model.residual, int(j)) for j in joints[:2]]
+    """Return Z of the joints that no effect describes and that leave most, at most two."""
+    left = (decision.model.mean_square / equations.power)[list(decision.unknown)]
+    joints = [
+        decision.unknown[i] for i in np.argsort(-left) if left[i] > REMAINDER_SHARE * left.max()
+    ]
+    found = [learn_remainder(equations, decision.model.residual, j) for j in joints[:2]]
     return tuple(r for r in found if r is not None)
 
 

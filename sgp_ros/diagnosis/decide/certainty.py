@@ -9,27 +9,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import CALM_SHARE, LEAST_ODDS, MOST_CERTAIN, TEMPER
-from sgp_ros.diagnosis.decide.decision import Decision, Scale
+from sgp_ros.diagnosis.criteria import (
+    CALM_SHARE,
+    COUNTED_SHARE,
+    LEAST_ASSERTED,
+    LEAST_ODDS,
+    MOST_CERTAIN,
+    PER_EFFECT,
+    PER_PARAMETER,
+    TEMPER,
+)
+from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision, Scale, without
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.result import Difference, Finding
+from sgp_ros.physics.parts import JOINT, MOTOR
 
 
 @dataclass(frozen=True, eq=False)
 class Probabilities:
-    """Of effects at joints, and of something unknown."""
+    """Of effects at joints, and of something unknown at each joint, (k,)."""
 
     by_key: dict[object, float]
-    unknown: float
+    unknown: np.ndarray
     asserted: Model
-    power: np.ndarray
+    scale: Scale
 
     def of(self, model: Model, index: int) -> float:
         """Return the probability of one effect of a model."""
@@ -37,12 +47,56 @@ class Probabilities:
 
     def why(self, model: Model) -> str:
         """Return why a rival was not asserted."""
-        rest = float((model.mean_square / self.power).max())
-        best = float((self.asserted.mean_square / self.power).max())
+        rest, best = (
+            float((m.mean_square / self.scale.power).max()) for m in (model, self.asserted)
+        )
         left = f'{100 * rest:.3g} % of the mean squared effort'
         if self.asserted.key and self.asserted.key < model.key:
-            return f'leaves {left} beside the asserted model, that alone {100 * best:.3g} %'
-        return f'leaves {left}, the asserted model {100 * best:.3g} %'
+            said = f'leaves {left} beside the asserted model, that alone {100 * best:.3g} %'
+        else:
+            said = f'leaves {left}, the asserted model {100 * best:.3g} %'
+        return said if rest > best else f'{said}; {self._objection(model)}'
+
+    def _objection(self, model: Model) -> str:
+        """Return what is wrong with a rival that leaves no more than the asserted model."""
+        scale, asserted = self.scale, self.asserted
+        if min(model.shares) <= COUNTED_SHARE:
+            return 'one of its effects is too small to count as physics'
+        if not scale.is_sound(model):
+            return 'its effects cancel each other or the bodies'
+        losses = {
+            'bodies that differ more than is likely': 0.5
+            * float(model.w @ model.w - asserted.w @ asserted.w),
+            'more numbers than it gains by': PER_EFFECT
+            * (len(model.effects) - len(asserted.effects))
+            + PER_PARAMETER * (model.freedom - asserted.freedom),
+            'more left at other joints': scale.likelihood(asserted) - scale.likelihood(model),
+        }
+        worst = max(losses, key=lambda name: losses[name])
+        if scale.worth(model) < scale.worth(asserted) and losses[worst] > 0.0:
+            return f'it takes {worst}, which costs {losses[worst]:.2g} nats'
+        return 'it does not predict parts left out, or leaves a joint undescribed'
+
+
+def settled(
+    equations: Equations, comparison: Comparison, decision: Decision
+) -> tuple[Decision, Contrasts, Probabilities]:
+    """Return the decision without findings that are improbable, with probabilities of the rest.
+
+    What is asserted beside others is at least `LEAST_ASSERTED` probable; the others are fitted
+    again without it. The most probable one stays: something is missing there.
+    """
+    while True:
+        contrasts = Contrasts(equations, decision.model)
+        chances = probabilities(equations, comparison, decision, contrasts)
+        effects = decision.model.effects
+        p = [chances.of(decision.model, i) for i in range(len(effects))]
+        if decision.verdict != 'missing_physics' or len(p) < 2 or min(p) >= LEAST_ASSERTED:
+            return decision, contrasts, chances
+        weakest = effects[int(np.argmin(p))]
+        kept = without(equations, decision.model, lambda s, out=weakest: s is out)  # type: ignore[misc]
+        rivals = (decision.model, *decision.rivals)
+        decision = replace(decision, model=kept, rivals=rivals)
 
 
 def probabilities(
@@ -50,29 +104,35 @@ def probabilities(
 ) -> Probabilities:
     """Return the tempered probabilities of all effects.
 
-    A richer law whose numbers make it the asserted one is no rival to it.
+    A richer law whose numbers make it the asserted one is no rival to it. An effect is as certain
+    as its joint is described; one that acts on all joints, as the least that is.
     """
     scale, asserted = Scale.of(equations, comparison), decision.model
     least = scale.worth(asserted) + math.log(LEAST_ODDS) / TEMPER
+    known = (*comparison.singles, *comparison.pairs, *comparison.more)
     models = [
         m
-        for m in (*comparison.singles, *comparison.pairs, *comparison.more)
+        for m in known
         if scale.counts(m)
         and not (m.key != asserted.key and scale.worth(m) > least and contrasts.is_same_law(m))
     ]
+    if asserted.effects and all(m.key != asserted.key for m in models):
+        models.append(asserted)
     adequate = 1.0 / (1.0 + decision.excess**2)
+    described = [a for j, a in enumerate(adequate) if j not in decision.unknown]
     by_key: dict[object, float] = {}
     worth = TEMPER * np.array([scale.worth(m) for m in (comparison.base, *models)])
     odds = np.exp(worth - worth.max())
     for model, p in zip(models, odds[1:] / odds.sum(), strict=True):
         for s in model.effects:
-            by_key[s.key] = by_key.get(s.key, 0.0) + float(p) * adequate
-    unknown = float(np.clip(decision.excess / (decision.excess + 1.0), 0.05, 0.97))
+            is_own = s.effect.site in {JOINT, MOTOR} and s.place.joint >= 0
+            a = adequate[s.place.joint] if is_own else min(described, default=0.0)
+            by_key[s.key] = by_key.get(s.key, 0.0) + float(p * a)
     return Probabilities(
         {key: min(p, MOST_CERTAIN) for key, p in by_key.items()},
-        unknown,
-        decision.model,
-        equations.power,
+        np.clip(decision.excess / (decision.excess + 1.0), 0.05, 0.97),
+        asserted,
+        scale,
     )
 
 
@@ -81,7 +141,13 @@ def certainty_of(
     equations: Equations,
     comparison: Comparison,
 ) -> float:
-    """Return the probability that the verdict is right."""
+    """Return the probability that the verdict is right: the least of what it rests on.
+
+    That is all findings; of unknowns alone the most certain one.
+    """
+    named = [f.probability for f in findings if f.effect != UNKNOWN]
+    if named:
+        return min(named)
     if findings:
         return max(f.probability for f in findings)
     left = float((comparison.parameters.mean_square / equations.power).max())

@@ -45,22 +45,36 @@ LEARNED = 200
 def structure(equations: Equations, residual: np.ndarray) -> np.ndarray:
     """Return the share of each joint's rest that is not noise, (k,), with its uncertainty.
 
-    The greater of what Z and what earlier rows explain on parts left out, plus `1/sqrt(N)` for
-    N rows; 1 where no opinion was asked or can be had.
+    The greater of what Z and what earlier rows explain, of joints that leave most; 1 of others.
 
     Args:
         equations: of the recording.
         residual: of a model, (N, k) [N m or N].
     """
-    N, k = residual.shape
     share = (residual**2).mean(axis=0) / equations.power
-    found = np.ones(k)
+    asked = share > max(STRUCTURE_LEAST_SHARE * float(share.max()), 1e-300)
+    return repeatable(equations, residual, asked).max(axis=0)
+
+
+def repeatable(equations: Equations, residual: np.ndarray, asked: np.ndarray) -> np.ndarray:
+    """Return what the motion, and what earlier rows, explain of each joint's rest, (2, k).
+
+    Shares on parts left out, plus `1/sqrt(N)` for N rows; 1 where no opinion was asked or can be
+    had. What only earlier rows explain is slow, and does not come back with the motion.
+
+    Args:
+        equations: of the recording.
+        residual: of a model, (N, k) [N m or N].
+        asked: (k,) whether a joint is looked at.
+    """
+    N, k = residual.shape
+    found = np.ones((2, k))
     if N < LEAST_ROWS:
         return found
-    for j in np.flatnonzero(share > max(STRUCTURE_LEAST_SHARE * float(share.max()), 1e-300)):
+    for j in np.flatnonzero(asked):
         r = residual[:, j]
-        told = max(_by_motion(equations, r, int(j)), _by_past(equations, r), 0.0)
-        found[j] = min(1.0, told + 1.0 / np.sqrt(N))
+        told = np.array([_by_motion(equations, r, int(j)), _by_past(equations, r)])
+        found[:, j] = np.minimum(1.0, np.maximum(told, 0.0) + 1.0 / np.sqrt(N))
     return found
 
 
@@ -83,7 +97,9 @@ def _by_past(equations: Equations, r: np.ndarray) -> float:
 
 def _by_motion(equations: Equations, r: np.ndarray, joint: int) -> float:
     """Return the share of r (N,) that Z of the motion explains on parts left out."""
-    U = equations.filter(process_inputs(equations.motion, joint, sees_effort=False)[0])
+    motion = equations.motion
+    inputs = process_inputs(motion, joint, sees_effort=False)[0]
+    U = equations.filter(np.column_stack([inputs, motion.acceleration[:, joint]]))
     U = U / (U.std(axis=0) + 1e-12)
     part = parts_of(len(r))
     rows = spread(np.flatnonzero(part > 0), LEARNED)

@@ -3,12 +3,18 @@
 Statistical significance is not enough: the schema calls physics what makes at least 0.4 % of the
 mean squared effort of some joint. Among models of nearly the same residual the one with the fewest
 parameters is asserted, if each of its effects predicts parts of the recording that were left out
-(`support`). It is adequate when what it leaves, as far as that is no noise (`structure`), is
-small against what it explains.
+(`support`).
+
+It is adequate, joint by joint, when what it leaves is small against what it explains there: as far
+as the motion predicts it (`repeatable`), for another law would explain that, and, less strictly,
+as far as earlier rows do. Effects of a joint that it does not describe are not asserted; those of
+the others stand, if together they explain more of the efforts than is left open: `missing_physics`
+with an unknown beside it, else `unexplained`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +22,7 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import (
     ADEQUATE_REST,
+    COLOURED_REST,
     COUNTED_SHARE,
     EVIDENCE,
     FLOOR_SHARE,
@@ -28,10 +35,16 @@ from sgp_ros.diagnosis.criteria import (
     SHAPE_ERROR,
     SLIGHT_REST,
 )
-from sgp_ros.diagnosis.decide.cross_validation import structure, support
+from sgp_ros.diagnosis.decide.cross_validation import repeatable, structure, support
+from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import JOINT, MOTOR
+
+UNKNOWN = 'unknown'
+"""Name of what no effect of the list describes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +55,9 @@ class Decision:
         verdict: as in the schema.
         model: that is asserted; for `unexplained` the inertial parameters alone.
         rivals: models that were not asserted, best first.
-        excess: what the best model leaves, relative to what an adequate one may.
+        excess: (k,) what the best model leaves, relative to what an adequate one may.
         worst: index of the joint where most is left.
+        unknown: indices of joints that the best model does not describe, the worst first.
         tentative: best model where nothing is adequate.
         against: score of the best model without effects [nats].
     """
@@ -51,8 +65,9 @@ class Decision:
     verdict: str
     model: Model
     rivals: tuple[Model, ...]
-    excess: float
+    excess: np.ndarray
     worst: int
+    unknown: tuple[int, ...] = ()
     tentative: Model | None = None
     against: float = 0.0
 
@@ -110,10 +125,30 @@ class Scale:
         """
         return float((structured * self.shares(model)).sum()) / self.explained(model)
 
-    def excess(self, model: Model, structured: np.ndarray | float = 1.0) -> float:
-        """Return what a model leaves, relative to what an adequate one may."""
-        slight = float((structured * self.shares(model)).max()) / SLIGHT_REST
-        return min(self.rest(model, structured) / ADEQUATE_REST, slight)
+    def found(self, model: Model) -> np.ndarray:
+        """Return what there is to explain at each joint, (k,) shares, as in `explained`."""
+        net = sum(model.forces, np.zeros_like(model.residual))
+        effects = np.minimum((net**2).mean(axis=0) / self.power, self.nominal)
+        return np.asarray(np.maximum(self.base, effects))
+
+    def excess(self, model: Model, told: np.ndarray | None = None) -> np.ndarray:
+        """Return what a model leaves at each joint, relative to what an adequate one may, (k,).
+
+        A joint that has effects of its own is measured by what is explained there; of others all
+        that is explained counts, and what is no physics.
+
+        Args:
+            model: fitted.
+            told: (2, k) share of the rest that motion and earlier rows predict, see `repeatable`;
+                None for all of it.
+        """
+        told = np.ones((2, len(self.power))) if told is None else told
+        owned = [s.place.joint for s in model.effects if s.effect.site in {JOINT, MOTOR}]
+        is_own = np.isin(np.arange(len(self.power)), owned)
+        explained = np.where(is_own, self.found(model), self.explained(model))
+        slight = np.where(is_own, SLIGHT_REST, LEAST_SHARE)
+        limits = np.maximum(np.multiply.outer([ADEQUATE_REST, COLOURED_REST], explained), slight)
+        return np.asarray((told * self.shares(model) / limits).max(axis=0))
 
     def counts(self, model: Model) -> bool:
         """Return whether effects are large enough and do not cancel each other, or the bodies."""
@@ -130,10 +165,13 @@ class Scale:
         It is one of the motion, which is what was measured: a residual of effort, and what a
         perfect model would leave of it, grows with the inertia of a model.
         """
+        return self.likelihood(model) - 0.5 * float(model.w @ model.w)
+
+    def likelihood(self, model: Model) -> float:
+        """Return the fit without that prior [nats]."""
         floor = self.floor * np.exp(2.0 * max(model.log_inertia, -50.0) / len(self.power))
         share = model.mean_square / self.power + floor
-        likelihood = self.rows * (model.log_inertia - 0.5 * float(np.log(share).sum()))
-        return likelihood - 0.5 * float(model.w @ model.w)
+        return self.rows * (model.log_inertia - 0.5 * float(np.log(share).sum()))
 
     def worth(self, model: Model) -> float:
         """Return the fit of a model, less the price of its freedom [nats]."""
@@ -161,29 +199,87 @@ def decide(equations: Equations, comparison: Comparison) -> Decision:
     ranked = _ranked(comparison, scale)
     best = _supported(equations, scale, [m for m in ranked if scale.worth(m) > scale.worth(base)])
     rivals = tuple(m for m in ranked if m is not best)
-    worst = int(np.argmax(scale.base))
     left = scale.shares(comparison.parameters)
     if best is not None:
-        excess = scale.excess(best, structure(equations, best.residual))
-        if excess < 1.0:
-            return Decision('missing_physics', best, rivals, excess, worst, against=base.score)
-        if left.max() > COUNTED_SHARE:
-            found = (best, *rivals)
-            return Decision('unexplained', base, found, excess, worst, best, base.score)
-    elif left.max() > LEAST_SHARE:
+        return _judged(equations, scale, comparison, best, rivals)
+    nothing = np.where(left > LEAST_SHARE, NOTHING_EXPLAINED, 0.0)
+    if nothing.any():
         left = left * structure(equations, comparison.parameters.residual)
-        if left.max() > LEAST_SHARE:
-            return Decision(
-                'unexplained', base, rivals, NOTHING_EXPLAINED, worst, against=base.score
-            )
+    if left.max() > LEAST_SHARE:
+        worst = int(np.argmax(scale.base))
+        unknown = _ordered(np.where(left > LEAST_SHARE, scale.base, 0.0), worst)
+        return Decision('unexplained', base, rivals, nothing, worst, unknown, None, base.score)
+    return _calm(base, rivals, scale)
+
+
+def _calm(base: Model, rivals: tuple[Model, ...], scale: Scale) -> Decision:
     verdict = 'parameters_only' if base.is_free else 'no_mismatch'
-    return Decision(verdict, base, rivals, NOTHING_EXPLAINED, worst, against=base.score)
+    excess = np.full(len(scale.base), NOTHING_EXPLAINED)
+    return Decision(verdict, base, rivals, excess, int(np.argmax(scale.base)), against=base.score)
+
+
+def _judged(
+    equations: Equations,
+    scale: Scale,
+    comparison: Comparison,
+    best: Model,
+    rivals: tuple[Model, ...],
+) -> Decision:
+    """Return the verdict on the best model: which joints it describes, and whether most."""
+    base = comparison.base
+    told = repeatable(equations, best.residual, scale.excess(best) >= 1.0)
+    excess = scale.excess(best, told)
+    open_ = np.flatnonzero(excess >= 1.0)
+    worst = int(np.argmax(scale.base))
+    if not len(open_):
+        return Decision('missing_physics', best, rivals, excess, worst, against=base.score)
+    known = without(
+        equations, best, lambda s: s.place.joint in open_ and s.effect.site in {JOINT, MOTOR}
+    )
+    named = scale.found(best)
+    is_open = np.isin(np.arange(len(named)), open_)
+    if known.effects and named[~is_open].sum() > named[is_open].sum():
+        unknown = _ordered(np.where(is_open, excess, 0.0), int(np.argmax(excess)))
+        others = (best, *rivals)
+        return Decision('missing_physics', known, others, excess, unknown[0], unknown,
+                        against=base.score)  # fmt: skip
+    if scale.shares(comparison.parameters).max() > COUNTED_SHARE:
+        unknown = _ordered(np.where(is_open, excess, 0.0), worst)
+        return Decision('unexplained', base, (best, *rivals), excess, worst, unknown, best,
+                        base.score)  # fmt: skip
+    return _calm(base, rivals, scale)
+
+
+def _ordered(size: np.ndarray, first: int) -> tuple[int, ...]:
+    """Return the joints of a size (k,) above zero, one of them first, then the largest."""
+    rest = [int(j) for j in np.argsort(-size) if size[j] > 0.0 and j != first]
+    return (first, *rest)
+
+
+def without(equations: Equations, model: Model, is_dropped: Callable[[EffectAt], bool]) -> Model:
+    """Return a model fitted again without some of its effects."""
+    kept = tuple(s for s in model.effects if not is_dropped(s))
+    if len(kept) == len(model.effects):
+        return model
+    return fit(
+        Columns(equations), kept, model.sigma, is_free=model.is_free, w=model.w, still=len(kept)
+    )
 
 
 def _supported(equations: Equations, scale: Scale, ranked: list[Model]) -> Model | None:
-    """Return the first model whose effects all predict parts of the recording left out."""
+    """Return the first model whose effects all predict parts of the recording left out.
+
+    Of more than two effects those that do not are taken out.
+    """
     columns, floor = Columns(equations), scale.floor * scale.power
     for model in ranked:
-        if scale.rows * min(support(columns, model, floor)) > EVIDENCE:
-            return model
+        found = model
+        while found.effects:
+            told = scale.rows * np.array(support(columns, found, floor))
+            if told.min() > EVIDENCE:
+                return found
+            if len(found.effects) <= 2:
+                break
+            weakest = found.effects[int(np.argmin(told))]
+            found = without(equations, found, lambda s, out=weakest: s is out)  # type: ignore[misc]
     return None

@@ -1,10 +1,17 @@
-"""What is said of models that were not asserted."""
+"""What is said of models that were not asserted, and how certain the rest is."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.decide.certainty import Probabilities
+from sgp_ros.diagnosis.criteria import LEAST_ASSERTED
+from sgp_ros.diagnosis.decide import certainty
+from sgp_ros.diagnosis.decide.certainty import Probabilities, certainty_of, settled
+from sgp_ros.diagnosis.decide.decision import UNKNOWN, Scale, decide
+from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.findings import doubted_if_none
 from sgp_ros.diagnosis.result import Finding, Location, Parameter
 from sgp_ros.physics.catalogue import EFFECTS
@@ -13,14 +20,72 @@ from sgp_ros.physics.parts import Place
 from test.diagnosis.fitted_models import fitted
 
 
+def _comparison(equations, *models):
+    bases = (fitted(equations, is_free=f) for f in (False, True))
+    return Comparison(*bases, models, ())
+
+
+def _said(equations, asserted):
+    scale = Scale.of(equations, _comparison(equations, asserted))
+    return Probabilities({}, np.zeros(1), asserted, scale)
+
+
 def test_a_rival_beside_what_is_asserted_is_told_from_one_in_its_place(equations_for, viscous):
     """It leaves less than the asserted model and still lost: what it adds is next to nothing."""
     _, equations = equations_for(viscous)
-    asserted = fitted(equations, 'viscous_friction')
-    said = Probabilities({}, 0.1, asserted, equations.power)
+    said = _said(equations, fitted(equations, 'viscous_friction'))
     more = fitted(equations, 'viscous_friction', 'quadratic_drag')
     assert 'beside the asserted model' in said.why(more)
     assert 'beside' not in said.why(fitted(equations, 'spring'))
+
+
+def test_a_rival_that_leaves_less_is_told_what_is_wrong_with_it(equations_for, viscous):
+    """Its price, the size of its effects, or bodies that are not likely."""
+    _, equations = equations_for(viscous)
+    said = _said(equations, fitted(equations, 'viscous_friction'))
+    more = fitted(equations, 'viscous_friction', 'quadratic_drag')
+    more = replace(more, residual=0.5 * said.asserted.residual)
+    more.__dict__['shares'] = [1.0, 1e-6]
+    assert 'too small' in said.why(more)
+    more.__dict__['shares'] = [1.0, 1.0]
+    assert 'more numbers' in said.why(more)
+    heavy = replace(more, w=np.full_like(more.w, 30.0), log_inertia=0.0)
+    heavy.__dict__['shares'] = [1.0, 1.0]
+    assert 'more than is likely' in said.why(heavy)
+    assert ';' not in said.why(fitted(equations, 'spring'))
+
+
+def test_what_is_improbable_is_not_asserted_beside_others(equations_for, viscous, monkeypatch):
+    """The rest is fitted again without it; the most probable one stays whatever it is."""
+    _, equations = equations_for(viscous)
+    pair = fitted(equations, 'viscous_friction', 'quadratic_drag')
+    comparison = _comparison(equations, fitted(equations, 'spring'))
+    scale = Scale.of(equations, comparison)
+    decision = replace(decide(equations, comparison), verdict='missing_physics', model=pair)
+    names = [s.key for s in pair.effects]
+    chances = Probabilities({names[0]: 0.3, names[1]: 9e-5}, np.zeros(1), pair, scale)
+    monkeypatch.setattr(certainty, 'probabilities', lambda *_: chances)
+    kept, _, _ = settled(equations, comparison, decision)
+    assert max(chances.by_key.values()) < LEAST_ASSERTED
+    assert [s.key for s in kept.model.effects] == names[:1]
+    assert kept.rivals[0] is pair
+
+
+@pytest.mark.parametrize(
+    ('named', 'unknown', 'expected'),
+    [((0.99, 0.96), (), 0.96), ((0.99,), (0.9,), 0.99), ((), (0.7, 0.9), 0.9)],
+)
+def test_a_verdict_is_as_certain_as_the_least_that_it_rests_on(
+    equations_for, viscous, named, unknown, expected
+):
+    """Beside named effects an unknown one of another joint is no reason for the verdict."""
+    _, equations = equations_for(viscous)
+    findings = [
+        Finding('joint0', effect, {}, Location(), 0.0, p, 0.1)
+        for effect, chances in (('spring', named), (UNKNOWN, unknown))
+        for p in chances
+    ]
+    assert certainty_of(findings, equations, _comparison(equations)) == expected
 
 
 @pytest.mark.parametrize(('std', 'is_doubted'), [(0.002, False), (0.006, True), (None, False)])
