@@ -25,11 +25,12 @@ from sgp_ros.diagnosis.criteria import (
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.diagnosis.explain.screening import Trial, screen
+from sgp_ros.diagnosis.explain.screening import WIDEST, Trial, screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import JOINT, MOTOR, PLACES
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 SWEEPS = 4
 """Most sweeps over the joints."""
@@ -101,7 +102,7 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
     model = fit(columns, model.effects, model.sigma, is_free=model.is_free, w=model.w, rounds=2,
                 steps=6)  # fmt: skip
     rivals = [t for block in _blocks(model) for t in _changes(columns, model, block, EFFECTS)]
-    return [m for m in (model, *rivals) if m.effects and m.is_possible()]
+    return [m for m in (model, *rivals) if m.effects and is_credible(m)]
 
 
 def _blocks(model: Model) -> Iterator[_Block]:
@@ -130,13 +131,25 @@ def _fitted(columns: Columns, model: Model, arranged: _Arranged, *more: EffectAt
 
 def _best(model: Model, trials: Iterable[Model], *, is_whole: bool = True) -> Model | None:
     """Return the trial that is worth most, if it is worth more than the model."""
-    gains = {
-        t: gain(t, model, is_whole=is_whole)
-        for t in trials
-        if t.is_possible() and np.isfinite(t.score)
-    }
+    gains = {t: gain(t, model, is_whole=is_whole) for t in trials if is_credible(t)}
     best = max(gains, key=lambda t: gains[t], default=None)
     return best if best is not None and gains[best] > 0.0 else None
+
+
+def is_credible(model: Model) -> bool:
+    """Return whether all effects have signs, sizes and regions that they can have."""
+    motion = model.frame.equations.motion
+    is_finite = model.is_possible() and bool(np.isfinite(model.score))
+    return is_finite and all(_is_confined(s, motion) for s in model.effects)
+
+
+def _is_confined(s: EffectAt, motion: ObservedMotion) -> bool:
+    """Return whether an effect of a region of positions has one: a stop everywhere is a spring."""
+    inside = s.effect.interval(s, motion)
+    if inside is None or inside[0] != 'position':
+        return True
+    q = motion.wrapped[:, s.place.joint]
+    return float(sum(((q >= a) & (q <= b)).mean() for a, b in inside[1])) < WIDEST
 
 
 def _grown(columns: Columns, model: Model, block: _Block) -> Model:

@@ -26,7 +26,7 @@ from sgp_ros.robots.observed_motion import ObservedMotion
 
 TRIALS = 2
 """Shapes per effect and place that are worth a fit."""
-_WIDEST = 0.75
+WIDEST = 0.75
 """Widest interval of position, as a share of the range: wider ones are no region."""
 
 _UNSEEN = 1e-13
@@ -248,7 +248,7 @@ def _intervals(
     size = area[j, j] - area[i, j] - area[j, i] + area[i, i]
     sums = np.concatenate([[0.0], np.cumsum(found.b)])
     push = sums[j] - sums[i]
-    usable = (push > 0.0) & (j - i <= _WIDEST * columns.shape[1]) & (size > 1e-12 * area[-1, -1])
+    usable = (push > 0.0) & (j - i <= WIDEST * columns.shape[1]) & (size > 1e-12 * area[-1, -1])
     gain = np.where(usable, push**2 / np.maximum(size, 1e-300), 0.0)
     order = np.argsort(-gain)
     far = (abs(i[order] - i[order[0]]) > TRIALS * 2) | (abs(j[order] - j[order[0]]) > TRIALS * 2)

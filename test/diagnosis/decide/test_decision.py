@@ -123,14 +123,14 @@ def test_more_than_two_effects_are_found_where_joints_lack_several(equations_for
     """Three effects on two joints, found by the search joint by joint."""
     world = simulate(
         CHAINS[2], 7, 12.0,
-        force=lambda t, q, v: (-4.0 * (q[0] - 0.3) - 1.5 * v[0], -0.8 * v[1]),
+        force=lambda t, q, v: (-1.5 * v[0] - 0.8 * abs(v[0]) * v[0], -0.8 * v[1]),
     )  # fmt: skip
     _, equations = equations_for(world)
     comparison = compare_models(equations, lambda _share: None)
     found = {(s.effect.name, s.place.joint) for m in comparison.more for s in m.effects}
     decision = decide(equations, comparison)
     asserted = {(s.effect.name, s.place.joint) for s in decision.model.effects}
-    truth = {('spring', 0), ('viscous_friction', 0), ('viscous_friction', 1)}
+    truth = {('quadratic_drag', 0), ('viscous_friction', 0), ('viscous_friction', 1)}
     assert truth <= found
     assert asserted == truth
 

@@ -11,6 +11,8 @@ from sgp_ros.diagnosis.explain.joint_search import by_joint, gain
 from sgp_ros.diagnosis.explain.regression import Columns, Frame
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 from test.diagnosis.worlds import CHAINS, simulate
 
 TRUTH = {('viscous_friction', 0), ('spring', 0), ('viscous_friction', 1)}
@@ -36,19 +38,27 @@ def _keys(model):
     return {(s.name, s.place.joint) for s in model.effects}
 
 
-def test_every_joint_gets_the_laws_that_it_lacks(equations):
+def _pair(equations):
     columns, base = _start(equations)
-    found, *rivals = by_joint(columns, base)
+    pair = tuple(EffectAt(EFFECTS[n], Place(0)) for n in ('spring', 'viscous_friction'))
+    return columns, fit(columns, pair, base.sigma, is_free=True)
+
+
+def test_every_joint_gets_the_laws_that_it_lacks(equations):
+    """What the best pair lacks is added at its joint, and nothing beside it."""
+    columns, pair = _pair(equations)
+    found, *rivals = by_joint(columns, pair)
     assert _keys(found) == TRUTH
     assert all(gain(rival, found) <= 0.0 for rival in rivals)
     assert any(len(rival.effects) < len(found.effects) for rival in rivals)
 
 
-def test_where_nothing_is_left_nothing_is_sought(equations):
-    columns, base = _start(equations)
-    found, *_ = by_joint(columns, base)
-    again = by_joint(columns, found)
-    assert not again or _keys(again[0]) == _keys(found)
+def test_what_is_not_worth_its_price_is_taken_out(equations):
+    columns, pair = _pair(equations)
+    wave = next(c for _, c in screen(columns, pair, [EFFECTS['cogging']], (0,)))
+    rich = fit(columns, (*pair.effects, wave), pair.sigma, is_free=True)
+    found, *_ = by_joint(columns, rich)
+    assert _keys(found) == TRUTH
 
 
 def test_a_gain_is_what_the_other_way_loses(equations):
