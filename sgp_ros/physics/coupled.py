@@ -127,6 +127,7 @@ class CoupledFriction(Effect):
     )
     linear = ('coulomb', 'viscous')
     has_source = True
+    plain = ('coulomb_friction', 'viscous_friction')
     site = MOTOR
     drawn_over = 'velocity'
     is_dry = True

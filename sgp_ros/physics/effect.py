@@ -71,10 +71,11 @@ class Effect:
         source: where the equation comes from.
         appearance: what it looks like in data.
         quantities: the parameters that are stated and reported.
-        linear: names of those that are coefficients, in the order of the columns. Without any,
-            the coefficient is 1: the shape alone says how large the effect is.
+        linear: names of those that are coefficients, in the order of the columns; without any the
+            coefficient is 1, and the shape alone says how large the effect is.
         kinds: the variants it comes in.
         has_source: whether it comes from another joint.
+        plain: laws of one joint that it becomes where nothing is coupled.
         site: what it sits on.
         edge: quantity that says where it begins, of an effect at one end of the range.
         needs_limits: whether the joint must have limits.
@@ -82,8 +83,7 @@ class Effect:
         size: stated number in which an effect without linear ones is linear nevertheless.
         term: how it enters a robot YAML under `terms`; None where it does not.
         small: to first order in its size; None where starts are shapes.
-        drawn_over: what its force is drawn over: `position`, `velocity`, `acceleration`,
-            `effort`, `time` (its magnitude over the recording) or `seconds` (a few of them).
+        drawn_over: a variable of the motion, `effort`, `time` (its size) or `seconds` (a few).
         is_force: it exerts a force; else it only changes what a sensor shows.
         is_online: a model that sees one time of the motion at once can hold it.
         is_late: it answers to commands of the past; the stated number is a time [s].
@@ -106,6 +106,7 @@ class Effect:
     linear: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ()
     has_source: bool = False
+    plain: tuple[str, ...] = ()
     site: Site = JOINT
     edge: str = ''
     needs_limits: bool = False

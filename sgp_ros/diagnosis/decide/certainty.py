@@ -67,8 +67,7 @@ class Probabilities:
         losses = {
             'bodies that differ more than is likely': 0.5
             * float(model.w @ model.w - asserted.w @ asserted.w),
-            'more numbers than it gains by': PER_EFFECT
-            * (len(model.effects) - len(asserted.effects))
+            'more numbers than it gains by': PER_EFFECT * (model.laws - asserted.laws)
             + PER_PARAMETER * (model.freedom - asserted.freedom),
             'more left at other joints': scale.likelihood(asserted) - scale.likelihood(model),
         }

@@ -175,7 +175,7 @@ class Scale:
 
     def worth(self, model: Model) -> float:
         """Return the fit of a model, less the price of its freedom [nats]."""
-        return self.fit(model) - PER_EFFECT * len(model.effects) - PER_PARAMETER * model.freedom
+        return self.fit(model) - PER_EFFECT * model.laws - PER_PARAMETER * model.freedom
 
 
 def _ranked(comparison: Comparison, scale: Scale) -> list[Model]:

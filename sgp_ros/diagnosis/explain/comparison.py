@@ -11,7 +11,7 @@ from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
-from sgp_ros.diagnosis.explain.joint_search import by_joint
+from sgp_ros.diagnosis.explain.joint_search import by_joint, uncoupled
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
@@ -75,9 +75,20 @@ def compare_models(equations: Equations, progress: Callable[[float], None]) -> C
         ]  # fmt: skip
         progress(0.45 + 0.55 * (number + 1) / len(parents))
     ranked = _ranked([*pairs, *_exchanged(columns, _ranked(pairs))])
+    ranked = _ranked([*ranked, *_plain(columns, (*singles[:1], *ranked[:1]))])
     best = max([*singles, *ranked], key=lambda m: m.score, default=None)
     more = _more(columns, best) if best is not None else []
     return Comparison(bases[0], bases[1], tuple(singles), tuple(ranked), tuple(more))
+
+
+def _plain(columns: Columns, models: Iterable[Model]) -> Iterator[Model]:
+    """Yield models with laws of each joint alone in place of those that couple two."""
+    for model in models:
+        for s in model.effects:
+            if s.effect.plain:
+                others = tuple(o for o in model.effects if o is not s)
+                without = fit(columns, others, model.sigma, is_free=model.is_free, w=model.w)
+                yield from uncoupled(columns, without, s)
 
 
 def _more(columns: Columns, best: Model) -> list[Model]:

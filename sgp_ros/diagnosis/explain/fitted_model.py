@@ -10,6 +10,8 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import FLOOR_SHARE
 from sgp_ros.diagnosis.explain.regression import Frame, dry_joints
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect import EMPTY
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -61,6 +63,11 @@ class Model:
         )
 
     @property
+    def laws(self) -> int:
+        """Number of laws, with those that an effect of two joints holds."""
+        return sum(1 + len(s.effect.plain) for s in self.effects)
+
+    @property
     def cost(self) -> float:
         """What the freedom of the model costs [nats]."""
         return price_of(self.frame, self.size)
@@ -97,7 +104,8 @@ class Model:
         """Greatest shares that the effects have of the mean squared effort of a joint.
 
         Before any filter, as the schema has it: what lies above the cut-off counts. Not so where
-        an effect follows the measured acceleration, which is mostly noise up there.
+        an effect follows the measured acceleration, which is mostly noise up there. Of one that
+        couples joints only what laws of each joint alone do not say counts.
         """
         equations = self.frame.equations
         found = []
@@ -105,10 +113,22 @@ class Model:
             if s.effect.sees_acceleration and not s.effect.has_memory:
                 found.append(filtered)
                 continue
-            force = s.columns(equations.motion) @ s.coefficients
+            force = _coupled(s, s.columns(equations.motion) @ s.coefficients, equations.motion)
             power = equations.power if force.ndim == 2 else equations.power[s.place.joint]
             found.append(float(((force**2).mean(axis=0) / power).max()))
         return found
+
+
+def _coupled(s: EffectAt, force: np.ndarray, motion: ObservedMotion) -> np.ndarray:
+    """Return what no law of one joint alone says of the force (n, k) of an effect."""
+    if not s.effect.plain:
+        return force
+    left = force.copy()
+    for joint in (s.place.joint, s.place.source):
+        alone = [EFFECTS[n].columns(motion, Place(joint), EMPTY) for n in s.effect.plain]
+        x = np.concatenate(alone, axis=1)
+        left[:, joint] -= x @ np.linalg.lstsq(x, force[:, joint], rcond=1e-9)[0]
+    return left
 
 
 def floors(equations: Equations) -> np.ndarray:

@@ -29,7 +29,7 @@ from sgp_ros.diagnosis.explain.screening import WIDEST, Trial, screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import JOINT, MOTOR, PLACES
+from sgp_ros.physics.parts import JOINT, MOTOR, PLACES, Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 SWEEPS = 4
@@ -55,7 +55,7 @@ def gain(trial: Model, model: Model, *, is_whole: bool = True) -> float:
     rows = np.minimum(len(of.residual) / factors, INDEPENDENT_ROWS)
     prior = 0.5 * float(model.w @ model.w - trial.w @ trial.w)
     inertia = float(rows.mean()) * (trial.log_inertia - model.log_inertia)
-    price = PER_EFFECT * (len(trial.effects) - len(model.effects))
+    price = PER_EFFECT * (trial.laws - model.laws)
     price += PER_PARAMETER * (trial.size - model.size)
     return float(rows @ np.log(model.sigma / trial.sigma)) + inertia + prior - price
 
@@ -187,12 +187,35 @@ def _changes(
         arranged = _arranged(model, block, s)
         without = _fitted(columns, model, arranged)
         yield without
+        if s.effect.plain:
+            yield from uncoupled(columns, without, s)
         others = [e for e in block.effects if e.name in laws and e is not s.effect]
         is_richer = len(s.effect.quantities) > 1
         if others and (is_richer or laws is EFFECTS):
             joints = (s.place.joint,) if s.place.joint not in PLACES.values() else block.joints
             found = _distinct(screen(columns, without, others, joints), 1)
             yield from (_fitted(columns, model, arranged, other) for other in found)
+
+
+def uncoupled(columns: Columns, without: Model, coupled: EffectAt) -> Iterator[Model]:
+    """Yield models with laws of each joint alone in place of one that couples two.
+
+    On one joint, on the other, on both; laws that drive, or that are too small, are left out.
+    """
+    place = coupled.place
+    for joints in ((place.joint,), (place.source,), (place.joint, place.source)):
+        alone = [EffectAt(EFFECTS[n], Place(j)) for j in joints for n in coupled.effect.plain]
+        alone = [s for s in alone if s.key not in without.key]
+        motion = without.frame.equations.motion
+        while alone:
+            trial = _fitted(columns, without, (without.effects, len(without.effects)), *alone)
+            own = list(zip(trial.effects, trial.shares, strict=True))[-len(alone) :]
+            kept = [EffectAt(s.effect, s.place) for s, share in own
+                    if s.is_possible(motion) and share > COUNTED_SHARE]  # fmt: skip
+            if len(kept) == len(alone):
+                yield trial
+                break
+            alone = kept
 
 
 def _distinct(found: Sequence[Trial], count: int) -> list[EffectAt]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE
 from sgp_ros.diagnosis.explain.candidates import fit, residual_of
 from sgp_ros.diagnosis.explain.fitted_model import floors
-from sgp_ros.diagnosis.explain.joint_search import by_joint, gain
+from sgp_ros.diagnosis.explain.joint_search import by_joint, gain, uncoupled
 from sgp_ros.diagnosis.explain.regression import Columns, Frame
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
@@ -99,3 +100,20 @@ def test_a_joint_is_screened_alone(equations):
     columns, base = _start(equations)
     found = screen(columns, base, EFFECTS.values(), (1,))
     assert {candidate.place.joint for _, candidate in found} == {1}
+
+
+def test_friction_that_couples_nothing_is_that_of_each_joint(equations):
+    """What two joints have alone is no coupling, and their own laws are its rival."""
+    columns, base = _start(equations)
+    coupled, place = EFFECTS['coupled_friction'], Place(1, source=0)
+    alone, both = (
+        fit(columns, (EffectAt(coupled, place, np.array([ratio])),), base.sigma, still=1)
+        for ratio in (0.0, 1.0)
+    )
+    assert alone.filtered_shares[0] > COUNTED_SHARE
+    assert alone.shares[0] < 1e-6 * alone.filtered_shares[0]
+    assert both.shares[0] > COUNTED_SHARE
+    _, pair = _pair(equations)
+    spring = fit(columns, pair.effects[:1], base.sigma)
+    rivals = [_keys(m) for m in uncoupled(columns, spring, alone.effects[0])]
+    assert TRUTH in rivals
