@@ -243,6 +243,7 @@ class FrictionDrift(Effect):
         Quantity('end', 'N m', low=0.0),
         Quantity('time_constant', 's', low=1e-3, is_positive=True),
     )
+    plain = ('coulomb_friction', 'viscous_friction')
     linear = ('end', 'start')
     kinds = KINDS
     drawn_over = 'time'

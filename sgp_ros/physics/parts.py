@@ -43,12 +43,14 @@ class Place:
         kind: such as `coulomb` or `viscous`; empty where there is but one.
         source: index of the joint it comes from; -1 where there is none.
         side: 1 or -1 for an effect at one end of the range; 0 elsewhere.
+        number: 0, or 1, 2, ... of further waves of the same law there.
     """
 
     joint: int
     kind: str = ''
     source: int = -1
     side: int = 0
+    number: int = 0
 
     @classmethod
     def of(

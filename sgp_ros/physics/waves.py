@@ -55,6 +55,11 @@ class Wave:
     low: float
     high: float
 
+    @property
+    def width(self) -> float:
+        """Periods per turn by which two waves differ that differ by one over the rows."""
+        return 2.0 * math.pi / max(float(np.ptp(self.phase)), 1e-9)
+
     def strongest(self, rows: np.ndarray, residual: np.ndarray, sigma: np.ndarray) -> np.ndarray:
         """Return the periods that explain most of a residual, strongest first, (peaks, 1).
 

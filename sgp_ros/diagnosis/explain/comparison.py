@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,7 +82,7 @@ def compare_models(equations: Equations, progress: Callable[[float], None]) -> C
 
 
 def _plain(columns: Columns, models: Iterable[Model]) -> Iterator[Model]:
-    """Yield models with laws of each joint alone in place of those that couple two."""
+    """Yield models with plain laws in place of those that couple or drift."""
     for model in models:
         for s in model.effects:
             if s.effect.plain:

@@ -64,8 +64,8 @@ class Model:
 
     @property
     def laws(self) -> int:
-        """Number of laws, with those that an effect of two joints holds."""
-        return sum(1 + len(s.effect.plain) for s in self.effects)
+        """Number of laws: one of two joints holds its plain ones, waves at one place are one."""
+        return sum((not s.place.number) + _extra_laws(s) for s in self.effects)
 
     @property
     def cost(self) -> float:
@@ -113,21 +113,29 @@ class Model:
             if s.effect.sees_acceleration and not s.effect.has_memory:
                 found.append(filtered)
                 continue
-            force = _coupled(s, s.columns(equations.motion) @ s.coefficients, equations.motion)
+            force = s.columns(equations.motion) @ s.coefficients
+            if s.place.source >= 0:
+                force = beyond_plain(s, force, equations.motion)
             power = equations.power if force.ndim == 2 else equations.power[s.place.joint]
             found.append(float(((force**2).mean(axis=0) / power).max()))
         return found
 
 
-def _coupled(s: EffectAt, force: np.ndarray, motion: ObservedMotion) -> np.ndarray:
-    """Return what no law of one joint alone says of the force (n, k) of an effect."""
+def _extra_laws(s: EffectAt) -> int:
+    return len(s.effect.plain) if s.place.source >= 0 else 0
+
+
+def beyond_plain(s: EffectAt, force: np.ndarray, motion: ObservedMotion) -> np.ndarray:
+    """Return what plain laws of one joint do not say of a force, (n, k) or (n,) as given."""
     if not s.effect.plain:
         return force
     left = force.copy()
     for joint in (s.place.joint, s.place.source):
-        alone = [EFFECTS[n].columns(motion, Place(joint), EMPTY) for n in s.effect.plain]
-        x = np.concatenate(alone, axis=1)
-        left[:, joint] -= x @ np.linalg.lstsq(x, force[:, joint], rcond=1e-9)[0]
+        if joint >= 0:
+            alone = [EFFECTS[n].columns(motion, Place(joint), EMPTY) for n in s.effect.plain]
+            x = np.concatenate(alone, axis=1)
+            own = left if left.ndim == 1 else left[:, joint]
+            own -= x @ np.linalg.lstsq(x, own, rcond=1e-9)[0]
     return left
 
 

@@ -21,11 +21,12 @@ from sgp_ros.diagnosis.criteria import (
     INDEPENDENT_ROWS,
     PER_EFFECT,
     PER_PARAMETER,
+    SLIGHT_REST,
 )
 from sgp_ros.diagnosis.explain.candidates import fit
-from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.fitted_model import Model, beyond_plain
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.diagnosis.explain.screening import WIDEST, Trial, screen
+from sgp_ros.diagnosis.explain.screening import WIDEST, Trial, are_apart, screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
@@ -140,7 +141,19 @@ def is_credible(model: Model) -> bool:
     """Return whether all effects have signs, sizes and regions that they can have."""
     motion = model.frame.equations.motion
     is_finite = model.is_possible() and bool(np.isfinite(model.score))
-    return is_finite and all(_is_confined(s, motion) for s in model.effects)
+    is_finite = is_finite and are_apart(model.effects, motion)
+    power = model.frame.equations.power
+    return is_finite and all(
+        _is_confined(s, motion) and _is_needed(s, motion, power) for s in model.effects
+    )
+
+
+def _is_needed(s: EffectAt, motion: ObservedMotion, power: np.ndarray) -> bool:
+    """Return whether plain laws would leave more of a law than is adequate in any case."""
+    if not s.effect.plain or s.place.source >= 0:
+        return True
+    left = beyond_plain(s, s.columns(motion) @ s.coefficients, motion)
+    return float((left**2).mean()) > SLIGHT_REST * float(power[s.place.joint])
 
 
 def _is_confined(s: EffectAt, motion: ObservedMotion) -> bool:
@@ -198,12 +211,13 @@ def _changes(
 
 
 def uncoupled(columns: Columns, without: Model, coupled: EffectAt) -> Iterator[Model]:
-    """Yield models with laws of each joint alone in place of one that couples two.
+    """Yield models with the plain laws of each joint in place of one that couples or drifts.
 
-    On one joint, on the other, on both; laws that drive, or that are too small, are left out.
+    Of two joints on one, on the other, on both; laws that drive, or are too small, are left out.
     """
     place = coupled.place
-    for joints in ((place.joint,), (place.source,), (place.joint, place.source)):
+    both = (place.joint, place.source)
+    for joints in ((place.joint,), (place.source,), both) if place.source >= 0 else (both[:1],):
         alone = [EffectAt(EFFECTS[n], Place(j)) for j in joints for n in coupled.effect.plain]
         alone = [s for s in alone if s.key not in without.key]
         motion = without.frame.equations.motion

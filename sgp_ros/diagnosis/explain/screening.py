@@ -9,7 +9,7 @@ instead of O(N k P).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,13 +52,12 @@ def screen(
     held = dry_joints(model.effects)
     rests = {held: _Rest.of(columns, model, held)}
     before = rests[held].left
-    known = {s.key for s in model.effects}
     found: list[Trial] = []
     for effect in effects:
         if effect.is_body and model.is_free:
             continue
-        for place in effect.places(columns.equations(held).motion):
-            if (effect.name, place) in known or (joints is not None and place.joint not in joints):
+        for place in _free_places(effect, model, columns.equations(held).motion):
+            if joints is not None and place.joint not in joints:
                 continue
             if not shows(effect, place, columns.equations(held).motion):
                 continue
@@ -67,8 +66,36 @@ def screen(
                 rests[dry] = _Rest.of(columns, model, dry)
             motion = columns.corrected(model.w if effect.uses_bodies else None)
             trials = _trials(_Look(columns, rests[dry], before), effect, place, motion)
+            if place.number:
+                trials = (t for t in trials if are_apart((*model.effects, t[1]), motion))
             found += sorted(trials, key=lambda t: -t[0])[:TRIALS]
     return sorted(found, key=lambda t: -t[0])
+
+
+def _free_places(effect: Effect, model: Model, motion: ObservedMotion) -> Iterator[Place]:
+    """Yield the places of a law that a model has not there yet; of a wave further ones too."""
+    for place in effect.places(motion):
+        here = [s.place.number for s in model.effects if _is_like(s, effect, place)]
+        if not here:
+            yield place
+        elif effect.wave(motion, place) is not None:
+            yield replace(place, number=1 + max(here))
+
+
+def _is_like(s: EffectAt, effect: Effect, place: Place) -> bool:
+    """Return whether an effect is one of a law at a place, of which waves may have several."""
+    return s.effect is effect and replace(s.place, number=0) == place
+
+
+def are_apart(effects: Sequence[EffectAt], motion: ObservedMotion) -> bool:
+    """Return whether waves of one law at one place differ by one period or more in the motion."""
+    for i, s in enumerate(effects):
+        first = replace(s.place, number=0)
+        others = [o for o in effects[:i] if _is_like(o, s.effect, first)]
+        wave = s.effect.wave(motion, s.place) if others else None
+        if wave and any(abs(o.shape[0] - s.shape[0]) < wave.width for o in others):
+            return False
+    return True
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE
 from sgp_ros.diagnosis.explain.candidates import fit, residual_of
 from sgp_ros.diagnosis.explain.fitted_model import floors
-from sgp_ros.diagnosis.explain.joint_search import by_joint, gain, uncoupled
+from sgp_ros.diagnosis.explain.joint_search import by_joint, gain, is_credible, uncoupled
 from sgp_ros.diagnosis.explain.regression import Columns, Frame
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
@@ -117,3 +119,39 @@ def test_friction_that_couples_nothing_is_that_of_each_joint(equations):
     spring = fit(columns, pair.effects[:1], base.sigma)
     rivals = [_keys(m) for m in uncoupled(columns, spring, alone.effects[0])]
     assert TRUTH in rivals
+
+
+def test_a_drift_that_shows_only_at_the_start_is_none(equations):
+    columns, base = _start(equations)
+    motion, place = equations.motion, Place(1, 'viscous')
+    drift = EffectAt(EFFECTS['friction_drift'], place)
+    short, long = (
+        fit(columns, (drift.with_shape(np.array([tau])),), base.sigma, still=1)
+        for tau in (motion.step, 0.5 * motion.time[-1])
+    )
+    faded = [
+        replace(m, effects=(replace(m.effects[0], coefficients=np.array([0.8, 1.6])),))
+        for m in (short, long)
+    ]
+    assert [is_credible(m) for m in faded] == [False, True]
+
+
+def test_several_waves_are_found_at_one_joint(equations_for):
+    """Each with its own period; two of nearly one period are one wave."""
+    world = simulate(
+        CHAINS[1], 5, 10.0,
+        force=lambda t, q, v: (0.9 * np.sin(12.0 * q[0]) + 0.6 * np.cos(31.0 * q[0]),),
+    )  # fmt: skip
+    _, equations = equations_for(world)
+    columns, base = _start(equations)
+    cogging = EFFECTS['cogging']
+    (_, first), *_ = screen(columns, base, [cogging])
+    one = fit(columns, (first,), base.sigma)
+    (_, second), *_ = screen(columns, one, [cogging])
+    both = fit(columns, (*one.effects, second), one.sigma)
+    assert len({s.key for s in both.effects}) == 2
+    assert sorted(float(s.shape[0]) for s in both.effects) == pytest.approx([12.0, 31.0], rel=0.01)
+    assert both.laws == 1
+    assert is_credible(both)
+    near = both.effects[0].with_shape(both.effects[1].shape + 0.1)
+    assert not is_credible(replace(both, effects=(near, both.effects[1])))
