@@ -28,6 +28,7 @@ from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision, Scale, without
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.joint_search import is_credible
 from sgp_ros.diagnosis.result import Difference, Finding
 from sgp_ros.physics.parts import JOINT, MOTOR
 
@@ -83,7 +84,8 @@ def settled(
     """Return the decision without findings that are improbable, with probabilities of the rest.
 
     What is asserted beside others is at least `LEAST_ASSERTED` probable; the others are fitted
-    again without it. The most probable one stays: something is missing there.
+    again without it, if they can have the numbers that follow. The most probable one stays:
+    something is missing there.
     """
     while True:
         contrasts = Contrasts(equations, decision.model)
@@ -94,6 +96,8 @@ def settled(
             return decision, contrasts, chances
         weakest = effects[int(np.argmin(p))]
         kept = without(equations, decision.model, lambda s, out=weakest: s is out)  # type: ignore[misc]
+        if not is_credible(kept):
+            return decision, contrasts, chances
         rivals = (decision.model, *decision.rivals)
         decision = replace(decision, model=kept, rivals=rivals)
 

@@ -39,6 +39,7 @@ from sgp_ros.diagnosis.decide.cross_validation import repeatable, structure, sup
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.joint_search import is_credible
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import JOINT, MOTOR
@@ -238,7 +239,7 @@ def _judged(
     )
     named = scale.found(best)
     is_open = np.isin(np.arange(len(named)), open_)
-    if known.effects and named[~is_open].sum() > named[is_open].sum():
+    if known.effects and is_credible(known) and named[~is_open].sum() > named[is_open].sum():
         unknown = _ordered(np.where(is_open, excess, 0.0), int(np.argmax(excess)))
         others = (best, *rivals)
         return Decision('missing_physics', known, others, excess, unknown[0], unknown,
@@ -274,7 +275,7 @@ def _supported(equations: Equations, scale: Scale, ranked: list[Model]) -> Model
     columns, floor = Columns(equations), scale.floor * scale.power
     for model in ranked:
         found = model
-        while found.effects:
+        while found.effects and is_credible(found):
             told = scale.rows * np.array(support(columns, found, floor))
             if told.min() > EVIDENCE:
                 return found
