@@ -138,7 +138,8 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
         correction=correction,
     )
     if corrected.several.decision.verdict == 'unexplained':
-        return _suspected(plain, found)
+        is_explained = plain.several.decision.verdict != 'unexplained'
+        return plain if is_explained else _suspected(plain, found)
     numbers = sum(len(e.numbers) for e in found.errors)
     price = PER_EFFECT * len(found.errors) + PER_PARAMETER * numbers
     gain = _gain(plain, corrected) - price
