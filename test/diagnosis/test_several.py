@@ -9,7 +9,8 @@ from sgp_ros.diagnosis.compare.several import join
 from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
-from sgp_ros.report.diagnosis_text import differences_text, verdict_sentence
+from sgp_ros.report.diagnosis_text import differences_text
+from sgp_ros.report.verdict import verdict_sentence
 from test.diagnosis.worlds import CHAINS, Link, events_of, simulate
 
 SECONDS = 6.0
