@@ -21,6 +21,9 @@ _FITTING = 20.0
 _LATER = 1.35
 """Ratio of delays from which searches start."""
 
+SPREAD = 0.25
+"""Prior standard deviation of the logarithm of a gain [1]. Convention, that of bodies."""
+
 
 def _sizes(motion: SeenMotion, place: Place) -> np.ndarray:
     return np.abs(_commands(motion).values[:, place.joint])
@@ -65,6 +68,11 @@ class TorqueGain(Effect):
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
         return bool(at.coefficients[0] > CONNECTED - 1.0)
+
+    def surprise(self, at: Placed) -> float:
+        """Return the price of a gain: a torque constant is known to a quarter, as a mass is."""
+        gain = max(1.0 + float(at.coefficients[0]), CONNECTED)
+        return 0.5 * (math.log(gain) / SPREAD) ** 2
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         return motion.effort[:, place.joint, None]

@@ -20,6 +20,8 @@ _STRONGER = 2.0
 """Load over that for which the efforts of the recording would just do."""
 
 
+LEVEL = 0.1
+"""Prior standard deviation of a tilt about either axis [rad]. Convention."""
 MOST_TILT = 0.35
 """Beyond it a base does not stand badly, it is mounted in another orientation [rad]."""
 
@@ -45,6 +47,10 @@ class GravityTilt(Effect):
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
         return True
+
+    def surprise(self, at: Placed) -> float:
+        """Return the price of a tilt: a base that is meant to be level stands within 0.1 rad."""
+        return 0.5 * float(at.shape @ at.shape) / LEVEL**2
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         """Return the force of the change of gravity, (n, k, 1)."""

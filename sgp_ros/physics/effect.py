@@ -161,12 +161,11 @@ class Effect:
     def report(self, at: Placed, motion: SeenMotion) -> dict[str, Value]:
         """Return the values of `quantities`, and the words that say which variant it is."""
         kind = at.place.kind
+        known = self.stated_quantities(kind)
         named = dict(zip((q.name for q in self.coefficient_quantities(kind)), at.coefficients,
                          strict=False))  # fmt: skip
         named |= dict(zip(self.shape_names(kind), at.shape, strict=False))
-        values: dict[str, Value] = {
-            q.name: float(named[q.name]) for q in self.stated_quantities(kind)
-        }
+        values: dict[str, Value] = {q.name: float(named[q.name]) for q in known}
         if kind:
             values['kind'] = kind
         if at.place.source >= 0:
@@ -186,11 +185,12 @@ class Effect:
             words['source_joint'] = tree.joint_names[place.source]
         return words | ({'side': side_word(place.side)} if self.edge else {})
 
-    def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
-        """Return whether coefficients and shape have physical signs and sizes.
+    def surprise(self, at: Placed) -> float:
+        """Return what the prior takes from such numbers [nats]; 0 where none is unlikely."""
+        return 0.0
 
-        Usually: what must not be negative is positive.
-        """
+    def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
+        """Return whether signs and sizes can be: usually what must not be negative is positive."""
         kind = at.place.kind
         if self.is_given:
             named = zip(self.stated_quantities(kind), at.shape, strict=False)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from sgp_ros.physics.drawing import Drawn, JointScene
@@ -230,6 +232,10 @@ class LoadFriction(Effect):
         return Drawn(0.2, lambda s: {'level': 0.05 * s * x.force, 'mu': s})
 
 
+WARM_S, WARM_SPREAD = 10.0, 0.7
+"""Time constant below which a warm-up is unlikely [s], spread of its logarithm [1]. Convention."""
+
+
 class FrictionDrift(Effect):
     """Friction that changes from the beginning of a recording on, as it warms up."""
 
@@ -260,6 +266,10 @@ class FrictionDrift(Effect):
         """Return whether it never drives."""
         c = at.coefficients
         return bool(np.all(c > -0.1 * np.max(np.abs(c))) and np.max(c) > 0.0)
+
+    def surprise(self, at: Placed) -> float:
+        """Return the price of a fast drift: grease and seals warm up in tens of seconds."""
+        return 0.5 * (min(math.log(float(at.shape[0]) / WARM_S), 0.0) / WARM_SPREAD) ** 2
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
         """Return shares of the duration."""

@@ -693,3 +693,20 @@ def test_bodies_without_mass_give_numbers():
     last = Place(TREE.size - 1)
     assert np.isfinite(EFFECTS['payload'].starts(motion, last)).all()
     assert np.isfinite(columns('backlash', 0, [0.3, 0.01], motion=motion)).all()
+
+
+def test_numbers_that_any_recording_allows_have_a_price():
+    """A torque constant is known to a quarter, a base stands level, a warm-up is slow."""
+    gain, tilt = (EFFECTS[name] for name in ('torque_gain', 'gravity_tilt'))
+    drift = EFFECTS['friction_drift']
+
+    def price(effect, shape, coefficients):
+        at = EffectAt(effect, Place(0), np.array(shape), np.array(coefficients))
+        return effect.surprise(at)
+
+    assert price(gain, [], [0.0]) == 0.0
+    assert price(gain, [], [-0.7]) == pytest.approx(price(gain, [], [1.0 / 0.3 - 1.0]))
+    assert price(gain, [], [-0.7]) > 10.0 > 1.0 > price(gain, [], [-0.2])
+    assert price(tilt, [0.05, 0.0], [1.0]) < 0.2 < 4.0 < price(tilt, [0.3, 0.0], [1.0])
+    assert price(drift, [30.0], [0.1, 0.3]) == 0.0
+    assert price(drift, [0.1], [0.1, 0.3]) > 10.0

@@ -176,7 +176,9 @@ class Scale:
 
     def worth(self, model: Model) -> float:
         """Return the fit of a model, less the price of its freedom [nats]."""
-        return self.fit(model) - PER_EFFECT * model.laws - PER_PARAMETER * model.freedom
+        unlikely = sum(s.effect.surprise(s) for s in model.effects)
+        price = PER_EFFECT * model.laws + PER_PARAMETER * model.freedom
+        return self.fit(model) - price - unlikely
 
 
 def _ranked(comparison: Comparison, scale: Scale) -> list[Model]:
