@@ -177,10 +177,11 @@ def test_running_scores_equal_batch_scores():
     assert np.isnan(running.nlpd)
     assert np.isnan(running.coverage95)
     for a, b, c in zip(y[:, 0], mean[:, 0], variance[:, 0], strict=True):
-        running.add(a, b, c)
+        running.add(a, b, c, 4.0 * c)
     assert running.nmse == pytest.approx(nmse(y, mean)[0])
     assert running.nlpd == pytest.approx(nlpd(y, mean, variance)[0])
     assert running.coverage95 == coverage95(y, mean, variance)[0]
+    assert running.raw_coverage95 == coverage95(y, mean, 4.0 * variance)[0]
 
 
 def test_scores_of_the_true_density_are_calibrated():
