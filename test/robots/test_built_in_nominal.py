@@ -61,7 +61,7 @@ def test_bodies_and_effects_move_as_the_coefficients_say(name, values):
         None,
         (),
         nominal.stated,
-        np.sign(v),
+        sign=np.sign,
     )
     needed = seen.nominal_effort - seen.stated_force
     if robot.target == 'effort':

@@ -74,7 +74,7 @@ def _needed(path, motion):
     n = len(motion.position)
     seen = ObservedMotion(
         nominal.tree, np.zeros(n), 0.0, motion.position, motion.velocity, motion.acceleration,
-        motion.effort, None, (0,), nominal.stated, np.sign(motion.velocity),
+        motion.effort, None, (0,), nominal.stated, sign=np.sign,
     )  # fmt: skip
     return seen.nominal_effort - seen.stated_force
 
