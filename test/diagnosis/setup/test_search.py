@@ -82,3 +82,17 @@ def test_every_hypothesis_proposes_a_change_that_its_neutral_numbers_do_not_make
             assert neutral.distance(plain) == pytest.approx(0.0, abs=1e-12), h.key
         elif h.key[:2] != ('joint_sign', 'waist'):  # about gravity, a turn is as good as another
             assert changed.distance(plain) > 0.0, h.key
+
+
+def test_a_corrected_motion_is_scaled_with_its_derivatives():
+    raw, tree = _raw(CASES / 'case_02')
+    probe = Probe(raw, tree, choose_bandwidth(raw, tree))
+    wrong = Correction.none(tree.size)
+    wrong.scale[2], wrong.offset[2], wrong.effort_scale[1] = 2.0, 0.1, 4.0
+    seen = probe.motion
+    right = wrong.motion(seen, probe.acting(0.0))
+    assert right.position[:, 2] == pytest.approx((seen.position[:, 2] - 0.1) / 2.0)
+    assert right.velocity[:, 2] == pytest.approx(seen.velocity[:, 2] / 2.0)
+    assert right.acceleration[:, 2] == pytest.approx(seen.acceleration[:, 2] / 2.0)
+    assert right.effort[:, 1] == pytest.approx(seen.effort[:, 1] / 4.0)
+    assert right.effort[:, 0] == pytest.approx(seen.effort[:, 0])
