@@ -79,6 +79,7 @@ setup(
         'console_scripts': [
             'sgp = sgp_ros.cli:main',
             'sgp_node = sgp_ros.ros.sgp_node:main',
+            'sgp_lifecycle_node = sgp_ros.ros.sgp_lifecycle_node:main',
             'reaction_wheel = sgp_ros.ros.reaction_wheel:main',
         ],
         # The experiments are beside the package, not a part of it: it installs without them.

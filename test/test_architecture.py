@@ -17,8 +17,8 @@ PROOF_MODULES = sorted(PROOF.rglob('*.py'))
 
 NUMERIC = {'numpy', 'scipy'}
 MESSAGES = {
-    'builtin_interfaces', 'diagnostic_msgs', 'rcl_interfaces', 'rclpy', 'sensor_msgs', 'std_msgs',
-    'std_srvs', 'trajectory_msgs',
+    'builtin_interfaces', 'diagnostic_msgs', 'lifecycle_msgs', 'rcl_interfaces', 'rclpy',
+    'sensor_msgs', 'std_msgs', 'std_srvs', 'trajectory_msgs',
 }  # fmt: skip
 LAYERS = {
     'errors': set(),

@@ -34,7 +34,9 @@ def test_entry_points_exist():
     """Every console script leads to a function."""
     setup = (ROOT / 'setup.py').read_text()
     scripts = re.findall(r"'(\w+) = ([\w.]+):(\w+)'", setup)
-    assert {name for name, _, _ in scripts} == {'sgp', 'sgp_node', 'reaction_wheel'}
+    assert {name for name, _, _ in scripts} == {
+        'sgp', 'sgp_node', 'sgp_lifecycle_node', 'reaction_wheel',
+    }  # fmt: skip
     for _, module, function in scripts:
         assert callable(getattr(import_module(module), function))
 
@@ -113,7 +115,7 @@ def test_colcon_build_installs_what_a_workspace_needs(workspace):
         for path in (ROOT / folder).rglob('*'):
             if path.is_file() and '__pycache__' not in path.parts:
                 assert (share / path.relative_to(ROOT)).is_file(), path
-    for name in ('sgp', 'sgp_node', 'reaction_wheel'):
+    for name in ('sgp', 'sgp_node', 'sgp_lifecycle_node', 'reaction_wheel'):
         assert (prefix / 'lib' / 'sgp_ros' / name).is_file()
 
 

@@ -47,12 +47,17 @@ def robot_names() -> tuple[str, ...]:
 def load_robot(name_or_path: str) -> Robot:
     """Return a robot that comes with the package, or one that a robot YAML or a URDF describes.
 
+    Args:
+        name_or_path: a name, a file, or the text of a URDF or of a robot YAML.
+
     Raises:
         ConfigError: neither a known name nor a readable robot file; all problems of a file are
             listed in one error.
     """
     if name_or_path in robot_names():
         return _shipped(_folder() / f'{name_or_path}.yaml')
+    if '\n' in name_or_path or name_or_path.lstrip().startswith('<'):
+        return _from_text(name_or_path)
     path = Path(name_or_path)
     expected = f'one of {list(robot_names())} or a robot file (.yaml, .urdf)'
     if not path.is_file():
@@ -76,17 +81,36 @@ def _shipped(path: Path) -> Robot:
 
 
 def _plain(path: Path) -> Robot:
+    return _of_urdf(path.name, path)
+
+
+def _of_urdf(urdf: str, path: Path) -> Robot:
     problems: list[str] = []
-    robot = _from_urdf({'urdf': path.name}, path, problems)
+    robot = _from_urdf({'urdf': urdf}, path, problems)
     if problems or robot is None:
         raise ConfigError(' | '.join(problems))
     return robot
 
 
+def _from_text(text: str) -> Robot:
+    """Return the robot of a URDF or robot YAML that is given as text, as on a ROS topic."""
+    if text.lstrip().startswith('<'):
+        return _of_urdf(text, Path())
+    return _from_document(text, Path('(text)'))
+
+
 def _build(path: Path) -> Robot:
     try:
-        document = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        text = path.read_text(encoding='utf-8')
+    except UnicodeDecodeError as error:
+        raise ConfigError(f'robot file {path} is not YAML ({error})', 'a robot YAML') from error
+    return _from_document(text, path)
+
+
+def _from_document(text: str, path: Path) -> Robot:
+    try:
+        document = yaml.safe_load(text)
+    except yaml.YAMLError as error:
         raise ConfigError(f'robot file {path} is not YAML ({error})', 'a robot YAML') from error
     if not isinstance(document, dict):
         raise ConfigError(f'robot file {path} holds {type(document).__name__}', 'a mapping')

@@ -1,4 +1,8 @@
-"""The node that identifies a robot online: topics, services and parameters around a session."""
+"""What identifies a robot on a node: topics, services, timers and parameters around a session.
+
+A node has one `Identification` or none, so that a plain node and one with a lifecycle are the same
+beneath. Everything it makes on its node is gone after `close`.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -21,7 +26,6 @@ from rclpy.qos import (
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
-from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 from sgp_ros.engine.samples import Event
@@ -38,6 +42,7 @@ from sgp_ros.ros.diagnosing import Diagnosing, DiagnosisFailed
 from sgp_ros.ros.health import parameter_statuses
 from sgp_ros.ros.messages import message_class, new_message
 from sgp_ros.ros.parameters import from_ros, to_ros
+from sgp_ros.ros.services import Services
 from sgp_ros.ros.session import Record, Session, Topics
 from sgp_ros.ros.start import build_engine
 from sgp_ros.ros.verdict import ERROR, WARN
@@ -47,56 +52,74 @@ _FLUSH_S = 1.0
 _QUIET_S = 5.0
 
 
-class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
-    """Identifies a robot from its joint states and commands.
+class Identification:
+    """Identifies a robot from its joint states and commands, from `listen` on.
+
+    Args:
+        node: on which everything is made.
+        robot: name, file or description, as `load_robot` takes it.
 
     Raises:
         ConfigError: parameters with which it cannot start.
     """
 
-    def __init__(self) -> None:
-        super().__init__('sgp_node')
-        engine, self._settings = build_engine(self)
+    def __init__(self, node: Node, robot: str) -> None:
+        self._node = node
+        self._name = node.get_fully_qualified_name().lstrip('/')
+        engine, self._settings = build_engine(node, robot)
         self._engine_settings = set(engine.config.to_mapping())
         self._is_writing_back = False
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._reported = self._steady.now()
+        self._made: list[tuple[Callable[[Any], object], Any]] = []
+        self._inputs: list[Any] = []
         self._advertise()
         self._session = Session(engine, self._open_record())
-        self._diagnosing = Diagnosing(
-            engine.robot,
-            str(self._settings['robot']),
-            float(self.get_parameter('diagnosis.window').value),
-        )
-        self._offer_services()
+        window_s = float(node.get_parameter('diagnosis.window').value)
+        self._diagnosing = Diagnosing(engine.robot, robot, window_s)
+        self._services = Services(node, self._session, self._diagnosing, self._settings)
         self._start_timers()
-        self.add_on_set_parameters_callback(self._on_set_parameters)
-        self._subscribe()
-        self.get_logger().info(f'waits for {self._joint_states} of robot {engine.robot.name}')
+        node.add_on_set_parameters_callback(self._on_set_parameters)
 
-    def destroy_node(self) -> None:
-        """Complete the record and end the worker, then leave the graph."""
-        session: Session | None = getattr(self, '_session', None)
-        if session is not None:
-            session.close()
-        diagnosing: Diagnosing | None = getattr(self, '_diagnosing', None)
-        if diagnosing is not None:
-            diagnosing.close()
-        super().destroy_node()
+    def listen(self) -> None:
+        """Take joint states and commands from now on."""
+        self._subscribe()
+        robot = self._session.engine.robot.name
+        self._node.get_logger().info(f'waits for {self._joint_states} of robot {robot}')
+
+    def pause(self) -> None:
+        """Take no more joint states and commands; `listen` goes on, after a gap."""
+        for subscription in self._inputs:
+            self._node.destroy_subscription(subscription)
+        self._inputs = []
+
+    def close(self) -> None:
+        """Complete the record, end the processes, and leave the node as it was before."""
+        self.pause()
+        self._node.remove_on_set_parameters_callback(self._on_set_parameters)
+        self._services.close()
+        self._session.close()
+        self._diagnosing.close()
+        for destroy, entity in reversed(self._made):
+            destroy(entity)
+        self._made = []
+
+    def _publisher(self, kind: type, topic: str, quality: QoSProfile | int = 10) -> Publisher:
+        publisher = self._node.create_publisher(kind, topic, quality)
+        self._made.append((self._node.destroy_publisher, publisher))
+        return publisher
 
     def _advertise(self) -> None:
-        self._prediction = self.create_publisher(JointTrajectory, '~/prediction', 10)
-        self._variance = self.create_publisher(JointTrajectory, '~/prediction_variance', 10)
-        self._raw_variance = self.create_publisher(
-            JointTrajectory, '~/prediction_raw_variance', 10
-        )
-        self._overlay = self.create_publisher(JointState, '~/predicted_joint_states', 10)
+        self._prediction = self._publisher(JointTrajectory, '~/prediction')
+        self._variance = self._publisher(JointTrajectory, '~/prediction_variance')
+        self._raw_variance = self._publisher(JointTrajectory, '~/prediction_raw_variance')
+        self._overlay = self._publisher(JointState, '~/predicted_joint_states')
         kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._parameters_out = self.create_publisher(DiagnosticArray, '~/parameters', kept)
-        self._diagnosis = self.create_publisher(String, '~/diagnosis', kept)
-        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._joint_states = self.resolve_topic_name('joint_states')
-        self._command = self.resolve_topic_name('command')
+        self._parameters_out = self._publisher(DiagnosticArray, '~/parameters', kept)
+        self._diagnosis = self._publisher(String, '~/diagnosis', kept)
+        self._diagnostics = self._publisher(DiagnosticArray, '/diagnostics')
+        self._joint_states = self._node.resolve_topic_name('joint_states')
+        self._command = self._node.resolve_topic_name('command')
 
     def _open_record(self) -> Record | None:
         path = str(self._settings['record.path'])
@@ -110,19 +133,21 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
     def _subscribe(self) -> None:
         quality = QoSProfile(
             history=HistoryPolicy.KEEP_LAST,
-            depth=int(self.get_parameter('qos.depth').value),
+            depth=int(self._node.get_parameter('qos.depth').value),
             reliability=ReliabilityPolicy.BEST_EFFORT,
             durability=DurabilityPolicy.VOLATILE,
         )
         overrides = QoSOverridingOptions.with_default_policies()
 
         def listen(kind: type, topic: str, convert: Callable[[Any, int], Event]) -> None:
-            self.create_subscription(
-                kind,
-                topic,
-                lambda message: self._hear(convert, message),
-                quality,
-                qos_overriding_options=overrides,
+            self._inputs.append(
+                self._node.create_subscription(
+                    kind,
+                    topic,
+                    lambda message: self._hear(convert, message),
+                    quality,
+                    qos_overriding_options=overrides,
+                )
             )
 
         kind = str(self._settings['command.type'])
@@ -130,28 +155,21 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
             listen(message_class(kind), 'command', COMMAND_TYPES[kind].decode)
         listen(JointState, 'joint_states', joint_sample)
 
-    def _offer_services(self) -> None:
-        for name, answer in (
-            ('refit', self._refit), ('reset', self._reset), ('save', self._save),
-            ('diagnose', self._diagnose),
-        ):  # fmt: skip
-            self.create_service(Trigger, f'~/{name}', answer)
-        self.create_service(SetBool, '~/learn', self._learn)
-
     def _start_timers(self) -> None:
         for period_s, action in (
             (_POLL_S, self._poll),
             (_FLUSH_S, self._session.flush_record),
-            (self.get_parameter('diagnostics.period').value, self._report),
-            (self.get_parameter('parameters.period').value, self._publish_parameters),
+            (self._node.get_parameter('diagnostics.period').value, self._report),
+            (self._node.get_parameter('parameters.period').value, self._publish_parameters),
         ):
-            self.create_timer(period_s, action, clock=self._steady)
+            timer = self._node.create_timer(period_s, action, clock=self._steady)
+            self._made.append((self._node.destroy_timer, timer))
 
     def _hear(self, convert: Callable[[Any, int], Event], message: Any) -> None:
         # The middleware's own time of receipt is out of reach: the wheels' EventsExecutor fails
         # on callbacks that ask for it.
         try:
-            event = convert(message, self.get_clock().now().nanoseconds)
+            event = convert(message, self._node.get_clock().now().nanoseconds)
         except MessageError as error:
             self._session.health.note_unreadable(error)
             return
@@ -177,7 +195,7 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
         before = self._session.engine.config
         warning = self._session.poll_fit()
         if warning:
-            self.get_logger().warning(warning)
+            self._node.get_logger().warning(warning)
         if self._session.engine.config is not before:
             self._write_back()
         self._tell_verdict()
@@ -185,15 +203,15 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
     def _tell_verdict(self) -> None:
         outcome = self._diagnosing.poll()
         if isinstance(outcome, DiagnosisFailed):
-            self.get_logger().error(f'no diagnosis: {outcome.reason}')
+            self._node.get_logger().error(f'no diagnosis: {outcome.reason}')
         elif outcome is not None:
             self._diagnosis.publish(String(data=json.dumps(outcome.content, allow_nan=False)))
-            self.get_logger().info(f'diagnosis: {outcome.content["verdict"]}')
+            self._node.get_logger().info(f'diagnosis: {outcome.content["verdict"]}')
 
     def _publish_parameters(self) -> None:
         statuses = parameter_statuses(self._session.engine)
         if statuses:
-            now_ns = self.get_clock().now().nanoseconds
+            now_ns = self._node.get_clock().now().nanoseconds
             self._parameters_out.publish(diagnostics_message(new_message, now_ns, statuses))
 
     def _report(self) -> None:
@@ -201,19 +219,19 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
         elapsed_s = (now - self._reported).nanoseconds * 1e-9
         self._reported = now
         sources = {
-            'joint_states': (self._joint_states, self.count_publishers(self._joint_states)),
-            'command': (self._command, self.count_publishers(self._command)),
+            'joint_states': (self._joint_states, self._node.count_publishers(self._joint_states)),
+            'command': (self._command, self._node.count_publishers(self._command)),
         }
         statuses = self._session.health.statuses(
-            self._session.engine, self.get_name(), elapsed_s, sources
+            self._session.engine, self._name, elapsed_s, sources
         )
         for status in statuses:
             if status.level == WARN:
-                self.get_logger().warning(status.message, throttle_duration_sec=_QUIET_S)
+                self._node.get_logger().warning(status.message, throttle_duration_sec=_QUIET_S)
             elif status.level >= ERROR:
-                self.get_logger().error(status.message, throttle_duration_sec=_QUIET_S)
-        now_ns = self.get_clock().now().nanoseconds
-        statuses += self._diagnosing.statuses(self.get_name())
+                self._node.get_logger().error(status.message, throttle_duration_sec=_QUIET_S)
+        now_ns = self._node.get_clock().now().nanoseconds
+        statuses += self._diagnosing.statuses(self._name)
         self._diagnostics.publish(diagnostics_message(new_message, now_ns, statuses))
 
     def _on_set_parameters(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
@@ -231,51 +249,11 @@ class SgpNode(Node):  # type: ignore[misc]  # rclpy is untyped
         values = engine.config.to_mapping()
         chosen = {n: values[n] for n in ('filter.window', 'filter.velocity')}
         learned = {n: to_ros(v) for n, v in (engine.hyper_settings() | chosen).items()}
-        shown = {n: self.get_parameter(n).value for n in learned}
+        shown = {n: self._node.get_parameter(n).value for n in learned}
         self._is_writing_back = True
         try:
-            self.set_parameters(
+            self._node.set_parameters(
                 [Parameter(n, value=v) for n, v in learned.items() if v != shown[n]]
             )
         finally:
             self._is_writing_back = False
-
-    def _refit(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = self._session.refit()
-        response.message = 'a fit was started; /diagnostics tells its outcome'
-        if not response.success:
-            initial = self._session.engine.config.learning_initial
-            response.message = f'too few samples to fit, learning.initial = {initial} are needed'
-        return response
-
-    def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._session.reset()
-        response.success, response.message = True, 'everything that was learned is forgotten'
-        return response
-
-    def _save(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        given = str(self.get_parameter('save.path').value) or f'{self.get_name()}.npz'
-        path = Path(given).absolute().with_suffix('.npz')
-        engine = self._session.engine
-        settings = {
-            'robot': self._settings['robot'],
-            'command.type': self._settings['command.type'],
-            **engine.config.to_mapping(),
-        }
-        try:
-            self._session.save(path, settings)
-        except OSError as error:
-            response.success, response.message = False, f'not saved: {error}'
-        else:
-            response.success, response.message = True, str(path)
-        return response
-
-    def _diagnose(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success, response.message = self._diagnosing.start(self._session.engine.config)
-        return response
-
-    def _learn(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        result = self.set_parameters([Parameter('learning.enabled', value=bool(request.data))])[0]
-        response.success = result.successful
-        response.message = result.reason or f'learning.enabled = {bool(request.data)}'
-        return response

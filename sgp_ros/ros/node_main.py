@@ -47,6 +47,12 @@ def run(name: str, summary: str, load: Callable[[], Callable[[], Node]]) -> int:
         return 2
 
 
+def settle_memory() -> None:
+    """Exempt what exists from the search for garbage, which would hold up messages for 50 ms."""
+    gc.collect()
+    gc.freeze()
+
+
 def _answer_help(name: str, summary: str) -> None:
     """End with the help where it is asked for; what follows --ros-args is for ROS."""
     own = sys.argv[1:]
@@ -67,10 +73,13 @@ def _start(load: Callable[[], Callable[[], Node]]) -> int:
     from rclpy.signals import SignalHandlerOptions
 
     make = load()
+    from sgp_ros.ros.robot_source import refuse_foreign_files
+
     try:
         # The handlers of rclpy would end the context under a callback that is publishing.
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         node = make()
+        refuse_foreign_files(node.get_fully_qualified_name(), sys.argv)
     except (SgpError, ParameterException, OSError, RuntimeError) as error:
         print(' '.join(str(error).split()), file=sys.stderr)
         rclpy.try_shutdown()
@@ -94,9 +103,7 @@ def _spin(node: Node) -> None:
         signal.signal(number, stop)
     executor = _executor()
     executor.add_node(node)
-    # What was imported stays: searching it for garbage would hold up messages for 50 ms at a time.
-    gc.collect()
-    gc.freeze()
+    settle_memory()
     never: Future[None] = Future()
     try:
         while rclpy.ok() and not is_told_to_stop:

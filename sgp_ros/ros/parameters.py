@@ -32,7 +32,7 @@ _LARGEST_INT = 2**63 - 1
 
 
 def declare(node: Node, settings: Iterable[Setting]) -> dict[str, SettingValue]:
-    """Declare one parameter per setting.
+    """Declare one parameter per setting, where the node does not have it yet.
 
     Returns:
         The values given at the start of the node, defaults where there were none.
@@ -44,7 +44,8 @@ def declare(node: Node, settings: Iterable[Setting]) -> dict[str, SettingValue]:
     problems = []
     for setting in settings:
         try:
-            node.declare_parameter(setting.name, to_ros(setting.default), descriptor(setting))
+            if not node.has_parameter(setting.name):
+                node.declare_parameter(setting.name, to_ros(setting.default), descriptor(setting))
         except ParameterException as error:
             problems.append(str(error))
             continue

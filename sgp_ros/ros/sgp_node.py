@@ -17,7 +17,7 @@ def main() -> None:
 
 
 def _load() -> Callable[[], Node]:
-    from sgp_ros.ros.identification import SgpNode
+    from sgp_ros.ros.nodes import SgpNode
 
     return SgpNode
 

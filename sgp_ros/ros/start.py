@@ -18,73 +18,32 @@ from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.samples import CommandSample, JointSample, SettingValue, frozen_array
 from sgp_ros.engine.setting import Setting
 from sgp_ros.engine.snapshots import restored, snapshot_config
-from sgp_ros.recordings.command_types import COMMAND_TYPES, FLOAT64_ARRAY, NO_COMMAND
 from sgp_ros.recordings.model_files import load_model
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
 from sgp_ros.ros.parameters import declare
-
-ROBOT = Setting(
-    'robot', 'str', 'reaction_wheel',
-    'Name of a built-in robot, or path of a robot YAML or URDF.', read_only=True,
-)  # fmt: skip
-MODEL_PATH = Setting(
-    'model.path', 'str', '',
-    'Saved model (.npz) to go on from, with its settings where none are given; empty: none.',
-    read_only=True,
-)  # fmt: skip
+from sgp_ros.ros.robot_source import refuse_unknown
+from sgp_ros.ros.settings import FIRST, ROBOT, node_settings
 
 _PERIOD_NS = 1_000_000
 _SAMPLES = 40
 
 
-def node_settings() -> tuple[Setting, ...]:
-    """Return the settings of the node that are none of the engine, beside robot and model."""
-    return (
-        Setting(
-            'command.type', 'str', FLOAT64_ARRAY,
-            'Message type on topic command; none: the effort comes in the joint states.',
-            choices=(NO_COMMAND, *COMMAND_TYPES), read_only=True,
-        ),
-        Setting(
-            'qos.depth', 'int', 200, 'Messages kept for the node while it is busy.',
-            low=1, high=100_000, read_only=True,
-        ),
-        Setting(
-            'record.path', 'str', '',
-            'MCAP file for what the node consumes and predicts; empty: no record.', read_only=True,
-        ),
-        Setting(
-            'save.path', 'str', '',
-            'File (.npz) that service save writes; empty: <node name>.npz where the node started.',
-        ),
-        Setting(
-            'diagnostics.period', 'float', 1.0, 'Time between two messages on /diagnostics.',
-            unit='s', low=0.1, high=3600.0, read_only=True,
-        ),
-        Setting(
-            'diagnosis.window', 'float', 60.0,
-            'How much of the past is kept for service diagnose.',
-            unit='s', low=1.0, high=3600.0, read_only=True,
-        ),
-        Setting(
-            'parameters.period', 'float', 1.0, 'Time between two messages on ~/parameters.',
-            unit='s', low=0.02, high=3600.0, read_only=True,
-        ),
-    )  # fmt: skip
-
-
-def build_engine(node: Node) -> tuple[Engine, dict[str, SettingValue]]:
+def build_engine(node: Node, name: str) -> tuple[Engine, dict[str, SettingValue]]:
     """Declare all parameters and return the engine, with the settings of the node.
 
     A saved model brings its own settings as the defaults of the parameters; what the user gives
     wins, where it may change at all.
 
+    Args:
+        node: that the parameters are declared on.
+        name: of the robot, or its description, as `load_robot` takes it.
+
     Raises:
         ConfigError: no such robot or model, or wrong parameters, all listed in one error.
     """
-    first = declare(node, (ROBOT, MODEL_PATH))
-    robot = load_robot(str(first['robot']))
+    first = declare(node, FIRST)
+    robot = load_robot(name)
     snapshot = load_model(Path(str(first['model.path']))) if first['model.path'] else None
     saved = {} if snapshot is None else snapshot_config(snapshot, robot).to_mapping()
     (kernel,) = (s for s in describe_settings(robot) if s.name == 'model.kernel')
@@ -93,6 +52,7 @@ def build_engine(node: Node) -> tuple[Engine, dict[str, SettingValue]]:
     rest = [setting for setting in settings if setting.name != kernel.name]
     given |= declare(node, (*node_settings(), *_with_defaults(rest, saved)))
     names = {setting.name for setting in settings}
+    refuse_unknown(node, names | set(first) | set(given), is_complete=True)
     config = EngineConfig.from_mapping({n: v for n, v in given.items() if n in names}, robot)
     warm_up(robot)
     engine = Engine(robot, config) if snapshot is None else restored(robot, snapshot)
@@ -101,7 +61,8 @@ def build_engine(node: Node) -> tuple[Engine, dict[str, SettingValue]]:
         wanted = {n: v for n, v in config.to_mapping().items() if v != present.get(n)}
         if wanted:
             engine.change(wanted)
-    return engine, {**first, **{n: v for n, v in given.items() if n not in names}}
+    own = {n: v for n, v in given.items() if n not in names}
+    return engine, {**first, **own, ROBOT.name: name}
 
 
 def _with_defaults(

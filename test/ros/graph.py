@@ -131,17 +131,17 @@ class Graph:
         self.wait_until(future.done, 'an answer')
         return future.result()
 
-    def status(self, name: str) -> dict[str, str]:
+    def status(self, name: str, node: str = 'sgp_node') -> dict[str, str]:
         """Return the values of the last status with this name, empty before the first."""
-        return self._statuses.get(f'sgp_node: {name}', {})
+        return self._statuses.get(f'{node}: {name}', {})
 
-    def message(self, name: str) -> str:
+    def message(self, name: str, node: str = 'sgp_node') -> str:
         """Return the sentence of the last status with this name."""
-        return self._messages.get(f'sgp_node: {name}', '')
+        return self._messages.get(f'{node}: {name}', '')
 
-    def count(self, key: str, status: str = 'samples') -> int:
+    def count(self, key: str, status: str = 'samples', node: str = 'sgp_node') -> int:
         """Return a number of a status, 0 before the first."""
-        return int(self.status(status).get(key, '0'))
+        return int(self.status(status, node).get(key, '0'))
 
     def close(self) -> None:
         """Kill what still runs and leave the graph."""

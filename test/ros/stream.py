@@ -17,13 +17,14 @@ START_NS = 1_700_000_000_000_000_000
 class Stream:
     """Publishes commands and states of a simulation, one sample after the other."""
 
-    def __init__(self, graph: Graph, seed: int = 1) -> None:
+    def __init__(self, graph: Graph, seed: int = 1, namespace: str = '') -> None:
         self._graph = graph
+        self._node = f'{namespace}/sgp_node'.lstrip('/')
         self._simulation = make_simulation('reaction_wheel', seed=seed, start_ns=START_NS)
-        self.states = graph.client.create_publisher(JointState, 'joint_states', 1000)
-        self.commands = graph.client.create_publisher(JointState, 'command', 1000)
+        self.states = graph.client.create_publisher(JointState, f'{namespace}/joint_states', 1000)
+        self.commands = graph.client.create_publisher(JointState, f'{namespace}/command', 1000)
         graph.wait_until(self._is_heard, 'a listener')
-        graph.wait_until(lambda: graph.status('samples'), 'diagnostics')
+        graph.wait_until(lambda: graph.status('samples', self._node), 'diagnostics')
 
     def state(self) -> JointState:
         """Publish the next command and return the state that belongs to it."""
@@ -53,10 +54,10 @@ class Stream:
         A publisher may find a listener before the listener finds it; what it sends meanwhile is
         lost.
         """
-        before = self._graph.count('read')
+        before = self._graph.count('read', node=self._node)
 
         def are_read() -> bool:
-            found = self._graph.count('read') >= before + count
+            found = self._graph.count('read', node=self._node) >= before + count
             if not found:
                 self.publish(1)
             return found

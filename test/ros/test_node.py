@@ -29,6 +29,7 @@ from test.ros.stream import START_NS, Stream, shuffled, stamp_ns
 pytestmark = pytest.mark.ros
 
 QUICK = {
+    'robot': 'reaction_wheel',
     'command__type': 'sensor_msgs/JointState',
     'diagnostics__period': 0.1,
     'parameters__period': 0.1,
@@ -273,7 +274,7 @@ def test_a_killed_fit_is_reported_and_the_node_goes_on(graph: Graph) -> None:
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_the_nodes_without_trace(graph: Graph, number: int) -> None:
-    node, robot = graph.start('sgp_node', diagnostics__period=0.1), graph.start('reaction_wheel')
+    node, robot = _start(graph), graph.start('reaction_wheel')
     graph.wait_until(lambda: graph.count('read') > 10, 'states')
     children = node.children()
     assert children
@@ -308,10 +309,12 @@ def test_a_record_survives_a_killed_node(graph: Graph, tmp_path: Path) -> None:
     ('settings', 'expected'),
     [
         ({'robot': 'submarine'}, 'submarine'),
-        ({'filter__window': 1}, 'filter.window'),
-        ({'filter__window': -2.0, 'buffer__budget': 1}, '2 wrong parameters'),
-        ({'command__type': 'std_msgs/Bool'}, 'command.type'),
-        ({'model__path': '/no/model.npz'}, 'no model file /no/model.npz'),
+        ({'robot': 'panda', 'filter__window': 1}, 'filter.window'),
+        ({'robot': 'panda', 'filter__window': -2.0, 'buffer__budget': 1}, '2 wrong parameters'),
+        ({'robot': 'panda', 'command__type': 'std_msgs/Bool'}, 'command.type'),
+        ({'robot': 'panda', 'model__path': '/no/model.npz'}, 'no model file /no/model.npz'),
+        ({'robbot': 'panda', 'hello': 3}, 'unknown parameters: hello, robbot (meant robot?)'),
+        ({'robot': 'panda', 'hyper__elbow__noise_variance': 1.0}, 'hyper.elbow.noise_variance'),
     ],
 )
 def test_a_node_that_cannot_start_says_why_in_one_line(

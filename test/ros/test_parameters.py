@@ -12,9 +12,9 @@ from sgp_ros.engine.config import EngineConfig, describe_settings
 from sgp_ros.engine.setting import Setting
 from sgp_ros.robots.registry import load_robot, robot_names
 from sgp_ros.ros.parameters import descriptor, from_ros, to_ros
-from sgp_ros.ros.start import ROBOT, node_settings
+from sgp_ros.ros.settings import FIRST, node_settings
 
-SETTINGS = (ROBOT, *node_settings(), *describe_settings(load_robot('reaction_wheel')))
+SETTINGS = (*FIRST, *node_settings(), *describe_settings(load_robot('reaction_wheel')))
 CONFIG = Path(__file__).parents[2] / 'config'
 
 
@@ -50,12 +50,11 @@ def test_a_shipped_file_configures_the_robot_of_its_name(path: Path) -> None:
     assert list(document) == ['/**']  # a section named after the node would miss a renamed one
     given = _flat('', document['/**']['ros__parameters'])
     robot = given.pop('robot')
-    assert Path(robot).stem == path.stem
+    assert robot == path.stem  # a name is found from anywhere
     known = {setting.name: setting for setting in node_settings()}
     for name in set(given) & set(known):
         assert known[name].problem(given.pop(name)) is None
-    found = load_robot(robot if robot in robot_names() else str(CONFIG.parent / robot))
-    EngineConfig.from_mapping(given, found)
+    EngineConfig.from_mapping(given, load_robot(robot))
 
 
 def test_every_robot_has_a_file() -> None:

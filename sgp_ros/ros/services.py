@@ -1,0 +1,95 @@
+"""The services of a node: refit, reset, save, learn, diagnose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from std_srvs.srv import SetBool, Trigger
+
+from sgp_ros.engine.samples import SettingValue
+from sgp_ros.ros.diagnosing import Diagnosing
+from sgp_ros.ros.session import Session
+
+
+class Services:
+    """Answers what a node is asked for.
+
+    Args:
+        node: that offers them.
+        session: of which they tell, or which they change.
+        diagnosing: starts diagnoses.
+        settings: of the node, as they were at its start.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        session: Session,
+        diagnosing: Diagnosing,
+        settings: Mapping[str, SettingValue],
+    ) -> None:
+        self._node = node
+        self._session = session
+        self._diagnosing = diagnosing
+        self._settings = settings
+        self._offered = [
+            node.create_service(kind, f'~/{name}', answer) for name, kind, answer in self._all()
+        ]
+
+    def _all(self) -> tuple[tuple[str, type, Callable[[Any, Any], Any]], ...]:
+        return (
+            ('refit', Trigger, self._refit),
+            ('reset', Trigger, self._reset),
+            ('save', Trigger, self._save),
+            ('diagnose', Trigger, self._diagnose),
+            ('learn', SetBool, self._learn),
+        )
+
+    def close(self) -> None:
+        """Offer them no more."""
+        for service in self._offered:
+            self._node.destroy_service(service)
+
+    def _refit(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success = self._session.refit()
+        response.message = 'a fit was started; /diagnostics tells its outcome'
+        if not response.success:
+            initial = self._session.engine.config.learning_initial
+            response.message = f'too few samples to fit, learning.initial = {initial} are needed'
+        return response
+
+    def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._session.reset()
+        response.success, response.message = True, 'everything that was learned is forgotten'
+        return response
+
+    def _save(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        given = str(self._settings['save.path']) or f'{self._node.get_name()}.npz'
+        path = Path(given).absolute().with_suffix('.npz')
+        settings = {
+            'robot': self._settings['robot'],
+            'command.type': self._settings['command.type'],
+            **self._session.engine.config.to_mapping(),
+        }
+        try:
+            self._session.save(path, settings)
+        except OSError as error:
+            response.success, response.message = False, f'not saved: {error}'
+        else:
+            response.success, response.message = True, str(path)
+        return response
+
+    def _diagnose(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success, response.message = self._diagnosing.start(self._session.engine.config)
+        return response
+
+    def _learn(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        is_wanted = bool(request.data)
+        (result,) = self._node.set_parameters([Parameter('learning.enabled', value=is_wanted)])
+        response.success = result.successful
+        response.message = result.reason or f'learning.enabled = {is_wanted}'
+        return response
