@@ -57,10 +57,13 @@ setup(
         'wheels': ['ros-rclpy[fastrtps]==7.1.6', 'ros-jazzy-common-interfaces==5.3.6'],
         # The dynamics of URDF robots in `sgp simulate`.
         'simulate': ['mujoco>=3.2'],
+        # xacro files; MJCF needs MuJoCo.
+        'models': ['xacro>=2', 'mujoco>=3.2'],
         # The rivals of `sgp bench`.
         'bench': ['scikit-learn>=1.4', 'torch>=2', 'gpytorch>=1.11'],
         'test': [
             'mujoco>=3.2',
+            'xacro>=2',
             'pytest>=8',
             'pytest-cov>=5',
             'hypothesis>=6.100',

@@ -22,13 +22,14 @@ MESSAGES = {
 }  # fmt: skip
 LAYERS = {
     'errors': set(),
+    'optional': {'errors'},
     'gp': NUMERIC | {'numba', 'errors'},
     'physics': {'numpy', 'numba', 'errors'},
     'rigid': NUMERIC | {'numba', 'pinocchio', 'clarabel', 'gp', 'physics', 'errors'},
-    'robots': {'numpy', 'yaml', 'physics', 'rigid', 'errors'},
+    'robots': {'numpy', 'yaml', 'physics', 'rigid', 'optional', 'errors'},
     'simulation': NUMERIC | {
         'mujoco', 'physics.catalogue', 'physics.effect', 'physics.effect_at', 'physics.parts',
-        'rigid', 'errors',
+        'rigid', 'optional', 'errors',
     },
     'engine': {'numpy', 'gp', 'physics', 'rigid', 'robots', 'errors'},
     'batch': NUMERIC | {
@@ -79,7 +80,7 @@ SUB_ROOMS = {
 """Layer to its sub-rooms in their order: each imports itself and those that stand before it."""
 
 PURE = ('gp', 'physics', 'rigid', 'engine', 'robots', 'simulation', 'batch')
-SILENT = ('errors', *PURE, 'recordings', 'diagnosis')
+SILENT = ('errors', 'optional', *PURE, 'recordings', 'diagnosis')
 IMPURE_MODULES = {
     'asyncio', 'concurrent', 'datetime', 'multiprocessing', 'os', 'random', 'secrets', 'socket',
     'subprocess', 'threading', 'time', 'uuid',

@@ -31,7 +31,6 @@ from sgp_ros.report.diagnosis_text import (
 )
 from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.report.verdict import simulated, verdict_sentence
-from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.gains import Gains, read_gains
 from sgp_ros.robots.given_bodies import with_bodies
 from sgp_ros.robots.nominal import Nominal, nominal_model
@@ -91,7 +90,7 @@ def run_diagnose(
     remarks = list(nominal.remarks)
     events = _read([bag] if isinstance(bag, str) else bag, model, chosen, remarks)
     tests = _read(chosen.tests, model, chosen, remarks, taken=('train', *events))
-    gains = _gains(chosen, tree)
+    gains = _gains(chosen, nominal)
     simulation = None if chosen.sim is None else _events(chosen.sim, model, chosen, remarks)
     found = diagnose(
         events, model, tree, tests, stated=nominal.stated, holds_out=not chosen.tests,
@@ -106,13 +105,14 @@ def run_diagnose(
     return _written(out, nominal, found, first, EFFORT_SOURCES[chosen.effort])
 
 
-def _gains(options: DiagnoseOptions, tree: Tree) -> Gains | None:
+def _gains(options: DiagnoseOptions, nominal: Nominal) -> Gains | None:
     """Return the gains of drives that hold position targets, where they are stated."""
-    if options.gains is None:
-        return None
+    tree = nominal.tree
     names = tree.moving_names
     driven = [name for name, on in zip(names, tree.is_actuated, strict=False) if on]
-    return read_gains(Path(options.gains), names, driven)
+    if options.gains is not None:
+        return read_gains(Path(options.gains), names, driven)
+    return None
 
 
 def _refusals(found: Diagnosis) -> list[str]:

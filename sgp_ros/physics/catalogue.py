@@ -22,6 +22,7 @@ ARMATURE = loads.Armature()
 GRAVITY_TILT = carried.GravityTilt()
 PAYLOAD = carried.Payload()
 TORQUE_GAIN = actuation.TorqueGain()
+ACTUATOR_LAG = actuation.ActuatorLag()
 COMMAND_DELAY = actuation.CommandDelay()
 HYSTERESIS = memory.Hysteresis()
 BACKLASH = memory.Backlash()
@@ -52,7 +53,7 @@ EFFECTS: dict[str, Effect] = {
         TORQUE_GAIN,
         actuation.DeadZone(),
         actuation.Saturation(),
-        actuation.ActuatorLag(),
+        ACTUATOR_LAG,
         COMMAND_DELAY,
         BACKLASH,
         HYSTERESIS,

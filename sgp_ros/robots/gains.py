@@ -61,26 +61,43 @@ def read_gains(path: Path, joints: Sequence[str], actuated: Sequence[str]) -> Ga
         raise ConfigError(
             f'{path.name}: {reason}', 'a YAML file with kp and kd by joint'
         ) from None
+    return checked_gains(content, path.name, joints, actuated)
+
+
+def checked_gains(
+    content: Any, place: str, joints: Sequence[str], actuated: Sequence[str]
+) -> Gains:
+    """Return gains from the content of a file, see `read_gains`.
+
+    Args:
+        content: to be a mapping with the keys `kp`, `kd` and perhaps `feedforward`.
+        place: where it stands, for messages.
+        joints: names of all joints.
+        actuated: joints that have a drive.
+
+    Raises:
+        ConfigError: not one number of each kind for each drive.
+    """
     if not isinstance(content, dict) or not set(content) <= set(_KEYS):
-        raise ConfigError(f'{path.name}: {_told(content)}', f'the keys {", ".join(_KEYS)}')
+        raise ConfigError(f'{place}: {_told(content)}', f'the keys {", ".join(_KEYS)}')
     feedforward = content.get('feedforward', 'none')
     if feedforward not in _FEEDFORWARD:
-        raise ConfigError(f'{path.name}: feedforward {feedforward!r}', ' or '.join(_FEEDFORWARD))
-    kp, kd = (_column(path, content.get(key), key, joints, actuated) for key in ('kp', 'kd'))
+        raise ConfigError(f'{place}: feedforward {feedforward!r}', ' or '.join(_FEEDFORWARD))
+    kp, kd = (_column(place, content.get(key), key, joints, actuated) for key in ('kp', 'kd'))
     return Gains(kp, kd, feedforward == 'gravity')
 
 
 def _column(
-    path: Path, found: Any, key: str, joints: Sequence[str], actuated: Sequence[str]
+    place: str, found: Any, key: str, joints: Sequence[str], actuated: Sequence[str]
 ) -> np.ndarray:
     table = found if isinstance(found, Mapping) else {}
     if set(table) != set(actuated):
-        raise ConfigError(f'{path.name}: {key} of {sorted(map(str, table))}',
+        raise ConfigError(f'{place}: {key} of {sorted(map(str, table))}',
                           f'one number for each of {sorted(actuated)}')  # fmt: skip
     for joint, x in table.items():
         is_number = isinstance(x, int | float) and not isinstance(x, bool)
         if not is_number or not math.isfinite(x) or x < 0.0:
-            raise ConfigError(f'{path.name}: {key} of {joint} is {x!r}', 'a number of at least 0')
+            raise ConfigError(f'{place}: {key} of {joint} is {x!r}', 'a number of at least 0')
     return np.array([float(table.get(joint, 0.0)) for joint in joints])
 
 

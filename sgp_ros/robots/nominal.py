@@ -64,7 +64,10 @@ class Nominal:
             for e in self.effects
             if not e.is_complete
         )
-        return (*((lumped,) if self.is_lumped else ()), *self.impossible, *unclear)
+        said = self.robot.source.get('remarks') or ()
+        assert isinstance(said, list | tuple)
+        lumped_said = (lumped,) if self.is_lumped else ()
+        return (*lumped_said, *map(str, said), *self.impossible, *unclear)
 
     @property
     def lacks_bodies(self) -> bool:

@@ -29,6 +29,7 @@ import yaml
 from sgp_ros.errors import ConfigError
 from sgp_ros.robots.entries import Entries, is_finite
 from sgp_ros.robots.lumped import LUMPED_KEYS, build_lumped_robot
+from sgp_ros.robots.models.door import MODEL_ENDINGS, find_file, read_model
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.shipped import shipped_folder
 
@@ -36,6 +37,7 @@ _KEYS = frozenset({'schema', 'robot', 'joints', 'parameters'})
 _URDF_KEYS = frozenset({
     'schema', 'urdf', 'name', 'joints', 'locked', 'passive', 'effort_gain', 'payload', 'terms',
     'coulomb_width', 'stribeck_velocity', 'prior', 'residual_inputs', 'effects', 'parameters',
+    'gains', 'remarks',
 })  # fmt: skip
 
 
@@ -45,7 +47,7 @@ def robot_names() -> tuple[str, ...]:
 
 
 def load_robot(name_or_path: str) -> Robot:
-    """Return a robot that comes with the package, or one that a robot YAML or a URDF describes.
+    """Return a robot that comes with the package, or one that a robot or model file describes.
 
     Args:
         name_or_path: a name, a file, or the text of a URDF or of a robot YAML.
@@ -58,11 +60,11 @@ def load_robot(name_or_path: str) -> Robot:
         return _shipped(_folder() / f'{name_or_path}.yaml')
     if '\n' in name_or_path or name_or_path.lstrip().startswith('<'):
         return _from_text(name_or_path)
-    path = Path(name_or_path)
-    expected = f'one of {list(robot_names())} or a robot file (.yaml, .urdf)'
+    path = find_file(name_or_path, Path())
+    expected = f'one of {list(robot_names())} or a robot file (.yaml, {", ".join(MODEL_ENDINGS)})'
     if not path.is_file():
         raise ConfigError(f'robot {name_or_path!r} is no built-in name and no file', expected)
-    if path.suffix == '.urdf':
+    if path.suffix.lower() in MODEL_ENDINGS:
         return _plain(path)
     if path.suffix not in ('.yaml', '.yml'):
         raise ConfigError(f'robot file {path} with ending {path.suffix!r}', expected)
@@ -81,12 +83,12 @@ def _shipped(path: Path) -> Robot:
 
 
 def _plain(path: Path) -> Robot:
-    return _of_urdf(path.name, path)
+    return _of_document(read_model(path), path)
 
 
-def _of_urdf(urdf: str, path: Path) -> Robot:
+def _of_document(document: Mapping[str, Any], path: Path) -> Robot:
     problems: list[str] = []
-    robot = _from_urdf({'urdf': urdf}, path, problems)
+    robot = _from_urdf(document, path, problems)
     if problems or robot is None:
         raise ConfigError(' | '.join(problems))
     return robot
@@ -95,7 +97,7 @@ def _of_urdf(urdf: str, path: Path) -> Robot:
 def _from_text(text: str) -> Robot:
     """Return the robot of a URDF or robot YAML that is given as text, as on a ROS topic."""
     if text.lstrip().startswith('<'):
-        return _of_urdf(text, Path())
+        return _of_document({'urdf': text}, Path())
     return _from_document(text, Path('(text)'))
 
 

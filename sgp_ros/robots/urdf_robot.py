@@ -19,6 +19,8 @@ A robot YAML with the key `urdf` says which joints move and which physics is ass
       - {effect: spring, joint: j1, parameters: {stiffness: {value: 2.9, std: 0.1},
                                                  rest: {value: 0.4, std: 0.01}}}
 
+    gains: {kp: {j1: 300.0}, kd: {j1: 10.0}}   # of drives whose commands are positions
+    remarks: [...]              # what the model file said that has no place here
     parameters:                 # values of coefficients, as `sgp identify` writes them
       elbow.coulomb: {value: 0.4, std: 0.01, unit: N m}
 
@@ -47,6 +49,7 @@ from sgp_ros.rigid.tree import Payload, Tree, read_urdf
 from sgp_ros.rigid.urdf_text import parse_urdf
 from sgp_ros.robots.effect_terms import changed_tree, effect_terms, effort_map, rest_friction
 from sgp_ros.robots.entries import Entries
+from sgp_ros.robots.models.door import find_file
 from sgp_ros.robots.nominal_prior import inertial_prior, joint_prior
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.stated_effects import read_effects
@@ -161,7 +164,7 @@ def urdf_text(robot: Robot) -> str:
 
 def _place(urdf: str, folder: Path) -> Path | str:
     """Return the file that the key `urdf` names, or the XML that stands there itself."""
-    return urdf if urdf.lstrip().startswith('<') else folder / urdf
+    return urdf if urdf.lstrip().startswith('<') else find_file(urdf, folder)
 
 
 def _read_tree(entries: Entries, place: Path | str) -> Tree | None:

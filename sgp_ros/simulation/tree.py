@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.optional import optional_package
 from sgp_ros.physics.catalogue import COULOMB_FRICTION
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.simulation.mechanism import TrueCoefficient, quantity
@@ -209,14 +209,7 @@ def _impossible(robot: str, problem: str) -> ConfigError:
 
 
 def _library() -> Any:
-    try:
-        library = import_module('mujoco')
-    except ImportError as error:
-        raise ConfigError(
-            f'MuJoCo, which simulates URDF robots, is missing ({error})',
-            'the package mujoco',
-            "pip install 'sgp_ros[simulate]'",
-        ) from error
+    library = optional_package('mujoco', 'to simulate URDF robots', 'simulate')
     # It would write warnings to MUJOCO_LOG.TXT where the user is; a motion that is not finite is
     # refused by `stepping`.
     library.set_mju_user_warning(_ignore)

@@ -6,12 +6,12 @@ load becomes one more link.
 
 from __future__ import annotations
 
-import math
 from xml.etree import ElementTree as ET
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from sgp_ros.rigid.rotations import rpy_of
 from sgp_ros.rigid.urdf_model import Urdf
 from sgp_ros.simulation.tree_text import TreePart, TreeText
 
@@ -131,19 +131,7 @@ def _lock(joint: ET.Element, position: float) -> None:
         if element.tag not in {'parent', 'child'}:
             joint.remove(element)
     joint.set('type', 'fixed')
-    ET.SubElement(joint, 'origin', xyz=_words(place), rpy=_words(_rpy(turn.as_matrix())))
-
-
-def _rpy(R: np.ndarray) -> tuple[float, float, float]:
-    """Return roll, pitch and yaw of `R = Rz(yaw) Ry(pitch) Rx(roll)`.
-
-    Pitch and yaw are read from `R Rx(-roll)`, so they suit any roll that rounding leaves where
-    the pitch is a right angle.
-    """
-    roll = math.atan2(R[2, 1], R[2, 2])
-    c, s = math.cos(roll), math.sin(roll)
-    across, up = c * R[:, 1] - s * R[:, 2], s * R[:, 1] + c * R[:, 2]
-    return roll, math.atan2(-R[2, 0], up[2]), math.atan2(-across[0], across[1])
+    ET.SubElement(joint, 'origin', xyz=_words(place), rpy=_words(rpy_of(turn.as_matrix())))
 
 
 def _words(numbers: tuple[float, ...] | np.ndarray) -> str:
