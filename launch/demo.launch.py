@@ -1,38 +1,47 @@
-"""Starts the simulated reaction wheel and the node that identifies it."""
+"""Starts the simulated reaction wheel and the node that identifies it.
 
-from launch.actions import DeclareLaunchArgument
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+ros2 launch sgp_ros demo.launch.py
+"""
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import Value
-from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchDescription
 
+ARGUMENTS = {
+    'robot': ('reaction_wheel_6', 'reaction_wheel, or reaction_wheel_6 without friction.'),
+    'seed': ('0', 'Seed of noise and motion of the simulation.'),
+    'controller': ('sinusoids', 'What drives the wheel: sinusoids, balance or zero.'),
+    'record': ('', 'Where to record what the node takes and gives; empty: nowhere.'),
+}
+
 
 def generate_launch_description() -> LaunchDescription:
-    """Return both nodes under one parameter file."""
-    robot = LaunchConfiguration('robot')
-    params = PathJoinSubstitution([FindPackageShare('sgp_ros'), 'config', [robot, '.yaml']])
-    seed = Value(LaunchConfiguration('seed'), value_type=int)
-    return LaunchDescription(
-        [
-            DeclareLaunchArgument('robot', default_value='reaction_wheel_6'),
-            DeclareLaunchArgument('seed', default_value='0'),
-            DeclareLaunchArgument('controller', default_value='sinusoids'),
-            DeclareLaunchArgument('record', default_value=''),
-            Node(
-                package='sgp_ros',
-                executable='reaction_wheel',
-                parameters=[
-                    params,
-                    {'seed': seed, 'controller': LaunchConfiguration('controller')},
-                ],
-            ),
-            Node(
-                package='sgp_ros',
-                executable='sgp_node',
-                output='screen',
-                parameters=[params, {'record.path': LaunchConfiguration('record')}],
-            ),
-        ]
-    )
+    """Return both nodes with their arguments."""
+    arguments = [
+        DeclareLaunchArgument(name, default_value=default, description=text)
+        for name, (default, text) in ARGUMENTS.items()
+    ]
+    return LaunchDescription([*arguments, OpaqueFunction(function=_nodes)])
+
+
+def _nodes(context: object) -> list[Node]:
+    """Return simulator and node under one parameter file."""
+    given = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
+    share = Path(get_package_share_directory('sgp_ros'))
+    params = str(share / 'config' / f'{given["robot"]}.yaml')
+    simulated = {'seed': int(given['seed']), 'controller': given['controller']}
+    recorded = [{'record.path': given['record']}] if given['record'] else []
+    return [
+        Node(package='sgp_ros', executable='reaction_wheel', parameters=[params, simulated]),
+        Node(
+            package='sgp_ros',
+            executable='sgp_node',
+            output='screen',
+            parameters=[params, *recorded],
+        ),
+    ]
