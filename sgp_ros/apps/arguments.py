@@ -150,7 +150,9 @@ def _add_diagnose(add: AddCommand) -> None:
         'sgp diagnose real.mcap --robot robot.urdf --test real_test.mcap --out out/diagnose',
     )  # fmt: skip
     _add_recording(parser, 'REAL', takes_several=True)
-    parser.add_argument('--sim', metavar='SIM', help='recording of the simulation to compare with')
+    parser.add_argument(
+        '--sim', metavar='SIM', help='recording or model file of the simulation to compare with'
+    )
     parser.add_argument('--test', dest='tests', action='append', default=[], metavar='BAG',
                         help='held-out recording for the proof; may be repeated; without any, '
                         'a quarter of REAL is held out')  # fmt: skip

@@ -64,7 +64,7 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis) -> None:
         **_physics(robot),
         **robot.source,
         'urdf': URDF_NAME,
-        'effects': [*known, *stated_findings(found.findings)],
+        'effects': [*known, *stated_findings((*found.findings, *found.shared))],
         'parameters': stated,
     }
     write_text(out / YAML_NAME, yaml.safe_dump(document, sort_keys=False))
@@ -150,8 +150,14 @@ def stated_findings(findings: Iterable[Finding]) -> list[dict[str, Any]]:
             | _side(finding),
         }
         for finding in findings
-        if finding.effect in EFFECTS
+        if finding.effect in EFFECTS and not _is_none(finding)
     ]
+
+
+def _is_none(finding: Finding) -> bool:
+    """Return whether the simulation alone has the effect."""
+    sizes = [finding.parameters[name].value for name in finding.difference]
+    return bool(sizes) and not any(sizes)
 
 
 def _entry(parameter: Parameter) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from sgp_ros.physics.catalogue import COULOMB_FRICTION, EFFECTS
+from sgp_ros.physics.catalogue import COULOMB_FRICTION, EFFECTS, VISCOUS_FRICTION
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import BASE, LAST, SIDES, TOOL, Quantity, Value
@@ -159,6 +159,18 @@ def typical_motion(tree: Tree) -> ObservedMotion:
     limit = tree.effort_limit[:k]
     effort = np.where(np.isfinite(limit) & (limit > 0.0), limit, 1.0)[None]
     return ObservedMotion(tree, np.zeros(1), 0.0, still, still, still, effort, None)
+
+
+def joint_friction(tree: Tree) -> tuple[EffectAt, ...]:
+    """Return damping and dry friction of `<dynamics>` as effects."""
+    (quantity,) = VISCOUS_FRICTION.quantities
+    sizes = {j: stated_dynamics(tree, 'damping', i) for i, j in enumerate(tree.moving_names)}
+    viscous = tuple(
+        EffectAt.stated(VISCOUS_FRICTION, joint, {quantity.name: size}, tree)
+        for joint, size in sizes.items()
+        if size > 0.0
+    )
+    return (*viscous, *dry_friction(tree))
 
 
 def dry_friction(tree: Tree) -> tuple[EffectAt, ...]:
