@@ -177,5 +177,17 @@ def _add_import(add: AddCommand) -> None:
                         help='columns and units')  # fmt: skip
 
 
-COMMANDS = (_add_demo, _add_simulate, _add_replay, _add_identify, _add_diagnose, _add_import)
+def _add_effects(add: AddCommand) -> None:
+    parser = add(
+        'effects', 'sgp_ros.apps.effects:run_effects',
+        'List the physics that a robot may have beside its bodies: names, formulas, units.',
+        'sgp effects --robot arm.yaml',
+    )  # fmt: skip
+    parser.add_argument('--robot', metavar='ROBOT',
+                        help='a robot whose own effects and laws are listed too')  # fmt: skip
+
+
+COMMANDS = (
+    _add_demo, _add_simulate, _add_replay, _add_identify, _add_diagnose, _add_effects, _add_import,
+)  # fmt: skip
 """What adds each command of the package, in the order of its help."""
