@@ -18,6 +18,13 @@ settings.register_profile('dev', deadline=None)
 settings.register_profile('ci', deadline=None, derandomize=True)
 settings.load_profile(os.environ.get('HYPOTHESIS_PROFILE', 'dev'))
 
+
+@pytest.fixture(autouse=True)
+def _bugs_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have an engine raise what it would count in the field."""
+    monkeypatch.setattr('sgp_ros.engine.engine.RAISES_FAILURES', True)
+
+
 _MISSING = tuple(name for name in ('pinocchio', 'mujoco') if find_spec(name) is None)
 """No wheel of Pinocchio 3 goes with NumPy 1.26, the oldest that is tested; MuJoCo is optional."""
 

@@ -29,7 +29,7 @@ LAYERS = {
     'robots': {'numpy', 'yaml', 'physics', 'rigid', 'optional', 'errors'},
     'simulation': NUMERIC | {
         'mujoco', 'physics.catalogue', 'physics.effect', 'physics.effect_at', 'physics.parts',
-        'physics.law', 'physics.grammar', 'rigid', 'optional', 'errors',
+        'rigid', 'optional', 'errors',
     },
     'engine': {'numpy', 'gp', 'physics', 'rigid', 'robots', 'errors'},
     'batch': NUMERIC | {
@@ -68,6 +68,7 @@ PROOF_ROOMS = {
     'numerics': {'result_files', 'bench', 'streams'},
     'concealed': {'result_files', 'paper'},
     'connection': {'result_files', 'concealed'},
+    'robustness': {'result_files'},
 }
 """Room of the proof to the other ones that it may import, beside every layer of the product."""
 

@@ -33,7 +33,7 @@ from sgp_ros.recordings.writer import RecordingWriter
 from sgp_ros.report.figures import History
 from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.report.html import write_report
-from sgp_ros.report.metrics import Timing, collect_metrics, model_remarks
+from sgp_ros.report.metrics import Timing, collect_metrics, model_remarks, stream_remarks
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.shipped import find_shipped
@@ -100,10 +100,12 @@ def _replay_into(
     """Write all files of a replay and return the content of metrics.json."""
     remarks, asked = list(recording.remarks), engine.config
     history, timing = History(), Timing()
+    failures: list[str] = []
     with RecordingWriter(out / 'predictions.mcap') as writer:
 
         def keep(step: Step) -> None:
             history.take(engine, step)
+            failures.extend(map(str, step.failures))
             for estimate in step.estimates:
                 found = outputs(estimate)
                 if found is not None:
@@ -113,6 +115,7 @@ def _replay_into(
         _check_use(engine, recording, options)
     remarks += [f'{count} messages could not be read: {reason}'
                 for reason, count in recording.unreadable.items()]  # fmt: skip
+    remarks += stream_remarks(engine, failures)
     remark = write_identified_robot(out, engine)
     remarks += [remark] if remark else []
     remarks += model_remarks(engine, asked=asked)

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
+from sgp_ros.engine.clock import StreamClock
 from sgp_ros.engine.config import EngineConfig
-from sgp_ros.engine.estimator import Estimator
 from sgp_ros.engine.filter_choice import StateFilter
 from sgp_ros.engine.fitting import FitRequest
+from sgp_ros.engine.fold import Fold
 from sgp_ros.engine.hyperparameters import settings_of
 from sgp_ros.engine.intake import Intake
+from sgp_ros.engine.journal import Failure, Journal
 from sgp_ros.engine.ordering import ReorderBuffer
 from sgp_ros.engine.results import (
     Counts,
-    Estimate,
     ParameterEstimate,
     Score,
     Step,
@@ -30,36 +32,25 @@ from sgp_ros.engine.samples import (
     SettingsChange,
     SettingValue,
 )
-from sgp_ros.engine.windows import Equation
 from sgp_ros.gp.scores import DriftTest
 from sgp_ros.gp.stacking import ProcessWeight
 from sgp_ros.robots.robot import Robot
 
+RAISES_FAILURES = False
+"""Whether an error that only a bug can cause is raised; the tests want to see it."""
 
-class Engine:
+
+class Engine(Fold):
     """Identifies one robot from a stream of events. No clock, no file, no thread.
 
     Attributes:
-        robot: what is known of the robot.
-        config: settings in force.
-        counts: what became of every sample.
-        delay_s: half the length of the last filter window [s].
-        order, intake, filter, estimator: the stages of the fold.
-        fits, next_fit: fits handed out so far, and the learned count at which the next is due.
+        fits: of hyper-parameters, handed out so far.
     """
 
     def __init__(self, robot: Robot, config: EngineConfig) -> None:
-        self.robot = robot
-        self.config = config
-        self.counts = Counts()
-        self.delay_s = 0.5 * max(config.filter_window, 0.0)
-        self.order = ReorderBuffer(round(config.reorder_window * 1e9))
-        self.intake = Intake(robot, config, self.counts)
-        self.filter = StateFilter(self.robot, self.config)
-        self.estimator = Estimator(robot, config, self.counts)
-        self._is_fit_due = False
+        super().__init__(robot, config)
+        self._journal = Journal(vars(self), self._unchanging, self._fold)
         self.fits = 0
-        self.next_fit = 0
 
     @property
     def is_ready(self) -> bool:
@@ -80,22 +71,18 @@ class Engine:
     def push(self, event: Event) -> Step:
         """Take one event; count it as refused if it cannot be used.
 
+        A step is whole or nothing: an event on which a bug strikes leaves no trace but a count and
+        `Step.failures`, and the filter begins anew behind it.
+
         Returns:
             The events that took effect, in order (a record of these reproduces the run), and the
             estimates they made possible.
         """
-        if not self.intake.admit(event):
-            return Step()
-        if self.order.is_late(event):
-            self.intake.refuse_late(event)
-            return Step()
-        return self._take(self.order.push(event))
+        return self._whole(event)
 
     def flush(self) -> Step:
         """Release what waits in the reorder window: the stream has ended."""
-        step = self._take(self.order.flush())
-        changes, estimates = self._estimates(*self.filter.finish(self.intake.commands))
-        return Step((*step.released, *changes), (*step.estimates, *estimates))
+        return self._whole(None)
 
     def change(self, settings: Mapping[str, object]) -> SettingsChange:
         """Change settings now, between two samples.
@@ -108,8 +95,7 @@ class Engine:
             NumericalError: no factor exists under new hyper-parameters; nothing has changed.
         """
         config = self.config.changed(settings, self.robot)
-        self._apply(config)
-        self.order.seal()
+        self._journal.do(self._change, config)
         values = config.to_mapping()
         return SettingsChange(self._now_ns, {name: values[name] for name in settings})
 
@@ -119,17 +105,13 @@ class Engine:
         Returns:
             The event to record.
         """
-        now = self._now_ns
-        self.order = ReorderBuffer(self.order.window_ns)
-        self._forget()
-        return Reset(now)
+        return Reset(self._journal.do(self._reset, self._now_ns))
 
     def request_refit(self) -> bool:
         """Ask for a fit of the hyper-parameters now; False while there is no model to fit."""
-        regression = self.estimator.regression
-        if regression is None or regression.size < self.config.learning_initial:
+        if not self._can_fit():
             return False
-        self._is_fit_due = True
+        self._journal.do(self._mark_fit, True)  # noqa: FBT003 - an action has one argument
         return True
 
     def take_fit_request(self) -> FitRequest | None:
@@ -137,9 +119,8 @@ class Engine:
         regression = self.estimator.regression
         if regression is None or not self._is_fit_due:
             return None
-        self._is_fit_due = False
+        self._journal.do(self._mark_fit, False)  # noqa: FBT003 - an action has one argument
         base = regression.base
-        self.fits += 1
         return FitRequest(
             self.fits - 1,
             regression.buffer,
@@ -149,6 +130,10 @@ class Engine:
             self.config.refit_restarts,
             self.config.seed,
         )
+
+    def count_refit(self, refusal: str) -> None:
+        """Count a fit that was put in force, or refused for one of `results.REFIT_REFUSALS`."""
+        self._journal.do(self._count_refit, refusal)
 
     def hyper_settings(self) -> dict[str, SettingValue]:
         """Return the hyper-parameters in force as settings, also those still automatic."""
@@ -203,74 +188,75 @@ class Engine:
     def begin_stream(self) -> None:
         """Keep what was learned; forget stream, counts and scores: another recording follows."""
         self.counts = Counts()
-        self.order = ReorderBuffer(self.order.window_ns)
+        self.order, self.clock = ReorderBuffer(self.order.window_ns), StreamClock(self.config)
         self.intake = Intake(self.robot, self.config, self.counts)
         self.filter = StateFilter(self.robot, self.config)
         self.estimator.begin_stream(self.counts)
         self._is_fit_due = False
         self.next_fit = self.config.refit_period
+        self._journal.forget()
 
     @property
-    def _now_ns(self) -> int:
-        return self.order.released_ns or 0
+    def waiting_events(self) -> tuple[int, int]:
+        """How many states and commands are neither used nor refused yet."""
+        held = [*self.order.pending, *self.clock.suspects]
+        states = sum(isinstance(event, JointSample) for event in held)
+        return states, sum(isinstance(event, CommandSample) for event in held)
 
-    def _take(self, events: list[Event]) -> Step:
-        released: list[Event] = []
-        estimates: list[Estimate] = []
-        for event in events:
-            if isinstance(event, JointSample):
-                is_duplicate = event.stamp_ns == self.intake.last_state_ns
-                state = self.intake.take_state(event)
-                if is_duplicate:
-                    continue
-                changes, found = self._estimates(*self.filter.take(state, self.intake.commands))
-                released += [event, *changes]
-                estimates += found
-                self._schedule_fit()
+    def _whole(self, event: Event | None) -> Step:
+        """Take an event, or the end of the stream, without the events on which it fails."""
+        failures: tuple[Failure, ...] = ()
+        while True:
+            self._journal.begin(self.counts.learned)
+            failed = tuple(failure.event for failure in failures)
+            try:
+                step = self._fold(event, failed)
+            except Exception as error:
+                if RAISES_FAILURES:
+                    raise
+                taking = self._taking
+                self._journal.undo()
+                failures = (*failures, Failure(taking or event, error))
+                if taking is None or any(taking is other for other in failed):
+                    if event is not None:
+                        self._journal.do(self._refuse_failed, event)
+                    return Step(failures=failures)
                 continue
-            if isinstance(event, CommandSample):
-                self.intake.take_command(event)
-            elif isinstance(event, SettingsChange):
-                self._apply(self.config.changed(event.settings, self.robot))
-            else:
-                self._forget()
-            released.append(event)
-        return Step(tuple(released), tuple(estimates))
+            if event is None or failures:
+                self._journal.forget()
+                return replace(step, failures=failures) if failures else step
+            self._journal.note(event)
+            return step
 
-    def _estimates(
-        self, equations: list[Equation], chosen: dict[str, SettingValue]
-    ) -> tuple[list[SettingsChange], list[Estimate]]:
-        """Take equations, and before them the filter that was chosen for them."""
-        changes = []
-        if chosen:
-            self.config = self.config.changed(chosen, self.robot)
-            self.estimator.configure(self.config)
-            changes.append(SettingsChange(self._now_ns, chosen))
-        estimates = []
-        for equation in equations:
-            self.delay_s = 0.5 * equation.span_s
-            estimates.append(self.estimator.take(equation))
-        return changes, estimates
+    def _refuse_failed(self, event: Event) -> None:
+        self.intake.refuse_failed(event)
 
-    def _forget(self) -> None:
-        self.estimator = Estimator(self.robot, self.config, self.counts)
-        self.intake = Intake(self.robot, self.config, self.counts)
-        self.filter = StateFilter(self.robot, self.config)
-        self._is_fit_due = False
-        self.next_fit = self.counts.learned
+    def _change(self, config: EngineConfig) -> None:
+        self._apply(config)
+        self.order.seal()
 
-    def _schedule_fit(self) -> None:
-        regression = self.estimator.regression
-        if regression is None or not self.config.refit_enabled:
-            return
-        if self.counts.learned >= self.next_fit and self.request_refit():
-            self.next_fit = self.counts.learned + self.config.refit_period
+    def _reset(self, now_ns: int) -> int:
+        self.order, self.clock = ReorderBuffer(self.order.window_ns), StreamClock(self.config)
+        self.began_ns = now_ns
+        self._forget()
+        return now_ns
 
-    def _apply(self, config: EngineConfig) -> None:
-        self.estimator.configure(config)
-        filters = ('filter_window', 'filter_degree', 'filter_hop', 'filter_velocity')
-        if any(getattr(config, name) != getattr(self.config, name) for name in filters):
-            self.filter = StateFilter(self.robot, config)
-        self.config = config
-        self.intake.configure(config)
-        self.order.window_ns = round(config.reorder_window * 1e9)
+    def _mark_fit(self, is_due: bool) -> None:  # noqa: FBT001 - an action has one argument
+        self._is_fit_due = is_due
+        self.fits += not is_due
+
+    def _count_refit(self, refusal: str) -> None:
+        if refusal:
+            self.counts.refits_refused_for[refusal] += 1
+        else:
+            self.counts.refits += 1
+
+    def _unchanging(self) -> Iterator[object]:
+        """Yield values that no step changes, so that a copy of the state can share them."""
+        yield from (self.robot, self.config)
+        yield from self.order.pending
+        yield from self.clock.suspects
+        yield from self.filter.windows.states
+        yield from self.intake.commands.efforts
+        if self.filter.trial is not None:
+            yield from self.filter.trial.states

@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
-from sgp_ros.engine.intake import CommandHistory, State
+from sgp_ros.engine.held_commands import CommandHistory
+from sgp_ros.engine.intake import State
 from sgp_ros.engine.rest import white_variance
 from sgp_ros.engine.samples import SettingValue
 from sgp_ros.engine.weak_form import WeakForm
@@ -67,6 +68,12 @@ class StateFilter:
         if commands.stamps_ns:
             commands.forget_before(commands.stamps_ns[-1])
         return [], {}
+
+    def begin_segment(self) -> None:
+        """Begin anew, also a choice that is not made yet: what follows has another time."""
+        self.windows.restart()
+        if self.trial is not None:
+            self.trial = FilterTrial()
 
     def finish(self, commands: CommandHistory) -> tuple[list[Equation], dict[str, SettingValue]]:
         """Return the same for the end of the stream."""

@@ -17,7 +17,7 @@ from sgp_ros.gp.model import Model
 
 NOISE = 'noise_variance'
 _AUTOMATIC = (0.0,)
-_LARGEST_VARIANCE = 1e24
+_LARGEST_VARIANCE = 1e100
 
 
 def prefix_of(joint: str) -> str:

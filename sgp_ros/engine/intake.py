@@ -6,21 +6,20 @@ accepted states is not decided here: online they fill windows, offline whole str
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from sgp_ros.engine.clock import END_NS
 from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.held_commands import CommandHistory
 from sgp_ros.engine.results import Counts
 from sgp_ros.engine.samples import EFFORT, POSITION, CommandSample, Event, JointSample
-from sgp_ros.engine.weak_form import WeakForm
-from sgp_ros.physics.drive import WindowDrive
 from sgp_ros.robots.robot import Robot
 
-_GREATEST = 1e150
-"""From here on a number has no square, so nothing can be computed of it."""
+GREATEST = 1e30
+"""From here on a number is no measurement: products of what follows from it, such as accelerations
+over nanoseconds, would not be finite."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,79 +37,6 @@ class State:
     position: np.ndarray
     velocity: np.ndarray | None
     effort: np.ndarray | None
-
-
-class CommandHistory:
-    """Zero-order hold over commands: each holds until the next one.
-
-    Args:
-        memory_s: how long a command matters after the next one [s].
-
-    Attributes:
-        stamps_ns: times at which commands began [ns], increasing.
-        efforts: one (k,) per command.
-    """
-
-    def __init__(self, memory_s: float = 0.0) -> None:
-        self._memory_ns = round(memory_s * 1e9)
-        self.stamps_ns: list[int] = []
-        self.efforts: list[np.ndarray] = []
-
-    def add(self, stamp_ns: int, effort: np.ndarray) -> None:
-        """Let `effort` (k,) hold from `stamp_ns` on, which is not before the last one."""
-        if self.stamps_ns and self.stamps_ns[-1] == stamp_ns:
-            self.efforts[-1] = effort
-            return
-        self.stamps_ns.append(stamp_ns)
-        self.efforts.append(effort)
-
-    def age_ns(self, stamp_ns: int) -> int | None:
-        """Return how old the command in force at `stamp_ns` is [ns]; None without one."""
-        index = bisect_right(self.stamps_ns, stamp_ns)
-        return None if index == 0 else stamp_ns - self.stamps_ns[index - 1]
-
-    def average(
-        self,
-        first_ns: int,
-        last_ns: int,
-        cumulative: Callable[[np.ndarray], np.ndarray],
-        acting: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
-    ) -> np.ndarray:
-        """Integrate the held commands against a kernel, exactly.
-
-        Args:
-            first_ns: start of the kernel's support, where a command is in force [ns].
-            last_ns: its end [ns].
-            cumulative: integral of the kernel from `first_ns` to times given in seconds after it.
-            acting: from held commands (pieces, k) and the middles of their times (pieces,) [s
-                after `first_ns`] to what acts; None for the commands themselves.
-
-        Returns:
-            (k,) [unit of the commands].
-        """
-        start = bisect_right(self.stamps_ns, first_ns) - 1
-        stop = bisect_right(self.stamps_ns, last_ns)
-        changes = [first_ns, *self.stamps_ns[start + 1 : stop], last_ns]
-        seconds = np.array([stamp - first_ns for stamp in changes]) * 1e-9
-        shares = np.diff(cumulative(seconds))  # (pieces,)
-        held = np.array(self.efforts[start:stop])  # (pieces, k)
-        if acting is not None:
-            held = acting(held, 0.5 * (seconds[1:] + seconds[:-1]))
-        return shares @ held
-
-    def drive(self, first_ns: int, form: WeakForm) -> WindowDrive:
-        """Return the commands as drives receive them, for the window that begins at `first_ns`."""
-        offsets = [stamp - first_ns for stamp in self.stamps_ns]
-        samples = form.times - form.times[0]
-        return WindowDrive(
-            np.array(offsets) * 1e-9, np.array(self.efforts), samples, form.left, form.right
-        )
-
-    def forget_before(self, stamp_ns: int) -> None:
-        """Drop commands that do not matter any more from `stamp_ns` on."""
-        keep = max(bisect_right(self.stamps_ns, stamp_ns - self._memory_ns) - 1, 0)
-        del self.stamps_ns[:keep]
-        del self.efforts[:keep]
 
 
 class Intake:
@@ -137,6 +63,7 @@ class Intake:
         self, robot: Robot, config: EngineConfig, counts: Counts, commands_are: str = EFFORT
     ) -> None:
         self._robot = robot
+        self._joints = robot.joint_names
         self._commands_are = commands_are
         self._counts = counts
         self._actuated = np.array([joint.is_actuated for joint in robot.joints])
@@ -161,43 +88,49 @@ class Intake:
         Returns:
             Whether joints, numbers and lengths are as they should be.
         """
+        reason = None if 0 <= event.stamp_ns < END_NS else 'clock'
         if isinstance(event, JointSample):
             self._counts.read += 1
-            reason = self._state_problem(event)
-            refused = self._counts.refused
+            reason = reason or self._state_problem(event)
         elif isinstance(event, CommandSample):
             self._counts.commands_read += 1
-            reason = self._command_problem(event)
-            refused = self._counts.commands_refused
-        else:
-            return True
+            reason = reason or self._command_problem(event)
         if reason:
-            refused[reason] += 1
+            self.refuse(event, reason)
         return reason is None
 
-    def refuse_late(self, event: Event) -> None:
-        """Count an event that came after a later one had been taken."""
+    def refuse_failed(self, event: Event) -> None:
+        """Count an event as read and as refused, on whose way an error struck."""
+        self._counts.read += isinstance(event, JointSample)
+        self._counts.commands_read += isinstance(event, CommandSample)
+        self.refuse(event, 'error')
+
+    def refuse(self, event: Event, reason: str) -> None:
+        """Count an event that is refused for a reason among those of `results`."""
         if isinstance(event, JointSample):
-            self._counts.refused['late'] += 1
+            self._counts.refused[reason] += 1
         elif isinstance(event, CommandSample):
-            self._counts.commands_refused['late'] += 1
+            self._counts.commands_refused[reason] += 1
+        else:
+            self._counts.changes_refused[reason] += 1
 
     def take_command(self, command: CommandSample) -> None:
         """Let a command hold from its stamp on; joints it leaves out keep theirs."""
         names = command.names or self._command_joints
-        held, k = self.commands.efforts, len(self._robot.joints)
+        held, k = self.commands.efforts, len(self._joints)
         is_target = self._commands_are == POSITION
         effort = held[-1].copy() if held else np.zeros(2 * k if is_target else k)
         for i, name in enumerate(names):
-            if name not in self._robot.joint_names:
+            if name not in self._joints:
                 continue
-            joint = self._robot.joint_names.index(name)
+            joint = self._joints.index(name)
             if is_target:
                 effort[joint] = command.effort[i]
                 effort[k + joint] = 0.0 if command.velocity is None else command.velocity[i]
             else:
                 effort[joint] = command.effort[i] * self._gains[joint]
         self.commands.add(command.stamp_ns, effort)
+        self._counts.commands_used += 1
 
     def take_state(self, sample: JointSample) -> State | None:
         """Return a state in the robot's order; None where it is refused, for one reason."""
@@ -236,23 +169,31 @@ class Intake:
         age = self.commands.age_ns(sample.stamp_ns)
         return age is not None and age <= self._config.command_timeout * 1e9, None
 
+    def begin_segment(self) -> None:
+        """Forget stamps and commands: what follows has another time."""
+        self.commands.clear()
+        self.last_state_ns = None
+
     def _state_problem(self, sample: JointSample) -> str | None:
+        size = (len(sample.names),)
+        velocity, effort = sample.velocity, sample.effort
+        if (
+            sample.position.shape != size
+            or (velocity is not None and velocity.shape != size)
+            or (effort is not None and effort.shape != size)
+        ):
+            return 'wrong_length'
         order = self._order(sample.names)
         if order is None:
             return 'unknown_joint'
-        if not _is_usable(sample.position[order]).all():
-            return 'nonfinite'
-        velocity, effort = _chosen(sample.velocity, order), _chosen(sample.effort, order)
-        if velocity is not None and not (np.isnan(velocity) | _is_usable(velocity)).all():
-            return 'nonfinite'
-        if effort is not None:
-            own = effort[self._actuated]
-            if not (np.isnan(own) | _is_usable(own)).all():
-                return 'nonfinite'
-        is_missing = velocity is None or np.isnan(velocity).any()
-        if self._config.filter_velocity == 'measured' and is_missing:
-            return 'nonfinite'
-        return None
+        is_missing = velocity is None or bool(np.isnan(velocity[order]).any())
+        is_number = (
+            _are_numbers(sample.position[order])
+            and (velocity is None or _are_numbers(velocity[order], or_missing=True))
+            and (effort is None or _are_numbers(effort[order][self._actuated], or_missing=True))
+            and not (self._config.filter_velocity == 'measured' and is_missing)
+        )
+        return None if is_number else 'nonfinite'
 
     def _order(self, names: tuple[str, ...]) -> np.ndarray | None:
         """Return the places of the robot's joints among `names`, (k,); None where one is missing.
@@ -260,8 +201,8 @@ class Intake:
         Sources keep their order, so the last one is kept.
         """
         if names != self._last_order[0]:
-            wanted = self._robot.joint_names
-            is_whole = set(wanted) <= set(names)
+            wanted = self._joints
+            is_whole = set(wanted) <= set(names) and len(set(names)) == len(names)
             order = np.array([names.index(name) for name in wanted]) if is_whole else None
             self._last_order = names, order
         return self._last_order[1]
@@ -269,19 +210,26 @@ class Intake:
     def _command_problem(self, command: CommandSample) -> str | None:
         if command.names is not None and command.kind != self._commands_are:
             return 'wrong_kind'
-        if len(command.effort) != len(command.names or self._command_joints):
+        size = (len(command.names or self._command_joints),)
+        if command.effort.shape != size or (
+            command.velocity is not None and command.velocity.shape != size
+        ):
             return 'wrong_length'
-        if command.names and not set(command.names) & set(self._robot.joint_names):
+        if command.names and not set(command.names) & set(self._joints):
             return 'unknown_joint'
-        if not _is_usable(command.effort).all():
-            return 'nonfinite'
-        return None
+        is_number = _are_numbers(command.effort) and (
+            command.velocity is None or _are_numbers(command.velocity)
+        )
+        return None if is_number else 'nonfinite'
 
 
 def _chosen(values: np.ndarray | None, order: np.ndarray | None) -> np.ndarray | None:
     return None if values is None else values[order]
 
 
-def _is_usable(values: np.ndarray) -> np.ndarray:
-    """Return which numbers are finite and have a square, (n,) of bool."""
-    return np.abs(values) < _GREATEST
+def _are_numbers(values: np.ndarray, *, or_missing: bool = False) -> bool:
+    """Return whether all numbers are smaller than `GREATEST`, or NaN where they may be missing."""
+    size = np.abs(values)
+    if or_missing:
+        return not (size >= GREATEST).any()
+    return bool((size < GREATEST).all())

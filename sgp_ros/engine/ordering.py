@@ -9,6 +9,8 @@ from sgp_ros.engine.samples import CommandSample, Event, JointSample
 
 _RANKS = {CommandSample: 0, JointSample: 1}
 _LAST_RANK = 2
+MOST_HELD = 20_000
+"""Events that wait for their order at most; beyond, the oldest leaves early."""
 
 
 class ReorderBuffer:
@@ -48,7 +50,10 @@ class ReorderBuffer:
         self._hold(event)
         newest = event.stamp_ns if self.newest_ns is None else self.newest_ns
         self.newest_ns = max(newest, event.stamp_ns)
-        return self._release(self.newest_ns - self.window_ns)
+        released = self._release(self.newest_ns - self.window_ns)
+        while len(self._heap) > MOST_HELD:  # a clock that stands still, or a flood
+            released.append(self._pop())
+        return released
 
     def flush(self) -> list[Event]:
         """Return everything that is held, in order."""
@@ -85,9 +90,12 @@ class ReorderBuffer:
     def _release(self, until_ns: int) -> list[Event]:
         released = []
         while self._heap and self._heap[0][0] <= until_ns:
-            self.released_ns, self.released_rank, _, event = heapq.heappop(self._heap)
-            released.append(event)
+            released.append(self._pop())
         return released
+
+    def _pop(self) -> Event:
+        self.released_ns, self.released_rank, _, event = heapq.heappop(self._heap)
+        return event
 
 
 def in_order(events: Iterable[Event]) -> list[Event]:

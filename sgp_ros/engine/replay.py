@@ -15,7 +15,7 @@ from sgp_ros.engine.fitting import FitResult, fit
 from sgp_ros.engine.hyperparameters import prefix_of, settings_of
 from sgp_ros.engine.results import Step
 from sgp_ros.engine.samples import Event, SettingsChange, SettingValue
-from sgp_ros.errors import NumericalError
+from sgp_ros.errors import ConfigError, NumericalError
 from sgp_ros.gp.model import separable
 
 
@@ -38,7 +38,7 @@ class Swap:
         self._parts: list[dict[str, SettingValue]] = []
         self.refusal = fit.refusal
         if self.refusal:
-            engine.counts.refits_refused_for[self.refusal] += 1
+            engine.count_refit(self.refusal)
             return
         assert fit.model is not None
         regression = engine.estimator.regression
@@ -57,8 +57,8 @@ class Swap:
         """Put the next part in force.
 
         Returns:
-            The event to record; None where the buffer has no factor under that part, which then
-            keeps the hyper-parameters it has.
+            The event to record; None where the buffer has no factor under that part, or no setting
+            can have its values: it then keeps the hyper-parameters it has.
         """
         part = self._parts.pop(0)
         change = None
@@ -66,8 +66,10 @@ class Swap:
             change = self._engine.change(part)
         except NumericalError:
             self.refusal = 'no_factor'
+        except ConfigError:
+            self.refusal = 'diverged'
         if self.is_done:
-            self._count()
+            self._engine.count_refit(self.refusal)
         return change
 
     def finish(self) -> list[SettingsChange]:
@@ -78,13 +80,6 @@ class Swap:
             if change is not None:
                 changes.append(change)
         return changes
-
-    def _count(self) -> None:
-        counts = self._engine.counts
-        if self.refusal:
-            counts.refits_refused_for[self.refusal] += 1
-        else:
-            counts.refits += 1
 
 
 def replay(

@@ -8,16 +8,25 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.journal import Failure
 from sgp_ros.engine.samples import Event
 from sgp_ros.gp.regression import Regression
 from sgp_ros.gp.scores import RunningScore
 from sgp_ros.robots.robot import Robot
 
-REFUSALS = ('late', 'duplicate', 'nonfinite', 'unpaired', 'unknown_joint', 'gap')
+REFUSALS = (
+    'late', 'duplicate', 'nonfinite', 'unpaired', 'unknown_joint', 'gap', 'wrong_length', 'clock',
+    'error',
+)  # fmt: skip
 """Reasons for which a state is refused; each refused state has exactly one."""
 
-COMMAND_REFUSALS = ('late', 'nonfinite', 'unknown_joint', 'wrong_kind', 'wrong_length')
+COMMAND_REFUSALS = (
+    'late', 'nonfinite', 'unknown_joint', 'wrong_kind', 'wrong_length', 'clock', 'error',
+)  # fmt: skip
 """Reasons for which a command is refused."""
+
+CHANGE_REFUSALS = ('late', 'clock', 'invalid', 'no_factor', 'error')
+"""Reasons for which a change of settings or a reset in a stream is refused."""
 
 REFIT_REFUSALS = ('diverged', 'no_better', 'no_factor')
 """Reasons for which a fit is refused: it found nothing that has an evidence; it found none higher
@@ -43,7 +52,9 @@ class Channel:
 
     @classmethod
     def raw(cls, measured: np.ndarray, mean: np.ndarray, variance: np.ndarray) -> Channel:
-        """Return a prediction before it is calibrated."""
+        """Return a prediction before it is calibrated; unknown where rounding left no variance."""
+        if not (variance > 0.0).all():
+            mean, variance = (np.where(variance > 0.0, x, np.nan) for x in (mean, variance))
         return cls(measured, mean, variance, variance)
 
     @classmethod
@@ -116,7 +127,9 @@ class Counts:
     Attributes:
         read, used, refused: states that came, those accepted, and those refused by reason; what
             waits for its order is neither yet.
-        commands_read, commands_refused: the same for commands.
+        commands_read, commands_used, commands_refused: the same for commands.
+        changes_refused: changes of settings and resets that a stream held, by reason.
+        clock_jumps: times at which the clock of the stream jumped, and a new segment began.
         estimated: windows that gave an equation.
         learned: equations that the model learned.
         scored: equations whose prediction entered the scores.
@@ -134,9 +147,14 @@ class Counts:
     used: int = 0
     refused: dict[str, int] = field(default_factory=lambda: dict.fromkeys(REFUSALS, 0))
     commands_read: int = 0
+    commands_used: int = 0
     commands_refused: dict[str, int] = field(
         default_factory=lambda: dict.fromkeys(COMMAND_REFUSALS, 0)
     )
+    changes_refused: dict[str, int] = field(
+        default_factory=lambda: dict.fromkeys(CHANGE_REFUSALS, 0)
+    )
+    clock_jumps: int = 0
     estimated: int = 0
     learned: int = 0
     scored: int = 0
@@ -164,10 +182,22 @@ class Step:
         released: events in the order in which they took effect; a record of these reproduces
             the run.
         estimates: predictions that became possible.
+        failures: events that only a bug can have kept from taking effect, counted as `error`.
     """
 
     released: tuple[Event, ...] = ()
     estimates: tuple[Estimate, ...] = ()
+    failures: tuple[Failure, ...] = ()
+
+    def then(self, other: Step) -> Step:
+        """Return what both set free, one after the other."""
+        if self is NOTHING or other is NOTHING:
+            return other if self is NOTHING else self
+        return Step(self.released + other.released, self.estimates + other.estimates)
+
+
+NOTHING = Step()
+"""What an event sets free that waits, or is refused."""
 
 
 def read_parameters(

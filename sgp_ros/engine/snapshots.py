@@ -32,7 +32,7 @@ from sgp_ros.gp.model import Model
 from sgp_ros.gp.regression import Regression
 from sgp_ros.robots.robot import Robot
 
-VERSION = 8
+VERSION = 9
 _WAITING = ('U', 'F', 'y', 'held')
 
 
@@ -53,6 +53,8 @@ def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
         else [order.released_ns, order.released_rank],
         'newest_ns': order.newest_ns,
         'pending': [_encode(event) for event in order.pending],
+        'suspects': [_encode(event) for event in engine.clock.suspects],
+        'began_ns': engine.began_ns,
         'commands': [
             [stamp, effort.tolist()]
             for stamp, effort in zip(
@@ -135,6 +137,8 @@ def _fill(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
         text['newest_ns'],
         [_decode(event) for event in text['pending']],
     )
+    engine.clock.suspects = [_decode(event) for event in text['suspects']]
+    engine.began_ns = text['began_ns']
     estimator = engine.estimator
     estimator.scoring.restore(text['scoring'])
     estimator.waiting = list(zip(*(snapshot[f'waiting_{name}'] for name in _WAITING), strict=True))

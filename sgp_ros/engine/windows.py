@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
-from sgp_ros.engine.intake import CommandHistory, State
+from sgp_ros.engine.held_commands import CommandHistory
+from sgp_ros.engine.intake import State
 from sgp_ros.engine.rest import friction_slack
 from sgp_ros.engine.weak_form import WeakForm, polynomial_smoother
 from sgp_ros.physics.term import Motion

@@ -33,7 +33,7 @@ class HyperParameter:
     description: str
     target: int = 0
     is_per_input: bool = False
-    high: float = 1e12
+    high: float = 1e50
     below: float = 1e4
     above: float = 1e4
 
@@ -43,7 +43,7 @@ class HyperParameter:
 
 
 SIGNAL_VARIANCE = HyperParameter(
-    'signal_variance', 'Prior variance of Z', target=2, high=1e24, below=1e8
+    'signal_variance', 'Prior variance of Z', target=2, high=1e100, below=1e8
 )
 LENGTHSCALES = HyperParameter('lengthscales', 'Length scale of Z per input', is_per_input=True)
 

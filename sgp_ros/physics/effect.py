@@ -41,8 +41,8 @@ Numbers = Mapping[str, float]
 class Effect:
     """A law of physics that a robot may have beside its rigid bodies.
 
-    A subclass states attributes, and where it differs from the usual ones, methods. A law of one
-    joint's own motion needs `local` alone:
+    A subclass states attributes, and the methods in which it differs from the usual ones. A law
+    of one joint's own motion needs `local` alone:
 
     >>> class CubicDrag(Effect):
     ...     name = 'cubic_drag'
@@ -95,7 +95,6 @@ class Effect:
         is_on_tree: it changes gravity or bodies, see `gravity` and `added_body`.
         is_of_command: it lies before the motor's current: a measured effort is behind it.
         has_memory: its force at a time depends on other times too, of the motion or the commands.
-        is_open: a robot may have it or not, and its numbers are not known.
     """
 
     name: str = ''
@@ -127,12 +126,6 @@ class Effect:
     is_on_tree: bool = False
     is_of_command: bool = False
     has_memory: bool = False
-    is_open: bool = False
-
-    @property
-    def key(self) -> str:
-        """What tells it from all others."""
-        return self.name
 
     @property
     def is_given(self) -> bool:
@@ -198,9 +191,11 @@ class Effect:
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
         """Return whether signs and sizes can be: usually what must not be negative is positive."""
-        known = self.stated_quantities if self.is_given else self.coefficient_quantities
-        named = zip(known(at.place.kind), at.shape if self.is_given else at.coefficients,
-                    strict=False)  # fmt: skip
+        kind = at.place.kind
+        if self.is_given:
+            named = zip(self.stated_quantities(kind), at.shape, strict=False)
+        else:
+            named = zip(self.coefficient_quantities(kind), at.coefficients, strict=False)
         return all(bool(x > 0.0) for q, x in named if q.low >= 0.0)
 
     def interval(self, at: Placed, motion: SeenMotion) -> tuple[str, list[list[float]]] | None:
@@ -266,7 +261,10 @@ class Effect:
         ]
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
-        """Return shapes where a search starts, (starts, s); of a `small` one what that needs."""
+        """Return shapes from which a search starts, (starts, s); (1, 0) without shape.
+
+        Where the effect has a `small` one, what that needs.
+        """
         return np.zeros((1, 0))
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
@@ -278,7 +276,8 @@ class Effect:
 
         A search takes steps of a part of it; usually the width of the bounds.
         """
-        return np.asarray(np.subtract(*self.bounds(motion, place)[::-1]))
+        low, high = self.bounds(motion, place)
+        return np.asarray(high - low)
 
     def wave(self, motion: SeenMotion, place: Place) -> Wave | None:
         """Return the wave over the position that it is, which starts a search; usually None."""
@@ -295,6 +294,7 @@ class Effect:
     def bins(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray] | None:
         """Return columns of narrow bins (n, b) and their edges (b + 1,); None for most laws.
 
-        The shape is then an interval, and the column the sum of those of the bins inside.
+        The shape of a law with bins is the lower and upper edge of an interval, and its column
+        the sum of those of the bins inside.
         """
         return None

@@ -21,6 +21,9 @@ MEANINGS = {
     'unpaired': 'no command at or before it, or one that is too old, and no measured effort',
     'unknown_joint': 'a joint of the robot is not in the message',
     'gap': 'the first state after a pause longer than max_gap',
+    'wrong_length': 'positions, velocities or efforts are not as many as names',
+    'clock': 'a stamp far from those of the other states',
+    'error': 'an internal error of this package struck on it; please report it',
 }
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from sgp_ros import __version__
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
-from sgp_ros.engine.results import ParameterEstimate, Score
+from sgp_ros.engine.results import Counts, ParameterEstimate, Score
 from sgp_ros.robots.nominal import nominal_model
 
 SCHEMA = 1
@@ -53,8 +53,7 @@ def collect_metrics(
         'robot': engine.robot.name,
         'recording': recording,
         'seed': seed,
-        'samples': {'read': counts.read, 'used': counts.used, 'refused': dict(counts.refused)},
-        'commands': {'read': counts.commands_read, 'refused': dict(counts.commands_refused)},
+        **_stream(counts),
         'joints': {
             joint: {channel: _score(score) for channel, score in channels.items()}
             for joint, channels in engine.scores().items()
@@ -67,21 +66,7 @@ def collect_metrics(
         'process_weight': _weights(engine),
         'parameters': [_parameter(p) for p in engine.parameters()],
         'physics_parameters': [_parameter(p) for p in engine.physics_parameters()],
-        'estimates': {
-            'made': counts.estimated,
-            'scored': counts.scored,
-            'learned': counts.learned,
-            'held': counts.held,
-            'repeating': counts.unlearnable,
-            'refits': counts.refits,
-            'refits_refused': counts.refits_refused,
-            'refits_refused_for': dict(counts.refits_refused_for),
-        },
-        'factor': {
-            'checks': counts.factor_checks,
-            'drift': counts.factor_drift,
-            'rebuilt': counts.factor_rebuilt,
-        },
+        **_learning(counts),
         'timing': _timing(timing),
         'delay_s': engine.delay_s,
         'settings': {k: _plain(v) for k, v in engine.config.to_mapping().items()},
@@ -136,6 +121,29 @@ def model_remarks(engine: Engine, asked: EngineConfig) -> list[str]:
     return remarks
 
 
+def stream_remarks(engine: Engine, failures: Sequence[str]) -> list[str]:
+    """Return what a reader must know of the stream.
+
+    Args:
+        engine: after the recording.
+        failures: errors that only a bug can cause, one line each.
+    """
+    remarks, counts = [], engine.counts
+    if counts.clock_jumps:
+        remarks.append(
+            f'the clock of the recording jumped {counts.clock_jumps} times: a new segment began, '
+            'what was learned stayed'
+        )
+    remarks += [
+        f'{n} changes of settings in the recording were refused: {reason}'
+        for reason, n in counts.changes_refused.items()
+        if n
+    ]
+    if failures:
+        remarks.append(f'{len(failures)} internal errors, please report the first: {failures[0]}')
+    return remarks
+
+
 def versions() -> dict[str, str]:
     """Return the versions that the numbers depend on."""
     found = {'sgp_ros': __version__, 'python': platform.python_version()}
@@ -143,6 +151,39 @@ def versions() -> dict[str, str]:
     with suppress(PackageNotFoundError):
         found['rclpy'] = version('rclpy')
     return found
+
+
+def _stream(counts: Counts) -> dict[str, Any]:
+    return {
+        'samples': {'read': counts.read, 'used': counts.used, 'refused': dict(counts.refused)},
+        'commands': {
+            'read': counts.commands_read,
+            'used': counts.commands_used,
+            'refused': dict(counts.commands_refused),
+        },
+        'changes_refused': dict(counts.changes_refused),
+        'clock_jumps': counts.clock_jumps,
+    }
+
+
+def _learning(counts: Counts) -> dict[str, Any]:
+    return {
+        'estimates': {
+            'made': counts.estimated,
+            'scored': counts.scored,
+            'learned': counts.learned,
+            'held': counts.held,
+            'repeating': counts.unlearnable,
+            'refits': counts.refits,
+            'refits_refused': counts.refits_refused,
+            'refits_refused_for': dict(counts.refits_refused_for),
+        },
+        'factor': {
+            'checks': counts.factor_checks,
+            'drift': counts.factor_drift,
+            'rebuilt': counts.factor_rebuilt,
+        },
+    }
 
 
 def _weights(engine: Engine) -> dict[str, dict[str, float]]:

@@ -47,10 +47,7 @@ class Nominal:
 
     @property
     def stated(self) -> tuple[EffectAt, ...]:
-        """The effects that are not part of the tree, dry friction of joints among them.
-
-        And laws that the robot may have or not.
-        """
+        """The effects that are not part of the tree, dry friction of joints among them."""
         known = (*self.effects, *dry_friction(self.tree))
         return tuple(e for e in known if e.is_complete and not e.effect.is_on_tree)
 

@@ -28,6 +28,8 @@ class Health:
         last_fit: one sentence on the last fit of hyper-parameters.
         fit_since_s: when the fit that runs was handed out, on a steady clock [s]; None without.
         record_problem: why the record stopped; empty while all is well.
+        failures, first_failure: errors that only a bug can cause, and the first of them with its
+            event, for the log.
     """
 
     def __init__(self) -> None:
@@ -35,6 +37,7 @@ class Health:
         self.last_fit = 'none yet'
         self.fit_since_s: float | None = None
         self.record_problem = ''
+        self.failures, self.first_failure = 0, ''
         self._durations_s: deque[float] = deque(maxlen=_DURATIONS)
         self._unreadable = 0
         self._unreadable_reason = ''
@@ -54,6 +57,16 @@ class Health:
             'no_better': f'refused: no better, its log evidence is {-gain:.3g} nat lower',
             'no_factor': 'refused: the buffer has no factor under what it found for some joint',
         }[refusal]
+
+    def note_failure(self, failure: str) -> None:
+        """Note an error that only a bug can cause; the engine goes on from before it."""
+        self.failures += 1
+        self.first_failure = self.first_failure or failure
+
+    def note_error(self, error: Exception, place: str) -> None:
+        """Note such an error at the edge of the node, with what it was about to do."""
+        text = ' '.join(f'{type(error).__name__}: {error}'.split())
+        self.note_failure(f'internal error in {place.strip("_")} ({text})')
 
     def note_unreadable(self, error: MessageError) -> None:
         """Note a message that is no sample."""
@@ -86,6 +99,9 @@ class Health:
         parts.append(('timing', OK, 'time the engine takes per message', self._timing()))
         parts.append(self._model(engine))
         parts += [self._fit(engine, j, name) for j, name in enumerate(engine.robot.joint_names)]
+        if self.failures:
+            text = f'{self.failures} internal errors, the first: {self.first_failure}'
+            parts.append(('errors', WARN + 1, text, {'count': str(self.failures)}))
         if self.record_problem:
             parts.append(('record', WARN + 1, self.record_problem, {}))
         return [
@@ -192,11 +208,13 @@ class Health:
 
 
 def _flat(counts: Counts, unreadable: int) -> dict[str, int]:
-    names = ('read', 'estimated', 'learned', 'scored', 'unlearnable', 'commands_read')
+    names = ('read', 'estimated', 'learned', 'scored', 'unlearnable', 'commands_read',
+             'commands_used', 'clock_jumps')  # fmt: skip
     return {
         **{name: getattr(counts, name) for name in names},
         **{f'refused.{reason}': n for reason, n in counts.refused.items()},
         **{f'commands_refused.{reason}': n for reason, n in counts.commands_refused.items()},
+        **{f'changes_refused.{reason}': n for reason, n in counts.changes_refused.items()},
         'unreadable': unreadable,
     }
 

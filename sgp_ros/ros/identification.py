@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +72,7 @@ class Identification:
         self._is_writing_back = False
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._reported = self._steady.now()
+        self._has_told_failure = False
         self._made: list[tuple[Callable[[Any], object], Any]] = []
         self._inputs: list[Any] = []
         self._advertise()
@@ -144,7 +146,7 @@ class Identification:
                 self._node.create_subscription(
                     kind,
                     topic,
-                    lambda message: self._hear(convert, message),
+                    lambda message: self._guarded(self._hear, convert, message),
                     quality,
                     qos_overriding_options=overrides,
                 )
@@ -162,8 +164,20 @@ class Identification:
             (self._node.get_parameter('diagnostics.period').value, self._report),
             (self._node.get_parameter('parameters.period').value, self._publish_parameters),
         ):
-            timer = self._node.create_timer(period_s, action, clock=self._steady)
+            timer = self._node.create_timer(
+                period_s, partial(self._guarded, action), clock=self._steady
+            )
             self._made.append((self._node.destroy_timer, timer))
+
+    def _guarded(self, action: Callable[..., None], *given: Any) -> None:
+        """Do what a message or a timer asks for; what only a bug can cause ends nothing."""
+        try:
+            action(*given)
+        except Exception as error:  # noqa: BLE001 - the edge of the node: it must go on
+            self._session.health.note_error(error, action.__name__)
+        if self._session.health.failures and not self._has_told_failure:
+            self._has_told_failure = True
+            self._node.get_logger().error(self._session.health.first_failure)
 
     def _hear(self, convert: Callable[[Any, int], Event], message: Any) -> None:
         # The middleware's own time of receipt is out of reach: the wheels' EventsExecutor fails
@@ -226,6 +240,8 @@ class Identification:
             self._session.engine, self._name, elapsed_s, sources
         )
         for status in statuses:
+            if status.name.endswith(': errors'):
+                continue  # told once, with the event
             if status.level == WARN:
                 self._node.get_logger().warning(status.message, throttle_duration_sec=_QUIET_S)
             elif status.level >= ERROR:
@@ -241,6 +257,9 @@ class Identification:
                 self._session.change(settings)
             except (ConfigError, NumericalError) as error:
                 return SetParametersResult(successful=False, reason=str(error))
+            except Exception as error:  # noqa: BLE001 - the edge of the node: it must go on
+                self._session.health.note_error(error, f'change of {sorted(settings)}')
+                return SetParametersResult(successful=False, reason=f'internal error: {error}')
         return SetParametersResult(successful=True)
 
     def _write_back(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,8 @@ class Services:
         self._diagnosing = diagnosing
         self._settings = settings
         self._offered = [
-            node.create_service(kind, f'~/{name}', answer) for name, kind, answer in self._all()
+            node.create_service(kind, f'~/{name}', partial(self._guarded, answer))
+            for name, kind, answer in self._all()
         ]
 
     def _all(self) -> tuple[tuple[str, type, Callable[[Any, Any], Any]], ...]:
@@ -53,6 +55,15 @@ class Services:
         """Offer them no more."""
         for service in self._offered:
             self._node.destroy_service(service)
+
+    def _guarded(self, answer: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
+        """Answer: an error that only a bug can cause ends nothing."""
+        try:
+            return answer(request, response)
+        except Exception as error:  # noqa: BLE001 - the edge of the node: it must go on
+            self._session.health.note_error(error, answer.__name__)
+            response.success, response.message = False, f'internal error: {error}'
+            return response
 
     def _refit(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.success = self._session.refit()

@@ -67,7 +67,7 @@ class Record:
             if isinstance(event, (SettingsChange, Reset)):
                 return
             self._is_open = True
-            opening = SettingsChange(event.stamp_ns - 1, _changeable(engine))
+            opening = SettingsChange(max(event.stamp_ns - 1, 0), _changeable(engine))
             self._writer.write_event(opening)
         self._writer.write_event(event)
 
@@ -176,6 +176,8 @@ class Session:
         self._record = None
 
     def _settle(self, step: Step) -> list[Outputs]:
+        for failure in step.failures:
+            self.health.note_failure(str(failure))
         for event in step.released:
             self._write_event(event)
         self.health.note_estimates(step.estimates, self.engine.robot.target)

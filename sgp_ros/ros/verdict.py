@@ -100,7 +100,10 @@ def _state_remedy(reason: str, arrivals: Arrivals) -> str:
             f'no command on {arrivals.command} ({arrivals.command_publishers} publishers) within '
             'command.timeout before them; check topic and command.type, or the clocks of the two'
         ),
-        'late': 'their stamps run backwards; call ~/reset if the clock was set back',
+        'late': 'they come later than reorder_window permits; raise it, or look at the network',
+        'clock': 'stamps lie far from those of the other states; check the clock of their source',
+        'wrong_length': 'positions, velocities or efforts are not as many as names',
+        'error': 'an internal error; the log tells the first one, please report it',
         'duplicate': 'stamps repeat; several publishers, or a source without own stamps',
         'nonfinite': 'positions or velocities are not finite; check the sensors',
         'gap': 'pauses are longer than max_gap; raise it or the rate',
@@ -113,6 +116,7 @@ def _command_remedy(reason: str, arrivals: Arrivals) -> str:
         'wrong_length': 'wrong_length: one number per joint of command.joints is wanted',
         'unknown_joint': f'unknown_joint: the robot has {list(arrivals.robot_joints)}',
         'late': 'late: older than reorder_window when they came; check the clocks',
+        'clock': 'clock: their stamps lie far from those of the states; check the clocks',
     }.get(reason, reason)
 
 

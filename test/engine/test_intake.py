@@ -14,6 +14,7 @@ from sgp_ros.batch.signals import collect_signals
 from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.results import REFUSALS
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.errors import RecordingError
 from sgp_ros.physics.term import Joint
@@ -113,8 +114,8 @@ def test_identify_and_diagnose_refuse_what_the_engine_refuses():
     events[50] = replace(events[50], stamp_ns=events[49].stamp_ns)
     events[60] = replace(events[60], names=('a', 'b', 'c'))
     events += _states(np.arange(3.0, 3.05, 0.01), [np.nan] * 3)
-    expected = {'late': 0, 'duplicate': 1, 'nonfinite': 1, 'unpaired': 5, 'unknown_joint': 1,
-                'gap': 1}  # fmt: skip
+    expected = dict.fromkeys(REFUSALS, 0)
+    expected |= {'duplicate': 1, 'nonfinite': 1, 'unpaired': 5, 'unknown_joint': 1, 'gap': 1}
     assert (
         _online(events, EngineConfig(hyper=Engine(ARM, _config()).config.hyper))[1].refused
         == expected

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy import integrate
 
 from sgp_ros.engine.config import EngineConfig
-from sgp_ros.engine.intake import CommandHistory, State
+from sgp_ros.engine.held_commands import CommandHistory
+from sgp_ros.engine.intake import State
 from sgp_ros.engine.weak_form import WeakForm, polynomial_smoother
 from sgp_ros.engine.windows import WindowFilter
 from sgp_ros.physics.formula import read_formula

@@ -34,7 +34,7 @@ def test_all_is_well_when_every_state_is_used() -> None:
             ERROR,
             ['no command on /arm/command (0 publishers)', 'command.type'],
         ),
-        ({'read': 9, 'refused': {'late': 8}}, ERROR, ['backwards', '~/reset']),
+        ({'read': 9, 'refused': {'late': 8}}, ERROR, ['later', 'reorder_window']),
         (
             {'read': 9, 'commands_read': 9, 'commands_refused': {'wrong_length': 9}},
             ERROR,

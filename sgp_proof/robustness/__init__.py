@@ -1,0 +1,1 @@
+"""Fuzzers by seed: events, files and kills."""

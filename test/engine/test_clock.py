@@ -1,0 +1,94 @@
+"""Laws of stamps far from all others: one is an error, two are a new time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.samples import CommandSample, JointSample
+from test.engine.worlds import PENDULUM, START_NS, config, pendulum_events
+
+HOUR_NS = 3600 * 10**9
+
+
+def _moved(events, by_ns):
+    return [replace(event, stamp_ns=event.stamp_ns + by_ns) for event in events]
+
+
+def _fed(events, engine=None):
+    engine = engine or Engine(PENDULUM, config())
+    estimates = []
+    for event in events:
+        estimates += engine.push(event).estimates
+    estimates += engine.flush().estimates
+    return engine, estimates
+
+
+@pytest.mark.parametrize('by_ns', [-HOUR_NS, HOUR_NS, 10**18 // 4])
+def test_what_was_learned_goes_on_after_a_clock_jumped(by_ns):
+    """A looped bag, NTP, a simulator that is reset: windows begin anew, W and Z are kept."""
+    events = pendulum_events(300)
+    engine, estimates = _fed([*events[:300], *_moved(events[300:], by_ns)])
+    whole, expected = _fed(events)
+    counts = engine.counts
+    assert counts.clock_jumps == 1
+    assert counts.refused['late'] == counts.refused['clock'] == 0
+    assert counts.read == counts.used + sum(counts.refused.values())
+    assert len(expected) - len(estimates) <= 4  # a filter window and a half
+    assert whole.counts.learned - counts.learned <= 4
+    later = [e for e in estimates if abs(e.stamp_ns - START_NS - by_ns) < HOUR_NS // 2]
+    assert all(e.is_scored for e in later)
+    assert len(later) > 20
+
+
+@pytest.mark.parametrize('by_ns', [-HOUR_NS, 5 * 10**9, HOUR_NS])
+@pytest.mark.parametrize('kind', [JointSample, CommandSample])
+def test_one_wrong_stamp_is_refused_and_nothing_else(by_ns, kind):
+    """All other estimates are those of a stream without it."""
+    events = pendulum_events(300)
+    wrong = next(e for e in events[300:] if isinstance(e, kind))
+    moved = replace(wrong, stamp_ns=wrong.stamp_ns + by_ns)
+    engine, estimates = _fed([*events[:300], moved, *events[300:]])
+    _, expected = _fed(events)
+    counts = engine.counts
+    assert counts.refused['clock'] + counts.commands_refused['clock'] == 1
+    assert counts.clock_jumps == 0
+    assert [e.stamp_ns for e in estimates] == [e.stamp_ns for e in expected]
+    np.testing.assert_array_equal(
+        [e.acceleration.mean for e in estimates], [e.acceleration.mean for e in expected]
+    )
+
+
+def test_two_states_of_the_far_future_cost_no_later_one():
+    """They are taken for a new time until the next two tell otherwise."""
+    events = pendulum_events(300)
+    wrong = _moved([e for e in events if isinstance(e, JointSample)][150:152], HOUR_NS)
+    engine, _ = _fed([*events[:300], *wrong, *events[300:]])
+    assert engine.counts.clock_jumps == 2
+    assert engine.counts.refused['late'] == 0
+    assert engine.counts.used >= 296
+
+
+def test_commands_of_another_clock_never_move_the_time():
+    """They are refused, however many come, and states go on."""
+    events = [
+        replace(e, stamp_ns=e.stamp_ns + HOUR_NS) if isinstance(e, CommandSample) else e
+        for e in pendulum_events(300)
+    ]
+    engine, _ = _fed(events)
+    assert engine.counts.clock_jumps <= 1  # the first command may have set the time
+    assert engine.counts.commands_refused['clock'] >= 298
+    assert engine.counts.refused['unpaired'] >= 298
+
+
+def test_a_stamp_that_no_message_holds_is_refused():
+    """Negative ones and those from 2^31 s on: no file could keep them."""
+    events = pendulum_events(50)
+    state = events[1]
+    wrong = [replace(state, stamp_ns=s) for s in (-1, -(10**18), 2**31 * 10**9, 2**64)]
+    engine, _ = _fed([*wrong, *events])
+    assert engine.counts.refused['clock'] == 4
+    assert engine.counts.used == 50
