@@ -18,8 +18,9 @@ endif
 demo: venv
 	$(BIN)/sgp demo
 
+# One process a core; a file's tests stay together, so that they share what they prepare.
 test: $(VENV)/.test
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 lint: $(VENV)/.lint
 	$(BIN)/ruff format --check .

@@ -66,6 +66,7 @@ setup(
             'xacro>=2',
             'pytest>=8',
             'pytest-cov>=5',
+            'pytest-xdist>=3.6',
             'hypothesis>=6.100',
             'scikit-learn>=1.4',
             'mpmath>=1.3',
