@@ -136,10 +136,8 @@ class EffectAt:
         """Return the reported numbers that a search left at a bound: they are no estimates."""
         if not len(self.shape):
             return frozenset()
-        low, high = self.effect.bounds(motion, self.place)
         scales = self.effect.scales(motion, self.place, self.shape)
-        inward = np.where(self.shape - low < _AT_BOUND * scales, 1.0, 0.0)
-        inward -= np.where(high - self.shape < _AT_BOUND * scales, 1.0, 0.0)
+        inward = self._inward(motion, scales)
         here = self.report(motion)
         found: set[str] = set()
         for i in np.flatnonzero(inward):
@@ -148,6 +146,19 @@ class EffectAt:
             there = self.with_shape(shape).report(motion)
             found |= {name for name, x in here.items() if x != there[name]}
         return frozenset(found)
+
+    def is_least(self, motion: SeenMotion) -> bool:
+        """Return whether a search left some shape at its lower bound."""
+        if not len(self.shape):
+            return False
+        scales = self.effect.scales(motion, self.place, self.shape)
+        return bool((self._inward(motion, scales) > 0.0).any())
+
+    def _inward(self, motion: SeenMotion, scales: np.ndarray) -> np.ndarray:
+        """Return the direction away from a bound, for each shape that is at one, else 0."""
+        low, high = self.effect.bounds(motion, self.place)
+        inward = np.where(self.shape - low < _AT_BOUND * scales, 1.0, 0.0)
+        return np.asarray(inward - np.where(high - self.shape < _AT_BOUND * scales, 1.0, 0.0))
 
     @property
     def sizes(self) -> tuple[Quantity, ...]:

@@ -276,9 +276,11 @@ class FrictionDrift(Effect):
         return np.asarray(motion.time.max() * np.array([0.01, 0.04, 0.1, 0.25, 0.6])[:, None])
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        """Return ten rows, and twice the duration: slower ones are a straight line over time."""
-        end = float(motion.time.max())
-        return np.array([min(0.01 * end, 10.0 * motion.step)]), np.array([2.0 * end])
+        """Return a hundredth of the duration, and twice all of it.
+
+        A faster one is a transient at the start, a slower one a straight line over time.
+        """
+        return self.starts(motion, place)[0], np.array([2.0 * float(motion.time.max())])
 
     def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         return relative_scales(*self.bounds(motion, place), shape)

@@ -39,6 +39,7 @@ class Hysteresis(Effect):
         Quantity('level', 'N m', low=0.0), Quantity('presliding', 'rad', 1e-9, is_positive=True),
     )  # fmt: skip
     linear = ('level',)
+    plain = ('coulomb_friction',)
     drawn_over = 'velocity'
     is_online = False
     has_memory = True

@@ -149,9 +149,14 @@ def is_credible(model: Model) -> bool:
 
 
 def _is_needed(s: EffectAt, motion: ObservedMotion, power: np.ndarray) -> bool:
-    """Return whether plain laws would leave more of a law than is adequate in any case."""
+    """Return whether plain laws would leave more of a law than is adequate in any case.
+
+    Not so one whose shape is at its lower bound: there it is one of them.
+    """
     if not s.effect.plain or s.place.source >= 0:
         return True
+    if s.is_least(motion):
+        return False
     left = beyond_plain(s, s.columns(motion) @ s.coefficients, motion)
     return float((left**2).mean()) > SLIGHT_REST * float(power[s.place.joint])
 

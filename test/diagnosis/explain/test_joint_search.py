@@ -136,6 +136,20 @@ def test_a_drift_that_shows_only_at_the_start_is_none(equations):
     assert [is_credible(m) for m in faded] == [False, True]
 
 
+def test_hysteresis_over_no_way_is_coulomb_friction(equations):
+    """At the lower bound of its presliding it is a jump at reversals, and asserted as such."""
+    columns, base = _start(equations)
+    motion, place = equations.motion, Place(1)
+    hysteresis = EFFECTS['hysteresis']
+    least, _ = hysteresis.bounds(motion, place)
+    found = [
+        fit(columns, (EffectAt(hysteresis, place, way),), base.sigma, still=1)
+        for way in (least, hysteresis.starts(motion, place)[3])
+    ]
+    found = [replace(m, effects=(replace(m.effects[0], coefficients=np.ones(1)),)) for m in found]
+    assert [is_credible(m) for m in found] == [False, True]
+
+
 def test_several_waves_are_found_at_one_joint(equations_for):
     """Each with its own period; two of nearly one period are one wave."""
     world = simulate(
