@@ -59,11 +59,15 @@ setup(
         'simulate': ['mujoco>=3.2'],
         # xacro files; MJCF needs MuJoCo.
         'models': ['xacro>=2', 'mujoco>=3.2'],
+        # Parquet and HDF5 files in `sgp import`.
+        'tables': ['pyarrow>=14', 'h5py>=3'],
         # The rivals of `sgp bench`.
         'bench': ['scikit-learn>=1.4', 'torch>=2', 'gpytorch>=1.11'],
         'test': [
             'mujoco>=3.2',
             'xacro>=2',
+            'pyarrow>=14',
+            'h5py>=3',
             'pytest>=8',
             'pytest-cov>=5',
             'pytest-xdist>=3.6',

@@ -37,7 +37,7 @@ LAYERS = {
     },
     'recordings': {
         'numpy', 'scipy', 'yaml', 'rosbags', 'mcap', 'zstandard', 'engine.samples',
-        'engine.results', 'errors',
+        'engine.results', 'optional', 'errors',
     },
     'diagnosis': NUMERIC | {'gp', 'physics', 'rigid', 'robots', 'engine', 'batch', 'errors'},
     'report': {

@@ -167,12 +167,16 @@ def _add_diagnose(add: AddCommand) -> None:
 def _add_import(add: AddCommand) -> None:
     parser = add(
         'import', 'sgp_ros.apps.importing:run_import',
-        'Turn a CSV, NPZ or MAT recording into MCAP.',
-        'sgp import emps_id.csv --map config/import/emps.yaml --out out/import',
+        'Turn a table (CSV, NPZ, MAT, Parquet, HDF5, JSON) into an MCAP recording.',
+        'sgp import log.npz --robot arm.xml --out out/import',
     )  # fmt: skip
-    parser.add_argument('table', metavar='FILE', help='.csv, .npz or .mat')
-    parser.add_argument('--map', dest='map_path', required=True, metavar='YAML',
-                        help='columns and units')  # fmt: skip
+    parser.add_argument('table', metavar='FILE',
+                        help='.csv, .npz, .mat, .parquet, .h5, .json or .jsonl')  # fmt: skip
+    parser.add_argument('--map', dest='map_path', metavar='YAML',
+                        help='columns and units (default: a guess, which is written)')  # fmt: skip
+    parser.add_argument('--robot', metavar='ROBOT', help='whose joints they are, for the guess')
+    parser.add_argument('--rate', type=_above(0.0), metavar='HZ',
+                        help='of the rows, where the table has no time')  # fmt: skip
 
 
 COMMANDS = (_add_demo, _add_simulate, _add_replay, _add_identify, _add_diagnose, _add_import)

@@ -6,16 +6,51 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from sgp_ros.recordings.tables import import_table
+from sgp_ros.recordings.imports import ImportSummary, import_table
+from sgp_ros.recordings.table_entries import JointHint
+from sgp_ros.robots.registry import load_robot
 
 
 def run_import(
-    table: str, map_path: str, out: Path, progress: Callable[[float], None]
-) -> dict[str, object]:
-    """Write a table as a recording, see `import_table`."""
-    summary = import_table(table, map_path, out)
+    table: str, out: Path, progress: Callable[[float], None], *, map_path: str | None = None,
+    robot: str | None = None, rate: float | None = None,
+) -> dict[str, object]:  # fmt: skip
+    """Write a table as a recording, see `import_table`.
+
+    Args:
+        table: file.
+        out: folder of the results.
+        progress: called with the share that is done.
+        map_path: YAML file that says what the columns are; None to guess it.
+        robot: whose joints these are; None where that is not known.
+        rate: of the rows of a table without times [Hz].
+    """
+    summary = import_table(table, map_path, out, _hints(robot), rate)
     progress(1.0)
     for remark in summary.remarks:
         sys.stderr.write(f'remark: {remark}\n')
+    for said in summary.unsure:
+        sys.stderr.write(f'unsure: {said}\n')
     print(f'{summary.samples} states of {", ".join(summary.joints)} in {summary.path}')
+    print(_counts(summary))
+    if summary.map_path is not None:
+        print(f'columns were guessed: look at {summary.map_path}, mend it, and give it as --map')
+    if summary.gains_path is not None:
+        print(f'gains of the drives in {summary.gains_path}')
     return summary.to_mapping()
+
+
+def _hints(robot: str | None) -> list[JointHint]:
+    if robot is None:
+        return []
+    joints = load_robot(robot).joints
+    return [JointHint(j.name, j.kind == 'prismatic', j.lower, j.upper) for j in joints]
+
+
+def _counts(summary: ImportSummary) -> str:
+    found = summary.quality
+    missing = ', '.join(f'{count} of {name}' for name, count in found['missing'].items() if count)
+    return (
+        f'{found["rate_hz"]:.4g} Hz; {found["gaps"]} gaps, {found["backward"]} backward and '
+        f'{found["repeated"]} repeated stamps; missing numbers: {missing or "none"}'
+    )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-EFFORT, POSITION = 'effort', 'position'
+EFFORT, POSITION, VELOCITY = 'effort', 'position', 'velocity'
 """What a command asks for."""
 
 SettingValue = bool | int | float | str | tuple[float, ...] | tuple[str, ...]
@@ -53,7 +53,8 @@ class CommandSample:
         effort: (m,) commanded effort [N m], [N] or the unit the robot's description states.
         names: the joints the numbers belong to; None for an array without names, whose order is
             the setting `command.joints`.
-        kind: what the numbers are, `EFFORT` or `POSITION`; numbers without names may be either.
+        kind: what the numbers are, `EFFORT`, `POSITION` or `VELOCITY`; numbers without names may
+            be any.
         velocity: (m,) target of the velocity beside one of the position; None without.
     """
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sgp_ros.engine.samples import POSITION, CommandSample, frozen_array
+from sgp_ros.engine.samples import EFFORT, POSITION, VELOCITY, CommandSample, frozen_array
 from sgp_ros.errors import MessageError
 from sgp_ros.recordings.messages import (
     JOINT_STATE,
@@ -108,23 +108,26 @@ def _encode_number(make: Make, command: CommandSample) -> Message:
 def _decode_joint_state(message: Message, receipt_ns: int) -> CommandSample:
     names = joint_names(message.name)
     stamp = stamp_ns(message, receipt_ns)
-    if len(message.effort) or not len(message.position):
+    if len(message.effort) or not (len(message.position) or len(message.velocity)):
         return CommandSample(stamp, matching(message.effort, names, 'effort'), names)
+    if not len(message.position):
+        velocity = matching(message.velocity, names, 'velocity')
+        return CommandSample(stamp, velocity, names, VELOCITY)
     position = matching(message.position, names, 'position')
-    velocity = matching(message.velocity, names, 'velocity') if len(message.velocity) else None
-    return CommandSample(stamp, position, names, POSITION, velocity)
+    rates = matching(message.velocity, names, 'velocity') if len(message.velocity) else None
+    return CommandSample(stamp, position, names, POSITION, rates)
 
 
 def _encode_joint_state(make: Make, command: CommandSample) -> Message:
     none = np.zeros(0)
-    is_target = command.kind == POSITION
+    rates = none if command.velocity is None else command.velocity
     return make(
         JOINT_STATE,
         header=header(make, command.stamp_ns),
         name=list(command.names or ()),
-        position=command.effort if is_target else none,
-        velocity=none if command.velocity is None else command.velocity,
-        effort=none if is_target else command.effort,
+        position=command.effort if command.kind == POSITION else none,
+        velocity=command.effort if command.kind == VELOCITY else rates,
+        effort=command.effort if command.kind == EFFORT else none,
     )
 
 
@@ -134,20 +137,25 @@ def _decode_trajectory(message: Message, receipt_ns: int) -> CommandSample:
     if not len(message.points):
         raise MessageError('trajectory without a point', 'efforts or positions in its first point')
     point, stamp = message.points[0], stamp_ns(message, receipt_ns)
+    if not len(point.effort) and not len(point.positions) and len(point.velocities):
+        velocity = matching(point.velocities, names, 'velocities of the first point')
+        return CommandSample(stamp, velocity, names, VELOCITY)
     if len(point.effort) or not len(point.positions):
         effort = matching(point.effort, names, 'effort of the first point')
         return CommandSample(stamp, effort, names)
     position = matching(point.positions, names, 'positions of the first point')
-    velocity = None
+    rates = None
     if len(point.velocities):
-        velocity = matching(point.velocities, names, 'velocities of the first point')
-    return CommandSample(stamp, position, names, POSITION, velocity)
+        rates = matching(point.velocities, names, 'velocities of the first point')
+    return CommandSample(stamp, position, names, POSITION, rates)
 
 
 def _encode_trajectory(make: Make, command: CommandSample) -> Message:
     if command.kind == POSITION:
         velocity = np.zeros(0) if command.velocity is None else command.velocity
         point = Point(positions=command.effort, velocities=velocity)
+    elif command.kind == VELOCITY:
+        point = Point(velocities=command.effort)
     else:
         point = Point(effort=command.effort)
     return trajectory_message(make, command.stamp_ns, command.names or (), point)

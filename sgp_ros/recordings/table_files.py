@@ -14,8 +14,13 @@ from scipy.io import loadmat
 from scipy.io.matlab import MatReadError
 
 from sgp_ros.errors import RecordingError
+from sgp_ros.recordings.table_formats import load_hdf5, load_json, load_parquet, refuse
 
 Columns = dict[str, np.ndarray]
+ENDINGS = (
+    '.csv', '.tsv', '.txt', '.dat', '.npz', '.mat', '.h5', '.hdf5', '.parquet', '.json', '.jsonl',
+)  # fmt: skip
+"""Of files that are read."""
 _DELIMITERS = (';', '\t', ',', ' ')
 _COMMENTS = '#%'
 _IN_BRACKETS = re.compile(r'\[[^\]]*\]')
@@ -29,12 +34,13 @@ def load_columns(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]
     Texts of a CSV file stay texts.
 
     Args:
-        path: `.csv`, `.tsv`, `.txt`, `.dat` with a header row; `.npz`; `.mat` up to version 7.
+        path: with one of `ENDINGS`; of text, the first row names the columns.
         remarks: what is left out of it is appended here.
 
     Raises:
         RecordingError: no such file, another format, or a damaged one.
     """
+    refuse(path)
     if not path.is_file():
         raise RecordingError(f'no table at {path}', 'a CSV, NPZ or MAT file', 'check the path')
     suffix = path.suffix.lower()
@@ -42,9 +48,15 @@ def load_columns(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]
         return _load_npz(path), ()
     if suffix == '.mat':
         return _load_mat(path), ()
+    if suffix in {'.h5', '.hdf5', '.hdf'}:
+        return load_hdf5(path), ()
+    if suffix in {'.parquet', '.pq'}:
+        return load_parquet(path), ()
+    if suffix in {'.json', '.jsonl', '.ndjson'}:
+        return load_json(path), ()
     if suffix in {'.csv', '.tsv', '.txt', '.dat'}:
         return _load_csv(path, remarks)
-    raise RecordingError(f'{path} with ending {suffix!r}', '.csv, .tsv, .txt, .dat, .npz or .mat')
+    raise RecordingError(f'{path} with ending {suffix!r}', f'one of {", ".join(ENDINGS)}')
 
 
 def _load_csv(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]]:
@@ -157,19 +169,14 @@ def _plain_arrays(content: np.lib.npyio.NpzFile) -> Iterator[tuple[str, np.ndarr
             array = content[name]
         except ValueError:
             continue
-        if array.ndim:
-            yield name, array
+        yield name, np.atleast_1d(array)
 
 
 def _load_mat(path: Path) -> Columns:
     try:
         content = loadmat(path, simplify_cells=True)
-    except NotImplementedError as error:
-        raise RecordingError(
-            f'{path} is a MAT file of version 7.3 (HDF5)',
-            'version 7 or older',
-            "save it in MATLAB with save(file, '-v7')",
-        ) from error
+    except NotImplementedError:  # version 7.3
+        return load_hdf5(path, is_matlab=True)
     except (MatReadError, ValueError, TypeError, KeyError, IndexError, zlib.error) as error:
         raise RecordingError(f'{path} cannot be read ({error})', 'a MATLAB .mat file') from error
     return dict(_flattened('', content))

@@ -10,9 +10,14 @@ The map is a YAML file, here for a CSV file with the columns `t_s`, `q_m`, `forc
 
 A time may also be a text such as `2024-05-01T12:00:00.25Z`, whatever its unit.
 Keys of `time`: `column`, `unit`, `index`, `rate` [Hz], `start`, the epoch [s] that belongs to the
-zero of the column (0 by default). A joint has a `position`, and may have `velocity` and `effort`.
+zero of the column (0 by default), and `episode`, a column that numbers parts whose clocks begin
+anew: they follow each other. A joint has a `position`, and may have `velocity` and `effort`.
 `commands` lists joints the same way; they are written in that order, as the type `command_type`
-(`std_msgs/Float64MultiArray` by default, see `command_types` for the others).
+(`std_msgs/Float64MultiArray` by default, see `command_types` for the others). In their place,
+`targets` lists what drives are told to reach, and `gains` what they do about it:
+
+    targets: {axis: {position: {column: q_des, unit: m}, velocity: {column: dq_des, unit: m/s}}}
+    gains: {kp: {axis: 300.0}, kd: {axis: 10.0}}
 
 Keys of a quantity: `column`, `unit`, `index` (which column of a matrix in NPZ or MAT, from 0),
 `scale` and `offset`:
@@ -39,6 +44,7 @@ import yaml
 from sgp_ros.engine.samples import CommandSample
 from sgp_ros.errors import ConfigError
 from sgp_ros.recordings.command_types import COMMAND_TYPES, FLOAT64_ARRAY
+from sgp_ros.recordings.messages import JOINT_STATE
 from sgp_ros.recordings.table_files import Columns
 from sgp_ros.recordings.typestore import new_message
 
@@ -86,11 +92,13 @@ class TimeBase:
         quantity: the column; its factor is the nanoseconds per unit. None with a rate.
         rate_hz: samples per second, 0 with a column.
         start_ns: stamp of time zero [ns].
+        episode: column that numbers episodes, whose clocks begin anew; empty without.
     """
 
     quantity: Quantity | None
     rate_hz: float
     start_ns: int
+    episode: str = ''
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,12 +110,14 @@ class TableMap:
         joints: joint to channel (`position`, `velocity`, `effort`) to its column.
         commands: joint to the column of its command, in the order in which they are written.
         command_type: message type of the commands.
+        targets: joint to `position` and `velocity` that its drive is told to reach.
     """
 
     time: TimeBase
     joints: Mapping[str, Mapping[str, Quantity]]
     commands: Mapping[str, Quantity]
     command_type: str
+    targets: Mapping[str, Mapping[str, Quantity]]
 
 
 def read_map(path: str | Path) -> Mapping[str, object]:
@@ -135,7 +145,7 @@ def check_map(content: Mapping[str, object], columns: Columns) -> TableMap:
         ConfigError: everything that is wrong, in one error that lists the columns there are.
     """
     check = _Check(columns)
-    check.keys('map', content, {'time', 'joints', 'commands', 'command_type'})
+    check.keys('map', content, {'time', 'joints', 'commands', 'command_type', 'targets', 'gains'})
     time = check.time(check.mapping('time', content.get('time')))
     joints = {
         str(joint): check.joint(f'joints.{joint}', parts)
@@ -147,14 +157,21 @@ def check_map(content: Mapping[str, object], columns: Columns) -> TableMap:
         str(joint): check.scaled(f'commands.{joint}', parts, UNITS['effort'])
         for joint, parts in check.mapping('commands', content.get('commands', {})).items()
     }
-    kind = check.command_type(content.get('command_type', FLOAT64_ARRAY), tuple(commands))
+    targets = {
+        str(joint): check.target(f'targets.{joint}', parts)
+        for joint, parts in check.mapping('targets', content.get('targets', {})).items()
+    }
+    if commands and targets:
+        check.problems.append('commands and targets: expected one of them')
+    default = JOINT_STATE if targets else FLOAT64_ARRAY
+    kind = check.command_type(content.get('command_type', default), tuple(commands or targets))
     if check.problems:
         raise ConfigError(
             f'{len(check.problems)} problems in the map: ' + ' | '.join(check.problems),
             '',
             'the table has ' + ', '.join(f'{n} {list(a.shape)}' for n, a in columns.items()),
         )
-    return TableMap(time, joints, commands, kind)
+    return TableMap(time, joints, commands, kind, targets)
 
 
 class _Check:
@@ -180,9 +197,12 @@ class _Check:
         start_ns = round(Decimal(str(start)) * 1_000_000_000)
         content = {key: value for key, value in content.items() if key != 'start'}
         if 'rate' not in content:
-            self.keys('time', content, {'column', 'unit', 'index', 'rate', 'start'})
+            self.keys('time', content, {'column', 'unit', 'index', 'rate', 'start', 'episode'})
             units: dict[str, float | None] = {**TIME_UNITS}
-            return TimeBase(self.quantity('time', content, units), 0.0, start_ns)
+            episode = str(content.get('episode', ''))
+            if episode and episode not in self._columns:
+                self.problems.append(f'time.episode {episode!r}: not in the table')
+            return TimeBase(self.quantity('time', content, units), 0.0, start_ns, episode)
         self.keys('time', content, {'rate'})
         rate = self._number('time', content, 'rate', 1.0)
         if not rate > 0.0:
@@ -209,6 +229,17 @@ class _Check:
         return {
             channel: self.scaled(f'{place}.{channel}', content[channel], UNITS[channel])
             for channel in UNITS
+            if channel in content
+        }
+
+    def target(self, place: str, parts: object) -> dict[str, Quantity]:
+        content = self.mapping(place, parts)
+        self.keys(place, content, {'position', 'velocity'})
+        if not content:
+            self.problems.append(f'{place}: neither position nor velocity')
+        return {
+            channel: self.scaled(f'{place}.{channel}', content[channel], UNITS[channel])
+            for channel in ('position', 'velocity')
             if channel in content
         }
 

@@ -9,55 +9,35 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
 import numpy as np
 
-from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
+from sgp_ros.engine.samples import (
+    EFFORT,
+    POSITION,
+    VELOCITY,
+    CommandSample,
+    JointSample,
+    frozen_array,
+)
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.recordings.command_types import COMMAND_TYPES
 from sgp_ros.recordings.table_files import Columns, load_columns
-from sgp_ros.recordings.table_map import Quantity, TableMap, TimeBase, check_map, read_map
-from sgp_ros.recordings.writer import RecordingWriter
+from sgp_ros.recordings.table_map import Quantity, TableMap, TimeBase, check_map
 
 _ISO = re.compile(r'(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:\d\d)?')
 _GREATEST = 1e150
 """Above this a number has no square, so nothing can be computed of it."""
 _LISTED = 5
 """Refused rows that are listed by number."""
+_PAUSE_NS = 10 * 10**9
+"""Between episodes: they are never taken for one motion [ns]."""
 _LATEST_NS = 2**31 * 10**9
 """First stamp that a ROS message cannot hold [ns]."""
-
-
-@dataclass(frozen=True, slots=True)
-class ImportSummary:
-    """What `import_table` wrote.
-
-    Attributes:
-        path: of the recording.
-        joints: names of the joints.
-        samples: number of states.
-        commands: number of commands.
-        start_ns: least stamp [ns].
-        end_ns: greatest stamp [ns].
-        remarks: what was left out of the table.
-    """
-
-    path: Path
-    joints: tuple[str, ...]
-    samples: int
-    commands: int
-    start_ns: int
-    end_ns: int
-    remarks: tuple[str, ...] = ()
-
-    def to_mapping(self) -> dict[str, object]:
-        """Return the summary as JSON holds it."""
-        lists = {'joints': list(self.joints), 'remarks': list(self.remarks)}
-        return {**asdict(self), 'path': str(self.path), **lists}
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +53,8 @@ class Table:
         command_joints: their joints, c of them.
         command_type: message type of the commands.
         remarks: what was left out of the file.
+        command_kind: what the commands are, see `CommandSample`.
+        command_rates: (n, c) target velocities beside commanded positions, None without.
     """
 
     stamps_ns: tuple[int, ...]
@@ -82,6 +64,8 @@ class Table:
     command_joints: tuple[str, ...]
     command_type: str
     remarks: tuple[str, ...] = ()
+    command_kind: str = EFFORT
+    command_rates: np.ndarray | None = None
 
     def events(self) -> Iterator[JointSample | CommandSample]:
         """Yield the rows in order, the command of a row before its state."""
@@ -89,17 +73,25 @@ class Table:
         names = self.command_joints if has_names else None
         for row, stamp_ns in enumerate(self.stamps_ns):
             if self.commands is not None:
-                yield CommandSample(stamp_ns, frozen_array(self.commands[row]), names)
+                rates = None if self.command_rates is None else self.command_rates[row]
+                yield CommandSample(
+                    stamp_ns, frozen_array(self.commands[row]), names, self.command_kind,
+                    None if rates is None else frozen_array(rates),
+                )  # fmt: skip
             values = {name: frozen_array(array[row]) for name, array in self.channels.items()}
             yield JointSample(stamp_ns, self.joints, **values)
 
 
-def read_table(path: str | Path, content: Mapping[str, object]) -> Table:
+def read_table(
+    path: str | Path, content: Mapping[str, object],
+    loaded: tuple[Columns, Sequence[int]] | None = None,
+) -> Table:  # fmt: skip
     """Read a table.
 
     Args:
         path: CSV, NPZ or MAT file.
         content: the map, see `table_map`.
+        loaded: what `load_columns` gave, where it has been called.
 
     Raises:
         ConfigError: what is wrong with the map, all in one error.
@@ -107,7 +99,7 @@ def read_table(path: str | Path, content: Mapping[str, object]) -> Table:
     """
     path = Path(path)
     remarks: list[str] = []
-    columns, lines = load_columns(path, remarks)
+    columns, lines = loaded or load_columns(path, remarks)
     table_map = check_map(content, columns)
     quantities = {
         f'{joint}.{channel}': quantity
@@ -115,6 +107,11 @@ def read_table(path: str | Path, content: Mapping[str, object]) -> Table:
         for channel, quantity in parts.items()
     }
     quantities |= {f'command {joint}': q for joint, q in table_map.commands.items()}
+    quantities |= {
+        f'target {joint} {channel}': quantity
+        for joint, parts in table_map.targets.items()
+        for channel, quantity in parts.items()
+    }
     values = {place: _values(path, columns, quantity) for place, quantity in quantities.items()}
     lengths = {place: len(array) for place, array in values.items()}
     n = next(iter(lengths.values()))
@@ -126,38 +123,6 @@ def read_table(path: str | Path, content: Mapping[str, object]) -> Table:
     return _without_impossible(path, table, lines, remarks)
 
 
-def import_table(path: str | Path, map_path: str | Path, out: str | Path) -> ImportSummary:
-    """Write a table as an MCAP recording.
-
-    Args:
-        path: CSV, NPZ or MAT file.
-        map_path: YAML map, see `table_map`.
-        out: `.mcap` file to write, or the folder to write `<name of the table>.mcap` into, which
-            is made; an existing file is replaced.
-
-    Raises:
-        ConfigError: what is wrong with the map.
-        RecordingError: the table cannot be read.
-    """
-    table = read_table(path, read_map(map_path))
-    out = Path(out)
-    out_path = out if out.suffix == '.mcap' else out / f'{Path(path).stem}.mcap'
-    out_path.parent.mkdir(parents=True, exist_ok=True)
-    with RecordingWriter(out_path, command_type=table.command_type) as writer:
-        for event in table.events():
-            writer.write_event(event)
-    n = len(table.stamps_ns)
-    return ImportSummary(
-        out_path,
-        table.joints,
-        n,
-        n if table.commands is not None else 0,
-        min(table.stamps_ns),
-        max(table.stamps_ns),
-        table.remarks,
-    )
-
-
 def _assemble(
     table_map: TableMap, values: Mapping[str, np.ndarray], stamps_ns: tuple[int, ...]
 ) -> Table:
@@ -167,18 +132,26 @@ def _assemble(
         if any(channel in parts for parts in table_map.joints.values()):
             stack = [values.get(f'{joint}.{channel}', missing) for joint in table_map.joints]
             channels[channel] = np.stack(stack, axis=1)  # (n, m)
-    commands = None
+    joints, kind = tuple(table_map.joints), table_map.command_type
     if table_map.commands:
         stack = [values[f'command {joint}'] for joint in table_map.commands]
         commands = np.stack(stack, axis=1)  # (n, c)
+        return Table(stamps_ns, joints, channels, commands, tuple(table_map.commands), kind)
+    if not table_map.targets:
+        return Table(stamps_ns, joints, channels, None, (), kind)
+    asked = {
+        channel: np.stack(
+            [values.get(f'target {j} {channel}', missing) for j in table_map.targets], axis=1
+        )
+        for channel in (POSITION, VELOCITY)
+        if any(channel in parts for parts in table_map.targets.values())
+    }  # (n, c) each
+    first = POSITION if POSITION in asked else VELOCITY
+    rates = asked.get(VELOCITY) if first == POSITION else None
     return Table(
-        stamps_ns,
-        tuple(table_map.joints),
-        channels,
-        commands,
-        tuple(table_map.commands),
-        table_map.command_type,
-    )
+        stamps_ns, joints, channels, asked[first], tuple(table_map.targets), kind,
+        command_kind=first, command_rates=rates,
+    )  # fmt: skip
 
 
 def _without_impossible(
@@ -188,7 +161,8 @@ def _without_impossible(
 
     A missing velocity, effort or command is none of them; a position must be there.
     """
-    arrays = [x for x in (*table.channels.values(), table.commands) if x is not None]
+    asked = (table.commands, table.command_rates)
+    arrays = [x for x in (*table.channels.values(), *asked) if x is not None]
     wrong = np.isnan(table.channels['position']).any(axis=1)
     for array in arrays:
         wrong |= (np.isinf(array) | (np.abs(np.nan_to_num(array)) > _GREATEST)).any(axis=1)
@@ -206,6 +180,7 @@ def _without_impossible(
         stamps_ns=tuple(s for s, k in zip(table.stamps_ns, kept, strict=True) if k),
         channels={name: array[kept] for name, array in table.channels.items()},
         commands=None if table.commands is None else table.commands[kept],
+        command_rates=None if table.command_rates is None else table.command_rates[kept],
         remarks=(*remarks, f'{said}: a position is missing, or a number is not below 1e150'),
     )
 
@@ -240,7 +215,18 @@ def _stamps(path: Path, columns: Columns, time: TimeBase, n: int) -> tuple[int, 
                 'clean the table, or set time.unit and time.start in the map',
             )
         stamps.append(stamp_ns)
-    return tuple(stamps)
+    return _one_after_another(stamps, columns[time.episode]) if time.episode else tuple(stamps)
+
+
+def _one_after_another(stamps: list[int], episode: np.ndarray) -> tuple[int, ...]:
+    """Return stamps of episodes with a pause between each and the next."""
+    found: list[int] = []
+    later = 0
+    for row, stamp_ns in enumerate(stamps):
+        if row and episode[row] != episode[row - 1]:
+            later = found[-1] + _PAUSE_NS - stamp_ns
+        found.append(stamp_ns + later)
+    return tuple(found)
 
 
 def _stamp(value: float | str, unit_ns: Decimal, start_ns: int) -> int | None:

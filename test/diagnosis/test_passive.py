@@ -9,8 +9,8 @@ import pytest
 
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.errors import RecordingError
+from sgp_ros.recordings.imports import import_table
 from sgp_ros.recordings.reader import open_recording
-from sgp_ros.recordings.tables import import_table
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import nominal_tree
 from test.diagnosis.worlds import CHAINS, events_of, shown, simulate, urdf

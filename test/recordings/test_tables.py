@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from sgp_ros.errors import ConfigError, RecordingError
+from sgp_ros.recordings.imports import import_table
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.table_map import read_map
-from sgp_ros.recordings.tables import import_table, read_table
+from sgp_ros.recordings.tables import read_table
 from test.recordings import worlds
 
 MAP = {
@@ -221,7 +222,7 @@ def test_objects_in_npz_are_never_unpickled(tmp_path):
         ('x.csv', b't,q\n1,two\n', 'column q'),
         ('x.csv', b'\xff\xfe\x00', 'no text'),
         ('x.npz', b'hello', 'cannot be read'),
-        ('x.mat', b'MATLAB 7.3 MAT-file'.ljust(124) + b'\x00\x02IM', '7.3'),
+        ('x.mat', b'MATLAB 7.3 MAT-file'.ljust(124) + b'\x00\x02IM', 'HDF5'),
         ('x.mat', b'hello', 'cannot be read'),
         ('x.xls', b'hello', "ending '.xls'"),
     ],

@@ -1,0 +1,126 @@
+"""What the name of a column says: a quantity, a joint, a unit, measured or asked for.
+
+Names are cut into words at dots, slashes, underscores, brackets, changes of case and before
+digits. Words that name a quantity, a unit or a target are taken out; what is left names the joint.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+TIME, POSITION, VELOCITY, EFFORT, CURRENT = 'time', 'position', 'velocity', 'effort', 'current'
+COMMAND, KP, KD, OTHER = 'command', 'kp', 'kd', 'other'
+
+_QUANTITIES = {
+    TIME: 't time times timestamp timestamps stamp stamps sec secs seconds clock',
+    POSITION: 'q qs pos position positions qpos angle angles theta jointpos encoder enc state',
+    VELOCITY: 'dq qd qdot vel velocity velocities qvel dtheta omega speed thetadot jointvel',
+    EFFORT: 'tau taus torque torques effort efforts force forces qfrc load moment trq',
+    CURRENT: 'i current currents amps curr',
+    KP: 'kp stiffness pgain',
+    KD: 'kd dgain',
+    OTHER: 'ddq qdd qddot acc accel acceleration accelerations qacc temperature temp voltage '
+    'index frame episode task reward done error ff feedforward',
+}
+_WORDS = {word: role for role, words in _QUANTITIES.items() for word in words.split()}
+_TARGETS = frozenset({
+    'des', 'desired', 'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'ref',
+    'reference', 'setpoint', 'goal', 'action', 'actions', 'ctrl', 'control', 'u', 'sp', 'd',
+})  # fmt: skip
+_PLAIN_TARGETS = _TARGETS - {'d'}
+_UNITS = {
+    's': 's', 'ms': 'ms', 'us': 'us', 'ns': 'ns', 'nsec': 'ns', 'nanosec': 'ns', 'msec': 'ms',
+    'rad': 'rad', 'radians': 'rad', 'deg': 'deg', 'degs': 'deg', 'degree': 'deg',
+    'degrees': 'deg', 'rev': 'rev', 'turns': 'rev', 'm': 'm', 'mm': 'mm', 'rpm': 'rpm',
+    'nm': 'N m', 'mnm': 'mN m', 'n': 'N', 'kn': 'kN', 'a': 'A', 'ma': 'mA', 'ticks': 'counts',
+    'counts': 'counts',
+}  # fmt: skip
+_LONG_UNITS = frozenset({
+    'rad', 'deg', 'degrees', 'rpm', 'counts', 'ticks', 'mm', 'nm', 'ms', 'ns', 'us',
+})  # fmt: skip
+"""Units that nothing else means, wherever they stand."""
+_FILLER = frozenset({
+    'joint', 'joints', 'states', 'observation', 'obs', 'data', 'msg', 'robot', 'motor', 'actual',
+    'measured', 'meas', 'act', 'raw', 'list', 'sensor', 'log', 'the', 'value', 'values', 'j',
+})  # fmt: skip
+_PAIRS = {('p', 'gain'): KP, ('d', 'gain'): KD, ('q', 'dot'): VELOCITY, ('theta', 'dot'): VELOCITY,
+          ('q', 'ddot'): OTHER, ('d', 'q'): VELOCITY, ('feed', 'forward'): OTHER}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Meaning:
+    """What a name says.
+
+    Attributes:
+        role: the quantity; `command` where only that it is asked for; empty for nothing known.
+        is_target: whether it is asked for, not measured.
+        rest: words that are left, in their order.
+        unit: as in a map; empty where none is said.
+    """
+
+    role: str
+    is_target: bool
+    rest: tuple[str, ...]
+    unit: str
+
+    @property
+    def joint(self) -> str:
+        """What is left without words that mean nothing beside others."""
+        return '_'.join(w for w in self.rest if w.lower() not in _FILLER)
+
+
+def meaning(name: str) -> Meaning:
+    """Return what the name of a column says."""
+    words, unit = _unit(_words(name))
+    role, is_target = '', False
+    rest: list[str] = []
+    i = 0
+    while i < len(words):
+        word = words[i].lower()
+        pair = (word, words[i + 1].lower()) if i + 1 < len(words) else None
+        if pair in _PAIRS:
+            role = _stronger(role, _PAIRS[pair])
+            i += 2
+            continue
+        if word in _PLAIN_TARGETS or (word == 'd' and i and role):
+            is_target = True
+        elif word in _WORDS and not (word in {'i', 'd', 't', 'index'} and role):
+            role = _stronger(role, _WORDS[word])
+        else:
+            rest.append(words[i])
+        i += 1
+    if not role and is_target:
+        role = COMMAND
+    return Meaning(role, is_target, tuple(rest), unit)
+
+
+def _stronger(before: str, found: str) -> str:
+    """Return which of two quantities a name means: `state` of a position is its position."""
+    if not before or OTHER in {before, found}:
+        return OTHER if before and OTHER in {before, found} else found
+    order = (KP, KD, VELOCITY, EFFORT, CURRENT, POSITION, TIME)
+    return min((before, found), key=order.index)
+
+
+def _words(name: str) -> list[str]:
+    bare = re.sub(r'([a-z])([A-Z])', r'\1 \2', re.sub(r'mA\b', 'ma', name))
+    bare = re.sub(r'([A-Za-z])(\d)', r'\1 \2', bare)
+    return [word for word in re.split(r'[^A-Za-z0-9]+', bare) if word]
+
+
+def _unit(words: list[str]) -> tuple[list[str], str]:
+    """Return the words without a unit behind them, and the unit, such as `rad s` for rad/s."""
+    if len(words) > 1 and words[-1].lower() == 's' and words[-2].lower() in _UNITS:
+        unit = _UNITS[words[-2].lower()]
+        if unit in {'rad', 'deg', 'rev', 'm', 'mm', 'counts'}:
+            return words[:-2], f'{unit}/s'
+    if len(words) > 2 and [w.lower() for w in words[-2:]] == ['n', 'm']:
+        return words[:-2], 'N m'
+    if len(words) > 1 and words[-1].lower() in _UNITS:
+        return words[:-1], _UNITS[words[-1].lower()]
+    inside = [i for i, w in enumerate(words) if w.lower() in _LONG_UNITS]
+    if len(inside) == 1 and len(words) > 1:
+        at = inside[0]
+        return words[:at] + words[at + 1 :], _UNITS[words[at].lower()]
+    return words, ''

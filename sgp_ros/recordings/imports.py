@@ -1,0 +1,137 @@
+"""Tables written as recordings, with the map that was used and the gains that they state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from sgp_ros.errors import ConfigError
+from sgp_ros.recordings.table_entries import JointHint
+from sgp_ros.recordings.table_files import load_columns
+from sgp_ros.recordings.table_formats import feature_names
+from sgp_ros.recordings.table_guess import guess_map
+from sgp_ros.recordings.table_map import read_map
+from sgp_ros.recordings.tables import Table, read_table
+from sgp_ros.recordings.writer import RecordingWriter
+
+_GAP = 5.0
+"""Steps without a row that count as a gap."""
+
+
+@dataclass(frozen=True, slots=True)
+class ImportSummary:
+    """What `import_table` wrote.
+
+    Attributes:
+        path: of the recording.
+        joints: names of the joints.
+        samples: number of states.
+        commands: number of commands.
+        start_ns: least stamp [ns].
+        end_ns: greatest stamp [ns].
+        remarks: what was left out of the table.
+        unsure: what the guess of a map may have wrong.
+        map_path: of the map that was guessed; None where one was given.
+        gains_path: of the gains that the table or its map states; None without.
+        quality: counts of missing numbers, gaps, backward and repeated stamps.
+    """
+
+    path: Path
+    joints: tuple[str, ...]
+    samples: int
+    commands: int
+    start_ns: int
+    end_ns: int
+    remarks: tuple[str, ...] = ()
+    unsure: tuple[str, ...] = ()
+    map_path: Path | None = None
+    gains_path: Path | None = None
+    quality: Mapping[str, Any] = field(default_factory=dict)
+
+    def to_mapping(self) -> dict[str, object]:
+        """Return the summary as JSON holds it."""
+        lists = {k: list(getattr(self, k)) for k in ('joints', 'remarks', 'unsure')}
+        files = (self.path, self.map_path, self.gains_path)
+        names = dict(zip(('path', 'map_path', 'gains_path'), files, strict=True))
+        return {
+            **asdict(self), **lists, **{k: None if p is None else str(p) for k, p in names.items()}
+        }  # fmt: skip
+
+
+def import_table(
+    path: str | Path, map_path: str | Path | None, out: str | Path,
+    hints: Sequence[JointHint] = (), rate_hz: float | None = None,
+) -> ImportSummary:  # fmt: skip
+    """Write a table as an MCAP recording.
+
+    Args:
+        path: a table, see `load_columns`.
+        map_path: YAML map, see `table_map`; None to guess one, which is written beside.
+        out: `.mcap` file to write, or the folder to write `<name of the table>.mcap` into, which
+            is made; an existing file is replaced.
+        hints: joints of the robot, for a guess.
+        rate_hz: of a table without times, for a guess; None where it has some.
+
+    Raises:
+        ConfigError: what is wrong with the map.
+        RecordingError: the table cannot be read.
+    """
+    path, out = Path(path), Path(out)
+    remarks: list[str] = []
+    loaded = load_columns(path, remarks)
+    unsure: list[str] = []
+    if map_path is None:
+        guess = guess_map(loaded[0], hints, feature_names(path), rate_hz)
+        content, unsure = guess.content, guess.unsure
+    else:
+        content = dict(read_map(map_path))
+    table = read_table(path, content, loaded)
+    out_path = out if out.suffix == '.mcap' else out / f'{path.stem}.mcap'
+    out_path.parent.mkdir(parents=True, exist_ok=True)
+    with RecordingWriter(out_path, command_type=table.command_type) as writer:
+        for event in table.events():
+            writer.write_event(event)
+    n = len(table.stamps_ns)
+    return ImportSummary(
+        out_path, table.joints, n, n if table.commands is not None else 0, min(table.stamps_ns),
+        max(table.stamps_ns), (*remarks, *table.remarks), tuple(unsure),
+        _written(out_path, 'map', content) if map_path is None else None,
+        _gains(out_path, content.get('gains')), quality(table),
+    )  # fmt: skip
+
+
+def quality(table: Table) -> dict[str, Any]:
+    """Return the median rate [Hz] and counts of what is missing or out of order."""
+    steps = np.diff(np.array(table.stamps_ns, dtype=np.float64)) * 1e-9
+    forward = steps[steps > 0.0]
+    usual = float(np.median(forward)) if len(forward) else 0.0
+    asked = {'command': table.commands} if table.commands is not None else {}
+    return {
+        'rate_hz': 1.0 / usual if usual > 0.0 else 0.0,
+        'gaps': int((steps > _GAP * usual).sum()) if usual > 0.0 else 0,
+        'backward': int((steps < 0.0).sum()),
+        'repeated': int((steps == 0.0).sum()),
+        'missing': {
+            name: int(np.isnan(x).sum()) for name, x in {**table.channels, **asked}.items()
+        },
+    }
+
+
+def _gains(out_path: Path, stated: object) -> Path | None:
+    """Write the gains of a map as the file that `--gains` takes."""
+    if stated is None:
+        return None
+    if not isinstance(stated, dict) or not {'kp', 'kd'} <= set(stated):
+        raise ConfigError(f'gains of the map are {stated!r}', 'kp and kd by joint')
+    return _written(out_path, 'gains', stated)
+
+
+def _written(out_path: Path, what: str, content: Mapping[str, Any]) -> Path:
+    path = out_path.with_name(f'{out_path.stem}_{what}.yaml')
+    path.write_text(yaml.safe_dump(dict(content), sort_keys=False), encoding='utf-8')
+    return path

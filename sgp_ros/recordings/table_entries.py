@@ -1,0 +1,165 @@
+"""The columns of a table as entries: which quantity of which joint each one is said to hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from sgp_ros.errors import RecordingError
+from sgp_ros.recordings.column_names import OTHER, Meaning, meaning
+from sgp_ros.recordings.table_units import as_numbers
+
+Columns = dict[str, np.ndarray]
+_NAMES = ('names', 'joint_names', 'joints', 'name')
+_DIGITS = '0123456789'
+
+
+@dataclass(frozen=True, slots=True)
+class JointHint:
+    """What is known of a joint before the table is read.
+
+    Attributes:
+        name: of the joint.
+        slides: whether it is prismatic.
+        lower, upper: range [rad or m], infinite for none.
+    """
+
+    name: str
+    slides: bool = False
+    lower: float = -np.inf
+    upper: float = np.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One joint's column."""
+
+    column: str
+    index: int | None
+    said: Meaning
+    label: str
+    numbers: np.ndarray
+
+    def place(self, unit: str, **more: float) -> dict[str, Any]:
+        """Return the entry of a map."""
+        index = {} if self.index is None else {'index': self.index}
+        return {'column': self.column, **index, 'unit': unit, **more}
+
+
+@dataclass(slots=True)
+class Guess:
+    """A map and what was not sure about it.
+
+    Attributes:
+        content: the map, as in a file.
+        unsure: one sentence each.
+    """
+
+    content: dict[str, Any] = field(default_factory=dict)
+    unsure: list[str] = field(default_factory=list)
+
+
+def entries_of(columns: Columns, rows: int, features: Mapping[str, Sequence[str]]) -> list[Entry]:
+    """Return the columns of numbers, those of matrices one by one."""
+    found = []
+    for name, array in columns.items():
+        if array.ndim > 2 or len(array) != rows:
+            continue
+        parts = features.get(name, ())
+        wide = array if array.ndim == 2 else array[:, None]
+        for i in range(wide.shape[1]):
+            numbers = as_numbers(wide[:, i])
+            if numbers is None:
+                continue
+            said, label = meaning(name), str(i) if array.ndim == 2 else ''
+            if len(parts) == wide.shape[1]:
+                inner = meaning(parts[i])
+                role = inner.role if inner.role not in {'', OTHER} else said.role
+                said = Meaning(role, said.is_target, inner.rest, inner.unit or said.unit)
+                label = inner.joint or parts[i]
+            index = i if array.ndim == 2 else None
+            found.append(Entry(name, index, said, label, numbers))
+    return _labelled(found)
+
+
+def _labelled(entries: list[Entry]) -> list[Entry]:
+    """Name the joints of single columns by the words that differ within a quantity."""
+    groups: dict[tuple[str, bool], list[Entry]] = {}
+    for e in entries:
+        groups.setdefault((e.said.role, e.said.is_target), []).append(e)
+    found = []
+    for group in groups.values():
+        plain = [e for e in group if not e.label]
+        rests = [list(e.said.rest) for e in plain]
+        common = 0
+        while rests and len(plain) > 1 and all(len(r) > common + 1 for r in rests) and len({
+            r[common] for r in rests
+        }) == 1:  # fmt: skip
+            common += 1
+        for e in group:
+            label = e.label or e.said.joint or '_'.join(e.said.rest[common:])
+            if not e.label and len(plain) > 1 and common:
+                label = '_'.join(e.said.rest[common:]) or label
+            found.append(Entry(e.column, e.index, e.said, label, e.numbers))
+    return found
+
+
+def chosen(
+    entries: Sequence[Entry], role: str, guess: Guess, *, is_target: bool = False
+) -> dict[str, Entry]:
+    """Return the columns of a quantity by the label of the joint; of two, the first."""
+    found: dict[str, Entry] = {}
+    for e in entries:
+        if (e.said.role, e.said.is_target) != (role, is_target):
+            continue
+        if e.label in found:
+            kept = found[e.label].column
+            if kept != e.column:
+                guess.unsure.append(f'The {role} is {kept}, not {e.column}.')
+            continue
+        found[e.label] = e
+    guess.unsure = list(dict.fromkeys(guess.unsure))
+    return found
+
+
+def joint_names(
+    positions: Mapping[str, Entry], columns: Columns, hints: Sequence[JointHint], guess: Guess
+) -> dict[str, str]:
+    """Return the label of each joint's column and its name."""
+    labels = list(positions)
+    listed = next((columns[n] for n in _NAMES if n in columns), None)
+    names = [str(x) for x in listed.ravel()] if listed is not None else []
+    if len(set(names)) == len(labels) and all(not x.strip(_DIGITS) for x in labels):
+        return dict(zip(labels, names, strict=True))
+    if not hints:
+        plain = [x for x in labels if not x.strip(_DIGITS)]
+        first = min((int(x) for x in plain if x), default=0)
+        return {x: f'joint_{int(x or first) - first + 1}' if x in plain else x for x in labels}
+    matched = {x: [h.name for h in hints if _same(x, h.name)] for x in labels}
+    if all(len(m) == 1 for m in matched.values()) and len({m[0] for m in matched.values()}) == len(
+        labels
+    ):
+        return {x: m[0] for x, m in matched.items()}
+    if len(labels) == len(hints):
+        order = sorted(labels, key=int) if all(x.isdigit() for x in labels) else labels
+        said = ', '.join(
+            f'{x or "the only one"} is {h.name}' for x, h in zip(order, hints, strict=True)
+        )
+        if len(labels) > 1:
+            guess.unsure.append(f'Columns are joints in the order of the robot: {said}.')
+        return {x: h.name for x, h in zip(order, hints, strict=True)}
+    raise RecordingError(
+        f'positions of {len(labels)} joints ({", ".join(labels)})',
+        f'those of the robot: {", ".join(h.name for h in hints)}',
+        'write a map, or a robot YAML with these joints',
+    )  # fmt: skip
+
+
+def _same(label: str, name: str) -> bool:
+    """Return whether a label names a joint."""
+    a, b = (''.join(c for c in x.lower() if c.isalnum()) for x in (label, name))
+    bare = b.replace('joint', '')
+    return bool(a) and (a in {b, bare} or a.replace('joint', '') == bare)

@@ -1,0 +1,168 @@
+"""Columns of Parquet, HDF5 and JSON files by name, and the formats that are refused."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sgp_ros.errors import RecordingError
+from sgp_ros.optional import optional_package
+
+Columns = dict[str, np.ndarray]
+
+_PROGRAM = 'pickled data are a program, and nothing is unpickled here'
+REFUSED = {
+    **dict.fromkeys(('.pkl', '.pickle', '.pt', '.pth', '.joblib', '.p'), _PROGRAM),
+    '.zarr': 'a zarr store is a folder of compressed chunks',
+    '.npy': 'one array has no names of columns',
+    '.xlsx': 'a spreadsheet holds formulas and several sheets',
+}
+"""Ending to the reason why such a file is not read."""
+_REMEDY = 'save the arrays with numpy.savez, or as CSV or Parquet'
+
+
+def refuse(path: Path) -> None:
+    """Refuse a file that is never read.
+
+    Raises:
+        RecordingError: it is one of `REFUSED`.
+    """
+    reason = REFUSED.get(path.suffix.lower())
+    if reason is not None:
+        raise RecordingError(f'{path.name}: {reason}', 'a table of numbers', _REMEDY)
+
+
+def load_parquet(path: Path) -> Columns:
+    """Return the columns of a Parquet file; lists of one length are matrices.
+
+    Raises:
+        RecordingError: a damaged file.
+        ConfigError: pyarrow is missing.
+    """
+    parquet = optional_package('pyarrow.parquet', 'to read Parquet', 'tables')
+    try:
+        table = parquet.read_table(str(path), use_threads=False)
+    except Exception as error:  # the library has its own errors
+        raise RecordingError(
+            f'{path.name} cannot be read ({" ".join(str(error).split())})', 'a Parquet file'
+        ) from error
+    columns: Columns = {}
+    for name in table.column_names:
+        _enter(columns, name, table.column(name).to_pylist())
+    return columns
+
+
+def feature_names(path: Path) -> dict[str, list[str]]:
+    """Return what LeRobot's `meta/info.json` above a file calls the parts of its columns."""
+    for folder in path.resolve().parents[:5]:
+        info = folder / 'meta' / 'info.json'
+        if not info.is_file():
+            continue
+        try:
+            features = json.loads(info.read_text(encoding='utf-8')).get('features', {})
+        except (OSError, ValueError, AttributeError):
+            return {}
+        found = {}
+        for column, said in features.items() if isinstance(features, dict) else ():
+            names = said.get('names') if isinstance(said, dict) else None
+            if isinstance(names, dict):
+                names = next((x for x in names.values() if isinstance(x, list)), None)
+            if isinstance(names, list) and all(isinstance(n, str) for n in names):
+                found[str(column)] = names
+        return found
+    return {}
+
+
+def load_hdf5(path: Path, *, is_matlab: bool = False) -> Columns:
+    """Return the datasets of an HDF5 file under dotted names.
+
+    Args:
+        path: of the file.
+        is_matlab: MATLAB writes the axes of an array in reverse order.
+
+    Raises:
+        RecordingError: a damaged file.
+        ConfigError: h5py is missing.
+    """
+    h5py = optional_package('h5py', 'to read HDF5', 'tables')
+    columns: Columns = {}
+
+    def enter(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.dtype.kind in 'fiub' and item.shape:
+            array = np.asarray(item[()])
+            array = array.T if is_matlab else array
+            flat = array.ravel() if array.ndim == 2 and 1 in array.shape else array
+            columns[name.replace('/', '.')] = flat
+
+    try:
+        with h5py.File(path, 'r') as file:
+            file.visititems(enter)
+    except (OSError, KeyError, ValueError, RuntimeError) as error:
+        raise RecordingError(
+            f'{path.name} cannot be read ({" ".join(str(error).split())})', 'an HDF5 file'
+        ) from error
+    return columns
+
+
+def load_json(path: Path) -> Columns:
+    """Return the columns of a JSON file: of a mapping to lists, or of a list of records.
+
+    In `.jsonl` and `.ndjson` each line is a record.
+
+    Raises:
+        RecordingError: no JSON, or no table.
+    """
+    try:
+        text = path.read_text(encoding='utf-8-sig')
+        if path.suffix.lower() == '.json':
+            content = json.loads(text)
+        else:
+            content = [json.loads(line) for line in text.splitlines() if line.strip()]
+    except (ValueError, RecursionError) as error:
+        raise RecordingError(
+            f'{path.name} is no JSON ({error})', 'JSON, or a record a line'
+        ) from None
+    columns: Columns = {}
+    if isinstance(content, list) and content and all(isinstance(x, dict) for x in content):
+        records = [dict(_flattened('', x)) for x in content]
+        names = dict.fromkeys(name for record in records for name in record)
+        for name in names:
+            _enter(columns, name, [record.get(name) for record in records])
+    elif isinstance(content, dict):
+        for name, value in _flattened('', content):
+            if isinstance(value, list):
+                _enter(columns, name, value)
+    if not columns:
+        raise RecordingError(f'{path.name} holds no table', 'lists by name, or a list of records')
+    return columns
+
+
+def _flattened(prefix: str, content: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    for name, value in content.items():
+        if isinstance(value, dict):
+            yield from _flattened(f'{prefix}{name}.', value)
+        else:
+            yield f'{prefix}{name}', value
+
+
+def _enter(columns: Columns, name: str, values: list[Any]) -> None:
+    """Enter a column of numbers, texts or lists of numbers; others are left out."""
+    if all(isinstance(x, list) for x in values if x is not None):
+        lengths = {len(x) for x in values if x is not None}
+        if len(lengths) != 1:
+            return
+        none = [None] * lengths.pop()
+        values = [none if x is None else x for x in values]
+        rows = [[np.nan if y is None else y for y in x] for x in values]
+        if all(isinstance(y, int | float) for x in rows for y in x):
+            columns[name] = np.array(rows, dtype=np.float64)
+    elif all(isinstance(x, int) for x in values):
+        columns[name] = np.array(values)
+    elif all(x is None or isinstance(x, int | float) for x in values):
+        columns[name] = np.array([np.nan if x is None else float(x) for x in values])
+    elif all(isinstance(x, str) for x in values):
+        columns[name] = np.array(values)

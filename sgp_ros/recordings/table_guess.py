@@ -1,0 +1,295 @@
+"""A map of a table that has none, guessed from the names of its columns and from its numbers.
+
+Names tell quantities and joints (`column_names`). Numbers decide what names leave open: the unit
+of time by the rate that follows, degrees by the range, the unit of a velocity by the slope of the
+position, and whether an `action` is a position by how near it stays to the position. Each
+decision that another log could prove wrong is returned in words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from sgp_ros.errors import RecordingError
+from sgp_ros.recordings.column_names import (
+    COMMAND,
+    CURRENT,
+    EFFORT,
+    KD,
+    KP,
+    POSITION,
+    TIME,
+    VELOCITY,
+    meaning,
+)
+from sgp_ros.recordings.table_entries import (
+    Columns,
+    Entry,
+    Guess,
+    JointHint,
+    chosen,
+    entries_of,
+    joint_names,
+)
+from sgp_ros.recordings.table_units import (
+    as_numbers,
+    follows,
+    is_constant,
+    position_unit,
+    time_unit,
+    velocity_unit,
+)
+
+_RATES = {'fs', 'rate', 'hz', 'freq', 'frequency', 'sampling_rate', 'fps'}
+_STEPS = {'dt', 'ts', 'step', 'timestep', 'sample_time'}
+
+
+def guess_map(
+    columns: Columns, hints: Sequence[JointHint] = (),
+    features: Mapping[str, Sequence[str]] | None = None, rate_hz: float | None = None,
+) -> Guess:  # fmt: skip
+    """Return a map of a table.
+
+    Args:
+        columns: of the table by name.
+        hints: joints of the robot in its order; none where it is not known.
+        features: names of the parts of a column, where a file says them.
+        rate_hz: where the table has no time; None for one that it states.
+
+    Raises:
+        RecordingError: no time or no positions can be told.
+    """
+    guess = Guess()
+    rows = _rows(columns)
+    seconds = _time(columns, rows, rate_hz, guess)
+    entries = entries_of(columns, rows, features or {})
+    positions = chosen(entries, POSITION, guess)
+    if not positions:
+        raise RecordingError(
+            f'no column of positions among {sorted(columns)}',
+            'names such as q, position, joint1_pos', 'write a map, see docs/import.md',
+        )  # fmt: skip
+    joints = joint_names(positions, columns, hints, guess)
+    hinted = {h.name: h for h in hints}
+    units = _position_units(positions, joints, hinted, guess)
+    found: dict[str, dict[str, Any]] = {
+        name: {'position': positions[label].place(units[label])} for label, name in joints.items()
+    }
+    _add_velocities(found, entries, joints, positions, units, seconds, guess)
+    _add_efforts(found, entries, joints, hinted, guess)
+    guess.content['joints'] = found
+    _add_commands(entries, joints, positions, units, guess)
+    _add_gains(columns, entries, joints, rows, guess)
+    return guess
+
+
+def _rows(columns: Columns) -> int:
+    """Return the length that most numbers of the table have."""
+    sizes: dict[int, int] = {}
+    for array in columns.values():
+        sizes[len(array)] = sizes.get(len(array), 0) + array.size
+    if not sizes or max(sizes.values()) < 2:
+        raise RecordingError('a table without rows', 'columns of numbers')
+    return max(sizes, key=lambda n: sizes[n])
+
+
+def _time(columns: Columns, rows: int, rate_hz: float | None, guess: Guess) -> np.ndarray:
+    """Enter the time base and return the times [s], (n,)."""
+    named = [
+        name for name, x in columns.items()
+        if x.shape[:1] == (rows,) and x.size == rows and meaning(name).role == TIME
+    ]  # fmt: skip
+    named.sort(key=lambda name: ('des' in name.lower(), len(name)))
+    for name in named if rate_hz is None else ():
+        stamps = as_numbers(columns[name])
+        if stamps is None:  # texts, such as those of ISO 8601
+            guess.content['time'] = {'column': name, 'unit': 's'}
+            return np.arange(rows, dtype=np.float64)
+        unit, is_sure = time_unit(stamps, meaning(name).unit)
+        if not unit:
+            continue
+        if not is_sure:
+            guess.unsure.append(f'The time {name} is taken to be in {unit}.')
+        if len(named) > 1:
+            others = ', '.join(n for n in named if n != name)
+            guess.unsure.append(f'The time is {name}, not {others}.')
+        guess.content['time'] = {'column': name, 'unit': unit, **_episodes(columns, rows)}
+        return stamps * {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}[unit]
+    rate_hz = rate_hz or _stated_rate(columns)
+    if rate_hz is None:
+        raise RecordingError(
+            f'no column of time among {sorted(columns)}', 'a name such as t, time, timestamp_ns',
+            'say how often the rows were taken with --rate HZ',
+        )  # fmt: skip
+    guess.content['time'] = {'rate': rate_hz}
+    return np.arange(rows) / rate_hz
+
+
+def _episodes(columns: Columns, rows: int) -> dict[str, str]:
+    """Return the column that numbers episodes whose clocks begin anew; nothing without."""
+    for name, array in columns.items():
+        word = name.lower().rsplit('.', 1)[-1]
+        if word in {'episode_index', 'episode', 'episode_id'} and array.shape == (rows,):
+            return {'episode': name} if len(np.unique(array)) > 1 else {}
+    return {}
+
+
+def _stated_rate(columns: Columns) -> float | None:
+    """Return the rate that a table of one number states [Hz]; None without."""
+    for name, array in columns.items():
+        word, value = name.lower(), as_numbers(array.ravel()[:1])
+        if array.size == 1 and value is not None and value[0] > 0.0:
+            if word in _RATES:
+                return float(value[0])
+            if word in _STEPS:
+                return 1.0 / float(value[0])
+    return None
+
+
+def _position_units(
+    positions: Mapping[str, Entry], joints: Mapping[str, str], hinted: Mapping[str, JointHint],
+    guess: Guess,
+) -> dict[str, str]:  # fmt: skip
+    units = {}
+    turning = [x for x in positions if not _hint(joints[x], hinted).slides]
+    said = {x: positions[x].said.unit for x in positions}
+    ranges = [
+        (positions[x].numbers, _hint(joints[x], hinted).lower, _hint(joints[x], hinted).upper)
+        for x in turning if said[x] not in {'rad', 'deg', 'rev', 'counts', 'm', 'mm'}
+    ]  # fmt: skip
+    angle, is_sure = position_unit(ranges)
+    if ranges and not is_sure:
+        guess.unsure.append(f'Positions are taken to be in {angle}, by their range.')
+    for x in positions:
+        known = said[x] in {'rad', 'deg', 'rev', 'm', 'mm'}
+        units[x] = said[x] if known else (angle if x in turning else 'm')
+    return units
+
+
+def _hint(name: str, hinted: Mapping[str, JointHint]) -> JointHint:
+    return hinted.get(name, JointHint(name))
+
+
+def _add_velocities(
+    found: dict[str, dict[str, Any]], entries: Sequence[Entry], joints: Mapping[str, str],
+    positions: Mapping[str, Entry], units: Mapping[str, str], seconds: np.ndarray, guess: Guess,
+) -> None:  # fmt: skip
+    velocities = chosen(entries, VELOCITY, guess)
+    for label, e in velocities.items():
+        if label not in joints:
+            guess.unsure.append(f'The velocity {e.column} belongs to no position: left out.')
+            continue
+        unit, said = velocity_unit(
+            e.numbers, positions[label].numbers, seconds, units[label], e.said.unit
+        )
+        if said:
+            guess.unsure.append(f'The velocity of {joints[label]} {said}.')
+        found[joints[label]]['velocity'] = e.place(unit)
+
+
+def _add_efforts(
+    found: dict[str, dict[str, Any]], entries: Sequence[Entry], joints: Mapping[str, str],
+    hinted: Mapping[str, JointHint], guess: Guess,
+) -> None:  # fmt: skip
+    efforts = chosen(entries, EFFORT, guess)
+    currents = {} if efforts else chosen(entries, CURRENT, guess)
+    for label, e in (efforts or currents).items():
+        if label not in joints:
+            guess.unsure.append(f'The effort {e.column} belongs to no position: left out.')
+            continue
+        if currents:
+            more = {'scale': 1e-3} if e.said.unit == 'mA' else {'scale': 1.0}
+            found[joints[label]]['effort'] = e.place('A', **more)
+        else:
+            usual = 'N' if _hint(joints[label], hinted).slides else 'N m'
+            unit = e.said.unit if e.said.unit in {'N m', 'mN m', 'N', 'kN'} else usual
+            found[joints[label]]['effort'] = e.place(unit)
+    if currents:
+        guess.unsure.append(
+            'Efforts are currents in A: state the torque constant as `scale` in the map, in N m/A.'
+        )
+
+
+def _add_commands(
+    entries: Sequence[Entry], joints: Mapping[str, str], positions: Mapping[str, Entry],
+    units: Mapping[str, str], guess: Guess,
+) -> None:  # fmt: skip
+    """Enter targets of position or velocity, or commanded efforts, whichever the log has."""
+    named = {
+        kind: {
+            x: e for x, e in chosen(entries, kind, guess, is_target=True).items() if x in joints
+        }
+        for kind in (POSITION, VELOCITY, EFFORT, COMMAND)
+    }
+    open_ones = named.pop(COMMAND)
+    if open_ones and not any(named.values()):
+        alike = [follows(e.numbers, positions[x].numbers) for x, e in open_ones.items()]
+        column = next(iter(open_ones.values())).column
+        if float(np.median(alike)) > 0.5:
+            named[POSITION] = open_ones
+            guess.unsure.append(f'{column} stays near the positions: taken for their targets.')
+        else:
+            guess.unsure.append(
+                f'Nothing says what {column} commands, and positions do not follow it: left out. '
+                'Enter it in the map under `targets` or `commands`.'
+            )
+    copies = [x for x, e in named[POSITION].items()
+              if np.array_equal(e.numbers, positions[x].numbers, equal_nan=True)]  # fmt: skip
+    if named[POSITION] and len(copies) == len(named[POSITION]):
+        column = next(iter(named[POSITION].values())).column
+        guess.unsure.append(f'The target {column} is the measured position itself: left out.')
+        named[POSITION] = {}
+    targets = {
+        joints[x]: {
+            kind: e[x].place(units[x] if kind == POSITION else f'{units[x]}/s')
+            for kind, e in ((POSITION, named[POSITION]), (VELOCITY, named[VELOCITY])) if x in e
+        }
+        for x in joints if x in named[POSITION] or x in named[VELOCITY]
+    }  # fmt: skip
+    if targets:
+        guess.content['targets'] = targets
+        if named[EFFORT]:
+            columns = dict.fromkeys(e.column for e in named[EFFORT].values())
+            guess.unsure.append(
+                f'Beside targets, {", ".join(columns)} is left out: which of them the drives '
+                'obey is not known.'
+            )
+    elif named[EFFORT]:
+        guess.content['commands'] = {
+            joints[x]: e.place(e.said.unit if e.said.unit in {'N m', 'mN m', 'N', 'kN'} else 'N m')
+            for x, e in named[EFFORT].items()
+        }
+
+
+def _add_gains(
+    columns: Columns, entries: Sequence[Entry], joints: Mapping[str, str], rows: int, guess: Guess
+) -> None:
+    """Enter gains that the table states, as one number or one for each joint, or in each row."""
+    found: dict[str, dict[str, float]] = {}
+    for role in (KP, KD):
+        values = {
+            joints[x]: e.numbers for x, e in chosen(entries, role, guess).items()
+            if x in joints
+        }  # fmt: skip
+        for name, array in columns.items():
+            numbers = as_numbers(array.ravel())
+            if meaning(name).role != role or len(array) == rows or numbers is None:
+                continue
+            if numbers.size in {1, len(joints)}:
+                each = np.broadcast_to(numbers, len(joints))
+                values = {j: each[i : i + 1] for i, j in enumerate(joints.values())}
+            else:
+                guess.unsure.append(
+                    f'{name} holds {numbers.size} gains for {len(joints)} joints: left out.'
+                )
+        if any(not is_constant(x) for x in values.values()):
+            guess.unsure.append(f'{role} changes in the log: left out, only fixed gains count.')
+        elif values:
+            found[role] = {joint: float(x[0]) for joint, x in values.items()}
+    if set(found) == {KP, KD} and set(found[KP]) == set(found[KD]):
+        guess.content['gains'] = found
+    elif found:
+        guess.unsure.append(f'Only {" and ".join(found)} of the gains is there: left out.')

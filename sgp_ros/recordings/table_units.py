@@ -1,0 +1,129 @@
+"""Units that the numbers of a column tell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+_EPOCHS = ((1e17, 'ns'), (1e14, 'us'), (1e11, 'ms'), (1e8, 's'))
+"""Least number of a time since 1970, and its unit."""
+_RATES_HZ = (5.0, 20_000.0)
+"""Of logs."""
+_PER_SECOND = {'s': 1.0, 'ms': 1e3, 'us': 1e6, 'ns': 1e9}
+_TURN = 2.0 * np.pi
+_MARGIN = 0.3
+"""Beyond a range that a position may read [rad]."""
+
+
+def as_numbers(column: np.ndarray) -> np.ndarray | None:
+    """Return a column as float64, nothing as NaN; None where it holds no numbers."""
+    if column.dtype.kind in 'fiub':
+        return column.astype(np.float64)
+    if column.dtype.kind != 'U':
+        return None
+    try:
+        return np.where(column == '', 'nan', column).astype(np.float64)
+    except ValueError:
+        return None
+
+
+def time_unit(stamps: np.ndarray, said: str) -> tuple[str, bool]:
+    """Return the unit of times and whether it is sure; no unit where they do not grow.
+
+    Args:
+        stamps: (n,).
+        said: unit in the name of the column; empty for none.
+    """
+    finite = stamps[np.isfinite(stamps)]
+    steps = np.diff(finite)
+    steps = steps[steps > 0.0]
+    if len(steps) < 1 or len(steps) < 0.5 * (len(finite) - 1):
+        return '', False
+    if said in _PER_SECOND:
+        return said, True
+    for least, unit in _EPOCHS:
+        if finite[0] >= least:
+            return unit, True
+    step = float(np.median(steps))
+    fitting = [u for u, per in _PER_SECOND.items() if _RATES_HZ[0] <= per / step <= _RATES_HZ[1]]
+    if not fitting:
+        return 's', False
+    # rates of logs lie in one decade of a thousand, but between 5 and 20 Hz
+    return fitting[0], len(fitting) == 1
+
+
+def position_unit(columns: Sequence[tuple[np.ndarray, float, float]]) -> tuple[str, bool]:
+    """Return `rad` or `deg` of turning joints and whether it is sure.
+
+    Args:
+        columns: of each joint its numbers (n,) and its range [rad], infinite for none.
+    """
+    votes = {'rad': 0, 'deg': 0}
+    largest = 0.0
+    for numbers, lower, upper in columns:
+        low, high = np.nanmin(numbers), np.nanmax(numbers)
+        largest = max(largest, abs(low), abs(high))
+        for unit, factor in (('rad', 1.0), ('deg', np.pi / 180.0)):
+            if np.isfinite(lower) and np.isfinite(upper):
+                fits = low * factor >= lower - _MARGIN and high * factor <= upper + _MARGIN
+                votes[unit] += bool(fits)
+    if votes['rad'] != votes['deg']:
+        return ('rad', True) if votes['rad'] > votes['deg'] else ('deg', True)
+    if largest <= _TURN + _MARGIN:
+        return 'rad', True
+    return ('deg' if largest > 6.0 * np.pi else 'rad'), False
+
+
+def velocity_unit(
+    velocity: np.ndarray, position: np.ndarray, seconds: np.ndarray, unit: str, said: str
+) -> tuple[str, str]:
+    """Return the unit of a velocity, and what is not sure of it.
+
+    The slope of the velocity on the change of the position tells degrees from radians.
+
+    Args:
+        velocity: (n,).
+        position: (n,).
+        seconds: (n,) [s].
+        unit: of the position.
+        said: unit in the name of the column; empty for none.
+    """
+    if said in {'rpm', 'rad/s', 'deg/s', 'rev/s', 'm/s', 'mm/s'}:
+        return said, ''
+    usual = f'{unit}/s'
+    step = np.diff(seconds)
+    good = (step > 0.0) & np.isfinite(np.diff(position)) & np.isfinite(velocity[1:])
+    rate = np.diff(position)[good] / step[good]
+    mean = 0.5 * (velocity[1:] + velocity[:-1])[good]
+    power = float(rate @ rate)
+    if good.sum() < 10 or power == 0.0:
+        return usual, ''
+    slope = float(mean @ rate) / power
+    explained = slope * float(mean @ rate) / max(float(mean @ mean), 1e-300)
+    if explained < 0.5:
+        return usual, 'does not follow its position'
+    other = {'rad': ('deg/s', 57.3), 'deg': ('rad/s', 1.0 / 57.3)}.get(unit)
+    if other is not None and 0.7 < slope / other[1] < 1.4:
+        return other[0], f'is taken to be in {other[0]}, by the slope of its position'
+    if not 0.7 < slope < 1.4:
+        return usual, f'is {slope:.3g} times the slope of its position'
+    return usual, ''
+
+
+def follows(command: np.ndarray, position: np.ndarray) -> float:
+    """Return the share of the spread of a position that stays within its command, 0 to 1."""
+    both = np.isfinite(command) & np.isfinite(position)
+    if both.sum() < 10:
+        return 0.0
+    spread = float(np.var(position[both]))
+    apart = float(np.mean((command[both] - position[both]) ** 2))
+    return max(0.0, 1.0 - apart / spread) if spread > 0.0 else 0.0
+
+
+def is_constant(numbers: np.ndarray) -> bool:
+    """Return whether numbers are all the same, to rounding."""
+    finite = numbers[np.isfinite(numbers)]
+    if not len(finite):
+        return False
+    return bool(np.ptp(finite) <= 1e-9 * max(1.0, float(np.abs(finite).max())))

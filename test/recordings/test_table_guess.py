@@ -1,0 +1,200 @@
+"""Tables without a map: what names and numbers tell, and what is said to be unsure."""
+
+from __future__ import annotations
+
+import json
+
+import h5py
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import yaml
+from scipy.io import savemat
+
+from sgp_ros.cli import main
+from sgp_ros.engine.samples import POSITION, VELOCITY, CommandSample, JointSample
+from sgp_ros.errors import RecordingError
+from sgp_ros.recordings.column_names import meaning
+from sgp_ros.recordings.imports import import_table
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.recordings.table_entries import JointHint
+
+T = np.arange(200) * 0.005
+Q = np.column_stack([np.sin(3.0 * T), 0.5 * np.cos(2.0 * T)])
+DQ = np.column_stack([3.0 * np.cos(3.0 * T), -np.sin(2.0 * T)])
+TAU = np.column_stack([np.cos(T), np.sin(5.0 * T)])
+LATE = np.column_stack([np.sin(3.0 * T + 0.1), 0.5 * np.cos(2.0 * T + 0.1)])
+HINTS = (JointHint('shoulder', lower=-2.0, upper=2.0), JointHint('elbow', lower=-2.0, upper=2.0))
+
+
+def _npz(folder, **arrays):
+    np.savez(folder / 'log.npz', **arrays)
+    return folder / 'log.npz'
+
+
+def _read(path, folder, hints=HINTS, rate=None):
+    """Return the summary, the states and the commands that were written."""
+    summary = import_table(path, None, folder / 'out', hints, rate)
+    events = list(open_recording(summary.path).events())
+    states = [e for e in events if isinstance(e, JointSample)]
+    return summary, states, [e for e in events if isinstance(e, CommandSample)]
+
+
+@pytest.mark.parametrize(
+    ('name', 'role', 'is_target', 'joint', 'unit'),
+    [
+        ('t', 'time', False, '', ''),
+        ('time_ms', 'time', False, '', 'ms'),
+        ('/joint_states/elbow/position', 'position', False, 'elbow', ''),
+        ('q_des_2', 'position', True, '2', ''),
+        ('tau_J_d', 'effort', True, '', ''),
+        ('dq_rad_s', 'velocity', False, '', 'rad/s'),
+        ('pos_deg_j2', 'position', False, '2', 'deg'),
+        ('tau_des_Nm', 'effort', True, '', 'N m'),
+        ('joint1_current_mA', 'current', False, '1', 'mA'),
+        ('observation.state', 'position', False, '', ''),
+        ('action', 'command', True, '', ''),
+        ('target_velocity', 'velocity', True, '', ''),
+        ('p_gain', 'kp', False, '', ''),
+        ('ddq', 'other', False, '', ''),
+    ],
+)
+def test_names_tell_quantity_joint_and_unit(name, role, is_target, joint, unit):
+    said = meaning(name)
+    assert (said.role, said.is_target, said.joint, said.unit) == (role, is_target, joint, unit)
+
+
+def test_a_log_of_position_control_is_read_with_its_gains(tmp_path):
+    """q, dq, q_des, kp, kd of a user, without any map."""
+    path = _npz(tmp_path, time=T, q=Q, dq=DQ, q_des=LATE, kp=[30.0, 20.0], kd=2.0)
+    summary, states, commands = _read(path, tmp_path)
+    assert summary.joints == ('shoulder', 'elbow')
+    np.testing.assert_allclose([s.position for s in states], Q)
+    np.testing.assert_allclose([s.velocity for s in states], DQ)
+    assert all(s.effort is None for s in states)
+    assert {c.kind for c in commands} == {POSITION}
+    np.testing.assert_allclose([c.effort for c in commands], LATE)
+    gains = yaml.safe_load(summary.gains_path.read_text())
+    assert gains == {
+        'kp': {'shoulder': 30.0, 'elbow': 20.0},
+        'kd': {'shoulder': 2.0, 'elbow': 2.0},
+    }
+    assert any('order of the robot' in said for said in summary.unsure)
+    again = import_table(path, summary.map_path, tmp_path / 'again')
+    assert (again.samples, again.commands, again.unsure) == (200, 200, ())
+    assert again.gains_path.read_text() == summary.gains_path.read_text()
+
+
+def test_columns_of_each_joint_are_gathered(tmp_path):
+    """In any order, with the joint before or behind; degrees are told by the ranges."""
+    degrees = np.degrees(Q)
+    table = np.column_stack([1e3 * T, degrees[:, 1], degrees[:, 0], np.degrees(DQ[:, ::-1]), TAU])
+    header = 'time,elbow_pos,shoulder_pos,elbow_vel,shoulder_vel,torque_shoulder,torque_elbow'
+    np.savetxt(tmp_path / 'log.csv', table, delimiter=',', header=header, comments='')
+    summary, states, commands = _read(tmp_path / 'log.csv', tmp_path)
+    order = [states[0].names.index(j) for j in ('shoulder', 'elbow')]
+    np.testing.assert_allclose([s.position[order] for s in states], Q, atol=1e-12)
+    np.testing.assert_allclose([s.velocity[order] for s in states], DQ, atol=1e-12)
+    np.testing.assert_allclose([s.effort[order] for s in states], TAU, atol=1e-12)
+    assert commands == []
+    assert summary.end_ns - summary.start_ns == 995_000_000
+    assert 'ms' in ' '.join(summary.unsure) or summary.quality['rate_hz'] == pytest.approx(200.0)
+
+
+def test_an_action_is_what_the_positions_say(tmp_path):
+    """Near them it is their target; else nothing says what it is, and it is left out."""
+    summary, _, commands = _read(_npz(tmp_path, t=T, q=Q, action=LATE), tmp_path)
+    assert {c.kind for c in commands} == {POSITION}
+    assert any('taken for their targets' in said for said in summary.unsure)
+    summary, _, commands = _read(_npz(tmp_path, t=T, q=Q, tau=TAU, action=9.0 * TAU), tmp_path)
+    assert commands == []
+    assert any('Nothing says what action commands' in said for said in summary.unsure)
+
+
+def test_a_target_that_is_the_position_is_no_target(tmp_path):
+    summary, _, commands = _read(_npz(tmp_path, t=T, q=Q, q_des=Q, tau=TAU), tmp_path)
+    assert commands == []
+    assert any('is the measured position itself' in said for said in summary.unsure)
+
+
+def test_targets_of_velocity_stay_what_they_are(tmp_path):
+    _, _, commands = _read(_npz(tmp_path, t=T, q=Q, dq_cmd=DQ), tmp_path)
+    assert {c.kind for c in commands} == {VELOCITY}
+    np.testing.assert_allclose([c.effort for c in commands], DQ)
+
+
+def test_lerobot_columns_have_the_names_of_its_info(tmp_path):
+    """Episodes follow each other with a pause; the index of a frame is no time."""
+    data = tmp_path / 'data' / 'chunk-000'
+    (tmp_path / 'meta').mkdir()
+    data.mkdir(parents=True)
+    names = ['shoulder.pos', 'elbow.pos']
+    features = {key: {'names': names} for key in ('observation.state', 'action')}
+    (tmp_path / 'meta' / 'info.json').write_text(json.dumps({'features': features}))
+    table = pa.table({
+        'observation.state': list(Q), 'action': list(LATE), 'timestamp': np.tile(T[:100], 2),
+        'frame_index': np.tile(np.arange(100), 2), 'episode_index': np.repeat([0, 1], 100),
+    })  # fmt: skip
+    pq.write_table(table, data / 'log.parquet')
+    summary, states, commands = _read(data / 'log.parquet', tmp_path, hints=())
+    assert summary.joints == ('shoulder', 'elbow')
+    assert {c.kind for c in commands} == {POSITION}
+    np.testing.assert_allclose([s.position for s in states], Q)
+    assert states[100].stamp_ns - states[99].stamp_ns == 10_000_000_000
+    assert summary.quality['gaps'] == 1
+
+
+@pytest.mark.parametrize('ending', ['h5', 'mat', 'json', 'jsonl', 'parquet'])
+def test_every_format_gives_the_same(tmp_path, ending):
+    arrays = {'t': T, 'q': Q, 'dq': DQ, 'tau': TAU}
+    path = tmp_path / f'log.{ending}'
+    if ending == 'h5':
+        with h5py.File(path, 'w') as file:
+            for name, x in arrays.items():
+                file[f'run/{name}'] = x
+    elif ending == 'mat':
+        savemat(path, {'run': arrays})
+    elif ending == 'json':
+        path.write_text(json.dumps({'run': {name: x.tolist() for name, x in arrays.items()}}))
+    elif ending == 'jsonl':
+        rows = [{name: x[i].tolist() for name, x in arrays.items()} for i in range(len(T))]
+        path.write_text('\n'.join(map(json.dumps, rows)))
+    else:
+        pq.write_table(pa.table({n: list(x) for n, x in arrays.items()}), path)
+    _, states, _ = _read(path, tmp_path)
+    for wanted, channel in ((Q, 'position'), (DQ, 'velocity'), (TAU, 'effort')):
+        np.testing.assert_allclose([getattr(s, channel) for s in states], wanted)
+
+
+@pytest.mark.parametrize('name', ['log.pkl', 'log.zarr', 'log.npy', 'policy.pt'])
+def test_what_is_never_read_is_refused_with_the_reason(tmp_path, capsys, name):
+    (tmp_path / name).write_bytes(b'x')
+    assert main(['import', str(tmp_path / name), '--out', str(tmp_path / 'out')]) == 2
+    said = capsys.readouterr().err
+    assert said.count('\n') == 1
+    assert 'save the arrays with numpy.savez' in said
+    assert not (tmp_path / 'out').exists()
+
+
+def test_faults_of_the_clock_and_missing_numbers_are_counted(tmp_path):
+    t, velocity = T.copy(), DQ.copy()
+    t[50:] += 1.0
+    t[120] = t[118]
+    velocity[3:7, 0] = np.nan
+    summary = import_table(_npz(tmp_path, t=t, q=Q, dq=velocity), None, tmp_path, HINTS)
+    assert summary.quality['gaps'] == 1
+    assert summary.quality['backward'] == 1
+    assert summary.quality['missing'] == {'position': 0, 'velocity': 4}
+
+
+def test_what_cannot_be_guessed_is_refused(tmp_path):
+    """No time, no position, or other joints than the robot's: one line each."""
+    with pytest.raises(RecordingError, match='--rate HZ'):
+        import_table(_npz(tmp_path, q=Q), None, tmp_path, HINTS)
+    assert import_table(_npz(tmp_path, q=Q), None, tmp_path, HINTS, 200.0).samples == 200
+    assert import_table(_npz(tmp_path, q=Q, dt=0.005), None, tmp_path, HINTS).samples == 200
+    with pytest.raises(RecordingError, match='no column of positions'):
+        import_table(_npz(tmp_path, t=T, x=Q), None, tmp_path, HINTS)
+    with pytest.raises(RecordingError, match='positions of 1 joints'):
+        import_table(_npz(tmp_path, t=T, q=Q[:, 0]), None, tmp_path, HINTS)
