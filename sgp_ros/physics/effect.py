@@ -75,8 +75,7 @@ class Effect:
             coefficient is 1, and the shape alone says how large the effect is.
         kinds: the variants it comes in.
         has_source: whether it comes from another joint.
-        plain: laws of one joint that it becomes where it neither couples nor drifts, and at the
-            lower bound of its shape.
+        plain: laws of one joint that it becomes without coupling, drift or way (least shape).
         site: what it sits on.
         edge: quantity that says where it begins, of an effect at one end of the range.
         needs_limits: whether the joint must have limits.
