@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.grammar import FUNCTIONS
 from sgp_ros.physics.parts import LAST
 
 TARGET = Path(__file__).parent / 'effects.md'
@@ -20,6 +21,35 @@ the catalogue in `sgp_ros/physics`.
 Signs are those of a generalised force: `M a + h = tau + tau_x`, so friction has positive numbers. `q`, `v` and
 `a` are position, velocity and acceleration of the joint. Units are those of a revolute joint; on a prismatic
 one read N for N m and m for rad. Kinds named `viscous` have levels in N m s/rad.
+
+## Laws of your own
+What no effect says is written down as a formula, in the robot YAML:
+
+```yaml
+effects:
+  - law:
+      joint: elbow
+      words: an eddy-current brake
+      formula: -a*dq[elbow]/(1 + (dq[elbow]/v0)**2)
+      parameters:
+        a: {{start: 0.5, unit: N m s/rad, range: [0, 10]}}
+        v0: {{start: 2.0, unit: rad/s, range: [0.2, 20]}}
+```
+
+- `formula` is the force `tau_x` on the joint, of `q[J]`, `dq[J]`, `ddq[J]`, `tau[J]` of any joint, the time `t`,
+  numbers and parameters, with `+ - * / **`, {functions}.
+  `lag(x, T)`, `play(x, width)` and `delay(x, T)` remember. A name that is no plain word stands in quotes:
+  `q["arm-1"]`.
+- A parameter with `start` is sought: `sgp diagnose` tries the law beside all effects, within `range`, and names it
+  only where it earns its price. With `value` for all parameters, and perhaps `std`, the law is a part of the robot. A
+  `value` among starts is a constant.
+- Units are checked: angles have none, and what has one needs a name (`tanh(dq[elbow]/v0)`, not `/0.05`). `sgp effects
+  --robot ROBOT` lists what a robot states.
+- A found law stands in `diagnosis.json` with `"effect": "law"` and its formula, and in `robot_diagnosed.yaml` with its
+  values, for replay, node and simulation.
+- Not online are laws of the time, with memory, or of an effort together with a position. Not simulated are `ddq`,
+  which is the effect `armature`, and `delay`. With `sign(dq[J])` that opposes its own motion a law holds the joint at
+  rest, as dry friction does.
 """
 _OVER = {
     'seconds': 'time, a few seconds of it', 'time': 'time, its magnitude',
@@ -28,7 +58,8 @@ _OVER = {
 
 def text() -> str:
     """Return the page."""
-    parts = [_HEAD.format(count=len(EFFECTS))]
+    functions = ', '.join(f'`{name}`' for name in FUNCTIONS)
+    parts = [_HEAD.format(count=len(EFFECTS), functions=functions)]
     parts += [_section(law) for law in EFFECTS.values()]
     return '\n'.join(parts)
 

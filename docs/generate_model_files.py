@@ -22,7 +22,12 @@ MuJoCo wants those of an MJCF where the file says they are.
 What a file states becomes a robot YAML: bodies, damping and dry friction stand in its URDF, other physics under
 `effects`, gains of drives under `gains`. Nothing is left out silently: each thing without a place here is named in
 a remark, with the joints or bodies that it is about. A xacro file is a program, expanded with its default
-arguments by the package `xacro`, as ROS does. This page is written by `docs/generate_model_files.py` from
+arguments by the package `xacro`, as ROS does.
+
+With `--sim FILE` the machine is compared with what the file states: bodies are those of the file, and all else,
+damping and dry friction included, counts from these alone on both sides, so that the numbers stand side by side.
+
+This page is written by `docs/generate_model_files.py` from
 the readers in `sgp_ros/robots/models`.
 """
 _FORMATS = (

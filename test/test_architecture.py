@@ -29,7 +29,7 @@ LAYERS = {
     'robots': {'numpy', 'yaml', 'physics', 'rigid', 'optional', 'errors'},
     'simulation': NUMERIC | {
         'mujoco', 'physics.catalogue', 'physics.effect', 'physics.effect_at', 'physics.parts',
-        'rigid', 'optional', 'errors',
+        'physics.law', 'physics.grammar', 'rigid', 'optional', 'errors',
     },
     'engine': {'numpy', 'gp', 'physics', 'rigid', 'robots', 'errors'},
     'batch': NUMERIC | {

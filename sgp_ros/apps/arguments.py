@@ -150,7 +150,9 @@ def _add_diagnose(add: AddCommand) -> None:
         'sgp diagnose real.mcap --robot robot.urdf --test real_test.mcap --out out/diagnose',
     )  # fmt: skip
     _add_recording(parser, 'REAL', takes_several=True)
-    parser.add_argument('--sim', metavar='SIM', help='recording of the simulation to compare with')
+    parser.add_argument(
+        '--sim', metavar='SIM', help='recording or model file of the simulation to compare with'
+    )
     parser.add_argument('--test', dest='tests', action='append', default=[], metavar='BAG',
                         help='held-out recording for the proof; may be repeated; without any, '
                         'a quarter of REAL is held out')  # fmt: skip
@@ -179,5 +181,17 @@ def _add_import(add: AddCommand) -> None:
                         help='of the rows, where the table has no time')  # fmt: skip
 
 
-COMMANDS = (_add_demo, _add_simulate, _add_replay, _add_identify, _add_diagnose, _add_import)
+def _add_effects(add: AddCommand) -> None:
+    parser = add(
+        'effects', 'sgp_ros.apps.effects:run_effects',
+        'List the physics that a robot may have beside its bodies: names, formulas, units.',
+        'sgp effects --robot arm.yaml',
+    )  # fmt: skip
+    parser.add_argument('--robot', metavar='ROBOT',
+                        help='a robot whose own effects and laws are listed too')  # fmt: skip
+
+
+COMMANDS = (
+    _add_demo, _add_simulate, _add_replay, _add_identify, _add_diagnose, _add_effects, _add_import,
+)  # fmt: skip
 """What adds each command of the package, in the order of its help."""

@@ -31,8 +31,10 @@ from sgp_ros.report.diagnosis_text import (
 )
 from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.report.verdict import simulated, verdict_sentence
+from sgp_ros.robots.bare import simulated_model
 from sgp_ros.robots.gains import Gains, read_gains
 from sgp_ros.robots.given_bodies import with_bodies
+from sgp_ros.robots.models.door import is_model
 from sgp_ros.robots.nominal import Nominal, nominal_model
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
@@ -45,7 +47,8 @@ class DiagnoseOptions:
     """What is read.
 
     Attributes:
-        sim: recording of the simulation that the machine is compared with; None for the robot.
+        sim: recording or model file of the simulation that the machine is compared with; None
+            for the robot.
         tests: held-out recordings; a part of the training recording without any.
         joint_states: topic of the states; None for the one there is.
         command: topic of the commands; None for the one there is.
@@ -86,15 +89,22 @@ def run_diagnose(
     chosen = DiagnoseOptions(**options)
     nominal = _nominal(robot, chosen)
     model, tree = nominal.robot, nominal.tree
+    simulated = None
+    if chosen.sim is not None and is_model(chosen.sim):
+        nominal, simulated = simulated_model(chosen.sim, nominal)
+        model, tree = nominal.robot, nominal.tree
     open_bodies(model.name, tree)  # refuses one that cannot move before much is read
     remarks = list(nominal.remarks)
     events = _read([bag] if isinstance(bag, str) else bag, model, chosen, remarks)
     tests = _read(chosen.tests, model, chosen, remarks, taken=('train', *events))
     gains = _gains(chosen, nominal)
-    simulation = None if chosen.sim is None else _events(chosen.sim, model, chosen, remarks)
+    simulation = None
+    if chosen.sim is not None and simulated is None:
+        simulation = _events(chosen.sim, model, chosen, remarks)
     found = diagnose(
         events, model, tree, tests, stated=nominal.stated, holds_out=not chosen.tests,
-        is_static=chosen.static, gains=gains, simulation=simulation, progress=progress,
+        is_static=chosen.static, gains=gains, simulation=simulation, simulated=simulated,
+        progress=progress,
         config=EngineConfig(effort_source=EFFORT_SOURCES[chosen.effort]),
     )  # fmt: skip
     remarks = [*found.remarks, *remarks, *_refusals(found)]

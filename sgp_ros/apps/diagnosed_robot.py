@@ -22,10 +22,14 @@ from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
 from sgp_ros.engine.samples import Event
 from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.formula import read_formula
+from sgp_ros.physics.law import NAME as LAW
+from sgp_ros.physics.law import is_online
 from sgp_ros.report.files import write_text
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.stated_effects import dry_friction
+from sgp_ros.robots.stated_laws import is_open
 from sgp_ros.robots.stated_values import stated_urdf
 from sgp_ros.robots.urdf_robot import DEFAULT_TERMS, nominal_tree, urdf_text
 
@@ -58,13 +62,14 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis) -> None:
         stated = {k: x for k, x in stated.items() if k.rpartition('.')[0] not in links}
     known = robot.source.get('effects') or []
     assert isinstance(known, list)
+    known = [item for item in known if not is_open(item)]  # tried, and found or not
     document = {
         'schema': 1,
         'name': robot.name,
         **_physics(robot),
         **robot.source,
         'urdf': URDF_NAME,
-        'effects': [*known, *stated_findings(found.findings)],
+        'effects': [*known, *stated_findings((*found.findings, *found.shared))],
         'parameters': stated,
     }
     write_text(out / YAML_NAME, yaml.safe_dump(document, sort_keys=False))
@@ -92,7 +97,7 @@ class Online:
         """
         named = ', '.join(
             f'what has no name at {f.joint} (its Gaussian process stays here, a node learns its '
-            'own)' if f.effect not in EFFECTS else f'{f.effect} of {f.joint}'
+            'own)' if f.effect not in {*EFFECTS, LAW} else f'{f.effect} of {f.joint}'
             for f in self.left_out
         )  # fmt: skip
         numbers = ', '.join(
@@ -123,9 +128,7 @@ def replayed(
         events: of a motion that was diagnosed; none of settled points.
         effort_source: setting `effort.source`.
     """
-    left_out = tuple(
-        f for f in findings if f.effect not in EFFECTS or not EFFECTS[f.effect].is_online
-    )
+    left_out = tuple(f for f in findings if not _is_online(f))
     if not left_out or not events:
         return None
     robot = load_robot(str(out / YAML_NAME))
@@ -140,18 +143,38 @@ def replayed(
     return Online(left_out, found, math.inf if max(stamps) <= end_ns else _REPLAYED_S)
 
 
+def _is_online(finding: Finding) -> bool:
+    if finding.effect == LAW:
+        return is_online(read_formula(finding.formula.partition('=')[2], is_law=True))
+    return finding.effect in EFFECTS and EFFECTS[finding.effect].is_online
+
+
 def stated_findings(findings: Iterable[Finding]) -> list[dict[str, Any]]:
     """Return the findings as the `effects` of a robot YAML; what is unknown has no effect."""
     return [
-        {
+        _stated_law(finding)
+        if finding.effect == LAW
+        else {
             'effect': finding.effect,
             'joint': finding.joint,
             'parameters': {name: _entry(p) for name, p in finding.parameters.items()}
             | _side(finding),
         }
         for finding in findings
-        if finding.effect in EFFECTS
+        if finding.effect in {*EFFECTS, LAW} and not _is_none(finding)
     ]
+
+
+def _is_none(finding: Finding) -> bool:
+    """Return whether the simulation alone has the effect."""
+    sizes = [finding.parameters[name].value for name in finding.difference]
+    return bool(sizes) and not any(sizes)
+
+
+def _stated_law(finding: Finding) -> dict[str, Any]:
+    parameters = {name: _entry(p) for name, p in finding.parameters.items()}
+    law = {'joint': finding.joint, 'formula': finding.formula, 'parameters': parameters}
+    return {LAW: law}
 
 
 def _entry(parameter: Parameter) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -36,7 +36,13 @@ from sgp_ros.diagnosis.locate.remainder import Remainder, learn_remainder
 from sgp_ros.diagnosis.prove.prediction import FinalModel, diagnosed_bodies
 from sgp_ros.diagnosis.prove.processes import harm, kept_processes
 from sgp_ros.diagnosis.prove.proof import prove, reasons_to_doubt
-from sgp_ros.diagnosis.reference import against_simulation, disagreement, none_in_simulation
+from sgp_ros.diagnosis.reference import (
+    Reference,
+    against_model,
+    against_simulation,
+    disagreement,
+    none_in_simulation,
+)
 from sgp_ros.diagnosis.result import Diagnosis, Proof
 from sgp_ros.diagnosis.shown import Predictions, Traces
 from sgp_ros.engine.config import EngineConfig
@@ -63,6 +69,7 @@ def diagnose(
     config: EngineConfig = USUAL,
     gains: Gains | None = None,
     simulation: Iterable[Event] | None = None,
+    simulated: Sequence[EffectAt] | None = None,
     progress: Callable[[float], None] = lambda _share: None,
 ) -> Diagnosis:
     """Say what a recording has that the nominal robot lacks.
@@ -79,6 +86,7 @@ def diagnose(
         config: settings of the intake.
         gains: of drives that hold position targets; None where commands are efforts.
         simulation: events of the simulation to compare with; None for the robot alone.
+        simulated: physics of a simulation that is known by its model, whose bodies `tree` has.
         progress: called with the share that is done.
 
     Raises:
@@ -99,6 +107,9 @@ def diagnose(
     try:
         connected = connect(recordings, tree, lambda x: progress(0.05 + 0.85 * x))
         found = _diagnosed(connected, robot.name, progress)
+        if simulated is not None:
+            reference = against_model(connected.equations, connected.several, simulated)
+            return _compared(found, connected, reference, ())
         if simulation is None:
             return found
         recordings = gather({'': simulation}, {}, tree, known, holds_out=False)
@@ -178,14 +189,21 @@ def _against(
     reference = against_simulation(
         connected.equations, connected.several, sim.equations, sim.several
     )
+    return _compared(found, connected, reference, (said,))
+
+
+def _compared(
+    found: Diagnosis, connected: Connected, reference: Reference | None, said: tuple[str, ...]
+) -> Diagnosis:
+    """Return the diagnosis with what differs from the simulation in the place of its findings."""
     if reference is None:
-        return replace(found, remarks=(said, _UNCLEAR, *found.remarks))
+        return replace(found, remarks=(*said, _UNCLEAR, *found.remarks))
     is_calm = reference.verdict in _CALM
     return replace(
         found, reference='simulation', findings=reference.findings, shared=reference.shared,
         verdict='setup_error' if is_calm and connected.findings else reference.verdict,
         certainty=_certainty(reference.certainty, connected, is_doubted=False),
-        traces=replace(found.traces, forces=()), remarks=(said, *found.remarks),
+        traces=replace(found.traces, forces=()), remarks=(*said, *found.remarks),
     )  # fmt: skip
 
 

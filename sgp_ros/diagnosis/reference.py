@@ -5,12 +5,15 @@ the simulation, or all of them, whichever is worth most on the two together. Eac
 gives the numbers of that structure with their errors. An effect differs where the difference is
 beyond its error and its force counts as physics, against the effort that moves: gravity, which
 both carry, would hide it. Bodies are compared by their force in the same way.
+
+A simulation may also be known by its model file. Its bodies are then the nominal ones, and what
+it states needs no fit.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -102,14 +105,85 @@ def against_simulation(
         finding = replace(finding, share=float(np.max(share)))
         is_different = finding.share > COUNTED_SHARE and finding.probability > 0.5
         (findings if is_different else shared).append(finding)
-    shift = ours.w - theirs.w
-    moved = ((equations.base @ shift) ** 2).mean(axis=0) / power
+    return _reference(equations, findings, shared, ours.w - theirs.w)
+
+
+def against_model(
+    equations: Equations, several: Several, stated: Sequence[EffectAt]
+) -> Reference | None:
+    """Return what differs from a model; None where the recording is unexplained.
+
+    Args:
+        equations: of the machine, for the bodies of the model alone.
+        several: its models.
+        stated: all physics of the model beside its bodies.
+    """
+    if several.decision.verdict == 'unexplained':
+        return None
+    real = _Side.of(equations, several)
+    is_free = several.decision.model.is_free
+    theirs = {s.key: s for s in stated}
+    union = theirs | {s.key: s for s in real.named}
+    models = [real.fitted(x, is_free=is_free) for x in (real.named, tuple(union.values()))]
+    worth = [real.scale.worth(m) for m in models]
+    ours = models[int(np.argmax(worth))]
+    power, motion = _moving_power(equations), equations.motion
+    findings: list[Finding] = []
+    shared: list[Finding] = []
+    for here, std in zip(ours.effects, reported_std(ours, real.columns), strict=True):
+        there = theirs.pop(here.key, None)
+        if there is None:
+            said = stated_parameters(here, motion, dict(std))
+            finding = none_in_simulation(_plain(here, said, equations, MOST_CERTAIN))
+            force = here.force(motion)
+        else:
+            finding = _compared(here, there, (std, {}), equations)
+            force = here.force(motion) - there.force(motion)
+        share = float(((force**2).mean(axis=0) / power).max())
+        is_different = share > COUNTED_SHARE and finding.probability > 0.5
+        (findings if is_different else shared).append(replace(finding, share=share))
+    for there in theirs.values():
+        share = float(((there.force(motion) ** 2).mean(axis=0) / power).max())
+        if share > COUNTED_SHARE:
+            odds = math.exp(min(TEMPER * (worth[1] - worth[0]), 50.0))
+            findings.append(_absent(there, equations, 1.0 / (1.0 + odds), share))
+        else:  # too little to be seen: nothing speaks against the simulation
+            said = stated_parameters(there, motion, {})
+            found = _plain(there, said, equations, MOST_CERTAIN)
+            shared.append(replace(found, share=share, in_simulation=said))
+    return _reference(equations, findings, shared, ours.w)
+
+
+def _reference(
+    equations: Equations, findings: list[Finding], shared: list[Finding], shift: np.ndarray
+) -> Reference:
+    """Return the comparison; `shift` (p,) is by how much the bodies differ."""
+    moved = ((equations.base @ shift) ** 2).mean(axis=0) / _moving_power(equations)
     calm = 'parameters_only' if moved.max() > COUNTED_SHARE else 'no_mismatch'
     findings.sort(key=lambda f: -f.probability)
     verdict = 'missing_physics' if findings else calm
     stated = [f.probability for f in findings]
     stated = stated or [1.0 - f.probability for f in shared if f.share > COUNTED_SHARE]
     return Reference(verdict, tuple(findings), tuple(shared), min([*stated, MOST_CERTAIN]))
+
+
+def _plain(
+    effect: EffectAt, parameters: Mapping[str, Parameter], equations: Equations, p: float
+) -> Finding:
+    return Finding(
+        joint_name(equations.motion, effect.place.joint), effect.name, dict(parameters),
+        Location(), 0.0, min(p, MOST_CERTAIN), 0.0, effect.effect.formula,
+    )  # fmt: skip
+
+
+def _absent(effect: EffectAt, equations: Equations, p: float, share: float) -> Finding:
+    """Return a finding of what the simulation has and the machine has not."""
+    theirs = stated_parameters(effect, equations.motion, {})
+    neutral = {q.name: q.neutral for q in effect.sizes}
+    none = {n: replace(x, value=neutral[n]) for n, x in theirs.items() if n in neutral}
+    apart = {n: replace(x, value=x.value - float(theirs[n].value)) for n, x in none.items()}  # type: ignore[operator]  # sizes are numbers
+    found = _plain(effect, {**theirs, **none}, equations, p)
+    return replace(found, share=share, in_simulation=theirs, difference=apart)
 
 
 def disagreement(shares: Mapping[str, float]) -> str:

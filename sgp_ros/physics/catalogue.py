@@ -2,13 +2,16 @@
 
 What stands here is found by a diagnosis, stated in a robot YAML, named in the report, drawn for
 the worlds of `sgp_proof.concealed` and documented in docs/effects.md. A new law is one class in
-this folder, one line here, and one law in `simulation`.
+this folder, one line here, and one law in `simulation`. Laws that a formula states are effects
+too (`law`), but stand in no list.
 """
 
 from __future__ import annotations
 
 from sgp_ros.physics import actuation, carried, confined, coupled, friction, loads, memory, sensing
 from sgp_ros.physics.effect import Effect
+from sgp_ros.physics.law import NAME as LAW
+from sgp_ros.physics.law import law_variable
 
 VISCOUS_FRICTION = friction.ViscousFriction()
 COULOMB_FRICTION = friction.CoulombFriction()
@@ -66,9 +69,16 @@ EFFECTS: dict[str, Effect] = {
 
 def exerts_force(name: str) -> bool:
     """Return whether an effect of this name is known and exerts a force."""
-    return name in EFFECTS and EFFECTS[name].is_force
+    return name == LAW or (name in EFFECTS and EFFECTS[name].is_force)
+
+
+def drawn_over(name: str, formula: str) -> str:
+    """Return the variable over which the force of a known effect is drawn, see `Effect`."""
+    return law_variable(formula) if name == LAW else EFFECTS[name].drawn_over
 
 
 def words_of(name: str) -> str:
-    """Return the plain name of an effect; of one that is not in the catalogue, the name itself."""
+    """Return the plain name of an effect, one word of a law, of what is not known its name."""
+    if name == LAW:
+        return 'a force law'
     return EFFECTS[name].words if name in EFFECTS else name.replace('_', ' ')

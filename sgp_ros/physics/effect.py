@@ -41,8 +41,8 @@ Numbers = Mapping[str, float]
 class Effect:
     """A law of physics that a robot may have beside its rigid bodies.
 
-    A subclass states attributes, and the methods in which it differs from the usual ones. A law
-    of one joint's own motion needs `local` alone:
+    A subclass states attributes, and where it differs from the usual ones, methods. A law of one
+    joint's own motion needs `local` alone:
 
     >>> class CubicDrag(Effect):
     ...     name = 'cubic_drag'
@@ -95,6 +95,7 @@ class Effect:
         is_on_tree: it changes gravity or bodies, see `gravity` and `added_body`.
         is_of_command: it lies before the motor's current: a measured effort is behind it.
         has_memory: its force at a time depends on other times too, of the motion or the commands.
+        is_open: a robot may have it or not, and its numbers are not known.
     """
 
     name: str = ''
@@ -126,6 +127,12 @@ class Effect:
     is_on_tree: bool = False
     is_of_command: bool = False
     has_memory: bool = False
+    is_open: bool = False
+
+    @property
+    def key(self) -> str:
+        """What tells it from all others."""
+        return self.name
 
     @property
     def is_given(self) -> bool:
@@ -191,11 +198,9 @@ class Effect:
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
         """Return whether signs and sizes can be: usually what must not be negative is positive."""
-        kind = at.place.kind
-        if self.is_given:
-            named = zip(self.stated_quantities(kind), at.shape, strict=False)
-        else:
-            named = zip(self.coefficient_quantities(kind), at.coefficients, strict=False)
+        known = self.stated_quantities if self.is_given else self.coefficient_quantities
+        named = zip(known(at.place.kind), at.shape if self.is_given else at.coefficients,
+                    strict=False)  # fmt: skip
         return all(bool(x > 0.0) for q, x in named if q.low >= 0.0)
 
     def interval(self, at: Placed, motion: SeenMotion) -> tuple[str, list[list[float]]] | None:
@@ -261,10 +266,7 @@ class Effect:
         ]
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
-        """Return shapes from which a search starts, (starts, s); (1, 0) without shape.
-
-        Where the effect has a `small` one, what that needs.
-        """
+        """Return shapes where a search starts, (starts, s); of a `small` one what that needs."""
         return np.zeros((1, 0))
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
@@ -276,8 +278,7 @@ class Effect:
 
         A search takes steps of a part of it; usually the width of the bounds.
         """
-        low, high = self.bounds(motion, place)
-        return np.asarray(high - low)
+        return np.asarray(np.subtract(*self.bounds(motion, place)[::-1]))
 
     def wave(self, motion: SeenMotion, place: Place) -> Wave | None:
         """Return the wave over the position that it is, which starts a search; usually None."""
@@ -294,7 +295,6 @@ class Effect:
     def bins(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray] | None:
         """Return columns of narrow bins (n, b) and their edges (b + 1,); None for most laws.
 
-        The shape of a law with bins is the lower and upper edge of an interval, and its column
-        the sum of those of the bins inside.
+        The shape is then an interval, and the column the sum of those of the bins inside.
         """
         return None

@@ -81,8 +81,8 @@ class EffectAt:
 
     @property
     def key(self) -> tuple[str, Place]:
-        """Name and place."""
-        return self.effect.name, self.place
+        """Law and place."""
+        return self.effect.key, self.place
 
     @property
     def kind(self) -> str:

@@ -5,7 +5,9 @@ A formula is made of
 - `q[J]`, `dq[J]`, `ddq[J]`, `tau[J]`: position, velocity, acceleration and effort of joint J,
   whose name stands in quotes where it is no plain word: `q["arm-1"]`;
 - numbers and named parameters;
-- `+ - * / **`, parentheses, and the functions of `FUNCTIONS`.
+- `+ - * / **`, parentheses, and the functions of `FUNCTIONS`;
+- in a law of force also `t`, the time since the beginning of a recording, and functions that
+  remember: `lag(x, T)`, `play(x, width)` over the full width, `delay(x, T)`.
 
 The standard library parses the text; whatever is not in this list is refused. What is left
 becomes nested NumPy functions, so a formula costs what the same expression costs in Python.
@@ -15,42 +17,31 @@ from __future__ import annotations
 
 import ast
 import math
-import operator
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
 import numpy as np
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.physics.term import Motion
-
-SIGNALS: Mapping[str, str] = {
-    'q': 'position', 'dq': 'velocity', 'ddq': 'acceleration', 'tau': 'effort',
-}  # fmt: skip
-"""Names of signals to the channels of a `Motion`."""
-DRIVEN = ('ddq', 'tau')
-"""Signals in which a regressor may be affine only."""
-FUNCTIONS: Mapping[str, np.ufunc] = {
-    'abs': np.abs, 'sign': np.sign, 'sin': np.sin, 'cos': np.cos, 'exp': np.exp, 'log': np.log,
-    'sqrt': np.sqrt, 'tanh': np.tanh, 'min': np.minimum, 'max': np.maximum,
-}  # fmt: skip
-_OPERATORS: Mapping[type[ast.operator], Callable[..., object]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
-    ast.Div: operator.truediv, ast.Pow: operator.pow,
-}  # fmt: skip
-_SIGNS: Mapping[type[ast.unaryop], Callable[..., object]] = {
-    ast.UAdd: operator.pos, ast.USub: operator.neg,
-}  # fmt: skip
-_LONGEST = 2000
-"""Characters of a formula."""
-_EXPECTED = (
-    f'numbers, parameters, {", ".join(f"{name}[J]" for name in SIGNALS)}, + - * / ** '
-    f'and the functions {", ".join(FUNCTIONS)}'
+from sgp_ros.physics.grammar import (
+    EXPECTED,
+    FUNCTIONS,
+    LONGEST,
+    OPERATORS,
+    SIGNALS,
+    SIGNS,
+    Contents,
+    combined,
+    signal_of,
 )
+from sgp_ros.physics.term import Motion
 
 Place = TypeVar('Place')
 """What a formula is evaluated on, such as a motion or a mapping of values."""
+T = TypeVar('T')
+Special = Callable[[str, frozenset[tuple[str, str]]], Callable[..., object] | None]
+"""From a function and the signals in its arguments to what takes a place and these arguments."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +51,8 @@ class Formula:
     Attributes:
         text: as it was written.
         parameters: names in it that stand for numbers.
-        signals: pairs such as `('dq', 'elbow')`.
+        signals: pairs such as `('dq', 'elbow')`; `('t', '')` for the time.
+        functions: names of those in it.
         driven_degree: its degree as a polynomial in accelerations and efforts; 0 without them, 1
             where it is affine, infinite where it is no polynomial.
 
@@ -75,6 +67,7 @@ class Formula:
     text: str
     parameters: frozenset[str]
     signals: frozenset[tuple[str, str]]
+    functions: frozenset[str]
     driven_degree: float
     _tree: ast.expr = field(repr=False, compare=False)
 
@@ -82,14 +75,36 @@ class Formula:
         self,
         parameter: Callable[[str], Callable[[Place], object]],
         signal: Callable[[str, str], Callable[[Place], object]],
+        special: Special = lambda _name, _signals: None,
     ) -> Callable[[Place], object]:
         """Return the formula as a function of a place.
 
         Args:
             parameter: from the name of a parameter to its value at a place.
             signal: likewise from a signal and a joint.
+            special: what stands for a function of `FUNCTIONS` or `MEMORY`; None for the usual.
         """
-        return _closure(self._tree, parameter, signal)
+        return _closure(self._tree, parameter, signal, special)
+
+    def folded(self, leaf: Callable[[ast.expr], T], inner: Callable[[ast.expr, list[T]], T]) -> T:
+        """Return what a rule makes of the formula, from its names and numbers upwards.
+
+        Args:
+            leaf: value of a number, a name or a signal.
+            inner: value of an operation or a function of the values of its parts.
+        """
+        return _folded(self._tree, leaf, inner)
+
+    def linear(self, names: Sequence[str]) -> tuple[str, ...]:
+        """Return parameters c of which the formula is `sum_i c_i g_i`, as many as there are.
+
+        Empty where some part of it has none of them as a factor.
+        """
+        chosen: tuple[str, ...] = ()
+        for name in names:
+            if _degrees(self._tree, {*chosen, name})[1] <= 1.0:
+                chosen += (name,)
+        return chosen if chosen and _degrees(self._tree, set(chosen)) == (1.0, 1.0) else ()
 
     def value(self, values: Mapping[str, float]) -> float:
         """Return the value without a motion; not finite where none is defined.
@@ -118,8 +133,12 @@ class Formula:
         return lambda motion: np.asarray(evaluate(motion), dtype=np.float64)
 
 
-def read_formula(text: object) -> Formula:
+def read_formula(text: object, *, is_law: bool = False) -> Formula:
     """Return the formula that a text or a number states.
+
+    Args:
+        text: of the formula.
+        is_law: whether it is a law of force, which may see the time and remember.
 
     Raises:
         ConfigError: neither of the two, or the text is no formula; it says which part of it.
@@ -127,85 +146,62 @@ def read_formula(text: object) -> Formula:
     if isinstance(text, bool) or not isinstance(text, (str, int, float)):
         raise ConfigError(f'formula {text!r}', 'a text or a number')
     written = text if isinstance(text, str) else repr(float(text))
-    if len(written) > _LONGEST:
-        raise ConfigError(f'a formula of {len(written)} characters', f'{_LONGEST} at most')
+    if len(written) > LONGEST:
+        raise ConfigError(f'a formula of {len(written)} characters', f'{LONGEST} at most')
     try:
         tree = ast.parse(written.strip(), mode='eval').body
-        parameters: set[str] = set()
-        signals: set[tuple[str, str]] = set()
-        degree = _checked(tree, written, parameters, signals)
+        found = Contents(written, is_law)
+        degree = found.degree(tree)
     except (SyntaxError, ValueError, RecursionError, MemoryError, OverflowError) as error:
-        raise ConfigError(f'formula {written!r} cannot be read', _EXPECTED) from error
-    return Formula(written, frozenset(parameters), frozenset(signals), degree, tree)
+        raise ConfigError(f'formula {written!r} cannot be read', EXPECTED) from error
+    return Formula(
+        written.strip(), frozenset(found.parameters), frozenset(found.signals),
+        frozenset(found.functions), degree, tree,
+    )  # fmt: skip
 
 
-def _checked(
-    node: ast.expr, text: str, parameters: set[str], signals: set[tuple[str, str]]
-) -> float:
-    """Return the degree of a node in accelerations and efforts; note what it is made of."""
-
-    def degree(part: ast.expr) -> float:
-        return _checked(part, text, parameters, signals)
-
-    if isinstance(node, ast.UnaryOp) and type(node.op) in _SIGNS:
-        return degree(node.operand)
-    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
-        return _combined(node, degree(node.left), degree(node.right))
-    if isinstance(node, ast.Call) and _is_known(node):
-        return 0.0 if max(map(degree, node.args)) == 0.0 else math.inf
-    if isinstance(node, ast.Name) and node.id not in FUNCTIONS and node.id not in SIGNALS:
-        parameters.add(node.id)
-        return 0.0
-    signal = _signal(node)
-    if signal is not None:
-        signals.add(signal)
-        return 1.0 if signal[0] in DRIVEN else 0.0
-    if _is_number(node):
-        return 0.0
-    raise ConfigError(f'{ast.unparse(node)!r} in the formula {text!r}', _EXPECTED)
+def _folded(
+    node: ast.expr, leaf: Callable[[ast.expr], T], inner: Callable[[ast.expr, list[T]], T]
+) -> T:
+    parts = _parts(node)
+    return inner(node, [_folded(p, leaf, inner) for p in parts]) if parts else leaf(node)
 
 
-def _combined(node: ast.BinOp, left: float, right: float) -> float:
-    if isinstance(node.op, (ast.Add, ast.Sub)):
-        return max(left, right)
-    if isinstance(node.op, ast.Mult):
-        return left + right
-    if isinstance(node.op, ast.Div):
-        return math.inf if right else left
-    return math.inf if left or right else 0.0
+def _parts(node: ast.expr) -> list[ast.expr]:
+    if isinstance(node, ast.UnaryOp):
+        return [node.operand]
+    if isinstance(node, ast.BinOp):
+        return [node.left, node.right]
+    return node.args if isinstance(node, ast.Call) else []
 
 
-def _signal(node: ast.expr) -> tuple[str, str] | None:
-    """Return signal and joint of `dq[J]`; None where it is something else."""
-    if not isinstance(node, ast.Subscript) or not isinstance(node.value, ast.Name):
-        return None
-    name, joint = node.value.id, node.slice
-    if name in SIGNALS and isinstance(joint, ast.Name):
-        return name, joint.id
-    if name in SIGNALS and isinstance(joint, ast.Constant) and isinstance(joint.value, str):
-        return name, joint.value
-    return None
+def _degrees(tree: ast.expr, names: Collection[str]) -> tuple[float, float]:
+    """Return the least and the greatest degree in some parameters; infinite for no polynomial."""
 
+    def leaf(node: ast.expr) -> tuple[float, float]:
+        here = float(isinstance(node, ast.Name) and node.id in names)
+        return here, here
 
-def _is_number(node: ast.expr) -> bool:
-    if not isinstance(node, ast.Constant) or type(node.value) not in {int, float}:
-        return False
-    return math.isfinite(float(node.value))  # type: ignore[arg-type]  # a number
+    def inner(node: ast.expr, parts: list[tuple[float, float]]) -> tuple[float, float]:
+        if isinstance(node, ast.UnaryOp):
+            return parts[0]
+        if isinstance(node, ast.BinOp):
+            (a, b), (c, d) = parts
+            is_sum = isinstance(node.op, (ast.Add, ast.Sub))
+            return min(a, c) if is_sum else combined(node, a, c), combined(node, b, d)
+        return (0.0, 0.0) if max(b for _, b in parts) == 0.0 else (0.0, math.inf)
 
-
-def _is_known(call: ast.Call) -> bool:
-    """Whether it is a known function of as many arguments as it takes."""
-    function = FUNCTIONS.get(call.func.id) if isinstance(call.func, ast.Name) else None
-    return function is not None and not call.keywords and function.nin == len(call.args)
+    return _folded(tree, leaf, inner)
 
 
 def _closure(
     node: ast.expr,
     parameter: Callable[[str], Callable[[Place], object]],
     signal: Callable[[str, str], Callable[[Place], object]],
+    special: Special = lambda _name, _signals: None,
 ) -> Callable[[Place], object]:
     def of(part: ast.expr) -> Callable[[Place], object]:
-        return _closure(part, parameter, signal)
+        return _closure(part, parameter, signal, special)
 
     if isinstance(node, ast.Constant):
         number = np.float64(node.value)  # type: ignore[arg-type]  # checked to be a number
@@ -213,19 +209,27 @@ def _closure(
     if isinstance(node, ast.Name):
         return parameter(node.id)
     if isinstance(node, ast.Subscript):
-        found = _signal(node)
+        found = signal_of(node)
         assert found is not None
         return signal(*found)
+    parts = [of(part) for part in _parts(node)]
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+        nodes = [x for x in ast.walk(node) if isinstance(x, ast.expr)]
+        own = special(node.func.id, frozenset(found for x in nodes if (found := signal_of(x))))
+        if own is not None:
+            return lambda place: own(place, *(part(place) for part in parts))
+    combine = _operation(node)
+    return lambda place: combine(*(part(place) for part in parts))
+
+
+def _operation(node: ast.expr) -> Callable[..., object]:
     if isinstance(node, ast.UnaryOp):
-        sign, operand = _SIGNS[type(node.op)], of(node.operand)
-        return lambda place: sign(operand(place))
+        return SIGNS[type(node.op)]
     if isinstance(node, ast.BinOp):
-        combine, left, right = _OPERATORS[type(node.op)], of(node.left), of(node.right)
-        return lambda place: combine(left(place), right(place))
+        return OPERATORS[type(node.op)]
     assert isinstance(node, ast.Call)
     assert isinstance(node.func, ast.Name)
-    function, parts = FUNCTIONS[node.func.id], [of(part) for part in node.args]
-    return lambda place: function(*(part(place) for part in parts))
+    return FUNCTIONS[node.func.id]
 
 
 def _no_parameter(name: str) -> Callable[[Place], object]:

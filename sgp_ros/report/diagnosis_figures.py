@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sgp_ros.diagnosis.result import Diagnosis, Finding, Proof
-from sgp_ros.physics.catalogue import EFFECTS, exerts_force
+from sgp_ros.physics.catalogue import drawn_over, exerts_force
 from sgp_ros.report.diagnosis_maps import (
     draw_bands,
     draw_location,
@@ -162,7 +162,7 @@ def draw_laws(found: Diagnosis) -> Figure:
         x, label = _abscissa(found, finding, j)
         law, measured = force[:, j], found.traces.after[:, j] + force[:, j]
         style = '.'
-        over = EFFECTS[finding.effect].drawn_over
+        over = drawn_over(finding.effect, finding.formula)
         if over == 'seconds':
             zoom, style = _zoom(found, j), '-'
             x, law, measured = (
@@ -245,7 +245,8 @@ def _strongest(found: Diagnosis, finding: Finding, force: np.ndarray) -> int:
 def _abscissa(
     found: Diagnosis, finding: Finding, j: int, name: str | None = None
 ) -> tuple[np.ndarray, str]:
-    name, unit = name or EFFECTS[finding.effect].drawn_over, position_unit(found, j)
+    name = name or drawn_over(finding.effect, finding.formula)
+    unit = position_unit(found, j)
     traces = found.traces
     words = {key: p.value for key, p in finding.parameters.items()}
     if words.get('kind') == 'torque' and words.get('source_joint') in found.joints:

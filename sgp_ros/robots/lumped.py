@@ -29,7 +29,8 @@ from typing import Any
 import numpy as np
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.physics.formula import DRIVEN, read_formula
+from sgp_ros.physics.formula import read_formula
+from sgp_ros.physics.grammar import DRIVEN
 from sgp_ros.physics.term import Coefficient, Joint, Motion, Term
 from sgp_ros.robots.bodies import read_bodies
 from sgp_ros.robots.entries import Entries

@@ -47,7 +47,10 @@ class Nominal:
 
     @property
     def stated(self) -> tuple[EffectAt, ...]:
-        """The effects that are not part of the tree, dry friction of joints among them."""
+        """The effects that are not part of the tree, dry friction of joints among them.
+
+        And laws that the robot may have or not.
+        """
         known = (*self.effects, *dry_friction(self.tree))
         return tuple(e for e in known if e.is_complete and not e.effect.is_on_tree)
 

@@ -6,12 +6,14 @@ grid, so that a reversal between two samples counts at its time.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.motion import Commands
 from sgp_ros.rigid.rigid_body import inverse_dynamics, mass_matrix, torque_regressor
@@ -33,7 +35,8 @@ class ObservedMotion:
         effort: (n, k) commanded, or measured where there are no commands; 0 for passive joints.
         drive: what the drives receive; None where only efforts were measured.
         starts: rows at which the grid begins anew after a pause.
-        stated: effects that the nominal robot has, beside those that are part of the tree.
+        stated: effects that the nominal robot has, beside those that are part of the tree, and
+            laws that it may have or not.
         recording: (n,) index of the recording that each row is from, of several that a diagnosis
             learns from; None for any other motion.
         sign: from velocities to what stands for their sign; None takes its mean over the cells
@@ -114,17 +117,27 @@ class ObservedMotion:
         return self.effort_for(self.position, self.velocity, self.acceleration)
 
     @cached_property
+    def catalogue(self) -> Mapping[str, Effect]:
+        """All laws that the robot may have beside its nominal ones, by what tells them apart."""
+        return EFFECTS | {x.effect.key: x.effect for x in self.stated if x.effect.is_open}
+
+    @property
+    def known(self) -> tuple[EffectAt, ...]:
+        """The effects that the nominal robot has, beside those that are part of the tree."""
+        return tuple(x for x in self.stated if not x.effect.is_open)
+
+    @cached_property
     def stated_force(self) -> np.ndarray:
         """Force of the effects that the nominal robot has, (n, k) [N m or N]."""
         force = np.zeros(self.position.shape)
-        for effect in self.stated:
+        for effect in self.known:
             force += effect.force(self)
         return force
 
     @property
     def dry_joints(self) -> frozenset[int]:
         """Indices of the joints that the nominal robot's dry friction may hold."""
-        return frozenset(j for x in self.stated for j in x.held_joints)
+        return frozenset(j for x in self.known for j in x.held_joints)
 
     @cached_property
     def gravity_columns(self) -> np.ndarray:

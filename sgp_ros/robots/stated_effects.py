@@ -4,7 +4,8 @@
       - {effect: coulomb_friction, joint: elbow, parameters: {level: {value: 0.317, std: 0.002}}}
 
 Names, parameters and signs are those of `diagnosis.json`, so that what a diagnosis found can be
-written here as it is. A parameter without `std` is not known before: its value is a start.
+written here as it is. A parameter without `std` is not known before: its value is a start. Laws
+that no effect states have a formula, see `stated_laws`.
 """
 
 from __future__ import annotations
@@ -14,14 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from sgp_ros.physics.catalogue import COULOMB_FRICTION, EFFECTS
+from sgp_ros.physics.catalogue import COULOMB_FRICTION, EFFECTS, VISCOUS_FRICTION
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.law import NAME as LAW
 from sgp_ros.physics.parts import BASE, LAST, SIDES, TOOL, Quantity, Value
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.entries import Entries, is_finite
 from sgp_ros.robots.nominal_prior import stated_dynamics
 from sgp_ros.robots.observed_motion import ObservedMotion
+from sgp_ros.robots.stated_laws import read_law
 
 
 def read_effects(entry: object, tree: Tree, problems: list[str]) -> tuple[EffectAt, ...]:
@@ -37,8 +40,16 @@ def read_effects(entry: object, tree: Tree, problems: list[str]) -> tuple[Effect
     if not isinstance(entry, list):
         problems.append(f'effects is {entry!r}, not a list')
         return ()
-    found = [_read(item, f'effects[{i}]', tree, problems) for i, item in enumerate(entry)]
+    found = [_effect_or_law(item, f'effects[{i}]', tree, problems) for i, item in enumerate(entry)]
     return tuple(effect for effect in found if effect is not None)
+
+
+def _effect_or_law(item: object, where: str, tree: Tree, problems: list[str]) -> EffectAt | None:
+    if isinstance(item, dict) and item.get('effect') == LAW:
+        return read_law({k: x for k, x in item.items() if k != 'effect'}, where, tree, problems)
+    if isinstance(item, dict) and set(item) == {LAW}:
+        return read_law(item[LAW], f'{where}.{LAW}', tree, problems)
+    return _read(item, where, tree, problems)
 
 
 def _read(item: object, where: str, tree: Tree, problems: list[str]) -> EffectAt | None:
@@ -159,6 +170,18 @@ def typical_motion(tree: Tree) -> ObservedMotion:
     limit = tree.effort_limit[:k]
     effort = np.where(np.isfinite(limit) & (limit > 0.0), limit, 1.0)[None]
     return ObservedMotion(tree, np.zeros(1), 0.0, still, still, still, effort, None)
+
+
+def joint_friction(tree: Tree) -> tuple[EffectAt, ...]:
+    """Return damping and dry friction of `<dynamics>` as effects."""
+    (quantity,) = VISCOUS_FRICTION.quantities
+    sizes = {j: stated_dynamics(tree, 'damping', i) for i, j in enumerate(tree.moving_names)}
+    viscous = tuple(
+        EffectAt.stated(VISCOUS_FRICTION, joint, {quantity.name: size}, tree)
+        for joint, size in sizes.items()
+        if size > 0.0
+    )
+    return (*viscous, *dry_friction(tree))
 
 
 def dry_friction(tree: Tree) -> tuple[EffectAt, ...]:

@@ -12,8 +12,10 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.law import FormulaLaw
 from sgp_ros.physics.parts import BASE, TOOL, Value
 from sgp_ros.simulation.effects import EffectParameter, Law
+from sgp_ros.simulation.formula_law import formula_law
 from sgp_ros.simulation.registry import LAWS
 
 _EXAMPLE = 'write for example coulomb_friction:joint=pole,level=0.01'
@@ -54,6 +56,8 @@ def checked_law(chosen: EffectAt) -> tuple[Effect, Law]:
     Raises:
         ConfigError: as `parse_effect`.
     """
+    if isinstance(chosen.effect, FormulaLaw):
+        return chosen.effect, formula_law(chosen.effect)
     effect, law = _known(chosen.name, chosen.name)
     parameters = law.parameters(effect)
     problems = _problems(law, parameters, chosen.parameters)

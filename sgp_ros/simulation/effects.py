@@ -174,7 +174,10 @@ class Law:
         words += [EffectParameter('kind', choices=effect.kinds)] if effect.kinds else []
         ends = (NEARER, *SIDES)
         side = [EffectParameter('side', choices=ends, default=NEARER)] if effect.edge else []
+        own = {p.name for p in self.own}
         numbers = (
-            EffectParameter(q.name, q.unit, q.low, kinds=q.kinds) for q in effect.quantities
+            EffectParameter(q.name, q.unit, q.low, kinds=q.kinds)
+            for q in effect.quantities
+            if q.name not in own
         )
         return *words, *numbers, *side, *self.own

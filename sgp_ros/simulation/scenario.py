@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.law import NAME as LAW
 from sgp_ros.physics.parts import BASE, JOINT, LAST, MOTOR, TOOL
 from sgp_ros.simulation.effect_text import checked_law, with_defaults
 from sgp_ros.simulation.effects import EVERY_MOTOR, Action
@@ -52,7 +53,7 @@ class Scenario:
     def actions(self) -> tuple[Action, ...]:
         """Return what the built-in and the added effects do."""
         chosen = (*self.mechanism.built_in(), *self.effects)
-        order = list(LAWS)
+        order = [*LAWS, LAW]
         return (
             tuple(
                 action
@@ -176,5 +177,12 @@ def _described(simulator: Simulator, effects: Iterable[EffectAt]) -> list[dict[s
             if not parameter.choices and not parameter.is_joint:
                 entry['unit'] = parameter.unit_on(joint, effect.parameters.get('kind', ''))
             parameters[parameter.name] = entry
-        described.append({'effect': effect.name, 'joint': effect.joint, 'parameters': parameters})
+        entry_of: dict[str, object] = {
+            'effect': effect.name,
+            'joint': effect.joint,
+            'parameters': parameters,
+        }
+        if effect.name == LAW:
+            entry_of['formula'] = effect.effect.formula
+        described.append(entry_of)
     return described

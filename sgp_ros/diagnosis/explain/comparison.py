@@ -14,7 +14,6 @@ from sgp_ros.diagnosis.explain.fitted_model import Model, floors
 from sgp_ros.diagnosis.explain.joint_search import by_joint, uncoupled
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
-from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 
 FIRST, SECOND, PARENTS = 12, 5, 6
@@ -57,7 +56,7 @@ def compare_models(equations: Equations, progress: Callable[[float], None]) -> C
     start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
     bases = [fit(columns, (), start, is_free=is_free) for is_free in (False, True)]
     progress(0.05)
-    effects = tuple(EFFECTS.values())
+    effects = tuple(equations.motion.catalogue.values())
     singles: list[Model] = []
     for number, base in enumerate(bases):
         first = _distinct(screen(columns, base, effects), FIRST)
@@ -112,7 +111,8 @@ def _exchanged(columns: Columns, ranked: list[Model]) -> list[Model]:
     that is better and leaves what counts as physics, it is done again with the best of them.
     """
     found: list[Model] = []
-    power = columns.equations(frozenset()).power
+    equations = columns.equations(frozenset())
+    power, effects = equations.power, equations.motion.catalogue.values()
     best = ranked[0] if ranked else None
     for _ in range(EXCHANGES):
         if best is None or (best.mean_square / power).max() < COUNTED_SHARE:
@@ -121,7 +121,7 @@ def _exchanged(columns: Columns, ranked: list[Model]) -> list[Model]:
         for kept in best.effects:
             parent = fit(columns, (kept,), best.sigma, is_free=best.is_free, w=best.w, rounds=2,
                          steps=4)  # fmt: skip
-            second = _distinct(screen(columns, parent, EFFECTS.values()), SECOND)
+            second = _distinct(screen(columns, parent, effects), SECOND)
             trials += [
                 fit(columns, (*parent.effects, s), best.sigma, is_free=best.is_free, w=best.w,
                     rounds=2, steps=8)

@@ -102,15 +102,16 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
         return []
     model = fit(columns, model.effects, model.sigma, is_free=model.is_free, w=model.w, rounds=2,
                 steps=6)  # fmt: skip
-    rivals = [t for block in _blocks(model) for t in _changes(columns, model, block, EFFECTS)]
+    rivals = [t for block in _blocks(model) for t in _changes(columns, model, block)]
     return [m for m in (model, *rivals) if m.effects and is_credible(m)]
 
 
 def _blocks(model: Model) -> Iterator[_Block]:
-    own = tuple(e for e in EFFECTS.values() if e.site in {JOINT, MOTOR})
+    laws = model.frame.equations.motion.catalogue.values()
+    own = tuple(e for e in laws if e.site in {JOINT, MOTOR})
     joints = np.flatnonzero(model.frame.equations.motion.moves)
     yield from (_Block((*own,), (int(j),)) for j in joints)
-    yield _Block(tuple(e for e in EFFECTS.values() if e not in own), None)
+    yield _Block(tuple(e for e in laws if e not in own), None)
 
 
 def _arranged(model: Model, block: _Block, dropped: EffectAt | None = None) -> _Arranged:
@@ -186,9 +187,8 @@ def _grown(columns: Columns, model: Model, block: _Block) -> Model:
 
 def _shrunk(columns: Columns, model: Model, block: _Block) -> Model:
     """Take out, or replace by a law of one number, what is not worth its price."""
-    simple = {n: e for n, e in EFFECTS.items() if len(e.quantities) == 1 and not e.shape_names()}
     while any(block.holds(s) for s in model.effects):
-        better = _best(model, _changes(columns, model, block, simple))
+        better = _best(model, _changes(columns, model, block, is_simple=True))
         if better is None:
             break
         model = better
@@ -196,9 +196,12 @@ def _shrunk(columns: Columns, model: Model, block: _Block) -> Model:
 
 
 def _changes(
-    columns: Columns, model: Model, block: _Block, laws: dict[str, Effect]
+    columns: Columns, model: Model, block: _Block, *, is_simple: bool = False
 ) -> Iterator[Model]:
-    """Yield the model without each effect of a block, and with the best other law in its place."""
+    """Yield the model without each effect of a block, and with the best other law in its place.
+
+    Of simple ones, a law of one number stands for one of several.
+    """
     for s in model.effects:
         if not block.holds(s):
             continue
@@ -207,9 +210,10 @@ def _changes(
         yield without
         if s.effect.plain:
             yield from uncoupled(columns, without, s)
-        others = [e for e in block.effects if e.name in laws and e is not s.effect]
+        others = [e for e in block.effects if e is not s.effect and not (
+            is_simple and (len(e.quantities) > 1 or e.shape_names()))]  # fmt: skip
         is_richer = len(s.effect.quantities) > 1
-        if others and (is_richer or laws is EFFECTS):
+        if others and (is_richer or not is_simple):
             joints = (s.place.joint,) if s.place.joint not in PLACES.values() else block.joints
             found = _distinct(screen(columns, without, others, joints), 1)
             yield from (_fitted(columns, model, arranged, other) for other in found)

@@ -163,8 +163,8 @@ def _sees_no_acceleration(effect: Effect) -> bool:
 
 
 def _chosen(stated: tuple[EffectAt, ...], is_in: Callable[[Effect], bool]) -> tuple[EffectAt, ...]:
-    """Return some of the stated effects."""
-    return tuple(x for x in stated if is_in(x.effect))
+    """Return some of the effects that the nominal robot has."""
+    return tuple(x for x in stated if is_in(x.effect) and not x.effect.is_open)
 
 
 def _part(model: Model, is_in: Callable[[Effect], bool]) -> Model:

@@ -41,6 +41,11 @@ _ROOTS = {'mujoco': 'mjcf', 'sdf': 'sdf', 'robot': 'urdf'}
 _OTHER = {'.mjcf': 'mjcf', '.sdf': 'sdf', '.world': 'sdf', '.xacro': 'xacro', '.urdf': 'urdf'}
 
 
+def is_model(name: str) -> bool:
+    """Return whether a name is that of a model file or a robot YAML, and not of a recording."""
+    return Path(name).suffix.lower() in {*MODEL_ENDINGS, '.yaml', '.yml'}
+
+
 def read_model(path: Path) -> dict[str, Any]:
     """Return what a model file says, as the content of a robot YAML.
 
