@@ -34,7 +34,7 @@ setup(
     maintainer_email='maintainers@sgp-ros.example',
     python_requires='>=3.10',
     packages=find_packages(include=[NAME, f'{NAME}.*', PROOF, f'{PROOF}.*']),
-    package_data={NAME: ['py.typed', 'report/templates/*']},
+    package_data={NAME: ['py.typed', 'report/templates/*', 'report/assets/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         *shared_files(),
@@ -75,6 +75,8 @@ setup(
             'scikit-learn>=1.4',
             'mpmath>=1.3',
             'threadpoolctl>=3',
+            # Drives the Chromium of the system through the pages of reports; brings none itself.
+            'playwright>=1.48',
             # colcon-core 0.21 refuses setuptools 80 and later.
             'colcon-core==0.21.0',
             'colcon-ros==0.5.0',

@@ -41,8 +41,8 @@ LAYERS = {
     },
     'diagnosis': NUMERIC | {'gp', 'physics', 'rigid', 'robots', 'engine', 'batch', 'errors'},
     'report': {
-        'numpy', 'matplotlib', 'jinja2', 'gp', 'physics', 'rigid', 'robots', 'engine', 'batch',
-        'diagnosis', 'errors',
+        'numpy', 'matplotlib', 'jinja2', 'markupsafe', 'gp', 'physics', 'rigid', 'robots',
+        'engine', 'batch', 'diagnosis', 'errors',
     },
     'ros': MESSAGES | {
         'numpy', 'yaml', 'engine', 'physics', 'robots', 'simulation', 'diagnosis', 'recordings',

@@ -25,6 +25,7 @@ from sgp_ros.report.figures import History
 from sgp_ros.report.files import write_text
 from sgp_ros.report.html import write_report
 from sgp_ros.report.metrics import Timing, collect_metrics
+from sgp_ros.report.next_steps import after_demo, ending
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.simulation.assembly import make_simulation
 
@@ -71,11 +72,12 @@ def run_demo(
     metrics['live_equals_replay'] = comparison.to_mapping()
     write_text(out / 'metrics.json', json.dumps(metrics, indent=1, allow_nan=False) + '\n')
     write_report(
-        out, engine, history, metrics, truth=truth, checks=[comparison.sentence, _EXPLANATION]
-    )
+        out, engine, history, metrics, truth=truth, checks=[comparison.sentence, _EXPLANATION],
+        steps=after_demo(bag),
+    )  # fmt: skip
     print_summary(metrics, truth)
     print(comparison.sentence)
-    print(f'report: {out / "report.html"}')
+    print(ending(out, after_demo(bag)))
     if not comparison.is_equal:
         raise RecordingError(
             comparison.sentence, 'equality bit for bit', f'report this with {bag}'

@@ -19,8 +19,11 @@ from sgp_ros.engine.samples import Event
 from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.reader import open_recording
-from sgp_ros.report.diagnosis import write_diagnosis, write_predictions
-from sgp_ros.report.diagnosis_proof import interval_text, tables
+from sgp_ros.report.diagnosis import (
+    write_diagnosis,
+    write_predictions,
+)
+from sgp_ros.report.diagnosis_proof import interval_text
 from sgp_ros.report.diagnosis_text import (
     differences_text,
     equivalence_sentence,
@@ -30,6 +33,7 @@ from sgp_ros.report.diagnosis_text import (
     why_it_lost,
 )
 from sgp_ros.report.files import replacing_results, write_text
+from sgp_ros.report.next_steps import Steps, after_diagnosis, ending
 from sgp_ros.report.verdict import simulated, verdict_sentence
 from sgp_ros.robots.bare import simulated_model
 from sgp_ros.robots.gains import Gains, read_gains
@@ -107,12 +111,13 @@ def run_diagnose(
         progress=progress,
         config=EngineConfig(effort_source=EFFORT_SOURCES[chosen.effort]),
     )  # fmt: skip
-    remarks = [*found.remarks, *remarks, *_refusals(found)]
-    found = replace(found, remarks=tuple(remarks))
+    found = replace(found, remarks=(*found.remarks, *remarks))
     # a node meets one recording of a motion, as it is; settled points are none
     is_met = gains is None and not chosen.static and not found.setup
     first = next(iter(events.values())) if is_met else []
-    return _written(out, nominal, found, first, EFFORT_SOURCES[chosen.effort])
+    bags = [bag] if isinstance(bag, str) else list(bag)
+    steps = after_diagnosis(found, bags[0], robot, out)
+    return _written(out, nominal, found, first, EFFORT_SOURCES[chosen.effort], steps)
 
 
 def _gains(options: DiagnoseOptions, nominal: Nominal) -> Gains | None:
@@ -123,12 +128,6 @@ def _gains(options: DiagnoseOptions, nominal: Nominal) -> Gains | None:
     if options.gains is not None:
         return read_gains(Path(options.gains), names, driven)
     return None
-
-
-def _refusals(found: Diagnosis) -> list[str]:
-    """Say how many states were refused, and why; nothing where none was."""
-    counts = ', '.join(f'{count} {reason}' for reason, count in found.refused.items())
-    return [f'States that were refused, by reason: {counts}.'] if counts else []
 
 
 def _nominal(robot: str, options: DiagnoseOptions) -> Nominal:
@@ -156,7 +155,12 @@ def _read(
 
 
 def _written(
-    out: Path, nominal: Nominal, found: Diagnosis, events: Sequence[Event], effort_source: str
+    out: Path,
+    nominal: Nominal,
+    found: Diagnosis,
+    events: Sequence[Event],
+    effort_source: str,
+    steps: Steps,
 ) -> dict[str, Any]:
     """Write all files, print the findings and return the content of diagnosis.json."""
     with replacing_results(out, 'diagnose'):
@@ -171,9 +175,9 @@ def _written(
         if online is not None:
             content['online'] = online.content()
         write_text(out / 'diagnosis.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
-        write_diagnosis(out, found)
+        write_diagnosis(out, found, nominal.tree, steps)
     print_diagnosis(found)
-    print(f'report: {out / "report.html"}')
+    print(ending(out, steps))
     return content
 
 
@@ -200,6 +204,9 @@ def print_diagnosis(found: Diagnosis) -> None:
     )
     for stem, proof in found.proofs.items():
         _print_proof(stem, proof)
+    if found.refused:
+        counts = ', '.join(f'{count} {reason}' for reason, count in found.refused.items())
+        print(f'  refused   states: {counts}')
     for remark in found.remarks:
         print(f'  remark    {remark}')
 
@@ -218,7 +225,7 @@ def _print_proof(stem: str, proof: Proof) -> None:
     """Print the errors of effort and roll-outs before and after, with 95 % intervals."""
     head = stem
     for kind, what in (('nmse', 'nMSE of the effort'), ('rollout_nmse', 'nMSE of roll-outs')):
-        before, after = (tables(proof)[f'{kind}_{when}'] for when in ('before', 'after'))
+        before, after = (proof.errors()[f'{kind}_{when}'] for when in ('before', 'after'))
         each = []
         for joint, x in before.items():
             interval = interval_text(proof, f'{kind}_after', joint)

@@ -25,15 +25,16 @@ from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.report.findings import collect_findings
-from sgp_ros.report.identification import (
+from sgp_ros.report.identification import write_identification
+from sgp_ros.report.identification_text import (
     called,
     cautions,
     excitation,
     filter_choice,
     unknown,
     verdict,
-    write_identification,
 )
+from sgp_ros.report.next_steps import after_identification, ending
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
 
@@ -120,6 +121,7 @@ def run_identify(
     if signals.left_out:
         counts['states of stretches too short to be filtered'] = signals.left_out
     findings = collect_findings(found, Path(bag).name, rollouts, counts)
+    steps = after_identification(robot, out, has_bodies='urdf' in model.source)
     with replacing_results(out, 'identify'):
         write_text(
             out / 'identification.json', json.dumps(findings, indent=1, allow_nan=False) + '\n'
@@ -128,10 +130,10 @@ def run_identify(
         std = np.where(known.is_identifiable, known.std, np.inf)
         values, has_bodies = best_coefficients(found), found.consistent is not None
         write_identified(out, model, values, std, has_bodies=has_bodies)
-        write_identification(out, found, findings, remarks)
+        write_identification(out, found, findings, remarks, steps)
     progress(1.0)
     print_findings(findings)
-    print(f'report: {out / "report.html"}')
+    print(ending(out, steps))
     return findings
 
 

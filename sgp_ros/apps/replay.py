@@ -34,6 +34,7 @@ from sgp_ros.report.figures import History
 from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.report.html import write_report
 from sgp_ros.report.metrics import Timing, collect_metrics, model_remarks, stream_remarks
+from sgp_ros.report.next_steps import after_replay, ending
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.shipped import find_shipped
@@ -85,7 +86,7 @@ def run_replay(
     with replacing_results(out, 'replay'):
         metrics = _replay_into(out, engine, recording, chosen, truth, progress)
     print_summary(metrics, truth)
-    print(f'report: {out / "report.html"}')
+    print(ending(out, after_replay(out)))
     return metrics
 
 
@@ -122,7 +123,7 @@ def _replay_into(
     metrics = collect_metrics(engine, recording.path.name, timing=timing, remarks=remarks)
     write_text(out / 'metrics.json', json.dumps(metrics, indent=1, allow_nan=False) + '\n')
     save_model(out / 'model.npz', take_snapshot(engine))
-    write_report(out, engine, history, metrics, truth=truth)
+    write_report(out, engine, history, metrics, truth=truth, steps=after_replay(out))
     return metrics
 
 
@@ -232,7 +233,7 @@ def _parameter_line(parameter: Mapping[str, Any], truth: Mapping[str, float] | N
     text = f'{name:12s} {parameter["value"]:11.5g} +- {1.96 * std:<9.3g} {parameter["unit"]}'
     if truth and name in truth:
         text += f'   true {truth[name]:.5g}'
-    return text
+    return f'{text}   {parameter["meaning"]}'.rstrip()
 
 
 def _make_engine(robot: Robot, options: ReplayOptions) -> Engine:

@@ -104,19 +104,12 @@ def _parameter(p: Parameter) -> dict[str, Any]:
 
 
 def _proof(p: Proof) -> dict[str, Any]:
-    tables = {
-        'nmse_before': p.nmse_before,
-        'nmse_after': p.nmse_after,
-        'acceleration_nmse_before': p.acceleration_before,
-        'acceleration_nmse_after': p.acceleration_after,
-        'rollout_nmse_before': p.rollout_before,
-        'rollout_nmse_after': p.rollout_after,
-    }
     entry: dict[str, Any] = {}
-    for name, table in tables.items():
+    for name, table in p.errors().items():
         entry[name] = {joint: _finite(x) for joint, x in table.items()}
         intervals = p.intervals.get(name, {})
         entry[f'{name}_interval'] = {joint: _ends(x) for joint, x in intervals.items()}
+        entry[name.replace('nmse', 'rms')] = {j: _finite(x) for j, x in p.rms(name).items()}
     for name, value, interval in zip(
         ('nlpd_before', 'nlpd_after'), (p.nlpd_before, p.nlpd_after), p.nlpd_intervals, strict=True
     ):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from sgp_ros.diagnosis.shown import Band, Dependence, Predictions, Traces
+from sgp_ros.diagnosis.shown import Band, Dependence, Predictions, Rollouts, Traces
 
 VERDICTS = ('no_mismatch', 'parameters_only', 'setup_error', 'missing_physics', 'unexplained')
 
@@ -147,6 +148,9 @@ class Proof:
         failed: of them, where one of the models did not end; these are in no mean.
         distance: median distance of the states from those learned from, in standard deviations
             per coordinate.
+        yardsticks: root mean square of what `nmse`, `acceleration_nmse` and `rollout_nmse` are
+            relative to, by these names and joint [N m or N, rad/s^2 or m/s^2, rad or m].
+        motion: the roll-outs themselves; None where none were made.
     """
 
     nmse_before: Mapping[str, float]
@@ -162,6 +166,29 @@ class Proof:
     rollouts: int = 0
     failed: int = 0
     distance: float = 0.0
+    yardsticks: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    motion: Rollouts | None = None
+
+    def errors(self) -> dict[str, Mapping[str, float]]:
+        """Return the errors by joint under their names in diagnosis.json, before, then after."""
+        return {
+            'nmse_before': self.nmse_before,
+            'nmse_after': self.nmse_after,
+            'acceleration_nmse_before': self.acceleration_before,
+            'acceleration_nmse_after': self.acceleration_after,
+            'rollout_nmse_before': self.rollout_before,
+            'rollout_nmse_after': self.rollout_after,
+        }
+
+    def rms(self, name: str) -> dict[str, float]:
+        """Return errors in units instead of relative ones, by joint; empty where unknown.
+
+        Args:
+            name: of `errors`.
+        """
+        errors = self.errors()[name]
+        scale = self.yardsticks.get(name.rpartition('_')[0], {})
+        return {j: math.sqrt(x) * scale[j] for j, x in errors.items() if j in scale}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

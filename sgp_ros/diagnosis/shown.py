@@ -91,3 +91,18 @@ class Predictions:
 
     time: np.ndarray
     acceleration: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rollouts:
+    """Positions of m roll-outs of n steps of a recording, for pictures, each (m, n + 1, k).
+
+    Attributes:
+        time: (m, n + 1) [s].
+        measured, before, after: of the machine, the nominal and the final model [rad or m].
+    """
+
+    time: np.ndarray
+    measured: np.ndarray
+    before: np.ndarray
+    after: np.ndarray

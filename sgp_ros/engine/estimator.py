@@ -152,6 +152,7 @@ class Estimator:
             channels['effort'],
             is_scored,
             is_learned,
+            None if physics is None else physics[1].mean,
         )
 
     def _learn(

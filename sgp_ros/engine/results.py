@@ -77,6 +77,7 @@ class Estimate:
         effort: measured and predicted efforts.
         is_scored: whether it entered the scores: a model existed and its variance was finite.
         is_learned: whether the model then learned it.
+        physics: (k,) the target as the physics alone predicts it; None without such a model.
     """
 
     stamp_ns: int
@@ -87,6 +88,7 @@ class Estimate:
     effort: Channel
     is_scored: bool
     is_learned: bool
+    physics: np.ndarray | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -83,6 +83,7 @@ class Coefficient:
         prior_mean: mean of its prior [unit].
         prior_std: standard deviation of its prior [unit]; infinite knows nothing.
         low: least value that exists [unit]: no armature and no friction is negative.
+        meaning: what it is, in a few words; empty where the name says it.
     """
 
     name: str
@@ -91,6 +92,7 @@ class Coefficient:
     prior_mean: float = 0.0
     prior_std: float = math.inf
     low: float = -math.inf
+    meaning: str = ''
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+import numpy as np
+from markupsafe import Markup
 
 from sgp_ros.diagnosis.prove.held_out import HELD_OUT
 from sgp_ros.diagnosis.result import Diagnosis, Finding, ParameterError
 from sgp_ros.diagnosis.shown import Predictions
 from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.report.charts import Chart
+from sgp_ros.report.diagnosis_charts import diagnosis_charts
 from sgp_ros.report.diagnosis_figures import draw_diagnosis
 from sgp_ros.report.diagnosis_maps import band_sentences, important_joints
-from sgp_ros.report.diagnosis_proof import densities, near_and_far, proof_rows, rollouts_sentences
+from sgp_ros.report.diagnosis_proof import (
+    columns,
+    densities,
+    errors_in_units,
+    near_and_far,
+    proof_rows,
+    rollouts_sentences,
+)
 from sgp_ros.report.diagnosis_text import (
     differences_text,
     effect_name,
@@ -31,14 +42,17 @@ from sgp_ros.report.diagnosis_text import (
 )
 from sgp_ros.report.figures import png
 from sgp_ros.report.files import write_bytes, write_text
-from sgp_ros.report.html import MEANINGS, embedded
+from sgp_ros.report.html import MEANINGS
 from sgp_ros.report.metrics import versions
+from sgp_ros.report.next_steps import Steps
+from sgp_ros.report.page import render_page
+from sgp_ros.report.robot_picture import robot_picture
 from sgp_ros.report.verdict import held_out_sentence, verdict_sentence
+from sgp_ros.rigid.tree import Tree
 
 _NAMED = ('kind', 'source_joint')
 """Parameters that are part of the name of an effect."""
-_SHOWN_RIVALS = 4
-"""Effects that change what is measured, not the motion."""
+_SHOWN_RIVALS, _SHOWN_VARIABLES = 4, 5
 _WITHOUT_FORCES = ('parameters_only', 'unexplained')
 _VERDICTS = {
     'missing_physics': 'Physics is missing',
@@ -49,44 +63,70 @@ _VERDICTS = {
 }
 
 
-def write_diagnosis(out: Path, found: Diagnosis) -> None:
-    """Write `report.html` and its figures as PNG into `out`."""
+def write_diagnosis(
+    out: Path, found: Diagnosis, tree: Tree | None = None, steps: Steps = ()
+) -> None:
+    """Write `report.html` and its figures as PNG into `out`.
+
+    Args:
+        out: folder.
+        found: the diagnosis.
+        tree: of the robot, for its picture; None for none.
+        steps: what to do next.
+    """
     figures = {name: png(figure) for name, figure in draw_diagnosis(found).items()}
     for name, content in figures.items():
         write_bytes(out / f'{name}.png', content)
-    write_text(out / 'report.html', render(found, figures))
+    picture = '' if tree is None else _picture(found, tree)
+    write_text(out / 'report.html', render(found, figures, picture, steps))
 
 
-def render(found: Diagnosis, figures: Mapping[str, bytes]) -> str:
-    """Return the page as HTML; every text in it is escaped."""
-    environment = Environment(
-        loader=PackageLoader('sgp_ros.report'), autoescape=True, undefined=StrictUndefined
-    )
+def render(
+    found: Diagnosis, figures: Mapping[str, bytes], picture: str = '', steps: Steps = ()
+) -> str:
+    """Return the page as HTML; every text in it is escaped.
+
+    Args:
+        found: the diagnosis.
+        figures: PNG by stem.
+        picture: of the robot, an `svg` element.
+        steps: what to do next.
+    """
+    charts = diagnosis_charts(found)
     best = found.findings[0] if found.findings else None
     large = [found.joints[j] for j in important_joints(found)]
-    return environment.get_template('diagnosis.html').render(
+    shown = {name: x for name, x in figures.items() if name != 'dependence'}  # bars of the page
+    return render_page(
+        'diagnosis.html', charts, shown,
         title=f'{_VERDICTS[found.verdict]}: diagnosis of {found.robot}',
-        verdict=_typeset(verdict_sentence(found)),
+        verdict=verdict_sentence(found),
         held_out='' if len(found.proofs) > 1 else held_out_sentence(found),
         cards=_cards(found),
-        large=', '.join(large),
+        picture=Markup(picture),  # noqa: S704 - names in it are escaped
+        shares=_share_rows(found),
+        large=large,
         regions=band_sentences(found, large),
-        others=', '.join(name for name in found.joints if name not in large),
+        has_bands=any(name.startswith('band ') for name in charts),
+        bands=[name for name in charts if name.startswith('band ')],
+        shapes=[name for name in charts if name.startswith('shape ')],
+        dependences=_dependences(found, large) if found.findings else [],
         is_calm=found.verdict == 'no_mismatch',
-        findings=[_finding(f) for f in found.findings],
+        setup=[_finding(f) for f in found.setup],
+        findings=[_finding(f, _chart_of(found, f, charts)) for f in found.findings],
+        shared=[_finding(f) for f in found.shared],
         rivals=[_rival(f, best) for f in found.alternatives[:_SHOWN_RIVALS]],
         more_rivals=[_rival(f, best) for f in found.alternatives[_SHOWN_RIVALS:]],
-        differences=[_typeset(line) for line in differences_text(found)],
+        differences=differences_text(found),
         equivalents=[equivalence_sentence(e) for e in found.equivalents],
         hidden=visibility_sentences(found),
         is_unexplained=found.verdict == 'unexplained',
         errors=[_error(e) for e in found.parameter_errors],
+        columns=columns(found),
+        errors_in_units=errors_in_units(found),
         proofs=proof_rows(found),
-        has_rollouts=any(p.rollout_before for p in found.proofs.values()),
         rollouts=rollouts_sentences(found),
         near_and_far=near_and_far(found),
         densities=densities(found),
-        figures={name: embedded({name: content}, ('',))[0] for name, content in figures.items()},
         settings=_settings(found),
         refusals=[
             {'reason': reason, 'count': count, 'meaning': MEANINGS.get(reason, '')}
@@ -94,8 +134,50 @@ def render(found: Diagnosis, figures: Mapping[str, bytes]) -> str:
             if count
         ],
         remarks=list(found.remarks),
+        next_steps=list(steps),
         versions=list(versions().items()),
     )  # fmt: skip
+
+
+def _picture(found: Diagnosis, tree: Tree) -> str:
+    """Return the robot as it stood in the middle of its motion; pale where nothing is wrong."""
+    shares = dict(_shares(found)) if found.verdict != 'no_mismatch' else {}
+    return robot_picture(tree, np.median(found.traces.position, axis=0), shares)
+
+
+def _shares(found: Diagnosis) -> list[tuple[str, float]]:
+    """Return the share of each joint of all that the nominal robot leaves."""
+    left = found.proofs['train'].nmse_before
+    known = {name: x for name, x in left.items() if math.isfinite(x)}
+    total = sum(known.values())
+    return [(name, known.get(name, 0.0) / total if total else 0.0) for name in found.joints]
+
+
+def _share_rows(found: Diagnosis) -> list[dict[str, Any]]:
+    left = found.proofs['train'].nmse_before
+    return [
+        {'joint': name, 'share': share, 'percent': percent(share), 'own': percent(left[name])}
+        for name, share in _shares(found)
+    ]
+
+
+def _dependences(found: Diagnosis, joints: Sequence[str]) -> list[dict[str, Any]]:
+    """Return the variables that explain most of the discrepancy of each joint."""
+    return [
+        {'joint': d.joint, 'rows': [
+            {'name': name, 'share': max(d.scores[name], 0.0),
+             'percent': percent(max(d.scores[name], 0.0)),
+             'is_significant': d.is_significant(name)}
+            for name in sorted(d.scores, key=lambda name: -d.scores[name])[:_SHOWN_VARIABLES]
+        ]}
+        for d in found.dependences if d.joint in joints
+    ]  # fmt: skip
+
+
+def _chart_of(found: Diagnosis, finding: Finding, charts: Mapping[str, Chart]) -> str:
+    """Return the name of the chart of a finding's law; empty where there is none."""
+    name = f'law {found.findings.index(finding)}'
+    return name if name in charts else ''
 
 
 def _cards(found: Diagnosis) -> list[dict[str, str]]:
@@ -114,7 +196,7 @@ def _cards(found: Diagnosis) -> list[dict[str, str]]:
         if stem != 'train':
             joint = worst_joint(proof)
             before, after = percent(proof.nmse_before[joint]), percent(proof.nmse_after[joint])
-            value = before if is_calm else f'{before} → {after}'
+            value = before if is_calm else f'{before} -> {after}'
             held = 'what was held out' if stem == HELD_OUT else f'{stem}, held out'
             label = f'of the variance of the effort of {joint} is left on {held}'
             cards.append({'value': value, 'label': label})
@@ -125,21 +207,27 @@ def _cards(found: Diagnosis) -> list[dict[str, str]]:
     return cards
 
 
-def _finding(f: Finding) -> dict[str, Any]:
+def _finding(f: Finding, chart: str = '') -> dict[str, Any]:
+    named = effect_name(f)
+    measured = 'variance of the velocity'
+    if f.effect not in EFFECTS or EFFECTS[f.effect].is_force:
+        measured = 'mean squared effort'
     return {
-        'name': effect_name(f),
+        'name': named[:1].upper() + named[1:],
         'place': place(f),
+        'chart': chart,
         'probability': f'{f.probability:.2f}',
-        'share': f'{percent(f.share)} of the '
-        + (
-            'variance of the velocity'
-            if f.effect in EFFECTS and not EFFECTS[f.effect].is_force
-            else 'mean squared effort'
-        ),
+        'share': f'it makes {percent(f.share)} of the {measured}',
         'formula': f.formula,
         'why': f.why[:1].upper() + f.why[1:],
+        'is_compared': bool(f.in_simulation),
         'parameters': [
-            {'name': name.replace('_', ' '), 'value': _typeset(quantity(p))}
+            {
+                'name': name.replace('_', ' '),
+                'value': quantity(p),
+                'simulated': quantity(f.in_simulation[name]) if name in f.in_simulation else '',
+                'difference': quantity(f.difference[name]) if name in f.difference else '',
+            }
             for name, p in f.parameters.items()
             if name not in _NAMED
         ],
@@ -185,10 +273,6 @@ def _settings(found: Diagnosis) -> list[tuple[str, str]]:
         shares = ', '.join(f'{joint} {percent(x)}' for joint, x in found.simulation.items())
         settings.append(('left of the effort of the simulation', shares))
     return settings
-
-
-def _typeset(text: str) -> str:
-    return text.replace('+-', '±')
 
 
 def write_predictions(folder: Path, found: Diagnosis) -> None:

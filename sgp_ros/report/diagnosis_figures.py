@@ -11,19 +11,24 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sgp_ros.diagnosis.result import Diagnosis, Finding, Proof
-from sgp_ros.physics.catalogue import drawn_over, exerts_force
+from sgp_ros.report.diagnosis_curves import (
+    abscissa,
+    acting,
+    broken,
+    forces_of,
+    law_curve,
+    leading,
+    zoomed,
+)
 from sgp_ros.report.diagnosis_maps import (
     draw_bands,
     draw_location,
     draw_others,
-    effort_scale,
     important_joints,
     mark_regions,
-    position_unit,
     reach_of,
-    shown_position,
 )
-from sgp_ros.report.diagnosis_proof import recording_name, tables
+from sgp_ros.report.diagnosis_proof import recording_name
 from sgp_ros.report.diagnosis_text import UNKNOWN, effect_name
 from sgp_ros.report.figures import BAND, GREY, MEASURED, PREDICTED
 
@@ -79,7 +84,7 @@ def _reach(found: Diagnosis) -> tuple[float, float]:
     values = [
         x
         for proof in found.proofs.values()
-        for name, table in tables(proof).items()
+        for name, table in proof.errors().items()
         for x in table.values()
         if not name.startswith('acceleration') and 0.0 < x < 1e6
     ] or [1.0]
@@ -94,7 +99,7 @@ def _bars(
         (0.2, 'before', BEFORE, 'nominal robot'),
         (-0.2, 'after', AFTER, 'final model'),
     ):
-        table = tables(proof)[f'{kind}_{when}']
+        table = proof.errors()[f'{kind}_{when}']
         shown = [float(np.clip(np.nan_to_num(table.get(name, 0.0)), *ends)) for name in joints]
         axes.barh(y + shift, np.subtract(shown, low), 0.38, left=low, color=colour, label=label)
         for i, name in enumerate(joints):
@@ -106,9 +111,7 @@ def _bars(
 
 FORCES = (PREDICTED, '#009E73', '#CC79A7')
 """One colour for each finding on a joint (Okabe and Ito 2008)."""
-_LARGE, _ZOOM_S = 3, 4.0
-_GAP = 1.5
-"""Sampling periods from which on no line joins two rows."""
+_LARGE = 3
 
 
 def draw_diagnosis(found: Diagnosis) -> dict[str, Figure]:
@@ -119,7 +122,7 @@ def draw_diagnosis(found: Diagnosis) -> dict[str, Figure]:
     if found.bands:
         reach = {found.joints[j]: reach_of(found, j) for j in important_joints(found)}
         figures['bands'] = draw_bands(found, reach)
-    if _forces(found):
+    if forces_of(found):
         figures['law'] = draw_laws(found)
     if found.findings:
         large = {found.joints[j] for j in important_joints(found)}
@@ -137,11 +140,11 @@ def draw_time(found: Diagnosis) -> Figure:
     figure = Figure(figsize=(10, 0.5 + 2.6 * len(joints)), layout='constrained')
     grid = figure.subplots(len(joints), 2, squeeze=False, width_ratios=(3, 2))
     for row, j in zip(grid, joints, strict=True):
-        for axes, shown in zip(row, (slice(None), _zoom(found, j)), strict=True):
+        for axes, shown in zip(row, (slice(None), zoomed(found, j)), strict=True):
             alike = _trace(axes, found, j, shown)
         row[0].set_ylabel(f'effort on {found.joints[j]} [{found.units[j]}]')
         row[1].locator_params(axis='x', nbins=6)
-        if _acting(found, j):
+        if acting(found, j):
             row[0].legend(loc='lower left', bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, ncols=2,
                           fontsize='small', frameon=False)  # fmt: skip
     for axes, part in zip(grid[-1], ('whole recording', 'where most is left'), strict=True):
@@ -154,41 +157,34 @@ def draw_time(found: Diagnosis) -> Figure:
 
 def draw_laws(found: Diagnosis) -> Figure:
     """Draw the forces of the largest findings over what they depend on, beside the data."""
-    shown = sorted(_forces(found), key=lambda pair: -pair[0].share)[:_LARGE]
+    shown = sorted(forces_of(found), key=lambda pair: -pair[0].share)[:_LARGE]
     figure = Figure(figsize=(10 if len(shown) > 1 else 6.5, 3.6), layout='constrained')
     for i, (finding, force) in enumerate(shown):
         axes = figure.add_subplot(1, len(shown), i + 1)
-        j = _strongest(found, finding, force)
-        x, label = _abscissa(found, finding, j)
-        law, measured = force[:, j], found.traces.after[:, j] + force[:, j]
-        style = '.'
-        over = drawn_over(finding.effect, finding.formula)
-        if over == 'seconds':
-            zoom, style = _zoom(found, j), '-'
-            x, law, measured = (
-                y[zoom] for y in (x, _broken(found, law), _broken(found, measured))
-            )
-        elif over == 'time':
-            law, measured = np.abs(law), np.abs(measured)
-        colour = next((c for f, _, c in _acting(found, j) if f is finding), FORCES[0])
-        axes.plot(x, measured, style, ms=6, lw=3.5, color=MEASURED, label='measured')
-        axes.plot(x, law, style, ms=1.8, lw=1.2, color=colour, label='the law')
+        curve = law_curve(found, finding, force)
+        j, style = curve.joint, '-' if curve.is_line else '.'
+        colour = next((c for f, _, c in _coloured(found, j) if f is finding), FORCES[0])
+        axes.plot(curve.x, curve.measured, style, ms=6, lw=3.5, color=MEASURED, label='measured')
+        axes.plot(curve.x, curve.law, style, ms=1.8, lw=1.2, color=colour, label='the law')
         axes.axhline(0.0, color=GREY, lw=0.6)
-        axes.set(xlabel=label, ylabel=f'effort on {found.joints[j]} [{found.units[j]}]')
+        axes.set(xlabel=curve.label, ylabel=f'effort on {found.joints[j]} [{found.units[j]}]')
         axes.set_title(fill(effect_name(finding), 26), fontsize='medium')
-        if 'position' in label:
+        if 'position' in curve.label:
             mark_regions(axes, found, j)
         axes.legend(fontsize='small', markerscale=2)
     return figure
+
+
+def _coloured(found: Diagnosis, j: int) -> list[tuple[Finding, np.ndarray, str]]:
+    """Return the findings that exert a force on a joint, with these and their colours."""
+    return [(*pair, FORCES[i % len(FORCES)]) for i, pair in enumerate(acting(found, j))]
 
 
 def draw_shape(found: Diagnosis, unknown: Finding) -> Figure:
     """Draw an unexplained discrepancy over what it depends on most, for both directions."""
     j = found.joints.index(unknown.joint)
     scores = next(d.scores for d in found.dependences if d.joint == unknown.joint)
-    own = [name for name in ('position', 'velocity', 'effort') if name in scores]
-    best = max(own, key=lambda name: scores[name])
-    x, label = _abscissa(found, unknown, j, best)
+    x, label = abscissa(found, unknown, j, leading(scores))
     figure = Figure(figsize=(6.5, 3.6), layout='constrained')
     axes = figure.add_subplot()
     forward = found.traces.velocity[:, j] > 0.0
@@ -204,70 +200,15 @@ def _trace(axes: Axes, found: Diagnosis, j: int, shown: slice) -> dict[str, Arti
     """Draw one joint over some rows and return, by name, what looks alike on all joints."""
     traces, time = found.traces, found.traces.time[shown]
     half = 2.0 * float(traces.noise[j])
-    before = _broken(found, traces.before[:, j])[shown]
+    before = broken(found, traces.before[:, j])[shown]
     alike: dict[str, Artist] = {}
     (alike['nominal robot leaves'],) = axes.plot(time, before, color=MEASURED, lw=3.5)
-    for finding, force, colour in _acting(found, j):
-        axes.plot(time, _broken(found, force[:, j])[shown], color=colour, lw=1.1,
+    for finding, force, colour in _coloured(found, j):
+        axes.plot(time, broken(found, force[:, j])[shown], color=colour, lw=1.1,
                   label=effect_name(finding))  # fmt: skip
     if found.verdict != 'no_mismatch':
-        left = _broken(found, traces.after[:, j])[shown]
+        left = broken(found, traces.after[:, j])[shown]
         (alike['final model leaves'],) = axes.plot(time, left, color='#D55E00', lw=0.9)
     alike['noise (2 std)'] = axes.axhspan(-half, half, color=BAND, lw=0, zorder=0)
     axes.margins(x=0.01)
     return alike
-
-
-def _broken(found: Diagnosis, values: np.ndarray) -> np.ndarray:
-    """Return values (N,) with NaN in the last row before a gap, where a line is to break."""
-    step = np.diff(found.traces.time, append=found.traces.time[-1])
-    return np.where(step > _GAP / found.rate_hz, np.nan, values)
-
-
-def _acting(found: Diagnosis, j: int) -> list[tuple[Finding, np.ndarray, str]]:
-    """Return the findings that exert a force on a joint, with these and their colours."""
-    acting = [(f, force) for f, force in _forces(found) if np.abs(force[:, j]).max() > 0.0]
-    return [(f, force, FORCES[i % len(FORCES)]) for i, (f, force) in enumerate(acting)]
-
-
-def _forces(found: Diagnosis) -> list[tuple[Finding, np.ndarray]]:
-    """Return the findings that exert forces, with these."""
-    pairs = zip(found.findings, found.traces.forces, strict=False)
-    return [(f, x) for f, x in pairs if exerts_force(f.effect)]
-
-
-def _strongest(found: Diagnosis, finding: Finding, force: np.ndarray) -> int:
-    if finding.joint in found.joints:
-        return found.joints.index(finding.joint)
-    return int(np.argmax((force**2).mean(axis=0) / effort_scale(found) ** 2))
-
-
-def _abscissa(
-    found: Diagnosis, finding: Finding, j: int, name: str | None = None
-) -> tuple[np.ndarray, str]:
-    name = name or drawn_over(finding.effect, finding.formula)
-    unit = position_unit(found, j)
-    traces = found.traces
-    words = {key: p.value for key, p in finding.parameters.items()}
-    if words.get('kind') == 'torque' and words.get('source_joint') in found.joints:
-        source = found.joints.index(str(words['source_joint']))
-        return traces.effort[:, source], f'effort of {found.joints[source]}'
-    curves = {
-        'time': (traces.time, 'time [s]'),
-        'seconds': (traces.time, 'time [s]'),
-        'velocity': (traces.velocity[:, j], f'velocity [{unit}/s]'),
-        'effort': (traces.effort[:, j], f'commanded effort [{found.units[j]}]'),
-        'acceleration': (
-            np.gradient(traces.velocity[:, j], traces.time), f'acceleration [{unit}/s^2]',
-        ),
-        'position': (shown_position(found, j), f'position [{unit}]'),
-    }  # fmt: skip
-    return curves[name]
-
-
-def _zoom(found: Diagnosis, j: int) -> slice:
-    """Return the rows of the few seconds in which the nominal robot leaves most."""
-    length = int(np.clip(_ZOOM_S * found.rate_hz, 2, len(found.traces.time)))
-    energy = np.convolve(found.traces.before[:, j] ** 2, np.ones(length), 'valid')
-    first = int(np.argmax(energy))
-    return slice(first, first + length)

@@ -118,19 +118,26 @@ def reach_of(found: Diagnosis, j: int) -> float:
     return max(largest, float(np.sqrt(LEAST_SHARE) * effort_scale(found)[j]))
 
 
-def _map(axes: Axes, found: Diagnosis, j: int, values: np.ndarray, reach: float) -> QuadMesh:
+def cells_of(
+    found: Diagnosis, j: int, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return edges of position and velocity, (c + 1,) each, and the mean of values (c, c)."""
     q, v = shown_position(found, j), found.traces.velocity[:, j]
     cells = int(np.clip(2.0 * np.sqrt(len(q)), _FEWEST_CELLS, _MOST_CELLS))
     edges = [np.linspace(x.min(), x.max() + 1e-12, cells + 1) for x in (q, v)]
     count = np.histogram2d(q, v, edges)[0]
     total = np.histogram2d(q, v, edges, weights=values)[0]
-    mean = np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
+    return edges[0], edges[1], np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
+
+
+def _map(axes: Axes, found: Diagnosis, j: int, values: np.ndarray, reach: float) -> QuadMesh:
+    x, y, mean = cells_of(found, j, values)
     axes.set_facecolor('#D4D4D4')
-    return axes.pcolormesh(*edges, mean.T, cmap='RdBu_r', vmin=-reach, vmax=reach)
+    return axes.pcolormesh(x, y, mean.T, cmap='RdBu_r', vmin=-reach, vmax=reach)
 
 
 VARIABLES = ('position', 'velocity', 'effort', 'time')
-_DIRECTIONS = (('backward', '#CC79A7'), ('forward', PREDICTED))
+DIRECTIONS = (('backward', '#CC79A7'), ('forward', PREDICTED))
 _REGION = '#F0E442'
 
 
@@ -155,7 +162,7 @@ def draw_bands(found: Diagnosis, reach: Mapping[str, float]) -> Figure:
             if variable in own:
                 _draw(axes, own[variable], depends[joint])
                 _mark(axes, found, joint, variable)
-                axes.set_xlabel(f'{variable} [{_units(unit)[variable]}]')
+                axes.set_xlabel(f'{variable} [{variable_units(unit)[variable]}]')
         row[0].set(ylabel=f'Z on {joint} [{unit}]', ylim=(-reach[joint], reach[joint]))
     parts = [axes.get_legend_handles_labels() for axes in grid.flat]
     by_label = {label: h for hs, labels in parts for h, label in zip(hs, labels, strict=True)}
@@ -176,7 +183,7 @@ def band_sentences(found: Diagnosis, joints: list[str]) -> list[str]:
             sentences.append(f'{d.joint}: nowhere beyond chance.')
             continue
         best = max(own, key=lambda b: d.scores[b.variable])
-        unit = _units(found.units[found.joints.index(d.joint)])[best.variable]
+        unit = variable_units(found.units[found.joints.index(d.joint)])[best.variable]
         parts = ' and '.join(f'{lo:.3g} to {hi:.3g} {unit}' for lo, hi in best.regions)
         share = f'{100.0 * best.rows:.0f} % of the rows'
         sentences.append(f'{d.joint}: at {best.variable} from {parts}, {share}.')
@@ -187,7 +194,7 @@ def _draw(axes: Axes, band: Band, dependence: Dependence) -> None:
     for i, (lo, hi) in enumerate(band.regions):
         label = None if i else 'not zero'
         axes.axvspan(lo, hi, color=_REGION, alpha=0.35, lw=0, zorder=0, label=label)
-    for i, (direction, colour) in enumerate(_DIRECTIONS):
+    for i, (direction, colour) in enumerate(DIRECTIONS):
         mean, half = band.mean[:, i], band.half[:, i]
         axes.fill_between(band.x, mean - half, mean + half, color=colour, alpha=0.25, lw=0)
         axes.plot(band.x, mean, '.-', ms=3, lw=1.2, color=colour, label=direction)
@@ -207,6 +214,7 @@ def _mark(axes: Axes, found: Diagnosis, joint: str, variable: str) -> None:
                 axes.axvspan(lo, hi, fill=False, ec='black', ls='--', lw=1.2)
 
 
-def _units(effort: str) -> dict[str, str]:
+def variable_units(effort: str) -> dict[str, str]:
+    """Return the units of position, velocity, effort and time of a joint with such an effort."""
     length = 'm' if effort == 'N' else 'rad'
     return {'position': length, 'velocity': f'{length}/s', 'effort': effort, 'time': 's'}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 from sgp_ros.diagnosis.prove.held_out import HELD_OUT
 from sgp_ros.diagnosis.prove.rollouts import HORIZON_S
@@ -17,18 +16,6 @@ def recording_name(stem: str) -> str:
     return _NAMES.get(stem, stem)
 
 
-def tables(proof: Proof) -> dict[str, Mapping[str, float]]:
-    """Return the errors by joint under their names in diagnosis.json, before and after in turn."""
-    return {
-        'nmse_before': proof.nmse_before,
-        'nmse_after': proof.nmse_after,
-        'acceleration_nmse_before': proof.acceleration_before,
-        'acceleration_nmse_after': proof.acceleration_after,
-        'rollout_nmse_before': proof.rollout_before,
-        'rollout_nmse_after': proof.rollout_after,
-    }
-
-
 def proof_rows(found: Diagnosis) -> list[dict[str, object]]:
     """Return a row for each recording and joint: its name and six numbers with intervals."""
     return [
@@ -40,12 +27,40 @@ def proof_rows(found: Diagnosis) -> list[dict[str, object]]:
                     'value': _short(table[joint]) if joint in table else '',
                     'interval': interval_text(proof, name, joint),
                 }
-                for name, table in tables(proof).items()
+                for name, table in proof.errors().items()
             ],
         }
         for stem, proof in found.proofs.items()
         for joint in found.joints
     ]
+
+
+def columns(found: Diagnosis) -> list[str]:
+    """Return the errors that a table has columns for, with units."""
+    length = '/'.join(dict.fromkeys('m' if unit == 'N' else 'rad' for unit in found.units))
+    named = {
+        'nmse_before': f'effort [{"/".join(dict.fromkeys(found.units))}]',
+        'acceleration_nmse_before': f'acceleration [{length}/s²]',
+        'rollout_nmse_before': f'roll-outs of {HORIZON_S:g} s [{length}]',
+    }
+    return [
+        text
+        for name, text in named.items()
+        if any(p.errors()[name] for p in found.proofs.values())
+    ]
+
+
+def errors_in_units(found: Diagnosis) -> list[dict[str, object]]:
+    """Return a row for each recording and joint: its name and root mean square errors."""
+    rows: list[dict[str, object]] = []
+    for stem, proof in found.proofs.items():
+        tables = [proof.rms(name) for name in proof.errors()][: 2 * len(columns(found))]
+        rows += [
+            {'stem': recording_name(stem), 'joint': joint,
+             'cells': [f'{t[joint]:.3g}' if joint in t else '' for t in tables]}
+            for joint in found.joints
+        ]  # fmt: skip
+    return rows
 
 
 def interval_text(proof: Proof, name: str, joint: str) -> str:

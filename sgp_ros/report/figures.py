@@ -106,16 +106,12 @@ def draw_parameters(engine: Engine, history: History, truth: Mapping[str, float]
 def draw_calibration(engine: Engine, history: History) -> Figure:
     """Draw the share of measurements inside central intervals against their stated level."""
     channel = engine.robot.target
-    keep = history.scored()
-    measured, mean, variance = (values[keep] for values in history.channel(channel))
     levels = np.linspace(0.0, 1.0, 101)
     figure = Figure(figsize=(5.2, 4.6), layout='constrained')
     axes = figure.add_subplot()
     axes.plot(levels, levels, color=GREY, lw=1, ls='--', label='exact')
     styles = ('-', '--', ':', '-.')
-    for j, name in enumerate(engine.robot.joint_names):
-        central = np.abs(2.0 * pit(measured[:, j], mean[:, j], variance[:, j]) - 1.0)
-        share = (central[:, None] <= levels).mean(axis=0)
+    for j, (name, share) in enumerate(shares_inside(engine, history, levels).items()):
         axes.plot(levels, share, lw=1.8, ls=styles[j % 4], label=name)
     axes.set(
         xlabel='stated level of the interval',
@@ -125,6 +121,17 @@ def draw_calibration(engine: Engine, history: History) -> Figure:
     )
     axes.legend(loc='upper left', fontsize='small')
     return figure
+
+
+def shares_inside(engine: Engine, history: History, levels: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the share of measurements inside central intervals of these levels, by joint."""
+    keep = history.scored()
+    measured, mean, variance = (x[keep] for x in history.channel(engine.robot.target))
+    shares = {}
+    for j, name in enumerate(engine.robot.joint_names):
+        central = np.abs(2.0 * pit(measured[:, j], mean[:, j], variance[:, j]) - 1.0)
+        shares[name] = (central[:, None] <= levels).mean(axis=0)
+    return shares
 
 
 def _curves(
@@ -199,6 +206,11 @@ class History:
             np.array([v.mean for v in values]),
             np.array([v.variance for v in values]),
         )
+
+    def physics(self) -> np.ndarray:
+        """Return the target as the physics alone predicts it, (n, k); NaN where it does not."""
+        nothing = np.full(len(self.estimates[0].names), np.nan)
+        return np.array([nothing if e.physics is None else e.physics for e in self.estimates])
 
     def scored(self) -> np.ndarray:
         """Which estimates entered the scores, (n,) of bool."""

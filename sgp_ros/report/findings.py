@@ -183,6 +183,7 @@ def _parameters(found: Identification) -> list[dict[str, Any]]:
         is_known = found.excitation.status[i] == IDENTIFIABLE and bool(physics.is_identifiable[i])
         row: dict[str, Any] = {
             'name': c.name,
+            'meaning': c.meaning,
             'joint': c.joint,
             'value': float(physics.mean[i]),
             'std': float(physics.std[i]) if is_known else None,

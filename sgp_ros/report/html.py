@@ -1,18 +1,19 @@
-"""One self-contained page about a run, opening with the finding in a sentence."""
+"""The page of a run through the online engine, opening with the finding in a sentence."""
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
 from sgp_ros.engine.engine import Engine
 from sgp_ros.gp.scores import INTERVAL_95
+from sgp_ros.report.charts import Chart
 from sgp_ros.report.figures import History, draw_all, png
 from sgp_ros.report.files import write_bytes, write_text
+from sgp_ros.report.next_steps import Steps
+from sgp_ros.report.page import render_page
+from sgp_ros.report.run_charts import run_charts
 
 MEANINGS = {
     'late': 'older than a state that was already used',
@@ -35,6 +36,7 @@ def write_report(
     *,
     truth: Mapping[str, float] | None = None,
     checks: Sequence[str] = (),
+    steps: Steps = (),
 ) -> list[Path]:
     """Write `report.html` and the figures as PNG into `out`; return their paths.
 
@@ -45,13 +47,15 @@ def write_report(
         metrics: as `collect_metrics` gives them.
         truth: true values of parameters by name, where known.
         checks: sentences to stand below the verdict.
+        steps: what to do next.
     """
     figures = {name: png(figure) for name, figure in draw_all(engine, history, truth).items()}
     paths = []
     for name, content in figures.items():
         paths.append(out / f'{name}.png')
         write_bytes(paths[-1], content)
-    page = render(engine, metrics, figures, truth or {}, checks)
+    charts = run_charts(engine, history, truth or {})
+    page = render(engine, metrics, charts, figures, truth or {}, checks, steps)
     paths.append(out / 'report.html')
     write_text(paths[-1], page)
     return paths
@@ -60,28 +64,28 @@ def write_report(
 def render(
     engine: Engine,
     metrics: Mapping[str, Any],
+    charts: Mapping[str, Chart],
     figures: Mapping[str, bytes],
     truth: Mapping[str, float],
     checks: Sequence[str],
+    steps: Steps = (),
 ) -> str:
     """Return the page as HTML; every text in it is escaped."""
-    environment = Environment(
-        loader=PackageLoader('sgp_ros.report'), autoescape=True, undefined=StrictUndefined
-    )
     samples = metrics['samples']
     timing = metrics['timing']
-    return environment.get_template('report.html').render(
+    return render_page(
+        'run.html', charts, figures,
         title=f'{metrics["robot"]} identified from {metrics["recording"]}',
         subtitle=engine.robot.description,
         verdict=verdict(metrics),
         checks=list(checks),
-        predictions=embedded(figures, ('acceleration_', 'effort_')),
+        cards=_cards(metrics),
+        predictions=[name for name in charts if name.startswith(('acceleration ', 'effort '))],
+        parameter_charts=[name for name in charts if name.startswith('parameter ')],
         scores=_scores(metrics),
         parameters=[_parameter_row(p, metrics, truth) for p in metrics['parameters']],
         parameter_note=_parameter_note(metrics),
-        parameter_figures=embedded(figures, ('parameters',)),
         has_truth=bool(truth),
-        calibration=embedded(figures, ('calibration',)),
         counts=(
             f'{samples["read"]} states read, {samples["used"]} used; '
             f'{metrics["commands"]["read"]} commands read, '
@@ -101,8 +105,23 @@ def render(
             f'{timing["realtime_factor"]:.3g} times faster than the robot.'
         ),
         settings=sorted(metrics['settings'].items()),
+        next_steps=list(steps),
         versions=list(metrics['versions'].items()),
-    )
+    )  # fmt: skip
+
+
+def _cards(metrics: Mapping[str, Any]) -> list[dict[str, str]]:
+    """Return for each joint the error of SGP beside that of the physics alone."""
+    cards = []
+    for joint, channels in metrics['joints'].items():
+        for channel, score in channels.items():
+            alone = metrics['physics_alone'].get(joint, {}).get(channel)
+            if alone is not None:
+                cards.append({
+                    'value': f'{alone["nmse"]:.2g} -> {score["nmse"]:.2g}',
+                    'label': f'nMSE of the {channel} of {joint}: physics alone -> SGP',
+                })  # fmt: skip
+    return cards
 
 
 def verdict(metrics: Mapping[str, Any]) -> str:
@@ -146,6 +165,7 @@ def _parameter_row(
     alone = {p['name']: p['value'] for p in metrics['physics_parameters']}
     row = {
         'name': name,
+        'meaning': parameter['meaning'],
         'joint': parameter['joint'] or '',
         'unit': parameter['unit'],
         'known': parameter['identifiable'],
@@ -176,15 +196,3 @@ def _parameter_note(metrics: Mapping[str, Any]) -> str:
         'of the physics without Z to the same samples: where the two differ by more than the '
         'interval, physics is missing or Z can imitate a column.'
     )
-
-
-def embedded(figures: Mapping[str, bytes], prefixes: tuple[str, ...]) -> list[dict[str, str]]:
-    """Return those PNG figures whose names begin with one of `prefixes` as data for a page."""
-    return [
-        {
-            'alt': name.replace('_', ' of ', 1),
-            'data': 'data:image/png;base64,' + base64.b64encode(content).decode(),
-        }
-        for name, content in figures.items()
-        if name.startswith(prefixes)
-    ]

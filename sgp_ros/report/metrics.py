@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
@@ -48,6 +48,7 @@ def collect_metrics(
     """Return the metrics of a finished run; a quantity the robot does not have is absent."""
     counts = engine.counts
     baseline = engine.baseline_scores()
+    meanings = {c.name: c.meaning for c in engine.robot.coefficients}
     return {
         'schema': SCHEMA,
         'robot': engine.robot.name,
@@ -64,15 +65,15 @@ def collect_metrics(
             if channels
         },
         'process_weight': _weights(engine),
-        'parameters': [_parameter(p) for p in engine.parameters()],
-        'physics_parameters': [_parameter(p) for p in engine.physics_parameters()],
+        'parameters': [_parameter(p, meanings) for p in engine.parameters()],
+        'physics_parameters': [_parameter(p, meanings) for p in engine.physics_parameters()],
         **_learning(counts),
         'timing': _timing(timing),
         'delay_s': engine.delay_s,
         'settings': {k: _plain(v) for k, v in engine.config.to_mapping().items()},
         'versions': versions(),
         'remarks': list(remarks),
-    }
+    }  # fmt: skip
 
 
 def model_remarks(engine: Engine, asked: EngineConfig) -> list[str]:
@@ -195,9 +196,10 @@ def _score(score: Score) -> dict[str, float]:
     return asdict(score)
 
 
-def _parameter(parameter: ParameterEstimate) -> dict[str, Any]:
+def _parameter(parameter: ParameterEstimate, meanings: Mapping[str, str]) -> dict[str, Any]:
     return {
         'name': parameter.name,
+        'meaning': meanings.get(parameter.name, ''),
         'joint': parameter.joint,
         'value': parameter.value,
         'std': parameter.std,

@@ -9,7 +9,7 @@
     constants: {g: 9.81}        # numbers, or formulas of those before
     coefficients:               # one column of f(u) each: its formula in the equation of a joint
       J: {unit: kg m^2, columns: {hinge: 'ddq[hinge]'}, value: 0.15}
-      G: {unit: N m, columns: {hinge: 'sin(q[hinge])'}, value: 0.3 * g}
+      G: {unit: N m, columns: {hinge: 'sin(q[hinge])'}, value: 0.3 * g, meaning: gravity}
     residual_inputs: own        # what Z sees
     bodies:                     # the simplest that have these coefficients
       derived: {mass: 4 * (G / g) ** 2 / (3 * J)}
@@ -40,7 +40,7 @@ LUMPED_KEYS = frozenset({
     'schema', 'name', 'description', 'source', 'target', 'joints', 'constants', 'coefficients',
     'residual_inputs', 'bodies', 'parameters',
 })  # fmt: skip
-_COLUMN_KEYS = {'unit', 'columns', 'value', 'source'}
+_COLUMN_KEYS = {'unit', 'columns', 'value', 'source', 'meaning'}
 _INPUT_OF = {'acceleration': 'tau', 'effort': 'ddq'}
 """By target, the driven signal that its columns may hold."""
 
@@ -152,7 +152,10 @@ def _term(name: str, entries: Entries, joints: Sequence[Joint], target: str, sou
         elif column is not None:
             columns.append((names.index(joint), column))
     own = names[columns[0][0]] if len(columns) == 1 else None
-    coefficient = Coefficient(name, entries.text('unit', ''), own)
+    meaning = entries.text('meaning', name)
+    coefficient = Coefficient(
+        name, entries.text('unit', ''), own, meaning='' if meaning == name else meaning
+    )
     return Term((coefficient,), _block(columns), entries.text('source', source))
 
 

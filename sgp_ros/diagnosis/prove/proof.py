@@ -29,6 +29,7 @@ from sgp_ros.diagnosis.compare.trajectory import (
 from sgp_ros.diagnosis.prove.prediction import FinalModel, accelerations
 from sgp_ros.diagnosis.prove.rollouts import cut, roll_out
 from sgp_ros.diagnosis.result import Proof
+from sgp_ros.diagnosis.shown import Rollouts
 from sgp_ros.errors import RecordingError
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -96,10 +97,13 @@ class _Scores:
     joints: tuple[str, ...]
     values: dict[str, dict[str, float]] = field(default_factory=dict)
     intervals: dict[str, dict[str, Interval]] = field(default_factory=dict)
+    yardsticks: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def add(self, name: str, squared: np.ndarray, yardstick: np.ndarray) -> None:
         """Take squared errors (n, k) and what they are measured by (n, k)."""
         self.values[name], self.intervals[name] = {}, {}
+        scale = np.sqrt(yardstick.mean(axis=0)).tolist()
+        self.yardsticks[name.rpartition('_')[0]] = dict(zip(self.joints, scale, strict=True))
         for j, joint in enumerate(self.joints):
             x, y = squared[:, j], yardstick[:, j]
             self.values[name][joint] = _ratio(float(x.mean()), float(y.mean()))
@@ -165,7 +169,9 @@ def prove(final: FinalModel, raw: RawTrajectory, tree: Tree, name: str) -> Proof
         )
     scores = _Scores(tree.moving_names)
     densities = _one_step(final, motion, low, resting(raw, motion, bandwidth), scores)
-    counts = _rolled_out(final, motion, ZeroPhase(rate, bandwidth.state_cutoff).trim, scores)
+    motions, counts = _rolled_out(
+        final, motion, ZeroPhase(rate, bandwidth.state_cutoff).trim, scores
+    )
     values = scores.values
     return Proof(
         values['nmse_before'], values['nmse_after'],
@@ -173,7 +179,7 @@ def prove(final: FinalModel, raw: RawTrajectory, tree: Tree, name: str) -> Proof
         float(densities[0].mean()), float(densities[1].mean()),
         values.get('rollout_nmse_before', {}), values.get('rollout_nmse_after', {}),
         scores.intervals, (mean_interval(densities[0]), mean_interval(densities[1])),
-        *counts, _distance(final.equations.motion, motion),
+        *counts, _distance(final.equations.motion, motion), scores.yardsticks, motions,
     )  # fmt: skip
 
 
@@ -208,21 +214,24 @@ def _one_step(
 
 def _rolled_out(
     final: FinalModel, motion: ObservedMotion, trim: int, scores: _Scores
-) -> tuple[int, int]:
-    """Score the roll-outs that both models finish; return all windows, and the others."""
+) -> tuple[Rollouts | None, tuple[int, int]]:
+    """Score the roll-outs that both models finish; return these, all windows, and the others."""
     if motion.is_static:
-        return 0, 0
+        return None, (0, 0)
     windows = cut(motion, trim)
     if not len(windows.first):
-        return 0, 0
+        return None, (0, 0)
     before, ends_before = roll_out(windows, final.nominal, final.equations)
     after, ends_after = roll_out(windows, final.model, final.equations, final.remainders)
     both = ends_before & ends_after
-    if both.any():
-        held = windows.held[both]
-        scores.add('rollout_nmse_before', windows.squared(before)[both], held)
-        scores.add('rollout_nmse_after', windows.squared(after)[both], held)
-    return len(both), int((~both).sum())
+    counts = len(both), int((~both).sum())
+    if not both.any():
+        return None, counts
+    steps, held = windows.steps, windows.held[both]
+    scores.add('rollout_nmse_before', windows.squared(before)[both] / steps, held / steps)
+    scores.add('rollout_nmse_after', windows.squared(after)[both] / steps, held / steps)
+    rows = windows.nodes[both]
+    return Rollouts(motion.time[rows], motion.position[rows], before[both], after[both]), counts
 
 
 def _distance(learned: ObservedMotion, motion: ObservedMotion) -> float:

@@ -1,0 +1,179 @@
+// Draws the charts of the page from the data beside them. No request leaves the page.
+'use strict';
+(() => {
+  const root = document.documentElement;
+  root.classList.add('scripted');
+  const data = JSON.parse(document.getElementById('chart-data').textContent);
+  const tone = name => getComputedStyle(root).getPropertyValue('--' + name).trim();
+  const groups = {};       // charts that share cursor and zoom
+  const drawn = new Map(); // figure -> chart
+  const dash = { dashed: [7, 4] };
+  const width = { thick: 4, dashed: 1.8, line: 1.5, points: 0 };
+
+  const number = x => x == null ? '–' : Number(x.toPrecision(4)).toString();
+  const axis = label => ({
+    label, labelSize: 20, size: 46, stroke: tone('ink'), labelFont: '12px system-ui',
+    font: '12px system-ui', grid: { stroke: tone('grid'), width: 1 }, ticks: { stroke: tone('grid') },
+  });
+
+  function marked(u, spans) {
+    if (!spans.length) return;
+    const { ctx, bbox } = u;
+    ctx.save();
+    ctx.fillStyle = tone('span');
+    for (const [lo, hi] of spans) {
+      const a = Math.max(u.valToPos(lo, 'x', true), bbox.left);
+      const b = Math.min(u.valToPos(hi, 'x', true), bbox.left + bbox.width);
+      if (b > a) ctx.fillRect(a, bbox.top, b - a, bbox.height);
+    }
+    ctx.restore();
+  }
+
+  function bounds(u, spans) {
+    const { ctx, bbox } = u;
+    ctx.save();
+    ctx.strokeStyle = tone('ink');
+    ctx.setLineDash([5, 4]);
+    for (const x of spans.flat()) {
+      const at = u.valToPos(x, 'x', true);
+      if (at < bbox.left || at > bbox.left + bbox.width) continue;
+      ctx.beginPath(); ctx.moveTo(at, bbox.top); ctx.lineTo(at, bbox.top + bbox.height); ctx.stroke();
+    }
+    ctx.restore();
+  }
+
+  const rgb = text => text.match(/[0-9a-f]{2}/gi).map(x => parseInt(x, 16));
+  function mixed(value, reach) { // blue below zero, the page at zero, orange above
+    const share = Math.max(-1, Math.min(1, value / reach));
+    const [from, to] = [rgb(tone('zero')), rgb(tone(share < 0 ? 'below' : 'above'))];
+    return 'rgb(' + from.map((x, i) => Math.round(x + (to[i] - x) * Math.abs(share))) + ')';
+  }
+
+  function cells(u, c) {
+    const { ctx, bbox } = u;
+    ctx.save();
+    ctx.fillStyle = tone('unseen');
+    ctx.fillRect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
+    const px = c.x.map(x => Math.round(u.valToPos(x, 'x', true)));
+    const py = c.y.map(y => Math.round(u.valToPos(y, 'y', true)));
+    c.values.forEach((column, i) => column.forEach((value, j) => {
+      if (value == null) return;
+      ctx.fillStyle = mixed(value, c.reach);
+      ctx.fillRect(px[i], py[j + 1], px[i + 1] - px[i], py[j] - py[j + 1]);
+    }));
+    ctx.restore();
+  }
+
+  function options(chart, at) {
+    const series = [{ label: chart.x_label.replace(/ \[.*/, ''), value: (u, x) => number(x) }];
+    const values = [chart.x], bands = [];
+    for (const s of chart.series) {
+      const colour = tone(s.tone);
+      if (s.low) {
+        values.push(s.low, s.high);
+        const hidden = { stroke: 'transparent', points: { show: false }, class: 'hidden' };
+        series.push({ ...hidden }, { ...hidden });
+        bands.push({ series: [series.length - 1, series.length - 2], fill: colour + '38' });
+      }
+      values.push(s.y);
+      const cloud = s.style === 'points';
+      series.push({
+        label: s.label, stroke: colour, width: width[s.style], dash: dash[s.style],
+        paths: cloud ? () => null : undefined, value: (u, y) => number(y),
+        points: { show: cloud, size: s.tone === 'measured' ? 6 : 3.5, fill: colour, stroke: colour },
+      });
+    }
+    const scales = { x: { time: false } };
+    if (chart.limit) scales.y = { range: chart.limit };
+    const c = chart.cells;
+    if (c) {
+      scales.x.range = [c.x[0], c.x[c.x.length - 1]];
+      scales.y = { range: [c.y[0], c.y[c.y.length - 1]] };
+      values[0] = [c.x[0], c.x[c.x.length - 1]];
+      values.push([null, null]);
+      series.push({ show: true, class: 'hidden' });
+    }
+    return [values, {
+      width: at.clientWidth, height: Math.round(Math.max(230, Math.min(320, at.clientWidth * 0.42))),
+      scales, series, bands,
+      axes: [axis(chart.x_label), { ...axis(chart.y_label), size: 58 }],
+      cursor: {
+        drag: { x: true, y: false, uni: 10 },
+        ...(chart.group ? { sync: { key: chart.group, setSeries: false } } : {}),
+      },
+      legend: { show: !c },
+      hooks: {
+        drawClear: [u => c ? cells(u, c) : marked(u, chart.spans)],
+        draw: [u => bounds(u, chart.spans)],
+        setScale: [(u, key) => { if (key === 'x' && chart.group) follow(u, chart.group); }],
+      },
+    }];
+  }
+
+  let following = false;
+  function follow(u, group) { // the others show the same stretch of time
+    if (following) return;
+    following = true;
+    const { min, max } = u.scales.x;
+    for (const other of groups[group] || []) if (other !== u) other.setScale('x', { min, max });
+    following = false;
+  }
+
+  function moved(u, kind) {
+    const x = u.data[0], whole = [x[0], x[x.length - 1]];
+    let { min, max } = u.scales.x;
+    const span = max - min, centre = 0.5 * (min + max);
+    if (kind === 'whole') [min, max] = whole;
+    if (kind === 'in') [min, max] = [centre - span / 4, centre + span / 4];
+    if (kind === 'out') [min, max] = [centre - span, centre + span];
+    if (kind === 'left' || kind === 'right') {
+      const step = (kind === 'left' ? -0.4 : 0.4) * span;
+      [min, max] = [min + step, max + step];
+    }
+    u.setScale('x', { min: Math.max(min, whole[0]), max: Math.min(max, whole[1]) });
+  }
+
+  function build(figure) {
+    const chart = data[figure.dataset.chart], at = figure.querySelector('.plot');
+    const [values, wanted] = options(chart, at);
+    const u = new uPlot(wanted, values, at);
+    u.root.chart = u;
+    if (chart.group) (groups[chart.group] ||= []).push(u);
+    drawn.set(figure, u);
+    if (chart.view) u.setScale('x', { min: chart.view[0], max: chart.view[1] });
+    figure.querySelectorAll('button[data-zoom]').forEach(button => {
+      button.onclick = () => moved(drawn.get(figure), button.dataset.zoom);
+    });
+  }
+
+  const figures = [...document.querySelectorAll('figure[data-chart]')];
+  function draw() {
+    for (const u of drawn.values()) u.destroy();
+    drawn.clear();
+    for (const key in groups) groups[key].length = 0;
+    figures.forEach(build);
+  }
+  draw();
+  new ResizeObserver(() => {
+    for (const [figure, u] of drawn) {
+      const wide = figure.querySelector('.plot').clientWidth;
+      if (wide && wide !== u.width) u.setSize({ width: wide, height: u.height });
+    }
+  }).observe(document.body);
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', draw);
+  document.addEventListener('toggle', e => { if (e.target.open) draw(); }, true);
+
+  document.querySelectorAll('pre.command').forEach(block => {
+    const button = document.createElement('button');
+    button.textContent = 'copy';
+    button.onclick = () => {
+      const range = document.createRange();
+      range.selectNodeContents(block.querySelector('code'));
+      getSelection().removeAllRanges();
+      getSelection().addRange(range);
+      button.textContent = document.execCommand('copy') ? 'copied' : 'selected';
+    };
+    block.append(button);
+  });
+})();

@@ -1,0 +1,82 @@
+"""What to do after a command: a sentence and the command to copy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from shlex import quote
+
+from sgp_ros.diagnosis.result import Diagnosis
+
+Steps = Sequence[tuple[str, str]]
+_OTHER = 'OTHER.mcap'
+"""Stands for a recording of the reader."""
+
+
+def after_diagnosis(found: Diagnosis, bag: str, robot: str, out: Path) -> Steps:
+    """Return what to do with a diagnosis.
+
+    Args:
+        found: the diagnosis.
+        bag: as it was given.
+        robot: likewise.
+        out: folder of the results.
+    """
+    diagnosed = _path(out / 'robot_diagnosed.yaml')
+    again = f'sgp diagnose {quote(bag)} --robot {quote(robot)} --out {_path(out)}'
+    if found.setup:
+        return [('Mend how the robot is connected or described, record, and look again:', again)]
+    if found.verdict == 'no_mismatch':
+        other = f'sgp diagnose {_OTHER} --robot {quote(robot)}'
+        return [('Nothing needs mending here. Try a motion that shows more:', other)]
+    if found.verdict == 'unexplained':
+        learn = f'sgp replay {quote(bag)} --robot {diagnosed}'
+        return [('Let a Gaussian process learn what has no name:', learn)]
+    return [
+        ('Check the corrected robot on another recording:',
+         f'sgp replay {_OTHER} --robot {diagnosed}'),
+        ('Simulate the corrected robot:', f'sgp simulate {diagnosed}'),
+    ]  # fmt: skip
+
+
+def after_identification(robot: str, out: Path, *, has_bodies: bool) -> Steps:
+    """Return what to do with an identified robot.
+
+    Args:
+        robot: as it was given.
+        out: folder of the results.
+        has_bodies: whether the robot has nominal bodies, which a diagnosis needs.
+    """
+    identified = _path(out / 'robot_identified.yaml')
+    steps = [('Use the identified robot on another recording:',
+              f'sgp replay {_OTHER} --robot {identified}')]  # fmt: skip
+    if has_bodies:
+        steps.append(('Ask what physics the model lacks:',
+                      f'sgp diagnose {_OTHER} --robot {quote(robot)}'))  # fmt: skip
+    return steps
+
+
+def after_replay(out: Path) -> Steps:
+    """Return what to do with a model that was learned online."""
+    robot, model = _path(out / 'robot_identified.yaml'), _path(out / 'model.npz')
+    command = f'sgp replay {_OTHER} --robot {robot} --model {model}'
+    return [('Continue from what was learned, on another recording:', command)]
+
+
+def after_demo(bag: Path) -> Steps:
+    """Return what to do after the demonstration."""
+    return [
+        ('Ask what the model lacked: the friction of the wheel is to be found:',
+         f'sgp diagnose {_path(bag)} --robot reaction_wheel_6'),
+        ('Use a recording of your own robot:', f'sgp identify {_OTHER} --robot ROBOT.urdf'),
+    ]  # fmt: skip
+
+
+def ending(out: Path, steps: Steps) -> str:
+    """Return the last lines of a command: where its page is, and what to do next."""
+    lines = [f'report: {out / "report.html"}', *(f'next: {said}\n  {x}' for said, x in steps)]
+    return '\n'.join(lines)
+
+
+def _path(path: Path) -> str:
+    return quote(str(path))

@@ -1,0 +1,58 @@
+"""Pages in one file: text, styles, charts as data, and the script that draws them.
+
+A page opens from disk and asks nobody for anything. Without scripts, and on paper, the same
+figures stand there as pictures.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from importlib.resources import files
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from sgp_ros.report.charts import THINNED, Chart, embedded_data
+
+_ASSETS = 'assets'
+
+
+def render_page(
+    template: str, charts: Mapping[str, Chart], figures: Mapping[str, bytes], **values: Any
+) -> str:
+    """Return a page as HTML; every text in it is escaped.
+
+    Args:
+        template: its name.
+        charts: by the names that the template asks for.
+        figures: PNG by stem, for print and for readers without scripts.
+        values: what else the template asks for.
+    """
+    environment = Environment(
+        loader=PackageLoader('sgp_ros.report'), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    environment.filters['typeset'] = typeset
+    return environment.get_template(template).render(
+        charts=charts,
+        chart_data=Markup(embedded_data(charts)),  # noqa: S704 - JSON without any <
+        figures={
+            name: 'data:image/png;base64,' + base64.b64encode(content).decode()
+            for name, content in figures.items()
+        },
+        thinned=THINNED,
+        styles=Markup(_asset('uPlot.min.css') + _asset('report.css')),  # noqa: S704 - our own
+        scripts=Markup(_asset('uPlot.iife.min.js') + _asset('report.js')),  # noqa: S704 - as above
+        **values,
+    )
+
+
+def typeset(text: str) -> str:
+    """Return text with the signs that a terminal may lack."""
+    return text.replace('+-', '±').replace(' -> ', ' → ')
+
+
+def _asset(name: str) -> str:
+    return (files('sgp_ros.report') / _ASSETS / name).read_text(encoding='utf-8')
