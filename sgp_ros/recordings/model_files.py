@@ -19,8 +19,8 @@ from sgp_ros.errors import ConfigError
 
 NODE_ONLY = frozenset({
     'command.type', 'diagnosis.window', 'diagnostics.period', 'joints', 'model.path',
-    'parameters.period', 'qos.depth', 'record.path', 'robot', 'robot_description', 'save.path',
-    'start_type_description_service', 'use_sim_time',
+    'monitor.duration', 'monitor.false_alarms', 'parameters.period', 'qos.depth', 'record.path',
+    'robot', 'robot_description', 'save.path', 'start_type_description_service', 'use_sim_time',
 })  # fmt: skip
 """Parameters of the node that mean nothing to a command; a test holds them to the node's."""
 

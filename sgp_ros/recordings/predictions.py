@@ -15,6 +15,8 @@ from sgp_ros.recordings.messages import Point
 from sgp_ros.recordings.writer import RecordingWriter
 
 _NONE = np.zeros(0)
+INTERVAL_95 = 1.959963984540054
+"""Half width of the central 95 % interval of a standard normal variable."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +31,8 @@ class Outputs:
             velocities.
         raw_variance: the same as the model states them.
         joint_state: measured state with the predicted effort.
+        residual: measured less predicted effort; None where no effort is predicted.
+        band: lower and upper ends of the calibrated 95 % interval of the effort; None likewise.
     """
 
     stamp_ns: int
@@ -37,6 +41,8 @@ class Outputs:
     variance: Point
     raw_variance: Point
     joint_state: JointSample
+    residual: JointSample | None = None
+    band: tuple[JointSample, JointSample] | None = None
 
 
 def outputs(estimate: Estimate) -> Outputs | None:
@@ -57,7 +63,23 @@ def outputs(estimate: Estimate) -> Outputs | None:
         JointSample(
             estimate.stamp_ns, estimate.names, *state, effort[0] if len(effort[0]) else None
         ),
+        *_error(estimate),
     )
+
+
+def _error(
+    estimate: Estimate,
+) -> tuple[JointSample | None, tuple[JointSample, JointSample] | None]:
+    """Return residual and band of the effort; NaN where there is none of a joint."""
+    effort = estimate.effort
+    if np.all(np.isnan(effort.mean)):
+        return None, None
+    half = INTERVAL_95 * np.sqrt(effort.variance)
+    residual, low, high = (
+        JointSample(estimate.stamp_ns, estimate.names, _NONE, effort=values)
+        for values in (effort.measured - effort.mean, effort.mean - half, effort.mean + half)
+    )
+    return residual, (low, high)
 
 
 @dataclass(frozen=True, slots=True)

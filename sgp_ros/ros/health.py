@@ -1,30 +1,37 @@
-"""Statuses of /diagnostics from what the engine counts, and of ~/parameters from what it found."""
+"""Statuses of /diagnostics on what arrives, how long it takes, and the state of the model."""
 
 from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitResult
-from sgp_ros.engine.results import Counts, Estimate, ParameterEstimate
+from sgp_ros.engine.joint_merging import JointMerger
+from sgp_ros.engine.results import Counts
+from sgp_ros.engine.samples import JointSample
 from sgp_ros.errors import MessageError
+from sgp_ros.recordings.command_types import FLOAT64_ARRAY
 from sgp_ros.recordings.messages import Status
-from sgp_ros.ros.verdict import OK, WARN, Arrivals, judge
+from sgp_ros.ros.verdict import ERROR, OK, Arrivals, judge
 
 _DURATIONS = 2000
-_MEMORY = 100
-_SURPRISING = 4.0
+_LONGEST_DELAY_S = 60.0
 
 
 class Health:
     """What happened since the node started, as far as the engine does not know it.
 
+    Args:
+        merger: of the joint states, which counts what came and what is missing.
+        command_type: as the setting `command.type`.
+
     Attributes:
         seen_joints: names in the last joint states.
+        without_effort: joints of the robot without a finite effort in the last state.
         last_fit: one sentence on the last fit of hyper-parameters.
         fit_since_s: when the fit that runs was handed out, on a steady clock [s]; None without.
         record_problem: why the record stopped; empty while all is well.
@@ -32,21 +39,40 @@ class Health:
             event, for the log.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, merger: JointMerger, command_type: str = FLOAT64_ARRAY) -> None:
+        self._merger = merger
+        self._command_type = command_type
+        self.without_effort: tuple[str, ...] = ()
         self.seen_joints: tuple[str, ...] = ()
         self.last_fit = 'none yet'
         self.fit_since_s: float | None = None
         self.record_problem = ''
         self.failures, self.first_failure = 0, ''
         self._durations_s: deque[float] = deque(maxlen=_DURATIONS)
+        self._delays_s: deque[float] = deque(maxlen=_DURATIONS)
         self._unreadable = 0
         self._unreadable_reason = ''
-        self._surprise: np.ndarray | None = None
         self._before: dict[str, int] = {}
+
+    def note_joints(self, sample: JointSample) -> None:
+        """Note what a message named, and which of its joints had no effort."""
+        self.seen_joints = sample.names
+        if sample.effort is None:
+            self.without_effort = sample.names
+        elif np.isnan(sample.effort).any():
+            is_unknown = np.isnan(sample.effort)
+            self.without_effort = tuple(np.array(sample.names)[is_unknown].tolist())
+        else:
+            self.without_effort = ()
 
     def note_push(self, duration_s: float) -> None:
         """Note how long the engine took for one event [s]."""
         self._durations_s.append(duration_s)
+
+    def note_delay(self, delay_s: float) -> None:
+        """Note the time from the stamp of a state to the publication of its prediction [s]."""
+        if abs(delay_s) < _LONGEST_DELAY_S:  # else the stamps are of another clock
+            self._delays_s.append(delay_s)
 
     def note_fit(self, fit: FitResult, refusal: str) -> None:
         """Note what a fit found, and why it was refused, empty if it was not."""
@@ -73,17 +99,12 @@ class Health:
         self._unreadable += 1
         self._unreadable_reason = str(error)
 
-    def note_estimates(self, estimates: Iterable[Estimate], target: str) -> None:
-        """Follow the squared error over its predicted variance: 1 while the model holds."""
-        for estimate in estimates:
-            if estimate.is_scored:
-                channel = getattr(estimate, target)
-                ratio = (channel.measured - channel.mean) ** 2 / channel.raw_variance
-                before = ratio if self._surprise is None else self._surprise
-                self._surprise = before + (ratio - before) / _MEMORY
-
     def statuses(
-        self, engine: Engine, node: str, elapsed_s: float, sources: Mapping[str, tuple[str, int]]
+        self,
+        engine: Engine,
+        node: str,
+        elapsed_s: float,
+        sources: Mapping[str, tuple[str, tuple[str, ...]]],
     ) -> list[Status]:
         """Return the statuses since the last call.
 
@@ -91,35 +112,44 @@ class Health:
             engine: whose counts and scores are told.
             node: name of the node, the prefix of every status.
             elapsed_s: since the last call [s].
-            sources: full topic name and number of publishers of joint_states and command.
+            sources: full topic name and names of the publishers of joint_states and command.
         """
         arrivals = self._arrivals(engine, sources)
         level, message = judge(arrivals)
         parts = [('samples', level, message, self._samples(engine.counts, arrivals, elapsed_s))]
-        parts.append(('timing', OK, 'time the engine takes per message', self._timing()))
+        parts.append(('timing', OK, *self._timing(engine)))
         parts.append(self._model(engine))
-        parts += [self._fit(engine, j, name) for j, name in enumerate(engine.robot.joint_names)]
         if self.failures:
             text = f'{self.failures} internal errors, the first: {self.first_failure}'
-            parts.append(('errors', WARN + 1, text, {'count': str(self.failures)}))
+            parts.append(('errors', ERROR, text, {'count': str(self.failures)}))
         if self.record_problem:
-            parts.append(('record', WARN + 1, self.record_problem, {}))
+            parts.append(('record', ERROR, self.record_problem, {}))
         return [
             Status(f'{node}: {name}', level, message, engine.robot.name, values)
             for name, level, message, values in parts
         ]
 
-    def _arrivals(self, engine: Engine, sources: Mapping[str, tuple[str, int]]) -> Arrivals:
-        now = _flat(engine.counts, self._unreadable)
+    def _arrivals(
+        self, engine: Engine, sources: Mapping[str, tuple[str, tuple[str, ...]]]
+    ) -> Arrivals:
+        now = self._totals(engine.counts)
+        publishers = sources['joint_states'][1]
+        self._merger.looks_for_returns = len(publishers) > 1
         new = {name: max(n - self._before.get(name, 0), 0) for name, n in now.items()}
         self._before = now
         return Arrivals(
             joint_states=sources['joint_states'][0],
             command=sources['command'][0],
             robot_joints=engine.robot.joint_names,
-            publishers=sources['joint_states'][1],
-            command_publishers=sources['command'][1],
+            publishers=publishers,
+            command_publishers=len(sources['command'][1]),
+            command_type=self._command_type,
             seen_joints=self.seen_joints,
+            without_effort=self.without_effort,
+            missing_joints=self._merger.missing,
+            shared_joints=self._merger.shared if len(publishers) > 1 else (),
+            received=new['messages'],
+            lost=new['lost'],
             read=new['read'],
             estimated=new['estimated'],
             refused=_under('refused.', new),
@@ -131,19 +161,37 @@ class Health:
 
     def _samples(self, counts: Counts, arrivals: Arrivals, elapsed_s: float) -> dict[str, str]:
         rate = arrivals.read / elapsed_s if elapsed_s > 0.0 else 0.0
-        totals = {name: str(n) for name, n in _flat(counts, self._unreadable).items()}
+        totals = {name: str(n) for name, n in self._totals(counts).items()}
         return {'rate_hz': f'{rate:.2f}', 'used': str(counts.used), **totals}
 
-    def _timing(self) -> dict[str, str]:
-        if not self._durations_s:
-            return {}
-        ms = 1e3 * np.array(self._durations_s)
-        p50, p99 = np.percentile(ms, (50, 99))
+    def _totals(self, counts: Counts) -> dict[str, int]:
+        merger = self._merger
+        received = sum(source.received for source in merger.sources.values()) + merger.foreign
         return {
-            'push_ms_p50': f'{p50:.4f}',
-            'push_ms_p99': f'{p99:.4f}',
-            'push_ms_max': f'{ms.max():.4f}',
+            **_flat(counts, self._unreadable),
+            'messages': received,
+            'lost': merger.lost,
+            'of_other_joints': merger.foreign,
+            'unmatched': merger.unmatched,
         }
+
+    def _timing(self, engine: Engine) -> tuple[str, dict[str, str]]:
+        """Return what the settings make a prediction wait, and what was measured."""
+        chosen_s = engine.config.reorder_window + engine.delay_s
+        values = {'delay_s_chosen': f'{chosen_s:.4f}'}
+        for name, times_s, unit in (
+            ('push_ms', self._durations_s, 1e3), ('delay_s', self._delays_s, 1.0),
+        ):  # fmt: skip
+            if times_s:
+                times = unit * np.array(times_s)
+                p50, p99 = np.percentile(times, (50, 99))
+                values |= {f'{name}_p50': f'{p50:.4f}', f'{name}_p99': f'{p99:.4f}'}
+                values[f'{name}_max'] = f'{times.max():.4f}'
+        message = (
+            f'predictions come {chosen_s:.3f} s after their stamps, by reorder_window and half of '
+            'filter.window, plus the computation'
+        )
+        return message, values
 
     def _model(self, engine: Engine) -> tuple[str, int, str, dict[str, str]]:
         config, counts, regression = engine.config, engine.counts, engine.estimator.regression
@@ -176,36 +224,6 @@ class Health:
             return 'none'
         return f'for {time.perf_counter() - self.fit_since_s:.1f} s'
 
-    def _fit(self, engine: Engine, j: int, joint: str) -> tuple[str, int, str, dict[str, str]]:
-        scores = engine.scores()[joint]
-        values = {
-            f'{channel}.{name}': f'{getattr(score, name):.6g}'
-            for channel, score in scores.items()
-            for name in ('nmse', 'nlpd', 'coverage95', 'raw_coverage95', 'n')
-        }
-        target = scores.get(engine.robot.target)
-        if target is None or self._surprise is None:
-            return f'fit {joint}', OK, 'nothing scored yet', values
-        surprise, drift = float(self._surprise[j]), engine.drift[j]
-        values['surprise'] = f'{surprise:.4f}'
-        values['drift'] = f'{drift.level:.4f}'
-        message = f'nMSE {target.nmse:.3g}, coverage {100 * target.coverage95:.1f} %'
-        weight = engine.process_weights().get(joint)
-        if weight is not None:
-            values['process_weight'] = f'{weight.value:.4f}'
-            if weight.value < 0.5:
-                message += (
-                    f'; Z errs more than the physics alone and has weight {weight.value:.2f}'
-                )
-        is_wrong = surprise > _SURPRISING
-        if is_wrong:
-            message += f'; recent squared errors are {surprise:.1f} times what the model expects'
-        if drift.is_drifting:
-            message += (
-                '; errors have grown beyond chance: the robot drifts or moves as never before'
-            )
-        return f'fit {joint}', WARN if is_wrong or drift.is_drifting else OK, message, values
-
 
 def _flat(counts: Counts, unreadable: int) -> dict[str, int]:
     names = ('read', 'estimated', 'learned', 'scored', 'unlearnable', 'commands_read',
@@ -221,23 +239,3 @@ def _flat(counts: Counts, unreadable: int) -> dict[str, int]:
 
 def _under(prefix: str, counts: Mapping[str, int]) -> dict[str, int]:
     return {n.removeprefix(prefix): count for n, count in counts.items() if n.startswith(prefix)}
-
-
-def parameter_statuses(engine: Engine) -> list[Status]:
-    """Return one status per identified coefficient, its numbers plain enough to be plotted."""
-    return [parameter_status(p, engine.robot.name) for p in engine.parameters()]
-
-
-def parameter_status(parameter: ParameterEstimate, robot: str) -> Status:
-    """Return the status of one coefficient of `robot`; no `std` where it is not identifiable."""
-    values = {'value': repr(parameter.value)}
-    if parameter.std is None:
-        message = 'not determined by the motion so far'
-    else:
-        values['std'] = repr(parameter.std)
-        message = f'{parameter.value:.6g} +- {1.96 * parameter.std:.2g} {parameter.unit} (95 %)'
-    values['unit'] = parameter.unit
-    values['identifiable'] = str(int(parameter.is_identifiable))
-    if parameter.joint is not None:
-        values['joint'] = parameter.joint
-    return Status(parameter.name, 0, message, robot, values)

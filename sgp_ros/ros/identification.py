@@ -7,17 +7,15 @@ beneath. Everything it makes on its node is gone after `close`.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.publisher import Publisher
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -26,31 +24,23 @@ from rclpy.qos import (
 )
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
-from trajectory_msgs.msg import JointTrajectory
 
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import ConfigError, MessageError, NumericalError
 from sgp_ros.recordings.command_types import COMMAND_TYPES, NO_COMMAND
-from sgp_ros.recordings.messages import (
-    diagnostics_message,
-    joint_sample,
-    joint_state_message,
-    trajectory_message,
-)
-from sgp_ros.recordings.predictions import Outputs, PredictionTopics
+from sgp_ros.recordings.messages import Status, joint_sample
 from sgp_ros.ros.diagnosing import Diagnosing, DiagnosisFailed
-from sgp_ros.ros.health import parameter_statuses
-from sgp_ros.ros.messages import message_class, new_message
+from sgp_ros.ros.messages import message_class
 from sgp_ros.ros.parameters import from_ros, to_ros
+from sgp_ros.ros.publishers import Publishers
 from sgp_ros.ros.services import Services
 from sgp_ros.ros.session import Record, Session, Topics
 from sgp_ros.ros.start import build_engine
-from sgp_ros.ros.verdict import ERROR, WARN
+from sgp_ros.ros.verdict import OK, WARN
 
 _POLL_S = 0.05
 _FLUSH_S = 1.0
-_QUIET_S = 5.0
+_QUIET_NS = 30 * 10**9
 
 
 class Identification:
@@ -73,10 +63,16 @@ class Identification:
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._reported = self._steady.now()
         self._has_told_failure = False
-        self._made: list[tuple[Callable[[Any], object], Any]] = []
+        self._logged: dict[str, tuple[int, int]] = {}
+        self._timers: list[Any] = []
         self._inputs: list[Any] = []
-        self._advertise()
-        self._session = Session(engine, self._open_record())
+        self._joint_states = node.resolve_topic_name('joint_states')
+        self._command = node.resolve_topic_name('command')
+        self._out = Publishers(node)
+        kind = str(self._settings['command.type'])
+        names = ('monitor.duration', 'monitor.false_alarms')
+        least_s, per_hour = (float(node.get_parameter(name).value) for name in names)
+        self._session = Session(engine, self._open_record(), kind, (least_s, per_hour))
         window_s = float(node.get_parameter('diagnosis.window').value)
         self._diagnosing = Diagnosing(engine.robot, robot, window_s)
         self._services = Services(node, self._session, self._diagnosing, self._settings)
@@ -102,34 +98,16 @@ class Identification:
         self._services.close()
         self._session.close()
         self._diagnosing.close()
-        for destroy, entity in reversed(self._made):
-            destroy(entity)
-        self._made = []
-
-    def _publisher(self, kind: type, topic: str, quality: QoSProfile | int = 10) -> Publisher:
-        publisher = self._node.create_publisher(kind, topic, quality)
-        self._made.append((self._node.destroy_publisher, publisher))
-        return publisher
-
-    def _advertise(self) -> None:
-        self._prediction = self._publisher(JointTrajectory, '~/prediction')
-        self._variance = self._publisher(JointTrajectory, '~/prediction_variance')
-        self._raw_variance = self._publisher(JointTrajectory, '~/prediction_raw_variance')
-        self._overlay = self._publisher(JointState, '~/predicted_joint_states')
-        kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._parameters_out = self._publisher(DiagnosticArray, '~/parameters', kept)
-        self._diagnosis = self._publisher(String, '~/diagnosis', kept)
-        self._diagnostics = self._publisher(DiagnosticArray, '/diagnostics')
-        self._joint_states = self._node.resolve_topic_name('joint_states')
-        self._command = self._node.resolve_topic_name('command')
+        for timer in self._timers:
+            self._node.destroy_timer(timer)
+        self._timers = []
+        self._out.close()
 
     def _open_record(self) -> Record | None:
         path = str(self._settings['record.path'])
         if not path:
             return None
-        outputs = (self._prediction, self._variance, self._overlay, self._raw_variance)
-        predictions = PredictionTopics(*(o.topic_name for o in outputs))
-        topics = Topics(self._joint_states, self._command, predictions)
+        topics = Topics(self._joint_states, self._command, self._out.prediction_topics)
         return Record(Path(path), topics, str(self._settings['command.type']))
 
     def _subscribe(self) -> None:
@@ -164,10 +142,11 @@ class Identification:
             (self._node.get_parameter('diagnostics.period').value, self._report),
             (self._node.get_parameter('parameters.period').value, self._publish_parameters),
         ):
-            timer = self._node.create_timer(
-                period_s, partial(self._guarded, action), clock=self._steady
+            self._timers.append(
+                self._node.create_timer(
+                    period_s, partial(self._guarded, action), clock=self._steady
+                )
             )
-            self._made.append((self._node.destroy_timer, timer))
 
     def _guarded(self, action: Callable[..., None], *given: Any) -> None:
         """Do what a message or a timer asks for; what only a bug can cause ends nothing."""
@@ -183,27 +162,26 @@ class Identification:
         # The middleware's own time of receipt is out of reach: the wheels' EventsExecutor fails
         # on callbacks that ask for it.
         try:
-            event = convert(message, self._node.get_clock().now().nanoseconds)
+            event = convert(message, self._now_ns)
         except MessageError as error:
             self._session.health.note_unreadable(error)
             return
-        self._diagnosing.take(event)
         engine = self._session.engine
         before = engine.is_ready, engine.config
-        for output in self._session.take(event):
-            self._publish(output)
+        for whole in self._session.merged(event):
+            self._diagnosing.take(whole)
+            for output in self._session.take(whole):
+                self._out.estimate(output)
+                self._session.health.note_delay((self._now_ns - output.stamp_ns) * 1e-9)
         if engine.is_ready != before[0] or engine.config is not before[1]:
             self._write_back()
+        if self._session.has_alarm_changed:
+            self._session.has_alarm_changed = False
+            self._publish_monitor()
 
-    def _publish(self, outputs: Outputs) -> None:
-        stamp_ns, names = outputs.stamp_ns, outputs.names
-        prediction = trajectory_message(new_message, stamp_ns, names, outputs.prediction)
-        variance = trajectory_message(new_message, stamp_ns, names, outputs.variance)
-        raw_variance = trajectory_message(new_message, stamp_ns, names, outputs.raw_variance)
-        self._prediction.publish(prediction)
-        self._variance.publish(variance)
-        self._raw_variance.publish(raw_variance)
-        self._overlay.publish(joint_state_message(new_message, outputs.joint_state))
+    @property
+    def _now_ns(self) -> int:
+        return int(self._node.get_clock().now().nanoseconds)
 
     def _poll(self) -> None:
         before = self._session.engine.config
@@ -219,36 +197,59 @@ class Identification:
         if isinstance(outcome, DiagnosisFailed):
             self._node.get_logger().error(f'no diagnosis: {outcome.reason}')
         elif outcome is not None:
-            self._diagnosis.publish(String(data=json.dumps(outcome.content, allow_nan=False)))
+            self._out.diagnosis(json.dumps(outcome.content, allow_nan=False))
             self._node.get_logger().info(f'diagnosis: {outcome.content["verdict"]}')
 
     def _publish_parameters(self) -> None:
-        statuses = parameter_statuses(self._session.engine)
-        if statuses:
-            now_ns = self._node.get_clock().now().nanoseconds
-            self._parameters_out.publish(diagnostics_message(new_message, now_ns, statuses))
+        engine = self._session.engine
+        found = engine.parameters()
+        if found:
+            self._out.parameters(self._now_ns, found, engine.robot.name)
+
+    def _publish_monitor(self) -> list[Status]:
+        session = self._session
+        statuses = session.fit_health.monitor_statuses(session.engine, self._name)
+        self._out.monitor(self._now_ns, statuses)
+        self._log(statuses)
+        return statuses
 
     def _report(self) -> None:
         now = self._steady.now()
         elapsed_s = (now - self._reported).nanoseconds * 1e-9
         self._reported = now
+        session = self._session
         sources = {
-            'joint_states': (self._joint_states, self._node.count_publishers(self._joint_states)),
-            'command': (self._command, self._node.count_publishers(self._command)),
+            name: (topic, self._publisher_names(topic))
+            for name, topic in (('joint_states', self._joint_states), ('command', self._command))
         }
-        statuses = self._session.health.statuses(
-            self._session.engine, self._name, elapsed_s, sources
-        )
+        statuses = session.health.statuses(session.engine, self._name, elapsed_s, sources)
+        statuses += session.fit_health.statuses(session.engine, self._name)
+        self._log(statuses)
+        statuses += self._publish_monitor()
+        statuses += self._diagnosing.statuses(self._name)
+        self._out.diagnostics(self._now_ns, statuses)
+
+    def _publisher_names(self, topic: str) -> tuple[str, ...]:
+        found = self._node.get_publishers_info_by_topic(topic)
+        return tuple(f'{info.node_namespace.rstrip("/")}/{info.node_name}' for info in found)
+
+    def _log(self, statuses: Iterable[Status]) -> None:
+        """Log what becomes a warning or error, again from time to time, and that it is over."""
+        logger, now_ns = self._node.get_logger(), self._steady.now().nanoseconds
         for status in statuses:
             if status.name.endswith(': errors'):
                 continue  # told once, with the event
-            if status.level == WARN:
-                self._node.get_logger().warning(status.message, throttle_duration_sec=_QUIET_S)
-            elif status.level >= ERROR:
-                self._node.get_logger().error(status.message, throttle_duration_sec=_QUIET_S)
-        now_ns = self._node.get_clock().now().nanoseconds
-        statuses += self._diagnosing.statuses(self._name)
-        self._diagnostics.publish(diagnostics_message(new_message, now_ns, statuses))
+            level, said_ns = self._logged.get(status.name, (OK, 0))
+            if status.level == level and (level == OK or now_ns - said_ns < _QUIET_NS):
+                continue
+            if status.level == OK:  # rclpy wants a line of its own for each severity
+                over = f'over: {status.message}'
+                logger.info(over)
+            elif status.level == WARN:
+                logger.warning(status.message)
+            else:
+                logger.error(status.message)
+            self._logged[status.name] = (status.level, now_ns)
 
     def _on_set_parameters(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
         settings = {p.name: from_ros(p) for p in parameters if p.name in self._engine_settings}

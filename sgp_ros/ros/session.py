@@ -7,7 +7,7 @@ with the settings in force, stamped one nanosecond before the first event.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -15,6 +15,7 @@ from pathlib import Path
 from sgp_ros.engine.config import describe_settings
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitResult
+from sgp_ros.engine.joint_merging import JointMerger
 from sgp_ros.engine.replay import Swap
 from sgp_ros.engine.results import Step
 from sgp_ros.engine.samples import Event, JointSample, Reset, SettingsChange, SettingValue
@@ -23,6 +24,7 @@ from sgp_ros.recordings.command_types import FLOAT64_ARRAY, NO_COMMAND
 from sgp_ros.recordings.model_files import save_model
 from sgp_ros.recordings.predictions import Outputs, PredictionTopics, outputs, write_outputs
 from sgp_ros.recordings.writer import RecordingWriter
+from sgp_ros.ros.fit_health import FitHealth
 from sgp_ros.ros.fit_process import FitProcess, WorkerLost
 from sgp_ros.ros.health import Health
 
@@ -90,19 +92,39 @@ class Session:
     Args:
         engine: identifies the robot.
         record: takes what the engine took and gave; None for no record.
+        command_type: as the setting `command.type`.
+        monitor: shortest excursion that alarms [s], and false alarms accepted an hour.
+
+    Attributes:
+        health, fit_health: of what arrives, and of how well it is predicted.
+        has_alarm_changed: whether an alarm began or ended since this was last set to False.
     """
 
-    def __init__(self, engine: Engine, record: Record | None = None) -> None:
+    def __init__(
+        self,
+        engine: Engine,
+        record: Record | None = None,
+        command_type: str = FLOAT64_ARRAY,
+        monitor: tuple[float, float] = (0.3, 1.0),
+    ) -> None:
         self.engine = engine
-        self.health = Health()
+        self._merger = JointMerger(engine.robot.joint_names)
+        self.health = Health(self._merger, command_type)
+        self.fit_health = FitHealth(len(engine.robot.joints), *monitor)
+        self.has_alarm_changed = False
         self._record = record
         self._fits = FitProcess()
         self._swap: Swap | None = None
 
+    def merged(self, event: Event) -> Sequence[Event]:
+        """Return what the engine is to take: states of all joints instead of parts of them."""
+        if not isinstance(event, JointSample):
+            return (event,)
+        self.health.note_joints(event)
+        return self._merger.take(event)
+
     def take(self, event: Event) -> list[Outputs]:
         """Push an event; return what is to be published."""
-        if isinstance(event, JointSample):
-            self.health.seen_joints = event.names
         with self._fits.held():
             started = time.perf_counter()
             step = self.engine.push(event)
@@ -180,7 +202,8 @@ class Session:
             self.health.note_failure(str(failure))
         for event in step.released:
             self._write_event(event)
-        self.health.note_estimates(step.estimates, self.engine.robot.target)
+        robot = self.engine.robot
+        self.has_alarm_changed |= self.fit_health.take(step.estimates, robot.target)
         found = [o for o in map(outputs, step.estimates) if o is not None]
         for output in found:
             self._write(partial(Record.write_outputs, outputs=output))

@@ -60,6 +60,16 @@ def node_settings() -> tuple[Setting, ...]:
             unit='s', low=1.0, high=3600.0, read_only=True,
         ),
         Setting(
+            'monitor.duration', 'float', 0.3,
+            'Errors alarm on ~/monitor that lie outside their 95 % interval for at least so long.',
+            unit='s', low=0.0, high=60.0, read_only=True,
+        ),
+        Setting(
+            'monitor.false_alarms', 'float', 1.0,
+            'False alarms of an undisturbed robot that are accepted; fewer need longer errors.',
+            unit='1/h', low=1e-6, high=1000.0, read_only=True,
+        ),
+        Setting(
             'parameters.period', 'float', 1.0, 'Time between two messages on ~/parameters.',
             unit='s', low=0.02, high=3600.0, read_only=True,
         ),

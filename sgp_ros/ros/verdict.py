@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from sgp_ros.recordings.command_types import NO_COMMAND
+
 OK, WARN, ERROR = 0, 1, 2
 """Levels of a DiagnosticStatus."""
 
 _FEW = 20
+_LOST_SHARE = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,10 +20,15 @@ class Arrivals:
 
     Attributes:
         joint_states, command: full topic names.
-        publishers: of joint states.
+        publishers: of joint states, full names of their nodes.
         command_publishers: of commands.
         robot_joints: joints that the robot wants.
+        command_type: as the setting `command.type`.
         seen_joints: joints that the last joint states named.
+        without_effort: joints without a finite effort in the last state.
+        missing_joints: joints that no message names.
+        shared_joints: joints of which several publishers tell.
+        received, lost: messages that came, and those missing by the period of their source.
         read, estimated: states that came, and equations they gave.
         refused: states refused, by reason.
         commands_read, commands_refused: the same for commands.
@@ -31,9 +39,15 @@ class Arrivals:
     joint_states: str
     command: str
     robot_joints: tuple[str, ...]
-    publishers: int = 0
+    publishers: tuple[str, ...] = ()
     command_publishers: int = 0
+    command_type: str = ''
     seen_joints: tuple[str, ...] = ()
+    without_effort: tuple[str, ...] = ()
+    missing_joints: tuple[str, ...] = ()
+    shared_joints: tuple[str, ...] = ()
+    received: int = 0
+    lost: int = 0
     read: int = 0
     estimated: int = 0
     refused: Mapping[str, int] = field(default_factory=dict)
@@ -47,7 +61,12 @@ def judge(arrivals: Arrivals) -> tuple[int, str]:
     """Return level and sentence."""
     if arrivals.read == 0:
         return _nothing(arrivals)
-    return _most_refused(arrivals) or _some_lost(arrivals) or (OK, 'every joint state is used')
+    return (
+        _most_refused(arrivals)
+        or _two_publishers(arrivals)
+        or _some_lost(arrivals)
+        or (OK, 'every joint state is used')
+    )
 
 
 def _most_refused(arrivals: Arrivals) -> tuple[int, str] | None:
@@ -62,7 +81,22 @@ def _most_refused(arrivals: Arrivals) -> tuple[int, str] | None:
     return None
 
 
+def _two_publishers(arrivals: Arrivals) -> tuple[int, str] | None:
+    if not arrivals.shared_joints:
+        return None
+    return WARN, (
+        f'joints {list(arrivals.shared_joints)} come from several publishers of '
+        f'{arrivals.joint_states}: {", ".join(arrivals.publishers)}; stop one, or remap it'
+    )
+
+
 def _some_lost(arrivals: Arrivals) -> tuple[int, str] | None:
+    if arrivals.lost > _LOST_SHARE * (arrivals.received + arrivals.lost):
+        return WARN, (
+            f'{arrivals.lost} of {arrivals.received + arrivals.lost} messages on '
+            f'{arrivals.joint_states} are missing by their period: raise qos.depth, or take load '
+            'from this computer or its network'
+        )
     if arrivals.unreadable:
         return WARN, f'{arrivals.unreadable} messages unreadable: {arrivals.unreadable_reason}'
     refused = {**arrivals.refused, **_prefixed(arrivals.commands_refused)}
@@ -80,13 +114,32 @@ def _some_lost(arrivals: Arrivals) -> tuple[int, str] | None:
 def _nothing(arrivals: Arrivals) -> tuple[int, str]:
     if arrivals.unreadable:
         return ERROR, f'no joint states could be read: {arrivals.unreadable_reason}'
-    if arrivals.publishers == 0:
+    if arrivals.received:
+        return _no_state(arrivals)
+    if not arrivals.publishers:
         remedy = 'start the robot, or remap with --ros-args -r joint_states:=/its/topic'
         return WARN, f'nobody publishes {arrivals.joint_states}; {remedy}'
     return WARN, (
-        f'no message on {arrivals.joint_states} from {arrivals.publishers} publishers; look for '
-        'an incompatible reliability or a stopped robot'
+        f'no message on {arrivals.joint_states} from {len(arrivals.publishers)} publishers; look '
+        'for an incompatible reliability or a stopped robot'
     )
+
+
+def _no_state(arrivals: Arrivals) -> tuple[int, str]:
+    """Say why messages gave no state of all joints."""
+    missing, wanted = list(arrivals.missing_joints), list(arrivals.robot_joints)
+    remedy = 'give a robot file with the joints that are published'
+    if missing == wanted:
+        return ERROR, (
+            f'{arrivals.joint_states} names joints {list(arrivals.seen_joints)}, the robot has '
+            f'{wanted}; {remedy}'
+        )
+    if missing:
+        return ERROR, (
+            f'no message on {arrivals.joint_states} names joints {missing} of the robot; '
+            f'publish them, or {remedy}'
+        )
+    return WARN, f'one of {", ".join(arrivals.publishers)} has stopped: its joints are waited for'
 
 
 def _state_remedy(reason: str, arrivals: Arrivals) -> str:
@@ -96,7 +149,9 @@ def _state_remedy(reason: str, arrivals: Arrivals) -> str:
             f'they name {names}, the robot has {wanted}; give parameter robot a YAML file with '
             'these joint names'
         ),
-        'unpaired': (
+        'unpaired': _effort_remedy(arrivals)
+        if arrivals.command_type == NO_COMMAND
+        else (
             f'no command on {arrivals.command} ({arrivals.command_publishers} publishers) within '
             'command.timeout before them; check topic and command.type, or the clocks of the two'
         ),
@@ -110,9 +165,19 @@ def _state_remedy(reason: str, arrivals: Arrivals) -> str:
     }.get(reason, 'see the documentation')
 
 
+def _effort_remedy(arrivals: Arrivals) -> str:
+    return (
+        f'no effort of joints {list(arrivals.without_effort)}; let the driver publish it (with '
+        'ros2_control: state_interface effort), or set command.type and topic command'
+    )
+
+
 def _command_remedy(reason: str, arrivals: Arrivals) -> str:
     return {
-        'wrong_kind': 'wrong_kind: efforts are wanted, the commands are positions',
+        'wrong_kind': (
+            'wrong_kind: efforts are wanted, the commands are position targets; set command.type '
+            'to none and let the joint states carry the effort'
+        ),
         'wrong_length': 'wrong_length: one number per joint of command.joints is wanted',
         'unknown_joint': f'unknown_joint: the robot has {list(arrivals.robot_joints)}',
         'late': 'late: older than reorder_window when they came; check the clocks',

@@ -9,22 +9,25 @@ import pytest
 
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitResult
+from sgp_ros.engine.joint_merging import JointMerger
 from sgp_ros.engine.replay import Swap
 from sgp_ros.engine.samples import CommandSample
 from sgp_ros.gp.model import Model
+from sgp_ros.ros.fit_health import FitHealth
 from sgp_ros.ros.health import Health
 from sgp_ros.ros.verdict import OK, WARN
 from test.engine.worlds import PENDULUM, config, pendulum_events
 
-SOURCES = {'joint_states': ('/joint_states', 1), 'command': ('/command', 1)}
+SOURCES = {'joint_states': ('/joint_states', ('/a',)), 'command': ('/command', ('/a',))}
+MERGER = JointMerger(PENDULUM.joint_names)
 
 
 def _fit_status(events):
     engine = Engine(PENDULUM, config(buffer__budget=60))
-    health = Health()
+    health = FitHealth(1, 0.3, 1.0)
     for event in events:
-        health.note_estimates(engine.push(event).estimates, 'acceleration')
-    statuses = health.statuses(engine, 'node', 1.0, SOURCES)
+        health.take(engine.push(event).estimates, 'acceleration')
+    statuses = health.statuses(engine, 'node')
     return next(status for status in statuses if status.name == 'node: fit hinge')
 
 
@@ -65,7 +68,7 @@ def test_the_reason_of_a_refused_fit_is_told(model, evidence, refusal, said):
     engine = Engine(PENDULUM, config())
     for event in pendulum_events(100):
         engine.push(event)
-    health = Health()
+    health = Health(MERGER)
     found = Model((None,), (1.0,)) if model else None
     health.note_fit(FitResult(0, found, evidence, 2.0, 5), refusal)
     statuses = health.statuses(engine, 'node', 1.0, SOURCES)
@@ -79,7 +82,7 @@ def test_refused_fits_are_counted_by_reason():
     for event in pendulum_events(100):
         engine.push(event)
     Swap(engine, FitResult(0, None, -np.inf, 2.0, 5))
-    statuses = Health().statuses(engine, 'node', 1.0, SOURCES)
+    statuses = Health(MERGER).statuses(engine, 'node', 1.0, SOURCES)
     values = next(status for status in statuses if status.name == 'node: model').values
     assert values['refits_refused'] == values['refits_refused.diverged'] == '1'
     assert values['refits_refused.no_better'] == values['refits_refused.no_factor'] == '0'

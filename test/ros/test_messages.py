@@ -16,8 +16,8 @@ from sgp_ros.recordings.messages import (
     trajectory_message,
 )
 from sgp_ros.recordings.predictions import outputs
-from sgp_ros.ros.health import parameter_status
 from sgp_ros.ros.messages import new_message
+from sgp_ros.ros.publishers import parameter_status
 
 STAMP_NS = 1_700_000_000_123_456_789
 NAN = float('nan')

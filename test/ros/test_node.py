@@ -67,7 +67,13 @@ def test_every_topic_and_service_of_the_contract_exists(graph: Graph) -> None:
         '/sgp_node/prediction_variance': 'trajectory_msgs/msg/JointTrajectory',
         '/sgp_node/prediction_raw_variance': 'trajectory_msgs/msg/JointTrajectory',
         '/sgp_node/predicted_joint_states': 'sensor_msgs/msg/JointState',
+        '/sgp_node/residual': 'sensor_msgs/msg/JointState',
+        '/sgp_node/band/lower': 'sensor_msgs/msg/JointState',
+        '/sgp_node/band/upper': 'sensor_msgs/msg/JointState',
         '/sgp_node/parameters': 'diagnostic_msgs/msg/DiagnosticArray',
+        '/sgp_node/parameter_values': 'sensor_msgs/msg/JointState',
+        '/sgp_node/monitor': 'diagnostic_msgs/msg/DiagnosticArray',
+        '/sgp_node/alarm': 'std_msgs/msg/Bool',
         '/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray',
         '/joint_states': 'sensor_msgs/msg/JointState',
         '/command': 'sensor_msgs/msg/JointState',
@@ -142,7 +148,7 @@ def test_what_cannot_be_used_is_counted_by_reason(graph: Graph) -> None:
     names = ['pole', 'wheel']
     publish(commands, Float64MultiArray(data=[1.0, 2.0, 3.0]), 'commands_refused.wrong_length')
     publish(states, JointState(name=names, position=[math.nan, 0.0]), 'refused.nonfinite')
-    publish(states, JointState(name=['elbow'], position=[0.0]), 'refused.unknown_joint')
+    publish(states, JointState(name=['elbow'], position=[0.0]), 'of_other_joints')
     publish(states, JointState(name=names, position=[0.0]), 'unreadable')
     publish(states, JointState(name=names, position=[0.0, 0.0]), 'refused.unpaired')
 

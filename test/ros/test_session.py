@@ -269,7 +269,7 @@ def test_a_fit_that_runs_is_told_until_it_ends(session: Session) -> None:
     for event in _events(60):
         session.take(event)
     assert session.refit()
-    sources = {'joint_states': ('/joint_states', 1), 'command': ('/command', 1)}
+    sources = {'joint_states': ('/joint_states', ('/a',)), 'command': ('/command', ())}
 
     def running() -> str:
         statuses = session.health.statuses(session.engine, 'node', 1.0, sources)

@@ -22,7 +22,7 @@ def test_all_is_well_when_every_state_is_used() -> None:
     ('known', 'level', 'words'),
     [
         ({}, WARN, ['nobody publishes /arm/joint_states', 'remap']),
-        ({'publishers': 2}, WARN, ['no message on /arm/joint_states from 2']),
+        ({'publishers': ('/a', '/b')}, WARN, ['no message on /arm/joint_states from 2']),
         ({'unreadable': 3, 'unreadable_reason': 'no names'}, ERROR, ['no names']),
         (
             {'read': 9, 'refused': {'unknown_joint': 9}, 'seen_joints': ('elbow',)},
@@ -35,6 +35,34 @@ def test_all_is_well_when_every_state_is_used() -> None:
             ['no command on /arm/command (0 publishers)', 'command.type'],
         ),
         ({'read': 9, 'refused': {'late': 8}}, ERROR, ['later', 'reorder_window']),
+        (
+            {
+                'read': 9,
+                'refused': {'unpaired': 9},
+                'command_type': 'none',
+                'without_effort': ('wheel',),
+            },
+            ERROR,
+            ["no effort of joints ['wheel']", 'state_interface'],
+        ),
+        (
+            {'received': 9, 'missing_joints': ('pole', 'wheel'), 'seen_joints': ('elbow',)},
+            ERROR,
+            ["['elbow']", "['pole', 'wheel']", 'robot file'],
+        ),
+        ({'received': 9, 'missing_joints': ('pole',)}, ERROR, ["names joints ['pole']"]),
+        ({'received': 9, 'publishers': ('/a', '/b')}, WARN, ['/a, /b', 'stopped']),
+        (
+            {'read': 9, 'shared_joints': ('pole',), 'publishers': ('/a', '/b')},
+            WARN,
+            ["['pole']", '/a, /b'],
+        ),
+        ({'read': 90, 'received': 90, 'lost': 10}, WARN, ['10 of 100', 'qos.depth']),
+        (
+            {'read': 9, 'commands_read': 9, 'commands_refused': {'wrong_kind': 9}},
+            ERROR,
+            ['position targets', 'none'],
+        ),
         (
             {'read': 9, 'commands_read': 9, 'commands_refused': {'wrong_length': 9}},
             ERROR,

@@ -1,0 +1,148 @@
+"""Statuses on how well the model holds, joint by joint, and on the parameters that it finds.
+
+A level above OK means that something has to be done: the errors of a joint have grown beyond
+chance, and so far that the growth counts as physics; or they left their interval for longer than
+chance allows, just now.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from sgp_ros.diagnosis.criteria import LEAST_SHARE
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.monitoring import ExcursionMonitor
+from sgp_ros.engine.results import Estimate
+from sgp_ros.recordings.messages import Status
+from sgp_ros.ros.verdict import OK, WARN
+
+_MEMORY = 100
+_ENOUGH = 5
+"""Parameters are told undetermined from this many times `learning.initial` samples on."""
+
+
+class FitHealth:
+    """Follows the errors of one-step predictions.
+
+    Args:
+        joints: number of joints.
+        least_s: shortest excursion that alarms [s].
+        per_hour: false alarms of the whole robot that are accepted an hour.
+
+    Attributes:
+        monitors: one per joint.
+    """
+
+    def __init__(self, joints: int, least_s: float, per_hour: float) -> None:
+        self.monitors = [ExcursionMonitor(least_s, per_hour / joints) for _ in range(joints)]
+        self._square = np.full(joints, np.nan)
+        self._surprise = np.full(joints, np.nan)
+        self._told: set[str] = set()
+
+    def take(self, estimates: Iterable[Estimate], target: str) -> bool:
+        """Take estimates; return whether an alarm began or ended."""
+        has_changed = False
+        for estimate in estimates:
+            if not estimate.is_scored:
+                continue
+            channel = getattr(estimate, target)
+            errors = channel.measured - channel.mean
+            self._follow(errors**2, channel.variance)
+            rows = zip(errors, channel.variance, channel.raw_variance, strict=True)
+            for monitor, (error, variance, raw) in zip(self.monitors, rows, strict=True):
+                if variance > 0.0 and raw > 0.0:  # not of a joint that friction holds, or unknown
+                    has_changed |= monitor.add(estimate.stamp_ns, error, variance, raw)
+        return has_changed
+
+    def statuses(self, engine: Engine, node: str) -> list[Status]:
+        """Return one status per joint, and one on the parameters."""
+        robot = engine.robot.name
+        found = []
+        for j, joint in enumerate(engine.robot.joint_names):
+            level, message, values = self._joint(engine, j, joint)
+            found.append(Status(f'{node}: fit {joint}', level, message, robot, values))
+        level, message, values = self._parameters(engine)
+        return [*found, Status(f'{node}: parameters', level, message, robot, values)]
+
+    def monitor_statuses(self, engine: Engine, node: str) -> list[Status]:
+        """Return one status per joint on its excursions, WARN while it alarms."""
+        return [
+            Status(
+                f'{node}: monitor {joint}', WARN if monitor.is_alarmed else OK,
+                _excursion(joint, monitor), engine.robot.name,
+                {
+                    'alarm': str(int(monitor.is_alarmed)),
+                    'ratio': f'{monitor.ratio:.3f}',
+                    'outside_s': f'{monitor.lasting_s:.3f}',
+                    'needed': str(monitor.needed),
+                    'alarms': str(monitor.alarms),
+                },
+            )
+            for joint, monitor in zip(engine.robot.joint_names, self.monitors, strict=True)
+        ]  # fmt: skip
+
+    def _follow(self, squares: np.ndarray, variance: np.ndarray) -> None:
+        with np.errstate(invalid='ignore', divide='ignore'):
+            ratios = squares / variance
+        for old, new in ((self._square, squares), (self._surprise, ratios)):
+            step = np.where(np.isnan(old), new, old + (new - old) / _MEMORY)
+            old[:] = np.where(np.isfinite(new), step, old)
+
+    def _joint(self, engine: Engine, j: int, joint: str) -> tuple[int, str, dict[str, str]]:
+        scores = engine.scores()[joint]
+        values = {
+            f'{channel}.{name}': f'{getattr(score, name):.6g}'
+            for channel, score in scores.items()
+            for name in ('nmse', 'nlpd', 'coverage95', 'raw_coverage95', 'n')
+        }
+        target = scores.get(engine.robot.target)
+        if target is None or np.isnan(self._square[j]):
+            return OK, 'nothing scored yet', values
+        running = engine.estimator.scoring.scores[engine.robot.target][j]
+        recent = float(self._square[j]) * running.n / running.target_squares
+        drift = engine.drift[j]
+        values |= {
+            'recent_nmse': f'{recent:.6g}',
+            'surprise': f'{self._surprise[j]:.4f}',
+            'drift': f'{drift.level:.4f}',
+        }
+        message = f'nMSE {target.nmse:.3g}, coverage {100 * target.coverage95:.1f} %'
+        weight = engine.process_weights().get(joint)
+        if weight is not None:
+            values['process_weight'] = f'{weight.value:.4f}'
+            if weight.value < 0.5:
+                message += f'; Z errs more than the physics alone, has weight {weight.value:.2f}'
+        if not (drift.is_drifting and recent > LEAST_SHARE):
+            return OK, message, values
+        message = (
+            f'{joint}: errors have grown beyond chance, recent nMSE {recent:.2g} (usually '
+            f'{target.nmse:.2g}); the robot has changed (load, wear, temperature) or moves as '
+            'never before: look at it, or call ~/diagnose'
+        )
+        return WARN, message, values
+
+    def _parameters(self, engine: Engine) -> tuple[int, str, dict[str, str]]:
+        """Warn once of each parameter that stays undetermined."""
+        found = engine.parameters()
+        unknown = [parameter.name for parameter in found if parameter.std is None]
+        values = {'parameters': str(len(found)), 'undetermined': str(len(unknown))}
+        if not unknown:
+            return OK, f'all of {len(found)} determined', values
+        some = ', '.join(unknown[:8]) + (' ...' if len(unknown) > 8 else '')
+        message = f'{len(unknown)} of {len(found)} not determined by the motion so far: {some}'
+        is_early = engine.counts.learned < _ENOUGH * engine.config.learning_initial
+        if is_early or set(unknown) <= self._told:
+            return OK, message, values
+        self._told |= set(unknown)
+        return WARN, f'{message}; move joints that stand still, faster and farther', values
+
+
+def _excursion(joint: str, monitor: ExcursionMonitor) -> str:
+    if not monitor.is_alarmed:
+        return 'inside what chance allows'
+    return (
+        f'{joint}: error at {monitor.ratio:.1f} times the half width of its interval, outside for '
+        f'{monitor.lasting_s:.1f} s; a collision, another load or a fault: look at the joint'
+    )

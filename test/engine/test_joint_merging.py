@@ -1,0 +1,124 @@
+"""Whole states from messages that bring a part of the joints each."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sgp_ros.engine.joint_merging import JointMerger
+from sgp_ros.engine.samples import JointSample, frozen_array
+
+MS = 10**6
+JOINTS = ('a', 'b', 'c')
+
+
+def _sample(stamp_ns, **position):
+    return JointSample(stamp_ns, tuple(position), frozen_array([*position.values()]))
+
+
+def _merged(samples, joints=JOINTS):
+    merger = JointMerger(joints)
+    return merger, [state for sample in samples for state in merger.take(sample)]
+
+
+def test_a_whole_message_passes_as_it_is():
+    """Whatever the order of its joints, and with a joint more."""
+    sent = [_sample(0, c=1, a=2, b=3), _sample(5, a=2, gripper=0, b=3, c=1)]
+    _, states = _merged(sent)
+    assert all(state is sample for state, sample in zip(states, sent, strict=True))
+
+
+def test_parts_of_one_stamp_are_one_state():
+    """In either order of arrival; nothing is interpolated."""
+    sent = [_sample(0, b=2), _sample(0, c=3, a=1), _sample(MS, a=4, c=6), _sample(MS, b=5)]
+    _, states = _merged(sent)
+    assert [state.stamp_ns for state in states] == [0, MS]
+    assert [state.names for state in states] == [JOINTS] * 2
+    np.testing.assert_array_equal([s.position for s in states], [[1, 2, 3], [4, 5, 6]])
+
+
+def test_the_slowest_part_sets_the_times_and_the_others_are_interpolated():
+    """Exactly for motions that a cubic follows, where velocities are known."""
+
+    def fast(t):
+        values = frozen_array([t**3 - t, 2 * t**2])
+        rates = frozen_array([3 * t**2 - 1, 4 * t])
+        return JointSample(round(t * 1e9), ('a', 'b'), values, rates, frozen_array([t, 1 - t]))
+
+    sent = [fast(0.002 * i) for i in range(200)]
+    sent += [_sample(round((0.0201 + 0.02 * i) * 1e9), c=i) for i in range(18)]
+    sent.sort(key=lambda sample: sample.stamp_ns)
+    _, states = _merged(sent)
+    late = [state for state in states if state.stamp_ns > 10**8]
+    assert len(late) >= 13
+    for state in late:
+        t = state.stamp_ns * 1e-9
+        np.testing.assert_allclose(state.position[:2], [t**3 - t, 2 * t**2], rtol=1e-12)
+        np.testing.assert_allclose(state.effort[:2], [t, 1 - t], rtol=1e-12)
+        assert state.position[2] == pytest.approx((t - 0.0201) / 0.02)
+        assert np.isnan(state.velocity[2])
+
+
+def test_joints_that_nobody_brings_are_named():
+    merger, states = _merged([_sample(0, a=1, b=2), _sample(1, gripper=1)])
+    assert states == []
+    assert merger.missing == ('c',)
+    assert merger.foreign == 1
+
+
+def test_a_joint_of_two_sources_is_named_and_taken_from_the_first():
+    sent = [s for i in range(5) for s in (_sample(i * MS, a=i, b=i, c=i), _sample(i * MS, b=9))]
+    merger, states = _merged(sent)
+    assert merger.shared == ('b',)
+    assert [state.position[1] for state in states] == [0, 1, 2, 3, 4]
+
+
+@pytest.mark.parametrize('positions', [(0.5, 0.1), (0.1, 0.1)])
+def test_two_publishers_of_the_same_joints_are_noticed_where_they_disagree(positions):
+    """Only a repeated jump there and back tells them apart, so only a disagreement is seen."""
+    merger = JointMerger(('a',))
+    merger.looks_for_returns = True
+    for i in range(40):
+        merger.take(_sample(i * MS, a=positions[i % 2] + 1e-4 * i))
+    assert merger.shared == (('a',) if positions[0] != positions[1] else ())
+
+
+def test_a_source_that_fell_silent_leaves_its_joints_to_another():
+    """Such as a driver that was restarted and now sends all joints in one message."""
+    sent = [s for i in range(5) for s in (_sample(i * MS, a=i), _sample(i * MS, b=i, c=i))]
+    sent += [_sample(10**10 + i * MS, a=7, b=7, c=7) for i in range(5)]
+    _, states = _merged(sent)
+    assert len(states) == 10
+    assert states[-1].position.tolist() == [7, 7, 7]
+
+
+def test_a_pause_of_one_source_costs_the_states_of_the_pause_alone():
+    sent = [_sample(i * 100 * MS, a=i) for i in range(100)]
+    sent += [_sample(i * 100 * MS, b=i, c=i) for i in range(100) if not 30 <= i < 60]
+    sent.sort(key=lambda sample: sample.stamp_ns)
+    merger, states = _merged(sent)
+    assert len(states) == 70
+    assert merger.unmatched == 30
+
+
+def test_a_clock_that_is_set_back_begins_anew():
+    loop = [
+        s for i in range(50) for s in (_sample(i * 50 * MS, a=i), _sample(i * 50 * MS, b=i, c=i))
+    ]
+    _, states = _merged(loop + loop)
+    assert len(states) == 100
+
+
+@pytest.mark.parametrize('jitter', [0.0, 0.3])
+def test_lost_messages_are_counted_by_the_period(jitter):
+    """Each one, however many in a row, while stamps jitter by less than half a period."""
+    rng = np.random.default_rng(0)
+    kept = np.flatnonzero(rng.uniform(size=3000) > 0.1)
+    kept = kept[kept > 40]
+    merger = JointMerger(('a',))
+    for i in [*range(41), *kept]:
+        stamp = round((i + jitter * rng.uniform(-0.5, 0.5)) * 2 * MS)
+        merger.take(_sample(stamp, a=0.0))
+    missing = int(kept[-1]) + 1 - 41 - len(kept)
+    assert missing > 200
+    assert abs(merger.lost - missing) <= (0 if jitter == 0.0 else 0.02 * missing)
