@@ -36,6 +36,7 @@ def test_commands_in_documents_exist(path):
                 'bench',
                 'demo',
                 'diagnose',
+                'export',
                 'identify',
                 'import',
                 'replay',

@@ -191,7 +191,25 @@ def _add_effects(add: AddCommand) -> None:
                         help='a robot whose own effects and laws are listed too')  # fmt: skip
 
 
+def _add_export(add: AddCommand) -> None:
+    parser = add(
+        'export', 'sgp_ros.apps.export:run_export',
+        'Write a robot as a file of another program, and list what that cannot say.',
+        'sgp export out/diagnose/robot_diagnosed.yaml --to mjcf --out out/export',
+    )  # fmt: skip
+    parser.add_argument('robot', metavar='ROBOT', help='a robot YAML or a model file')
+    parser.add_argument(
+        '--to', required=True,
+        choices=('mjcf', 'urdf', 'sdf', 'isaaclab', 'ros2_control', 'json'), help='the format',
+    )  # fmt: skip
+    parser.add_argument('--model', metavar='MJCF',
+                        help='to be changed (default: where the robot came from)')  # fmt: skip
+    parser.add_argument('--ranges', action='store_true',
+                        help='write value +- 2 std of the numbers too')  # fmt: skip
+
+
 COMMANDS = (
     _add_demo, _add_simulate, _add_replay, _add_identify, _add_diagnose, _add_effects, _add_import,
+    _add_export,
 )  # fmt: skip
 """What adds each command of the package, in the order of its help."""

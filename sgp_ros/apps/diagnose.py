@@ -117,7 +117,7 @@ def run_diagnose(
     first = next(iter(events.values())) if is_met else []
     bags = [bag] if isinstance(bag, str) else list(bag)
     steps = after_diagnosis(found, bags[0], robot, out)
-    return _written(out, nominal, found, first, EFFORT_SOURCES[chosen.effort], steps)
+    return _written(out, nominal, found, first, EFFORT_SOURCES[chosen.effort], steps, gains)
 
 
 def _gains(options: DiagnoseOptions, nominal: Nominal) -> Gains | None:
@@ -161,12 +161,13 @@ def _written(
     events: Sequence[Event],
     effort_source: str,
     steps: Steps,
+    gains: Gains | None,
 ) -> dict[str, Any]:
     """Write all files, print the findings and return the content of diagnosis.json."""
     with replacing_results(out, 'diagnose'):
         write_predictions(out, found)
         bodies = nominal.without_stated(found.bodies)
-        write_diagnosed(out, nominal.robot, replace(found, bodies=bodies))
+        write_diagnosed(out, nominal.robot, replace(found, bodies=bodies), gains)
         online = replayed(out, found.findings, events, effort_source)
         if online is not None:
             said = online.remark(found.proofs['train'].nmse_after)

@@ -26,6 +26,7 @@ from sgp_ros.physics.formula import read_formula
 from sgp_ros.physics.law import NAME as LAW
 from sgp_ros.physics.law import is_online
 from sgp_ros.report.files import write_text
+from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.stated_effects import dry_friction
@@ -42,13 +43,14 @@ _REPLAYED_S = 60.0
 """Most of a recording that is replayed for what a node does not model [s]."""
 
 
-def write_diagnosed(out: Path, robot: Robot, found: Diagnosis) -> None:
+def write_diagnosed(out: Path, robot: Robot, found: Diagnosis, gains: Gains | None = None) -> None:
     """Write `robot_diagnosed.yaml` and `robot_diagnosed.urdf`.
 
     Args:
         out: folder.
         robot: nominal robot from a URDF.
         found: the diagnosis of a recording of it.
+        gains: of its drives; None where their commands are efforts.
 
     Raises:
         ConfigError: the URDF is no longer what it was.
@@ -69,6 +71,7 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis) -> None:
         **_physics(robot),
         **robot.source,
         'urdf': URDF_NAME,
+        **({} if gains is None else {'gains': _gains(robot, found, gains)}),
         'effects': [*known, *stated_findings((*found.findings, *found.shared))],
         'parameters': stated,
     }
@@ -175,6 +178,20 @@ def _stated_law(finding: Finding) -> dict[str, Any]:
     parameters = {name: _entry(p) for name, p in finding.parameters.items()}
     law = {'joint': finding.joint, 'formula': finding.formula, 'parameters': parameters}
     return {LAW: law}
+
+
+def _gains(robot: Robot, found: Diagnosis, gains: Gains) -> dict[str, Any]:
+    """Return the gains in force, which may not be those that were stated."""
+    names = robot.joint_names
+    content = gains.content(names)
+    for f in found.setup:
+        for key, table in (('kp', content['kp']), ('kd', content['kd'])):
+            scale = f.parameters.get(key)
+            if scale is None or isinstance(scale.value, str):
+                continue
+            for name in table if f.joint == 'all' else [f.joint]:
+                table[name] *= scale.value
+    return content
 
 
 def _entry(parameter: Parameter) -> dict[str, Any]:

@@ -42,6 +42,16 @@ class Gains:
         """Return the gains times factors, (k,) each."""
         return Gains(self.kp * kp, self.kd * kd, self.holds_gravity)
 
+    def content(self, joints: Sequence[str]) -> dict[str, Any]:
+        """Return the gains as a file states them."""
+        driven = [(j, float(p), float(d)) for j, p, d in
+                  zip(joints, self.kp, self.kd, strict=True) if p or d]  # fmt: skip
+        found: dict[str, Any] = {
+            'kp': {j: p for j, p, _ in driven},
+            'kd': {j: d for j, _, d in driven},
+        }
+        return found | ({'feedforward': 'gravity'} if self.holds_gravity else {})
+
 
 def read_gains(path: Path, joints: Sequence[str], actuated: Sequence[str]) -> Gains:
     """Return the gains that a file states.

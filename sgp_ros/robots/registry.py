@@ -37,7 +37,7 @@ _KEYS = frozenset({'schema', 'robot', 'joints', 'parameters'})
 _URDF_KEYS = frozenset({
     'schema', 'urdf', 'name', 'joints', 'locked', 'passive', 'effort_gain', 'payload', 'terms',
     'coulomb_width', 'stribeck_velocity', 'prior', 'residual_inputs', 'effects', 'parameters',
-    'gains', 'remarks',
+    'gains', 'remarks', 'model',
 })  # fmt: skip
 
 

@@ -21,6 +21,7 @@ A robot YAML with the key `urdf` says which joints move and which physics is ass
 
     gains: {kp: {j1: 300.0}, kd: {j1: 10.0}}   # of drives whose commands are positions
     remarks: [...]              # what the model file said that has no place here
+    model: arm.xml              # the MJCF that this came from, for `sgp export`
     parameters:                 # values of coefficients, as `sgp identify` writes them
       elbow.coulomb: {value: 0.4, std: 0.01, unit: N m}
 

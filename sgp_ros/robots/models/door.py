@@ -54,7 +54,7 @@ def read_model(path: Path) -> dict[str, Any]:
     """
     kind = _OTHER.get(path.suffix.lower()) or _kind_of(path)
     if kind == 'mjcf':
-        return read_mjcf(path).document()
+        return {**read_mjcf(path).document(), 'model': str(path.resolve())}
     if kind == 'sdf':
         return read_sdf(path).document()
     if kind == 'xacro':
