@@ -127,7 +127,10 @@ def probabilities(
     worth = TEMPER * np.array([scale.worth(m) for m in (comparison.base, *models)])
     odds = np.exp(worth - worth.max())
     for model, p in zip(models, odds[1:] / odds.sum(), strict=True):
-        for s in model.effects:
+        named = {s.key: s for s in model.effects}
+        if p > LEAST_ODDS:  # another name of what is asserted counts for it
+            named |= {s.key: s for s in asserted.effects if contrasts.stands_for(model, s)}
+        for s in named.values():
             is_own = s.effect.site in {JOINT, MOTOR} and s.place.joint >= 0
             a = adequate[s.place.joint] if is_own else min(described, default=0.0)
             by_key[s.key] = by_key.get(s.key, 0.0) + float(p * a)

@@ -14,12 +14,13 @@ from functools import cached_property
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations, joint_name
-from sgp_ros.diagnosis.criteria import ALIKE, CLEARER, LEAST_SHARE
+from sgp_ros.diagnosis.criteria import ADEQUATE_REST, ALIKE, CLEARER, LEAST_SHARE
 from sgp_ros.diagnosis.decide.decision import Decision, Scale
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model, imbalance
 from sgp_ros.diagnosis.result import Equivalent
 from sgp_ros.physics.drive import Drive
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 MOST = 3
@@ -71,6 +72,22 @@ class Contrasts:
         So does a law with one parameter more whose value makes it the simpler one.
         """
         return max(self.of(rival).values()) < LEAST_SHARE
+
+    def stands_for(self, rival: Model, effect: EffectAt) -> bool:
+        """Return whether an effect of a rival exerts the force of an asserted one on any motion.
+
+        They differ by less than what an adequate model leaves of what it explains: dry friction
+        and a hysteresis whose presliding nobody can resolve are one law with two names.
+        """
+        return any(self._is_same_force(effect, other) for other in rival.effects)
+
+    def _is_same_force(self, effect: EffectAt, other: EffectAt) -> bool:
+        for motion, _, _ in self._motions.values():
+            force = effect.force(motion)
+            apart = ((force - other.force(motion)) ** 2).sum()
+            if not apart < ADEQUATE_REST * (force**2).sum():
+                return False
+        return True
 
     @cached_property
     def _motions(self) -> dict[str, tuple[ObservedMotion, np.ndarray, np.ndarray]]:

@@ -12,7 +12,10 @@ from sgp_ros.diagnosis.decide.decision import Decision, decide
 from sgp_ros.diagnosis.decide.equivalence import MOTIONS, Contrasts, equivalents, moved
 from sgp_ros.diagnosis.explain.comparison import Comparison, compare_models
 from sgp_ros.diagnosis.pipeline import diagnose
-from test.diagnosis.fitted_models import fitted
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
+from test.diagnosis.fitted_models import fitted, with_coefficients
 from test.diagnosis.worlds import CHAINS, events_of, robot_of, simulate
 
 
@@ -101,6 +104,15 @@ def test_a_richer_name_of_the_same_law_is_no_other_explanation(equations_for):
     assert contrasts.is_same_law(richer)
     assert not contrasts.is_same_law(fitted(equations, 'viscous_friction'))
     assert _told(equations, best, [richer]) == ()
+
+
+def test_one_law_of_two_names_is_one(narrow):
+    """Dry friction, and hysteresis with a presliding that is too short to be seen or long."""
+    dry = with_coefficients(fitted(narrow, 'coulomb_friction'), np.array([0.4]))
+    contrasts = Contrasts(narrow, dry)
+    for presliding, is_same in ((1e-5, True), (0.3, False)):
+        other = EffectAt(EFFECTS['hysteresis'], Place(0), np.array([presliding]), np.array([0.4]))
+        assert contrasts.stands_for(replace(dry, effects=(other,)), dry.effects[0]) == is_same
 
 
 def test_noise_does_not_hide_that_bodies_may_be_heavier(tmp_path):
