@@ -90,6 +90,7 @@ class StribeckFriction(Effect):
         Quantity('stribeck_velocity', 'rad/s', low=1e-9, is_positive=True, is_scored=False),
     )
     linear = ('coulomb', 'static')
+    plain = ('coulomb_friction', 'viscous_friction')
     term = TermForm('stribeck', ('stribeck',), columns=(1,))
     drawn_over = 'velocity'
     is_dry = True
@@ -171,6 +172,7 @@ class AsymmetricCoulomb(Effect):
     appearance = 'a step at each reversal that is not centred on zero'
     quantities = (Quantity('level_pos', 'N m', low=0.0), Quantity('level_neg', 'N m', low=0.0))
     linear = ('level_pos', 'level_neg')
+    plain = ('coulomb_friction',)
     term = TermForm(
         'asymmetric_coulomb', ('coulomb_positive', 'coulomb_negative'), (0, 1),
         dynamics='friction', is_dissipative=True,

@@ -74,12 +74,24 @@ class Contrasts:
         return max(self.of(rival).values()) < LEAST_SHARE
 
     def stands_for(self, rival: Model, effect: EffectAt) -> bool:
-        """Return whether an effect of a rival exerts the force of an asserted one on any motion.
+        """Return whether an effect of a rival is an asserted one by another name.
 
-        They differ by less than what an adequate model leaves of what it explains: dry friction
-        and a hysteresis whose presliding nobody can resolve are one law with two names.
+        On any motion they differ by less than what an adequate model leaves of what it explains,
+        as dry friction and a hysteresis whose presliding nobody can resolve; or it is a richer law
+        that on the recorded motion is mostly the asserted one, as friction that drifts a little.
         """
-        return any(self._is_same_force(effect, other) for other in rival.effects)
+        return any(
+            self._is_richer(effect, other) or self._is_same_force(effect, other)
+            for other in rival.effects
+        )
+
+    def _is_richer(self, effect: EffectAt, other: EffectAt) -> bool:
+        if effect.name not in other.effect.plain or effect.place.joint != other.place.joint:
+            return False
+        motion = self._equations.motion
+        x, force = effect.columns(motion), other.force(motion)[:, effect.place.joint]
+        left = force - x @ np.linalg.lstsq(x, force, rcond=None)[0]
+        return other.place.source < 0 and bool((left**2).sum() < 0.5 * (force**2).sum())
 
     def _is_same_force(self, effect: EffectAt, other: EffectAt) -> bool:
         for motion, _, _ in self._motions.values():
