@@ -114,14 +114,14 @@ class Listener:
         self._context.try_shutdown()
 
 
-def _node_pid():
+def node_pid():
     """Return the only child of this process."""
     own = os.getpid()
     text = Path(f'/proc/{own}/task/{own}/children').read_text(encoding='utf-8')
     return int(text.split()[0])
 
 
-def _processor_s(pid):
+def processor_s(pid):
     fields = Path(f'/proc/{pid}/stat').read_text(encoding='utf-8').rpartition(')')[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
 
@@ -173,10 +173,10 @@ def _run(settings, seconds, graph):
         _, first_pause_s = _publish(listener, machine, samples[:first])
         listener.latencies_s.clear()
         listener.callbacks.clear()
-        pid = _node_pid()
-        before, wall = _processor_s(pid), time.monotonic()
+        pid = node_pid()
+        before, wall = processor_s(pid), time.monotonic()
         took_s, pause_s = _publish(listener, machine, samples[first:])
-        used, elapsed = _processor_s(pid) - before, time.monotonic() - wall
+        used, elapsed = processor_s(pid) - before, time.monotonic() - wall
         end = time.monotonic() + 2.0
         while time.monotonic() < end:
             listener.turn()

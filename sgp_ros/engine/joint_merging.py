@@ -24,7 +24,8 @@ from sgp_ros.engine.samples import JointSample
 _PERIODS = 31
 PAUSE_NS = 1_000_000_000
 """A source that is silent for longer, by the stamps of the others, is waited for no more."""
-_LONGEST_GAP_NS = 10_000_000_000
+_LONGEST_GAP_NS = 2_000_000_000
+"""A longer gap is a pause of the source, and nothing of it is taken for lost."""
 _SLOWER = 1.5
 _RETURN = 4.0
 _LEAST_STEP = 1e-3
@@ -43,6 +44,7 @@ class Source:
         owned: those of them that are taken from it, the others come from another source.
         parts: its messages that are still needed, in order of stamps.
         received, lost: messages that came, and those missing by its period.
+        pauses: gaps too long for a loss.
         returns: messages after which the joints were nearer to where they were two messages ago
             than to the last: two publishers that say different things of them look like this.
         last_ns, period_ns: newest stamp and median distance of stamps [ns]; None and 0 before any.
@@ -55,7 +57,7 @@ class Source:
         self.joints = sorted(joints)
         self.owned: list[int] = []
         self.parts: list[Part] = []
-        self.received = self.lost = self.returns = 0
+        self.received = self.lost = self.pauses = self.returns = 0
         self.last_ns: int | None = None
         self.period_ns = 0.0
         self._spacings: list[int] = []
@@ -67,6 +69,7 @@ class Source:
         spacing = 0 if self.last_ns is None else stamp_ns - self.last_ns
         if self.last_ns is None or spacing > 0 or spacing < -PAUSE_NS:
             self.last_ns = stamp_ns
+        self.pauses += spacing > _LONGEST_GAP_NS
         if not 0 < spacing <= _LONGEST_GAP_NS:
             return
         if self.period_ns and spacing > 1.5 * self.period_ns:

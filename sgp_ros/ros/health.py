@@ -171,6 +171,7 @@ class Health:
             **_flat(counts, self._unreadable),
             'messages': received,
             'lost': merger.lost,
+            'pauses': sum(source.pauses for source in merger.sources.values()),
             'of_other_joints': merger.foreign,
             'unmatched': merger.unmatched,
         }
