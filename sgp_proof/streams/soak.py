@@ -4,8 +4,9 @@
 
 Seven joints with Panda's model and refits, as in `live_rate`, and a process that computes without
 a pause. A message is lost that was published and not read; the node counts what it misses by the
-period of the stamps, which are those at which messages were due. Both are differences over the run, which begins after a warm-up and a pause
-long enough to be none of a loss. Memory is the resident set of the node's process, once a minute.
+period of the stamps, which are those at which messages were due. Both are differences over the
+run, which begins after a warm-up and a pause long enough to be none of a loss. Memory is the
+resident set of the node's process, once a minute.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from sgp_proof.streams.live_rate import Listener, Machine, node_pid, processor_s
 from sgp_ros.apps.live_processes import LiveProcesses, graph_environment
 from sgp_ros.recordings.model_files import load_parameters
 
-RATE_HZ, WARM_UP_S, PAUSE_S, BUDGET, DEPTH = 500.0, 40.0, 4.0, 500, 1000
+RATE_HZ, WARM_UP_S, PAUSE_S, BUDGET, DEPTH = 500.0, 40.0, 4.0, 300, 1000
 BLOCK_S = 60.0
 _START_LIMIT_S = 60.0
 _BUSY = 'while True: pass'
@@ -90,10 +91,12 @@ def _run(minutes, graph):
         processes.wait_for(
             node, listener.publisher.get_subscription_count, _START_LIMIT_S, 'to listen'
         )
+        pid = node_pid()  # the only child so far
+        busy = subprocess.Popen([sys.executable, '-c', _BUSY])
         samples = _samples(machine, 0.0, WARM_UP_S)
         _publish(listener, machine, samples, time.time_ns(), 0)
         _quiet(listener, PAUSE_S)
-        pid, before = node_pid(), _counts(listener)
+        before = _counts(listener)
         listener.callbacks.clear()
         began_ns, used_s, began = time.time_ns(), processor_s(pid), time.monotonic()
         for block in range(round(60.0 * minutes / BLOCK_S)):
@@ -109,8 +112,9 @@ def _run(minutes, graph):
         _quiet(listener, PAUSE_S)
         after = _counts(listener)
     finally:
-        busy.kill()
-        busy.wait()
+        if busy is not None:
+            busy.kill()
+            busy.wait()
         processes.stop()
         listener.close()
     found = {name: after[name] - before[name] for name in after}

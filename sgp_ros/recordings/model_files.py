@@ -20,7 +20,8 @@ from sgp_ros.errors import ConfigError
 NODE_ONLY = frozenset({
     'command.type', 'diagnosis.window', 'diagnostics.period', 'joints', 'model.path',
     'monitor.duration', 'monitor.false_alarms', 'parameters.period', 'qos.depth', 'record.path',
-    'robot', 'robot_description', 'save.path', 'start_type_description_service', 'use_sim_time',
+    'record.split.age', 'record.split.size', 'robot', 'robot_description', 'save.path',
+    'save.period', 'save.restore', 'start_type_description_service', 'use_sim_time',
 })  # fmt: skip
 """Parameters of the node that mean nothing to a command; a test holds them to the node's."""
 

@@ -92,7 +92,7 @@ class RecordingWriter:
             self._write(self._command_topic, self._command_type, event.stamp_ns, message, log_ns)
         else:
             message = new_message(TEXT, data=change_to_text(event))
-            self._write(self._changes_topic, TEXT, event.stamp_ns, message)
+            self._write(self._changes_topic, TEXT, event.stamp_ns, message, log_ns)
 
     def write_joint_state(self, topic: str, sample: JointSample) -> None:
         """Write a JointState; what the sample lacks stays empty."""

@@ -33,8 +33,9 @@ from sgp_ros.ros.diagnosing import Diagnosing, DiagnosisFailed
 from sgp_ros.ros.messages import message_class
 from sgp_ros.ros.parameters import from_ros, to_ros
 from sgp_ros.ros.publishers import Publishers
+from sgp_ros.ros.record import Record, Topics, filled_name
 from sgp_ros.ros.services import Services
-from sgp_ros.ros.session import Record, Session, Topics
+from sgp_ros.ros.session import Session
 from sgp_ros.ros.start import build_engine
 from sgp_ros.ros.verdict import OK, WARN
 
@@ -95,6 +96,8 @@ class Identification:
         """Complete the record, end the processes, and leave the node as it was before."""
         self.pause()
         self._node.remove_on_set_parameters_callback(self._on_set_parameters)
+        if self._settings['save.period']:
+            self._services.autosave()
         self._services.close()
         self._session.close()
         self._diagnosing.close()
@@ -108,7 +111,13 @@ class Identification:
         if not path:
             return None
         topics = Topics(self._joint_states, self._command, self._out.prediction_topics)
-        return Record(Path(path), topics, str(self._settings['command.type']))
+        limits = (f'record.split.{name}' for name in ('size', 'age'))
+        record = Record(
+            Path(filled_name(path, self._name)), topics, str(self._settings['command.type']),
+            *(float(str(self._settings[name])) for name in limits),
+        )  # fmt: skip
+        self._node.get_logger().info(f'records to {record.path}')
+        return record
 
     def _subscribe(self) -> None:
         quality = QoSProfile(
@@ -147,6 +156,11 @@ class Identification:
                     period_s, partial(self._guarded, action), clock=self._steady
                 )
             )
+
+        save_s = float(str(self._settings['save.period']))
+        if save_s:
+            save = partial(self._guarded, self._services.autosave)
+            self._timers.append(self._node.create_timer(save_s, save, clock=self._steady))
 
     def _guarded(self, action: Callable[..., None], *given: Any) -> None:
         """Do what a message or a timer asks for; what only a bug can cause ends nothing."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from rclpy.node import Node
@@ -13,6 +12,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from sgp_ros.engine.samples import SettingValue
 from sgp_ros.ros.diagnosing import Diagnosing
+from sgp_ros.ros.record import save_file
 from sgp_ros.ros.session import Session
 
 
@@ -37,6 +37,7 @@ class Services:
         self._session = session
         self._diagnosing = diagnosing
         self._settings = settings
+        self._file = save_file(str(settings['save.path']), node.get_fully_qualified_name())
         self._offered = [
             node.create_service(kind, f'~/{name}', partial(self._guarded, answer))
             for name, kind, answer in self._all()
@@ -78,21 +79,25 @@ class Services:
         response.success, response.message = True, 'everything that was learned is forgotten'
         return response
 
-    def _save(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        given = str(self._settings['save.path']) or f'{self._node.get_name()}.npz'
-        path = Path(given).absolute().with_suffix('.npz')
-        settings = {
-            'robot': self._settings['robot'],
-            'command.type': self._settings['command.type'],
-            **self._session.engine.config.to_mapping(),
-        }
+    def autosave(self) -> None:
+        """Save without keeping messages waiting; what fails is logged."""
         try:
-            self._session.save(path, settings)
+            self._session.save_beside(self._file, self._saved_settings())
+        except OSError as error:
+            self._node.get_logger().error(f'not saved: {error}')
+
+    def _save(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            self._session.save(self._file, self._saved_settings())
         except OSError as error:
             response.success, response.message = False, f'not saved: {error}'
         else:
-            response.success, response.message = True, str(path)
+            response.success, response.message = True, str(self._file)
         return response
+
+    def _saved_settings(self) -> dict[str, SettingValue]:
+        own = {name: self._settings[name] for name in ('robot', 'command.type')}
+        return own | self._session.engine.config.to_mapping()
 
     def _diagnose(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.success, response.message = self._diagnosing.start(self._session.engine.config)

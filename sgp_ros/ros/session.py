@@ -1,89 +1,30 @@
-"""One run of an engine with its record and its fits: all that the node does beside messages.
-
-A record holds what the engine took and gave, in order, so that a replay repeats the run. It opens
-with the settings in force, stamped one nanosecond before the first event.
-"""
+"""One run of an engine with its record and its fits: all that the node does beside messages."""
 
 from __future__ import annotations
 
+import contextlib
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from sgp_ros.engine.config import describe_settings
+import numpy as np
+
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitResult
 from sgp_ros.engine.joint_merging import JointMerger
 from sgp_ros.engine.replay import Swap
 from sgp_ros.engine.results import Step
-from sgp_ros.engine.samples import Event, JointSample, Reset, SettingsChange, SettingValue
+from sgp_ros.engine.samples import Event, JointSample, SettingValue
 from sgp_ros.engine.snapshots import take_snapshot
-from sgp_ros.recordings.command_types import FLOAT64_ARRAY, NO_COMMAND
+from sgp_ros.recordings.command_types import FLOAT64_ARRAY
 from sgp_ros.recordings.model_files import save_model
-from sgp_ros.recordings.predictions import Outputs, PredictionTopics, outputs, write_outputs
-from sgp_ros.recordings.writer import RecordingWriter
+from sgp_ros.recordings.predictions import Outputs, outputs
 from sgp_ros.ros.fit_health import FitHealth
 from sgp_ros.ros.fit_process import FitProcess, WorkerLost
 from sgp_ros.ros.health import Health
-
-
-@dataclass(frozen=True, slots=True)
-class Topics:
-    """Full names of the topics of a node, as the record shows them."""
-
-    joint_states: str
-    command: str
-    predictions: PredictionTopics
-
-
-class Record:
-    """A growing MCAP file; what was flushed survives a crash.
-
-    Args:
-        path: of the file; missing folders are made.
-        topics: names in the file.
-        command_type: as the setting `command.type`.
-
-    Raises:
-        OSError: the file cannot be written.
-    """
-
-    def __init__(self, path: Path, topics: Topics, command_type: str) -> None:
-        self.path = path.absolute()
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        self._topics = topics
-        kind = FLOAT64_ARRAY if command_type == NO_COMMAND else command_type
-        self._writer = RecordingWriter(
-            self.path, topics.joint_states, topics.command, kind, is_live=True
-        )
-        self._is_open = False
-
-    def write_event(self, event: Event, engine: Engine) -> None:
-        """Write an event that took effect; `engine` tells the settings in force.
-
-        Changes before the first sample are part of the settings with which the record opens.
-        """
-        if not self._is_open:
-            if isinstance(event, (SettingsChange, Reset)):
-                return
-            self._is_open = True
-            opening = SettingsChange(max(event.stamp_ns - 1, 0), _changeable(engine))
-            self._writer.write_event(opening)
-        self._writer.write_event(event)
-
-    def write_outputs(self, outputs: Outputs) -> None:
-        """Write what was published of one estimate."""
-        write_outputs(self._writer, self._topics.predictions, outputs)
-
-    def flush(self) -> None:
-        """Make everything written so far readable even if the process dies now."""
-        self._writer.flush()
-
-    def close(self) -> None:
-        """Complete the file."""
-        self._writer.close()
+from sgp_ros.ros.record import Record
 
 
 class Session:
@@ -115,6 +56,8 @@ class Session:
         self._record = record
         self._fits = FitProcess()
         self._swap: Swap | None = None
+        self._saving: threading.Thread | None = None
+        self._save_problem: OSError | None = None
 
     def merged(self, event: Event) -> Sequence[Event]:
         """Return what the engine is to take: states of all joints instead of parts of them."""
@@ -184,7 +127,36 @@ class Session:
         Raises:
             OSError: the files cannot be written.
         """
+        self._end_saving()
         save_model(path, take_snapshot(self.engine), settings)
+
+    def save_beside(self, path: Path, settings: Mapping[str, SettingValue]) -> None:
+        """Save model and settings in a thread, which writes a copy while messages are served.
+
+        Raises:
+            OSError: the files of the last call could not be written.
+        """
+        if self._saving is not None and self._saving.is_alive():
+            return
+        self._end_saving()
+        model = {name: np.array(array) for name, array in take_snapshot(self.engine).items()}
+
+        def save() -> None:
+            try:
+                save_model(path, model, settings)
+            except OSError as error:
+                self._save_problem = error
+
+        self._saving = threading.Thread(target=save)
+        self._saving.start()
+
+    def _end_saving(self) -> None:
+        if self._saving is not None:
+            self._saving.join()
+            self._saving = None
+        problem, self._save_problem = self._save_problem, None
+        if problem is not None:
+            raise problem
 
     def flush_record(self) -> None:
         """Make the record so far survive a crash."""
@@ -192,6 +164,8 @@ class Session:
 
     def close(self) -> None:
         """End the stream: release what waits, complete the record, kill the worker."""
+        with contextlib.suppress(OSError):
+            self._end_saving()
         self._fits.close()
         self._settle(self.engine.flush())
         self._write(lambda record: record.close())
@@ -227,8 +201,3 @@ class Session:
             self.health.fit_since_s = None if request is None else time.perf_counter()
             if request is not None:
                 self._fits.submit(request)
-
-
-def _changeable(engine: Engine) -> dict[str, SettingValue]:
-    fixed = {s.name for s in describe_settings(engine.robot) if s.read_only}
-    return {n: v for n, v in engine.config.to_mapping().items() if n not in fixed}

@@ -29,48 +29,67 @@ FIRST = (ROBOT, DESCRIPTION, JOINTS, MODEL_PATH)
 """Those that decide which others there are."""
 
 
-def node_settings() -> tuple[Setting, ...]:
-    """Return the settings beside `FIRST`."""
-    return (
-        Setting(
-            'command.type', 'str', FLOAT64_ARRAY,
-            'Message type on topic command; none: the effort comes in the joint states.',
-            choices=(NO_COMMAND, *COMMAND_TYPES), read_only=True,
-        ),
-        Setting(
-            'qos.depth', 'int', 200, 'Messages kept for the node while it is busy.',
-            low=1, high=100_000, read_only=True,
-        ),
-        Setting(
-            'record.path', 'str', '',
-            'MCAP file for what the node consumes and predicts; empty: no record.', read_only=True,
-        ),
-        Setting(
-            'save.path', 'str', '',
-            'File (.npz) that service save writes; empty: <node name>.npz where the node started.',
-            read_only=True,
-        ),
-        Setting(
-            'diagnostics.period', 'float', 1.0, 'Time between two messages on /diagnostics.',
-            unit='s', low=0.1, high=3600.0, read_only=True,
-        ),
-        Setting(
-            'diagnosis.window', 'float', 60.0,
-            'How much of the past is kept for service diagnose.',
-            unit='s', low=1.0, high=3600.0, read_only=True,
-        ),
-        Setting(
-            'monitor.duration', 'float', 0.3,
-            'Errors alarm on ~/monitor that lie outside their 95 % interval for at least so long.',
-            unit='s', low=0.0, high=60.0, read_only=True,
-        ),
-        Setting(
-            'monitor.false_alarms', 'float', 1.0,
-            'False alarms of an undisturbed robot that are accepted; fewer need longer errors.',
-            unit='1/h', low=1e-6, high=1000.0, read_only=True,
-        ),
-        Setting(
-            'parameters.period', 'float', 1.0, 'Time between two messages on ~/parameters.',
-            unit='s', low=0.02, high=3600.0, read_only=True,
-        ),
-    )  # fmt: skip
+NODE = (
+    Setting(
+        'command.type', 'str', FLOAT64_ARRAY,
+        'Message type on topic command; none: the effort comes in the joint states.',
+        choices=(NO_COMMAND, *COMMAND_TYPES), read_only=True,
+    ),
+    Setting(
+        'qos.depth', 'int', 200, 'Messages kept for the node while it is busy.',
+        low=1, high=100_000, read_only=True,
+    ),
+    Setting(
+        'record.path', 'str', '',
+        'MCAP file for what the node takes and predicts; may hold {time} and {node}; a taken '
+        'name gets a number; empty: no record.', read_only=True,
+    ),
+    Setting(
+        'record.split.size', 'float', 0.0,
+        'Size of a record at which its next file begins, in a folder of its name; 0: never.',
+        unit='MB', low=0.0, high=1e6, read_only=True,
+    ),
+    Setting(
+        'record.split.age', 'float', 0.0,
+        'Age of a record at which its next file begins, in a folder of its name; 0: never.',
+        unit='s', low=0.0, high=1e7, read_only=True,
+    ),
+    Setting(
+        'save.path', 'str', '',
+        'File (.npz) that service save writes; may hold {node}; empty: {node}.npz where the '
+        'node started.', read_only=True,
+    ),
+    Setting(
+        'save.period', 'float', 0.0,
+        'Time between two saves by itself, and one at the end; 0: on request alone.',
+        unit='s', low=0.0, high=1e6, read_only=True,
+    ),
+    Setting(
+        'save.restore', 'bool', default=False,
+        description='Go on from the file of save.path where there is one.', read_only=True,
+    ),
+    Setting(
+        'diagnostics.period', 'float', 1.0, 'Time between two messages on /diagnostics.',
+        unit='s', low=0.1, high=3600.0, read_only=True,
+    ),
+    Setting(
+        'diagnosis.window', 'float', 60.0,
+        'How much of the past is kept for service diagnose.',
+        unit='s', low=1.0, high=3600.0, read_only=True,
+    ),
+    Setting(
+        'monitor.duration', 'float', 0.3,
+        'Errors alarm on ~/monitor that lie outside their 95 % interval for at least so long.',
+        unit='s', low=0.0, high=60.0, read_only=True,
+    ),
+    Setting(
+        'monitor.false_alarms', 'float', 1.0,
+        'False alarms of an undisturbed robot that are accepted; fewer need longer errors.',
+        unit='1/h', low=1e-6, high=1000.0, read_only=True,
+    ),
+    Setting(
+        'parameters.period', 'float', 1.0, 'Time between two messages on ~/parameters.',
+        unit='s', low=0.02, high=3600.0, read_only=True,
+    ),
+)  # fmt: skip
+"""Those beside `FIRST`."""

@@ -22,8 +22,9 @@ from sgp_ros.recordings.model_files import load_model
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
 from sgp_ros.ros.parameters import declare
+from sgp_ros.ros.record import save_file
 from sgp_ros.ros.robot_source import refuse_unknown
-from sgp_ros.ros.settings import FIRST, ROBOT, node_settings
+from sgp_ros.ros.settings import FIRST, NODE, ROBOT
 
 _PERIOD_NS = 1_000_000
 _SAMPLES = 40
@@ -44,13 +45,14 @@ def build_engine(node: Node, name: str) -> tuple[Engine, dict[str, SettingValue]
     """
     first = declare(node, FIRST)
     robot = load_robot(name)
-    snapshot = load_model(Path(str(first['model.path']))) if first['model.path'] else None
+    model = str(first['model.path']) or _left_over(node)
+    snapshot = load_model(Path(model)) if model else None
     saved = {} if snapshot is None else snapshot_config(snapshot, robot).to_mapping()
     (kernel,) = (s for s in describe_settings(robot) if s.name == 'model.kernel')
     given = declare(node, _with_defaults((kernel,), saved))  # it names the hyper-parameters
     settings = describe_settings(robot, str(given['model.kernel']))
     rest = [setting for setting in settings if setting.name != kernel.name]
-    given |= declare(node, (*node_settings(), *_with_defaults(rest, saved)))
+    given |= declare(node, (*NODE, *_with_defaults(rest, saved)))
     names = {setting.name for setting in settings}
     refuse_unknown(node, names | set(first) | set(given), is_complete=True)
     config = EngineConfig.from_mapping({n: v for n, v in given.items() if n in names}, robot)
@@ -63,6 +65,17 @@ def build_engine(node: Node, name: str) -> tuple[Engine, dict[str, SettingValue]
             engine.change(wanted)
     own = {n: v for n, v in given.items() if n not in names}
     return engine, {**first, **own, ROBOT.name: name}
+
+
+def _left_over(node: Node) -> str:
+    """Return the file that an earlier run saved, where it is to be gone on from."""
+    settings = [s for s in NODE if s.name in ('save.path', 'save.restore')]
+    given = declare(node, settings)
+    path = save_file(str(given['save.path']), node.get_fully_qualified_name())
+    if not given['save.restore'] or not path.is_file():
+        return ''
+    node.get_logger().info(f'goes on from {path}')
+    return str(path)
 
 
 def _with_defaults(

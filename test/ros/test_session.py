@@ -29,7 +29,8 @@ from sgp_ros.recordings.predictions import PredictionTopics
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.ros.fit_process import FitProcess, WorkerLost
-from sgp_ros.ros.session import Record, Session, Topics
+from sgp_ros.ros.record import Record, Topics
+from sgp_ros.ros.session import Session
 from sgp_ros.simulation.assembly import make_simulation
 
 ROOT = Path(__file__).parents[2]
