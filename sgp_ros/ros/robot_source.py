@@ -26,7 +26,7 @@ from sgp_ros.errors import ConfigError, SgpError
 from sgp_ros.recordings.messages import Status, diagnostics_message
 from sgp_ros.ros.messages import new_message
 from sgp_ros.ros.parameters import declare
-from sgp_ros.ros.settings import FIRST, NODE
+from sgp_ros.ros.settings import FIRST, node_settings
 from sgp_ros.ros.verdict import ERROR, WARN
 
 _TOPIC = 'robot_description'
@@ -54,7 +54,7 @@ class RobotSource:
     def __init__(self, node: Node) -> None:
         self._node = node
         given = declare(node, FIRST)
-        refuse_unknown(node, [s.name for s in (*FIRST, *NODE)] + _engine_names())
+        refuse_unknown(node, [s.name for s in (*FIRST, *node_settings())] + _engine_names())
         joints = given['joints']
         assert isinstance(joints, tuple)
         self._joints = [str(joint) for joint in joints if joint]

@@ -29,12 +29,7 @@ FIRST = (ROBOT, DESCRIPTION, JOINTS, MODEL_PATH)
 """Those that decide which others there are."""
 
 
-NODE = (
-    Setting(
-        'command.type', 'str', FLOAT64_ARRAY,
-        'Message type on topic command; none: the effort comes in the joint states.',
-        choices=(NO_COMMAND, *COMMAND_TYPES), read_only=True,
-    ),
+_OTHERS = (
     Setting(
         'qos.depth', 'int', 200, 'Messages kept for the node while it is busy.',
         low=1, high=100_000, read_only=True,
@@ -92,4 +87,15 @@ NODE = (
         unit='s', low=0.02, high=3600.0, read_only=True,
     ),
 )  # fmt: skip
-"""Those beside `FIRST`."""
+
+
+def node_settings() -> tuple[Setting, ...]:
+    """Return the settings beside `FIRST`, with the command types that are known now."""
+    return (
+        Setting(
+            'command.type', 'str', FLOAT64_ARRAY,
+            'Message type on topic command; none: the effort comes in the joint states.',
+            choices=(NO_COMMAND, *COMMAND_TYPES), read_only=True,
+        ),
+        *_OTHERS,
+    )  # fmt: skip

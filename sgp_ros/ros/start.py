@@ -24,7 +24,7 @@ from sgp_ros.robots.robot import Robot
 from sgp_ros.ros.parameters import declare
 from sgp_ros.ros.record import save_file
 from sgp_ros.ros.robot_source import refuse_unknown
-from sgp_ros.ros.settings import FIRST, NODE, ROBOT
+from sgp_ros.ros.settings import FIRST, ROBOT, node_settings
 
 _PERIOD_NS = 1_000_000
 _SAMPLES = 40
@@ -52,7 +52,7 @@ def build_engine(node: Node, name: str) -> tuple[Engine, dict[str, SettingValue]
     given = declare(node, _with_defaults((kernel,), saved))  # it names the hyper-parameters
     settings = describe_settings(robot, str(given['model.kernel']))
     rest = [setting for setting in settings if setting.name != kernel.name]
-    given |= declare(node, (*NODE, *_with_defaults(rest, saved)))
+    given |= declare(node, (*node_settings(), *_with_defaults(rest, saved)))
     names = {setting.name for setting in settings}
     refuse_unknown(node, names | set(first) | set(given), is_complete=True)
     config = EngineConfig.from_mapping({n: v for n, v in given.items() if n in names}, robot)
@@ -69,7 +69,7 @@ def build_engine(node: Node, name: str) -> tuple[Engine, dict[str, SettingValue]
 
 def _left_over(node: Node) -> str:
     """Return the file that an earlier run saved, where it is to be gone on from."""
-    settings = [s for s in NODE if s.name in ('save.path', 'save.restore')]
+    settings = [s for s in node_settings() if s.name in ('save.path', 'save.restore')]
     given = declare(node, settings)
     path = save_file(str(given['save.path']), node.get_fully_qualified_name())
     if not given['save.restore'] or not path.is_file():

@@ -15,7 +15,7 @@ from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.table_map import check_map
 from sgp_ros.recordings.topics import Topic, choose_command
 from sgp_ros.ros.messages import message_class, new_message
-from sgp_ros.ros.settings import NODE
+from sgp_ros.ros.settings import node_settings
 from sgp_ros.ros.simulated_robot import simulator_settings
 from test.recordings import worlds
 
@@ -67,7 +67,7 @@ def test_a_registered_type_may_be_imported_from_a_table():
 @pytest.mark.usefixtures('dummy')
 def test_the_nodes_offer_and_understand_a_registered_type():
     """Their settings follow from the table, and the class of a message from its name."""
-    for settings in (NODE, simulator_settings()):
+    for settings in (node_settings(), simulator_settings()):
         (setting,) = (s for s in settings if s.name == 'command.type')
         assert NAME in setting.choices
     assert message_class(NAME) is Float32MultiArray

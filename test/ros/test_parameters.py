@@ -12,9 +12,9 @@ from sgp_ros.engine.config import EngineConfig, describe_settings
 from sgp_ros.engine.setting import Setting
 from sgp_ros.robots.registry import load_robot, robot_names
 from sgp_ros.ros.parameters import descriptor, from_ros, to_ros
-from sgp_ros.ros.settings import FIRST, NODE
+from sgp_ros.ros.settings import FIRST, node_settings
 
-SETTINGS = (*FIRST, *NODE, *describe_settings(load_robot('reaction_wheel')))
+SETTINGS = (*FIRST, *node_settings(), *describe_settings(load_robot('reaction_wheel')))
 CONFIG = Path(__file__).parents[2] / 'config'
 
 
@@ -51,7 +51,7 @@ def test_a_shipped_file_configures_the_robot_of_its_name(path: Path) -> None:
     given = _flat('', document['/**']['ros__parameters'])
     robot = given.pop('robot')
     assert robot == path.stem  # a name is found from anywhere
-    known = {setting.name: setting for setting in NODE}
+    known = {setting.name: setting for setting in node_settings()}
     for name in set(given) & set(known):
         assert known[name].problem(given.pop(name)) is None
     EngineConfig.from_mapping(given, load_robot(robot))
