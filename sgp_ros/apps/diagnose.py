@@ -34,6 +34,7 @@ from sgp_ros.report.diagnosis_text import (
 )
 from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.report.next_steps import Steps, after_diagnosis, ending
+from sgp_ros.report.overlay import write_overlay
 from sgp_ros.report.verdict import simulated, verdict_sentence
 from sgp_ros.robots.bare import simulated_model
 from sgp_ros.robots.gains import Gains, read_gains
@@ -108,6 +109,7 @@ def run_diagnose(
     found = diagnose(
         events, model, tree, tests, stated=nominal.stated, holds_out=not chosen.tests,
         is_static=chosen.static, gains=gains, simulation=simulation, simulated=simulated,
+        has_overlays=True,
         progress=progress,
         config=EngineConfig(effort_source=EFFORT_SOURCES[chosen.effort]),
     )  # fmt: skip
@@ -176,6 +178,7 @@ def _written(
         if online is not None:
             content['online'] = online.content()
         write_text(out / 'diagnosis.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
+        write_overlay(out, found)
         write_diagnosis(out, found, nominal.tree, steps)
     print_diagnosis(found)
     print(ending(out, steps))

@@ -33,6 +33,7 @@ from sgp_ros.diagnosis.gathered import Knowledge, Recordings, gather
 from sgp_ros.diagnosis.locate.bands import bands
 from sgp_ros.diagnosis.locate.dependence import dependences
 from sgp_ros.diagnosis.locate.remainder import Remainder, learn_remainder
+from sgp_ros.diagnosis.prove.overlay import overlays
 from sgp_ros.diagnosis.prove.prediction import FinalModel, diagnosed_bodies
 from sgp_ros.diagnosis.prove.processes import harm, kept_processes
 from sgp_ros.diagnosis.prove.proof import prove, reasons_to_doubt
@@ -53,6 +54,7 @@ from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.robot import Robot
 
+Progress = Callable[[float], None]
 _CALM = ('no_mismatch', 'parameters_only')
 _UNCLEAR = 'What machine and simulation share cannot be said: one of them is unexplained.'
 
@@ -70,7 +72,8 @@ def diagnose(
     gains: Gains | None = None,
     simulation: Iterable[Event] | None = None,
     simulated: Sequence[EffectAt] | None = None,
-    progress: Callable[[float], None] = lambda _share: None,
+    has_overlays: bool = False,
+    progress: Progress = lambda _share: None,
 ) -> Diagnosis:
     """Say what a recording has that the nominal robot lacks.
 
@@ -87,6 +90,7 @@ def diagnose(
         gains: of drives that hold position targets; None where commands are efforts.
         simulation: events of the simulation to compare with; None for the robot alone.
         simulated: physics of a simulation that is known by its model, whose bodies `tree` has.
+        has_overlays: whether motions of both models are replayed over the measured ones.
         progress: called with the share that is done.
 
     Raises:
@@ -106,7 +110,7 @@ def diagnose(
     )  # fmt: skip
     try:
         connected = connect(recordings, tree, lambda x: progress(0.05 + 0.85 * x))
-        found = _diagnosed(connected, robot.name, progress)
+        found = _diagnosed(connected, robot.name, progress, replays=has_overlays)
         if simulated is not None:
             reference = against_model(connected.equations, connected.several, simulated)
             return _compared(found, connected, reference, ())
@@ -122,10 +126,12 @@ def diagnose(
         ) from error
 
 
-def _diagnosed(connected: Connected, robot: str, progress: Callable[[float], None]) -> Diagnosis:
+def _diagnosed(
+    connected: Connected, robot: str, progress: Progress, *, replays: bool
+) -> Diagnosis:
     recordings, whole, several = connected.recordings, connected.equations, connected.several
     raw, tree, names = recordings.learned, whole.motion.tree, recordings.names
-    several, contrasts, chances = _settled(several)
+    several, sides, chances = _settled(several)
     equations = several.equations
     comparison, decision, model = several.comparison, several.decision, several.model
     depends = dependences(equations, comparison.base.residual)
@@ -163,14 +169,12 @@ def _diagnosed(connected: Connected, robot: str, progress: Callable[[float], Non
         refused={reason: count for reason, count in raw.refused.items() if count},
         remarks=(*connected.remarks, *raw.remarks, *bound_remarks(decision), *on_z, *doubts),
         bodies=diagnosed_bodies(whole, model, recordings.unstated),
-        equivalents=(
-            *equivalents(equations, comparison, decision, contrasts),
-            *connected.equivalents,
-        ),
+        equivalents=(*equivalents(equations, comparison, decision, sides), *connected.equivalents),
         recordings=names if len(names) > 1 else (),
         differences=differ,
         setup=connected.findings,
         visibility=visibility(equations, comparison, decision),
+        overlays=overlays(final, parts if replays else {}, tree),
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sgp_ros.diagnosis.shown import Band, Dependence, Predictions, Rollouts, Traces
+from sgp_ros.diagnosis.shown import Band, Dependence, Overlay, Predictions, Rollouts, Traces
 
 VERDICTS = ('no_mismatch', 'parameters_only', 'setup_error', 'missing_physics', 'unexplained')
 
@@ -221,6 +221,7 @@ class Diagnosis:
         shared: effects that machine and simulation have alike.
         setup: errors of how the robot was connected or described, undone before all else.
         visibility: least that would show, infinite if nothing would; by joint, effect, parameter.
+        overlays: motions of both models over the measured one, by stem; empty where not asked for.
         bodies: (b, 10) inertial parameters of the final model, of bodies that can exist, in the
             order of the tree; None for the nominal ones.
     """
@@ -252,3 +253,4 @@ class Diagnosis:
     shared: tuple[Finding, ...] = ()
     setup: tuple[Finding, ...] = ()
     visibility: Mapping[tuple[str, str, str], Parameter] = field(default_factory=dict)
+    overlays: Mapping[str, Overlay] = field(default_factory=dict)

@@ -106,3 +106,37 @@ class Rollouts:
     measured: np.ndarray
     before: np.ndarray
     after: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Replay:
+    """Motion of a model under what was recorded.
+
+    Attributes:
+        position: (N, k), NaN where there is none [rad or m].
+        rms: (k,) root mean square errors, NaN of a replay that is not stable [rad or m].
+    """
+
+    position: np.ndarray
+    rms: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Overlay:
+    """Measured, nominal and diagnosed motion of one recording, N rows.
+
+    Attributes:
+        time: (N,) since the first state [s].
+        position: (N, k) measured [rad or m].
+        effort: (N, k) that acted, low-passed [N m or N].
+        efforts: `nominal` and `diagnosed` to what they take for this motion, (N, k).
+        replays: mode to the replays of both, see `prove.overlay`.
+        seconds: length of the recording [s].
+    """
+
+    time: np.ndarray
+    position: np.ndarray
+    effort: np.ndarray
+    efforts: Mapping[str, np.ndarray]
+    replays: Mapping[str, Mapping[str, Replay]]
+    seconds: float

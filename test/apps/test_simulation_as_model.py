@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 import yaml
 
@@ -55,6 +56,23 @@ def test_machine_and_model_stand_side_by_side(machine, tmp_path):
     stated = {e.name: e.numbers for e in nominal_model(diagnosed).stated}
     assert stated['coulomb_friction']['level'] == pytest.approx(0.5, abs=0.02)
     assert stated['viscous_friction']['b'] == pytest.approx(0.2, abs=0.03)
+
+
+def test_the_motions_of_both_models_lie_over_the_measured_one(machine, tmp_path):
+    """In the order of their errors; the series are those of the file's rows."""
+    _diagnosed(machine, tmp_path, 0.03)
+    found = json.loads((tmp_path / 'out' / 'overlay.json').read_text())
+    assert set(found['recordings']) == {'train', 'held_out'}
+    train = found['recordings']['train']
+    assert set(train['modes']) == {'open_0.5', 'open_2', 'open_whole'}
+    for errors in (mode['position_rms'] for mode in train['modes'].values()):
+        worst = errors['nominal'] or {'hinge': np.inf}  # which may not be stable
+        assert errors['diagnosed']['hinge'] < 0.2 * worst['hinge']
+    with np.load(tmp_path / 'out' / 'overlay.npz') as series:
+        n = len(series['train/time'])
+        assert series['train/open_0.5_diagnosed'].shape == series['train/position'].shape == (n, 1)
+        error = series['train/open_0.5_diagnosed'] - series['train/position']
+        assert np.nanstd(error) < 0.1 * series['train/position'].std()
 
 
 def test_another_machine_is_refused(machine, tmp_path, capsys):

@@ -7,7 +7,7 @@ remember is handed in with the efforts: it belongs to a trajectory, not to a sta
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from sgp_ros.diagnosis.locate.remainder import Remainder
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 _SMALL = 1e-6
@@ -125,6 +126,42 @@ class DiagnosedDynamics:
             self.tree, given[:, 2 * k], self.step, q, v, a, given[:, :k], None, stated=stated,
             recording=given[:, 2 * k + 1], sign=np.sign,
         )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class ServoedDynamics(DiagnosedDynamics):
+    """The same under drives; its loads hold efforts for joints at rest at 0, `tau + kp q + kd v`.
+
+    Attributes:
+        kp, kd: (k,) gains [N m/rad, N m s/rad].
+    """
+
+    kp: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    kd: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    @classmethod
+    def of(cls, dynamics: DiagnosedDynamics, gains: Gains) -> ServoedDynamics:
+        """Return dynamics with drives."""
+        return cls(
+            dynamics.model, dynamics.tree, dynamics.step, dynamics.remainders, dynamics.stated,
+            gains.kp, gains.kd,
+        )  # fmt: skip
+
+    def equations(
+        self, q: np.ndarray, v: np.ndarray, loads: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return M and the drive with the efforts that the drives give in these states."""
+        return super().equations(q, v, self._acting(q, v, loads))
+
+    def level_of_dry_friction(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
+        """Return half the jump of each joint's force as its velocity changes sign, (m, k)."""
+        return super().level_of_dry_friction(q, self._acting(q, np.zeros_like(q), loads))
+
+    def _acting(self, q: np.ndarray, v: np.ndarray, loads: np.ndarray) -> np.ndarray:
+        k = q.shape[1]
+        acting = loads.copy()
+        acting[:, :k] -= self.kp * q + self.kd * v
+        return acting
 
 
 def dynamics_of(

@@ -21,7 +21,13 @@ from sgp_ros.batch.rollout import advance
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.locate.remainder import Remainder
-from sgp_ros.diagnosis.prove.dynamics import DiagnosedDynamics, dynamics_of, remembered_force
+from sgp_ros.diagnosis.prove.dynamics import (
+    DiagnosedDynamics,
+    ServoedDynamics,
+    dynamics_of,
+    remembered_force,
+)
+from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 HORIZON_S = 0.3
@@ -105,8 +111,16 @@ def roll_out(
     model: Model,
     equations: Equations,
     remainders: tuple[Remainder, ...] = (),
+    gains: Gains | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Roll out a model from the start of every window.
+
+    Args:
+        windows: of the recording.
+        model: fitted on `equations`.
+        equations: of the training recording.
+        remainders: processes beside the model.
+        gains: of drives that go on controlling the model; None for the efforts of the recording.
 
     Returns:
         positions (m, n + 1, k) [rad or m], and (m,) which windows ended with finite numbers and,
@@ -114,11 +128,15 @@ def roll_out(
     """
     motion = windows.motion
     dynamics = dynamics_of(model, equations, motion, remainders)
+    effort = motion.effort
+    if gains is not None:
+        effort = effort + gains.kp * motion.position + gains.kd * motion.velocity
+        dynamics = ServoedDynamics.of(dynamics, gains)
     force = remembered_force(model, motion, dynamics.tree)
     ways = np.sqrt(windows.held.mean(axis=0) / windows.steps) + 1e-300
     before, settled = None, np.zeros(len(windows.first), dtype=bool)
     for _ in range(MOST_ROUNDS):
-        q, v = _rolled(windows, dynamics, force)
+        q, v = _rolled(windows, dynamics, force, effort)
         finite = np.isfinite(q).all(axis=(1, 2)) & np.isfinite(v).all(axis=(1, 2))
         if before is not None:
             settled = finite & (np.abs(q - before).max(axis=1) < CONVERGED * ways).all(axis=1)
@@ -130,13 +148,13 @@ def roll_out(
 
 
 def _rolled(
-    windows: RolloutWindows, dynamics: DiagnosedDynamics, force: np.ndarray
+    windows: RolloutWindows, dynamics: DiagnosedDynamics, force: np.ndarray, effort: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     motion, nodes = windows.motion, windows.nodes
     recording = -np.ones(len(motion.time)) if motion.recording is None else motion.recording
     loads = np.concatenate(
         [
-            windows.means(motion.effort), windows.means(force),
+            windows.means(effort), windows.means(force),
             windows.means(motion.time[:, None]), windows.means(recording[:, None]),
         ],
         axis=2,

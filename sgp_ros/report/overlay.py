@@ -1,0 +1,74 @@
+"""`overlay.json` and `overlay.npz`: measured, nominal and diagnosed motion, for reports."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sgp_ros.diagnosis.result import Diagnosis
+from sgp_ros.diagnosis.shown import Overlay
+from sgp_ros.report.files import write_text
+
+
+def write_overlay(folder: Path, found: Diagnosis) -> None:
+    """Write both files; nothing where no recording was replayed."""
+    if not found.overlays:
+        return
+    arrays: dict[str, Any] = _series(found.overlays)
+    growing = folder / 'overlay.part.npz'
+    np.savez(growing, **arrays)
+    growing.replace(folder / 'overlay.npz')
+    text = json.dumps(overlay_content(found), indent=1, allow_nan=False)
+    write_text(folder / 'overlay.json', text + '\n')
+
+
+def overlay_content(found: Diagnosis) -> dict[str, Any]:
+    """Return the errors of overlays by recording."""
+    joints, units = found.joints, found.units
+
+    def by_joint(x: np.ndarray) -> dict[str, float] | None:
+        return dict(zip(joints, map(float, x), strict=True)) if np.isfinite(x).all() else None
+
+    return {
+        'schema': 1,
+        'series': 'overlay.npz',
+        'recordings': {
+            stem: {
+                'joints': list(joints),
+                'units': {
+                    'position': ['m' if unit == 'N' else 'rad' for unit in units],
+                    'effort': list(units),
+                },
+                'seconds': o.seconds,
+                'effort_rms': {
+                    name: by_joint(np.sqrt(((o.effort - x) ** 2).mean(axis=0)))
+                    for name, x in o.efforts.items()
+                },
+                'modes': {
+                    mode: {'position_rms': {n: by_joint(r.rms) for n, r in sides.items()}}
+                    for mode, sides in o.replays.items()
+                },
+            }
+            for stem, o in found.overlays.items()
+        },
+    }
+
+
+def _series(found: Mapping[str, Overlay]) -> dict[str, np.ndarray]:
+    series: dict[str, np.ndarray] = {}
+    for stem, o in found.items():
+        series |= {
+            f'{stem}/time': o.time, f'{stem}/position': o.position, f'{stem}/effort': o.effort
+        }  # fmt: skip
+        series |= {f'{stem}/effort_{name}': x for name, x in o.efforts.items()}
+        series |= {
+            f'{stem}/{mode}_{name}': r.position
+            for mode, sides in o.replays.items()
+            for name, r in sides.items()
+            if np.isfinite(r.rms).all()
+        }
+    return series
