@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
 import multiprocessing
-import os
 import signal
+import threading
+import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
@@ -24,24 +27,21 @@ from sgp_ros.errors import SgpError
 from sgp_ros.recordings.messages import Status
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.robot import Robot
+from sgp_ros.ros.fit_process import yield_to_others
 from sgp_ros.ros.verdict import ERROR, OK, WARN
 
-_NICENESS = 10
+_PART = 250
+_CANCELLED = 'cancelled'
+_REST_S = 0.001
+_CHECKED_AT_ONCE = 2000
+"""Up to so many states, the service itself looks whether the robot moved; else the process."""
+Names = tuple[str, ...]
+State = tuple[int, Names, np.ndarray, np.ndarray | None, np.ndarray | None]
+Command = tuple[int, np.ndarray, Names | None]
 
-
-@dataclass(frozen=True, slots=True)
-class DiagnosisRequest:
-    """What a diagnosis works on.
-
-    Attributes:
-        robot: robot YAML or URDF.
-        events: states and commands.
-        config: settings of the intake.
-    """
-
-    robot: str
-    events: tuple[Event, ...]
-    config: EngineConfig
+MOST_EVENTS = 200_000
+"""Remembered at most, whatever the window: a minute of states and commands at 1.6 kHz each."""
+_STATE_FIELDS = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,80 +70,102 @@ class DiagnosisProcess:
     """A process that diagnoses one recording; it starts at once.
 
     Args:
-        request: robot and recording.
+        robot: robot file, name or description.
+        config: settings of the intake.
+        past: states and commands.
+
+    Attributes:
+        share: of the work that is done, 0 to 1.
+        began_s: when it started, on a steady clock [s].
     """
 
-    def __init__(self, request: DiagnosisRequest) -> None:
+    def __init__(self, robot: str, config: EngineConfig, past: Sequence[State | Command]) -> None:
         context = multiprocessing.get_context('spawn')
         self._connection, theirs = context.Pipe()
         self._process: SpawnProcess = context.Process(
             target=_diagnose, args=(theirs,), daemon=True
         )
-        self._request: DiagnosisRequest | None = request
+        self.share, self.began_s = 0.0, time.monotonic()
         # As in `fit_process`: Ctrl-C in a terminal reaches the whole process group.
         resource_tracker.ensure_running()
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         self._process.start()
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         theirs.close()
+        given = (self._connection, robot, config, past)
+        self._sender = threading.Thread(target=_send, args=given, daemon=True)
+        self._sender.start()
 
     def poll(self) -> DiagnosisDone | DiagnosisFailed | None:
         """Return the outcome once there is one; never waits for it."""
         try:
-            if not self._connection.poll():
-                return None
-            answer = self._connection.recv()
-            if self._request is not None:  # the process listens now
-                request, self._request = self._request, None
-                self._connection.send(request)
-                return None
+            while self._connection.poll():
+                answer = self._connection.recv()
+                if not isinstance(answer, float):
+                    assert isinstance(answer, (DiagnosisDone, DiagnosisFailed))
+                    return answer
+                self.share = answer
         except (EOFError, OSError):
             self._process.join()
             code = self._process.exitcode
             return DiagnosisFailed(f'the process of the diagnosis ended with code {code}')
-        assert isinstance(answer, (DiagnosisDone, DiagnosisFailed))
-        return answer
+        return None
 
     def close(self) -> None:
         """Kill the process."""
         self._process.kill()
         self._process.join()
+        self._sender.join()  # it fails at once: nobody reads any more
         self._connection.close()
 
 
+def _send(
+    connection: Connection, robot: str, config: EngineConfig, past: Sequence[State | Command]
+) -> None:
+    """Send a recording in parts: a whole minute at once would keep messages waiting."""
+    with contextlib.suppress(OSError):  # `poll` finds the end of the connection
+        connection.send((robot, config, len(past)))
+        for start in range(0, len(past), _PART):
+            connection.send(past[start : start + _PART])
+            time.sleep(_REST_S)
+
+
 def _diagnose(connection: Connection) -> None:
-    os.nice(_NICENESS)
+    yield_to_others()
     try:
-        connection.send(None)
-        connection.send(_outcome(connection.recv()))
+        robot, config, count = connection.recv()
+        past: list[State | Command] = []
+        while len(past) < count:
+            past += connection.recv()
+        connection.send(_outcome(robot, config, _events(past), connection))
     except (EOFError, OSError):
         return  # the node is gone
 
 
-def _outcome(request: DiagnosisRequest) -> DiagnosisDone | DiagnosisFailed:
+def _outcome(
+    robot: str, config: EngineConfig, events: Sequence[Event], connection: Connection
+) -> DiagnosisDone | DiagnosisFailed:
     from sgp_ros.diagnosis.mapping import diagnosis_mapping
     from sgp_ros.diagnosis.pipeline import diagnose
-    from sgp_ros.robots.nominal import nominal_model
     from sgp_ros.robots.registry import load_robot
 
     try:
-        nominal = nominal_model(load_robot(request.robot))
+        nominal = nominal_model(load_robot(robot))
+        require_motion(events, nominal.robot.name, nominal.tree.moving_names)
         found = diagnose(
-            request.events, nominal.robot, nominal.tree, {}, stated=nominal.stated,
-            config=request.config,
+            events, nominal.robot, nominal.tree, {}, stated=nominal.stated, config=config,
+            progress=lambda share: connection.send(float(share)),
         )  # fmt: skip
         return DiagnosisDone(diagnosis_mapping(found))
     except SgpError as error:
         return DiagnosisFailed(' '.join(str(error).split()))
 
 
-Names = tuple[str, ...]
-State = tuple[int, Names, np.ndarray, np.ndarray | None, np.ndarray | None]
-Command = tuple[int, np.ndarray, Names | None]
-
-MOST_EVENTS = 200_000
-"""Remembered at most, whatever the window: a minute of states and commands at 1.6 kHz each."""
-_STATE_FIELDS = 5
+def _events(past: Iterable[State | Command]) -> tuple[JointSample | CommandSample, ...]:
+    return tuple(
+        JointSample(*fields) if len(fields) == _STATE_FIELDS else CommandSample(*fields)
+        for fields in past
+    )
 
 
 class Diagnosing:
@@ -182,10 +204,7 @@ class Diagnosing:
     @property
     def events(self) -> tuple[JointSample | CommandSample, ...]:
         """States and commands of the window, in the order in which they came."""
-        return tuple(
-            JointSample(*past) if len(past) == _STATE_FIELDS else CommandSample(*past)
-            for past in self._past
-        )
+        return _events(self._past)
 
     def start(self, config: EngineConfig) -> tuple[bool, str]:
         """Start a diagnosis of the recent past.
@@ -204,12 +223,20 @@ class Diagnosing:
             open_bodies(self._robot.name, nominal.tree)  # refuses one that cannot move
             if states < SHORTEST_ROWS:
                 return False, f'too few states: {states}, at least {SHORTEST_ROWS} are needed'
-            events = self.events
-            require_motion(events, self._robot.name, nominal.tree.moving_names)
+            if states <= _CHECKED_AT_ONCE:
+                require_motion(self.events, self._robot.name, nominal.tree.moving_names)
         except SgpError as error:
             return False, ' '.join(str(error).split())
-        self._process = DiagnosisProcess(DiagnosisRequest(self._path, events, config))
+        self._process = DiagnosisProcess(self._path, config, tuple(self._past))
         return True, f'started on {states} states'
+
+    def cancel(self) -> tuple[bool, str]:
+        """End a diagnosis that runs; return whether one did, and one sentence."""
+        if self._process is None:
+            return False, 'no diagnosis is running'
+        self.close()
+        self._outcome = DiagnosisFailed(_CANCELLED)
+        return True, 'the diagnosis is cancelled'
 
     def poll(self) -> DiagnosisDone | DiagnosisFailed | None:
         """Return the outcome of a diagnosis that has just ended."""
@@ -223,9 +250,19 @@ class Diagnosing:
         """Return the last verdict with a status for each finding; empty before the first call."""
         name, robot = f'{node}: diagnosis', self._robot.name
         if self._process is not None:
-            return [Status(name, OK, 'a diagnosis is running', robot, {'state': 'running'})]
+            share, passed_s = self._process.share, time.monotonic() - self._process.began_s
+            left_s = passed_s * (1.0 - share) / share if share > 0.0 else math.nan
+            left = f', {left_s:.0f} s left' if share > 0.0 else ''
+            values = {
+                'state': 'running', 'share': f'{share:.3f}', 'passed_s': f'{passed_s:.1f}',
+                'left_s': f'{left_s:.1f}',
+            }  # fmt: skip
+            return [Status(name, OK, f'{100 * share:.0f} % diagnosed{left}', robot, values)]
         if isinstance(self._outcome, DiagnosisFailed):
-            return [Status(name, ERROR, self._outcome.reason, robot, {'state': 'failed'})]
+            reason = self._outcome.reason
+            if reason == _CANCELLED:
+                return [Status(name, OK, reason, robot, {'state': reason})]
+            return [Status(name, ERROR, reason, robot, {'state': 'failed'})]
         if self._outcome is None:
             return []
         content = self._outcome.content

@@ -149,7 +149,7 @@ def _send(connection: Connection, request: FitRequest) -> None:
         connection.send(request)
 
 
-def _yield_to_others() -> None:
+def yield_to_others() -> None:
     """Take a low weight, and never the place of one that runs.
 
     Not `SCHED_IDLE` (Linux): on a computer that is always busy, as that of a robot, no fit would
@@ -170,7 +170,7 @@ def _end_with_parent() -> None:
 
 def _serve(connection: Connection) -> None:
     _end_with_parent()
-    _yield_to_others()
+    yield_to_others()
     try:
         connection.send(_READY)
         while True:

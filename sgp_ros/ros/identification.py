@@ -240,7 +240,10 @@ class Identification:
         statuses += session.fit_health.statuses(session.engine, self._name)
         self._log(statuses)
         statuses += self._publish_monitor()
-        statuses += self._diagnosing.statuses(self._name)
+        told = self._diagnosing.statuses(self._name)
+        if told:
+            self._out.diagnosis_status(self._now_ns, told)
+        statuses += told
         self._out.diagnostics(self._now_ns, statuses)
 
     def _publisher_names(self, topic: str) -> tuple[str, ...]:

@@ -51,11 +51,12 @@ class Publishers:
         self._monitor = publisher(DiagnosticArray, '~/monitor', _LATCHED)
         self._alarm = publisher(Bool, '~/alarm', _LATCHED)
         self._diagnosis = publisher(String, '~/diagnosis', _LATCHED)
+        self._progress = publisher(DiagnosticArray, '~/diagnosis_status', _LATCHED)
         self._diagnostics = publisher(DiagnosticArray, '/diagnostics')
         self._all = [
             self._prediction, self._variance, self._raw_variance, self._overlay, self._residual,
             *self._band, self._parameters, self._values, self._monitor, self._alarm,
-            self._diagnosis, self._diagnostics,
+            self._diagnosis, self._progress, self._diagnostics,
         ]  # fmt: skip
 
     @property
@@ -109,6 +110,10 @@ class Publishers:
     def diagnostics(self, stamp_ns: int, statuses: Sequence[Status]) -> None:
         """Publish /diagnostics."""
         self._diagnostics.publish(diagnostics_message(new_message, stamp_ns, statuses))
+
+    def diagnosis_status(self, stamp_ns: int, statuses: Sequence[Status]) -> None:
+        """Publish how far a diagnosis is, and what it found."""
+        self._progress.publish(diagnostics_message(new_message, stamp_ns, statuses))
 
     def diagnosis(self, text: str) -> None:
         """Publish the content of diagnosis.json."""

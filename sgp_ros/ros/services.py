@@ -1,4 +1,4 @@
-"""The services of a node: refit, reset, save, learn, diagnose."""
+"""The services of a node: refit, reset, save, learn, diagnose, cancel."""
 
 from __future__ import annotations
 
@@ -49,6 +49,7 @@ class Services:
             ('reset', Trigger, self._reset),
             ('save', Trigger, self._save),
             ('diagnose', Trigger, self._diagnose),
+            ('cancel_diagnosis', Trigger, self._cancel),
             ('learn', SetBool, self._learn),
         )
 
@@ -101,6 +102,10 @@ class Services:
 
     def _diagnose(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.success, response.message = self._diagnosing.start(self._session.engine.config)
+        return response
+
+    def _cancel(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success, response.message = self._diagnosing.cancel()
         return response
 
     def _learn(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:

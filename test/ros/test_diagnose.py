@@ -108,6 +108,10 @@ def test_a_diagnosis_of_the_recent_past_is_published(graph: Graph) -> None:
     assert answer.success, answer.message
     assert answer.message.startswith('started on ')
     assert int(answer.message.split()[2]) > 0.9 * sent
+    graph.wait_until(
+        lambda: float(graph.status('diagnosis').get('share', '0')) > 0.0, 'progress', PATIENCE_S
+    )
+    assert float(graph.status('diagnosis')['left_s']) > 0.0
     again = graph.call(Trigger, DIAGNOSE)
     assert not again.success
     assert 'already running' in again.message
@@ -140,6 +144,18 @@ def test_a_killed_diagnosis_is_reported_and_the_node_lives(graph: Graph) -> None
     assert 'ended with code -9' in graph.message('diagnosis')
     assert graph.call(Trigger, DIAGNOSE).success
     assert node.is_running
+
+
+def test_a_diagnosis_is_cancelled(graph: Graph) -> None:
+    """And another one may start."""
+    _start(graph)
+    _play(graph, 3.0)
+    cancel = '/sgp_node/cancel_diagnosis'
+    assert not graph.call(Trigger, cancel).success
+    assert graph.call(Trigger, DIAGNOSE).success
+    assert graph.call(Trigger, cancel).success
+    graph.wait_until(lambda: graph.status('diagnosis').get('state') == 'cancelled', 'the end')
+    assert graph.call(Trigger, DIAGNOSE).success
 
 
 def test_what_cannot_be_diagnosed_is_said_at_once(graph: Graph) -> None:

@@ -79,7 +79,10 @@ def test_every_topic_and_service_of_the_contract_exists(graph: Graph) -> None:
         '/command': 'sensor_msgs/msg/JointState',
     }
     services = {
-        **{f'/sgp_node/{n}': 'Trigger' for n in ('refit', 'reset', 'save', 'diagnose')},
+        **{
+            f'/sgp_node/{n}': 'Trigger'
+            for n in ('refit', 'reset', 'save', 'diagnose', 'cancel_diagnosis')
+        },
         '/sgp_node/learn': 'SetBool',
     }
 
