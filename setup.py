@@ -55,6 +55,8 @@ setup(
     extras_require={
         # rclpy from PyPI for machines without ROS; apt users have it already.
         'wheels': ['ros-rclpy[fastrtps]==7.1.6', 'ros-jazzy-common-interfaces==5.3.6'],
+        # Names and options by the Tab key: eval "$(register-python-argcomplete sgp)".
+        'completion': ['argcomplete>=3'],
         # The dynamics of URDF robots in `sgp simulate`.
         'simulate': ['mujoco>=3.2'],
         # xacro files; MJCF needs MuJoCo.

@@ -4,18 +4,20 @@ A function is loaded when its command runs, so that help comes at once. Its keyw
 the names of the arguments of its command, with `out` and `progress` besides. Other packages add
 commands by an entry point of the group `sgp_ros.commands`, see `AddCommand`.
 
-Results go to stdout, remarks and progress to stderr. What a user can cause ends in one line on
-stderr and exit status 2.
+Results go to stdout, remarks and progress to stderr; with `--json` the JSON has stdout for itself,
+and the text goes to stderr. What a user can cause ends in one line on stderr and exit status 2.
 """
 
 from __future__ import annotations
 
 import argparse
+import io
 import json
 import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext, redirect_stdout, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
@@ -26,11 +28,20 @@ for _name in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS'):
     os.environ.setdefault(_name, '1')
 
 from sgp_ros import __version__  # noqa: E402 - the environment above comes first
-from sgp_ros.apps.arguments import COMMANDS, AddCommand  # noqa: E402 - as above
+from sgp_ros.apps.arguments import (  # noqa: E402 - as above
+    COMMANDS,
+    EXAMPLE,
+    GROUPS,
+    AddCommand,
+)
+from sgp_ros.apps.terminal import mark_folder, require_own_folder, strong  # noqa: E402 - as above
 from sgp_ros.errors import ConfigError, SgpError  # noqa: E402 - the environment above comes first
 
 GROUP = 'sgp_ros.commands'
 """Entry-point group of functions that take an `AddCommand` and add commands with it."""
+
+TABLES = ('.csv', '.npz', '.mat', '.parquet', '.h5', '.json', '.jsonl')
+MODELS = ('.urdf', '.xacro', '.xml', '.mjcf', '.sdf', '.yaml', '.yml')
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -40,14 +51,38 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status: 0, or 2 on bad input."""
     given = list(sys.argv[1:] if argv is None else argv)
     try:
-        arguments = vars(_parser(given).parse_args(given))
+        parser = _parser(given)
+        _complete(parser)
+        arguments = vars(parser.parse_args(given))
     except ConfigError as error:
-        sys.stderr.write(f'{error}\n')
+        sys.stderr.write(f'{_hint(given) or error}\n')
         return BAD_INPUT
-    name, function, prints_json = (arguments.pop(f'_{k}') for k in ('name', 'function', 'json'))
+    try:
+        return _run(arguments)
+    except BrokenPipeError:  # a reader such as `head` has seen enough
+        with suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _run(arguments: dict[str, Any]) -> int:
+    """Run a command with its parsed arguments and return its exit status."""
+    name, function, prints_json, is_quiet, is_forced = (
+        arguments.pop(f'_{k}') for k in ('name', 'function', 'json', 'quiet', 'force')
+    )
     signal.signal(signal.SIGTERM, _interrupt)
     try:
-        result = _load(function)(progress=Progress(name), **arguments)
+        out = arguments['out']
+        if not is_forced:
+            require_own_folder(out, name)
+        with _text_to(is_quiet=is_quiet, prints_json=prints_json):
+            result = _load(function)(progress=Progress(name, is_quiet=is_quiet), **arguments)
+        mark_folder(out, name)
+        if prints_json:
+            sys.stdout.write(json.dumps(result, allow_nan=False) + '\n')
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
     except (SgpError, OSError) as error:
         text = ' '.join(str(error).split())
         sys.stderr.write(f'sgp {name}: {text}\n')
@@ -55,9 +90,45 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         sys.stderr.write(f'sgp {name}: interrupted\n')
         return INTERRUPTED
-    if prints_json:
-        sys.stdout.write(json.dumps(result, allow_nan=False) + '\n')
     return 0
+
+
+def _text_to(*, is_quiet: bool, prints_json: bool) -> AbstractContextManager[Any]:
+    """Say where the text of a command goes: to stdout, beside the JSON, or nowhere."""
+    if is_quiet:
+        return redirect_stdout(_Nowhere())
+    return redirect_stdout(sys.stderr) if prints_json else nullcontext()
+
+
+class _Nowhere(io.TextIOBase):
+    """A stream that keeps nothing."""
+
+    def write(self, text: str) -> int:
+        """Take a text as written."""
+        return len(text)
+
+
+def _complete(parser: argparse.ArgumentParser) -> None:
+    """Answer a shell that asks for completions, where argcomplete is installed."""
+    if '_ARGCOMPLETE' in os.environ:
+        with suppress(ImportError):
+            import argcomplete
+
+            argcomplete.autocomplete(parser)
+
+
+def _hint(given: Sequence[str]) -> str:
+    """Return what to do where a file was given instead of a command; empty otherwise."""
+    if not given or given[0].startswith('-') or not Path(given[0]).exists():
+        return ''
+    place, ending = given[0], Path(given[0]).suffix.lower()
+    if ending in TABLES:
+        then = f'sgp import {place}'
+    elif ending in MODELS:
+        then = f'sgp simulate {place}, or give it to another command with --robot'
+    else:
+        then = f'sgp diagnose {place} --robot ROBOT.urdf'
+    return f'sgp: {place} is a file, expected a command; try {then}'
 
 
 class Progress:
@@ -65,16 +136,18 @@ class Progress:
 
     Args:
         name: of the command, in front of the bar.
+        is_quiet: whether nothing is shown.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, *, is_quiet: bool = False) -> None:
         self._name = name
         self._shown = -1
+        self._is_shown = not is_quiet
 
     def __call__(self, share: float) -> None:
         """Show that `share` of the work, 0 to 1, is done."""
         percent = int(100.0 * min(max(share, 0.0), 1.0))
-        if percent == self._shown or not sys.stderr.isatty():
+        if percent == self._shown or not (self._is_shown and sys.stderr.isatty()):
             return
         self._shown = percent
         bar = ('#' * (2 * percent // 5)).ljust(40, '.')
@@ -100,25 +173,48 @@ class _Parser(argparse.ArgumentParser):
         raise ConfigError(f'{self.prog}: {message}', '', f'see {self.prog} --help')
 
 
+class _Sgp(_Parser):
+    """The parser of `sgp` itself, whose help lists the commands by what they are for."""
+
+    summaries: dict[str, str]
+
+    def format_help(self) -> str:
+        """Return the help: groups of commands, and an example that runs."""
+        listed = {name for _, names in GROUPS for name in names}
+        groups = [*GROUPS, ('More', tuple(name for name in self.summaries if name not in listed))]
+        lines = [self.description or '', '', 'usage: sgp COMMAND ..., sgp COMMAND --help', '']
+        for title, names in groups:
+            known = [name for name in names if name in self.summaries]
+            lines += [strong(title)] * bool(known)
+            lines += [f'  {name:10s} {self.summaries[name]}' for name in known]
+        return '\n'.join([*lines, '', EXAMPLE, ''])
+
+
 def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
-    parser = _Parser(
-        prog='sgp', description='Identify a robot with semi-parametric Gaussian processes.'
-    )
+    parser = _Sgp(prog='sgp', description='Find out what physics a robot has and its model lacks.')
+    parser.summaries = {}
     parser.add_argument('--version', action='version', version=f'sgp {__version__}')
-    commands = parser.add_subparsers(dest='_name', required=True, metavar='COMMAND')
+    commands = parser.add_subparsers(
+        dest='_name', required=True, metavar='COMMAND', parser_class=_Parser
+    )
 
     def add(name: str, function: str, summary: str, example: str) -> argparse.ArgumentParser:
-        parser = commands.add_parser(
+        parser.summaries[name] = summary
+        found = commands.add_parser(
             name, help=summary, description=summary, epilog=f'example: {example}'
         )
-        parser.set_defaults(_function=function)
-        parser.add_argument(
+        found.set_defaults(_function=function)
+        found.add_argument(
             '--out', metavar='DIR', type=Path, default=Path('out') / name,
             help='folder of the results (default: %(default)s)',
         )  # fmt: skip
-        parser.add_argument('--json', dest='_json', action='store_true',
-                            help='print the result as JSON, the last line of stdout')  # fmt: skip
-        return parser
+        found.add_argument('--force', dest='_force', action='store_true',
+                           help='write into DIR beside files of somebody else')  # fmt: skip
+        found.add_argument('--json', dest='_json', action='store_true',
+                           help='print the result as JSON; text goes to stderr')  # fmt: skip
+        found.add_argument('--quiet', dest='_quiet', action='store_true',
+                           help='print no text and no progress, errors only')  # fmt: skip
+        return found
 
     for add_one in COMMANDS:
         add_one(add)

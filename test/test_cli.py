@@ -46,12 +46,12 @@ def test_a_simulated_recording_is_identified(wheel, tmp_path, capsys):
     arguments = _replay(wheel / 'reaction_wheel.mcap', tmp_path, '--truth', wheel / 'truth.json')
     assert main([str(a) for a in [*arguments, '--json']]) == 0
     captured = capsys.readouterr()
-    metrics = json.loads(captured.out.strip().splitlines()[-1])
+    metrics = json.loads(captured.out)
     truth = json.loads((wheel / 'truth.json').read_text())['coefficients']
     for parameter in metrics['parameters']:
         error = abs(parameter['value'] - truth[parameter['name']]['value'])
         assert error < 5 * parameter['std'], parameter
-    assert 'true' in captured.out
+    assert 'true' in captured.err
     page = (tmp_path / 'out' / 'report.html').read_text()
     assert 'true value' in page
 
@@ -249,7 +249,8 @@ def test_results_replace_older_ones_and_leave_no_parts(wheel, tmp_path):
 
 def test_help_shows_an_example(capsys):
     """Every command has one."""
-    for command in ('demo', 'simulate', 'replay', 'identify', 'diagnose', 'import', 'reproduce'):
+    for command in ('demo', 'robots', 'simulate', 'replay', 'identify', 'diagnose', 'import',
+                    'reproduce'):  # fmt: skip
         with pytest.raises(SystemExit) as caught:
             main([command, '--help'])
         assert caught.value.code == 0
@@ -275,6 +276,59 @@ def test_help_shows_an_example(capsys):
 def test_a_number_that_makes_no_sense_is_refused_as_it_was_given(arguments, said, capsys):
     """What was found is what the user wrote, and what was expected stands beside it."""
     assert said in _refused(arguments.split(), capsys)
+
+
+def test_the_help_groups_the_commands_and_shows_an_example(capsys):
+    """Also those that other packages add; each stands there once."""
+    with pytest.raises(SystemExit):
+        main(['--help'])
+    text = capsys.readouterr().out
+    parts = ('Look around', '  demo ', 'From your', '  diagnose ', 'With a model', '  bench ')
+    at = [text.index(part) for part in (*parts, 'example')]
+    assert at == sorted(at)
+    assert text.count('\n  diagnose ') == 1
+
+
+def test_the_robots_that_come_with_the_package_are_listed(capsys):
+    """JSON has stdout for itself, the text goes to stderr; quiet, it goes nowhere."""
+    assert main(['robots', '--json']) == 0
+    captured = capsys.readouterr()
+    listed = {entry['name']: entry['joints'] for entry in json.loads(captured.out)['robots']}
+    assert listed['reaction_wheel'] == ['pole', 'wheel']
+    assert 'reaction_wheel' in captured.err
+    assert main(['robots', '--quiet']) == 0
+    assert capsys.readouterr().out == ''
+
+
+def test_a_file_instead_of_a_command_is_told_what_to_do_with_it(tmp_path, capsys):
+    """A table is imported, a model simulated, a recording diagnosed."""
+    for name, then in (('a.csv', 'sgp import'), ('a.urdf', '--robot'), ('a.mcap', 'sgp diagnose')):
+        (tmp_path / name).write_text('x')
+        assert then in _refused([tmp_path / name], capsys)
+    (tmp_path / 'table.csv').write_text('t,q\n0,1\n')
+    assert 'sgp import' in _refused(_replay(tmp_path / 'table.csv', tmp_path), capsys)
+
+
+def test_files_of_somebody_else_are_not_mixed_with_results(wheel, tmp_path, capsys):
+    """But by force; a folder that a command of ours wrote to is ours."""
+    out = tmp_path / 'out'
+    out.mkdir()
+    (out / 'thesis.tex').write_text('mine')
+    arguments = _replay(wheel / 'reaction_wheel.mcap', tmp_path)
+    assert 'thesis.tex' in _refused(arguments, capsys)
+    assert main([str(a) for a in [*arguments, '--force']]) == 0
+    assert main([str(a) for a in arguments]) == 0
+    assert (out / 'thesis.tex').read_text() == 'mine'
+
+
+def test_a_reader_that_has_seen_enough_is_no_error():
+    """As in `sgp effects | head -1`: nothing is complained of."""
+    done = subprocess.run(
+        f'{sys.executable} -m sgp_ros.cli robots | head -n 1',
+        shell=True, capture_output=True, text=True, check=True, cwd=ROOT,
+    )  # fmt: skip
+    assert done.stdout.count('\n') == 1
+    assert done.stderr == ''
 
 
 def test_help_comes_without_what_computes():

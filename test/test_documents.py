@@ -40,6 +40,7 @@ def test_commands_in_documents_exist(path):
                 'identify',
                 'import',
                 'replay',
+                'robots',
                 'reproduce',
                 'simulate',
             }, name

@@ -208,8 +208,26 @@ def _add_export(add: AddCommand) -> None:
                         help='write value +- 2 std of the numbers too')  # fmt: skip
 
 
+def _add_robots(add: AddCommand) -> None:
+    add(
+        'robots', 'sgp_ros.apps.robots:run_robots',
+        'List the built-in robots: names, joints, what they are.',
+        'sgp robots',
+    )  # fmt: skip
+
+
+GROUPS = (
+    ('Look around', ('demo', 'robots', 'effects')),
+    ('From your recording', ('import', 'check', 'diagnose', 'identify', 'replay')),
+    ('With a model', ('simulate', 'export')),
+)
+"""Titles and commands of the help; others come after them."""
+EXAMPLE = """example, which needs nothing but this package:
+  sgp simulate simple_pendulum --effect coulomb_friction:joint=pendulum,level=0.2 --out out/real
+  sgp diagnose out/real/simple_pendulum.mcap --robot simple_pendulum"""
+
 COMMANDS = (
-    _add_demo, _add_simulate, _add_replay, _add_identify, _add_diagnose, _add_effects, _add_import,
-    _add_export,
+    _add_demo, _add_simulate, _add_replay, _add_identify, _add_diagnose, _add_effects,
+    _add_robots, _add_import, _add_export,
 )  # fmt: skip
 """What adds each command of the package, in the order of its help."""

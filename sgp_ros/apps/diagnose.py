@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sgp_ros.apps.diagnosed_robot import replayed, write_diagnosed
+from sgp_ros.apps.terminal import strong, warned
 from sgp_ros.batch.acceptance import require_joints
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
@@ -187,7 +188,7 @@ def _written(
 
 def print_diagnosis(found: Diagnosis) -> None:
     """Print the verdict, the findings, their nearest rivals and the proof; `+-` is for 95 %."""
-    print(verdict_sentence(found))
+    print(strong(verdict_sentence(found)))
     _print_findings('set-up', found.setup)
     _print_findings('found', found.findings)
     _print_findings('both', found.shared)
@@ -212,7 +213,7 @@ def print_diagnosis(found: Diagnosis) -> None:
         counts = ', '.join(f'{count} {reason}' for reason, count in found.refused.items())
         print(f'  refused   states: {counts}')
     for remark in found.remarks:
-        print(f'  remark    {remark}')
+        print(warned(f'  remark    {remark}'))
 
 
 def _print_findings(kind: str, findings: Sequence[Finding]) -> None:

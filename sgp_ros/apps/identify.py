@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from sgp_ros.apps.identified_robot import nominal_coefficients, write_identified
+from sgp_ros.apps.terminal import strong, warned
 from sgp_ros.batch.identification import HELD_OUT, Identification, IdentificationOptions, identify
 from sgp_ros.batch.regression_data import FilteredData, smoothed_motion
 from sgp_ros.batch.rollout import cut_windows, joined
@@ -241,7 +242,7 @@ def _scored(
 
 def print_findings(findings: Mapping[str, Any]) -> None:
     """Print scores per method, parameters with 95 % intervals, and what is not to be trusted."""
-    print(verdict(findings))
+    print(strong(verdict(findings)))
     print(filter_choice(findings['filter']))
     _print_scores(findings)
     _print_rollouts(findings)
@@ -256,7 +257,7 @@ def print_findings(findings: Mapping[str, Any]) -> None:
     for text in findings['excitation']['suggestions']:
         print(f'a motion that would show more: {text}')
     for text in cautions(findings):
-        print(f'caution: {text}')
+        print(warned(f'caution: {text}'))
 
 
 def _print_scores(findings: Mapping[str, Any]) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from sgp_ros.recordings.imports import ImportSummary, import_table
 from sgp_ros.recordings.table_entries import JointHint
+from sgp_ros.report.next_steps import after_import, next_lines
 from sgp_ros.robots.registry import load_robot
 
 
@@ -37,6 +38,7 @@ def run_import(
         print(f'columns were guessed: look at {summary.map_path}, mend it, and give it as --map')
     if summary.gains_path is not None:
         print(f'gains of the drives in {summary.gains_path}')
+    print(next_lines(after_import(summary.path, robot)))
     return summary.to_mapping()
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from sgp_ros.apps.identified_robot import nominal_coefficients, write_identified
+from sgp_ros.apps.terminal import warned
 from sgp_ros.batch.bodies import nearest_bodies
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
@@ -223,7 +224,7 @@ def print_summary(metrics: Mapping[str, Any], truth: Mapping[str, float] | None)
     for parameter in metrics['parameters']:
         print(_parameter_line(parameter, truth))
     for remark in metrics['remarks']:
-        print(f'remark: {remark}')
+        print(warned(f'remark: {remark}'))
 
 
 def _parameter_line(parameter: Mapping[str, Any], truth: Mapping[str, float] | None) -> str:

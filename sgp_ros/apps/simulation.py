@@ -16,6 +16,7 @@ from sgp_ros.recordings.command_types import FLOAT64_ARRAY
 from sgp_ros.recordings.messages import JOINT_STATE
 from sgp_ros.recordings.writer import RecordingWriter
 from sgp_ros.report.files import write_text
+from sgp_ros.report.next_steps import after_simulation, next_lines
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.effect_text import parse_physical
 from sgp_ros.simulation.recording import SimulatedRecording, simulate
@@ -78,6 +79,7 @@ def run_simulation(
     n = len(recording.stamps_ns)
     print(simulator.description)
     print(f'{n} samples of {", ".join(recording.joint_names)} in {path}, the truth in {truth}')
+    print(next_lines(after_simulation(path, robot)))
     return {
         'recording': str(path), 'truth': str(truth), 'motion': str(motion), 'samples': n,
         'seed': seed,

@@ -29,6 +29,7 @@ from sgp_ros.recordings.topics import (
 )
 from sgp_ros.recordings.typestore import decoder
 
+_TABLES = ('.csv', '.npz', '.mat', '.parquet', '.h5', '.json', '.jsonl')
 _KINDS = 'an .mcap file, a rosbag2 directory or a ROS 1 .bag'
 
 
@@ -153,7 +154,8 @@ def _file_source(path: Path) -> Source:
         return SqliteSource([path])
     if head.startswith(b'#ROSBAG V2'):
         return RosbagsSource(path)
-    raise RecordingError(f'{path} is no recording (starts with {head[:8]!r})', _KINDS)
+    remedy = f'turn a table into one: sgp import {path}' if path.suffix in _TABLES else ''
+    raise RecordingError(f'{path} is no recording (starts with {head[:8]!r})', _KINDS, remedy)
 
 
 def _directory_source(path: Path) -> tuple[Source, tuple[str, ...]]:

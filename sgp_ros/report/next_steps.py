@@ -9,6 +9,7 @@ from shlex import quote
 from sgp_ros.diagnosis.result import Diagnosis
 
 Steps = Sequence[tuple[str, str]]
+PLUS_MINUS = '+- is half the width of a 95 % interval'
 _OTHER = 'OTHER.mcap'
 """Stands for a recording of the reader."""
 
@@ -72,10 +73,27 @@ def after_demo(bag: Path) -> Steps:
     ]  # fmt: skip
 
 
+def after_import(path: Path, robot: str | None) -> Steps:
+    """Return what to do with an imported recording of a robot; None where it is not known."""
+    named = 'ROBOT.urdf' if robot is None else quote(robot)
+    return [('Ask what physics the model lacks:',
+             f'sgp diagnose {_path(path)} --robot {named}')]  # fmt: skip
+
+
+def after_simulation(path: Path, robot: str) -> Steps:
+    """Return what to do with a simulated recording of a robot."""
+    return [('Find out what was put in:',
+             f'sgp diagnose {_path(path)} --robot {quote(robot)}')]  # fmt: skip
+
+
 def ending(out: Path, steps: Steps) -> str:
-    """Return the last lines of a command: where its page is, and what to do next."""
-    lines = [f'report: {out / "report.html"}', *(f'next: {said}\n  {x}' for said, x in steps)]
-    return '\n'.join(lines)
+    """Return the last lines of a command: what its signs mean, its page, what to do next."""
+    return f'{PLUS_MINUS}\nreport: {out / "report.html"}\n{next_lines(steps)}'
+
+
+def next_lines(steps: Steps) -> str:
+    """Return the steps as lines of a terminal."""
+    return '\n'.join(f'next: {said}\n  {command}' for said, command in steps)
 
 
 def _path(path: Path) -> str:

@@ -65,7 +65,8 @@ def finished(request, folders, capsys):
             '--json', *map(str, tests),
         )  # fmt: skip
         assert status == 0
-        done[number] = capsys.readouterr().out
+        captured = capsys.readouterr()
+        done[number] = captured.err + captured.out
     return number, folder / number, done[number]
 
 

@@ -154,12 +154,12 @@ def test_roll_outs_run_over_held_out_stretches_only(folder, holdout):
     assert lengths == pytest.approx(len(held.time) / held.rate, rel=0.15)
 
 
-def test_json_prints_the_findings_in_the_last_line(folder, tmp_path, capsys):
+def test_json_prints_the_findings_alone_on_stdout(folder, tmp_path, capsys):
     command = _command(folder / 'arm.mcap', folder / 'arm.yaml', tmp_path, '--json')
     assert main([*command, '--inputs', 'own:velocity']) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert json.loads(lines[-1]) == json.loads((tmp_path / 'identification.json').read_text())
-    assert 'The model predicts the effort in the held-out part' in lines[0]
+    captured = capsys.readouterr()
+    assert json.loads(captured.out) == json.loads((tmp_path / 'identification.json').read_text())
+    assert 'The model predicts the effort in the held-out part' in captured.err
 
 
 def test_a_result_of_an_earlier_run_does_not_pass_for_one_of_this(tmp_path):

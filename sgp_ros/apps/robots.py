@@ -1,0 +1,34 @@
+"""`sgp robots`: the robots that come with the package."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from sgp_ros.robots.registry import load_robot, robot_names
+
+
+def run_robots(out: Path, progress: Callable[[float], None]) -> dict[str, Any]:  # noqa: ARG001 - it writes nothing
+    """List the built-in robots.
+
+    Args:
+        out: unused.
+        progress: called with the share that is done.
+    """
+    names, entries = robot_names(), []
+    for i, name in enumerate(names):
+        robot = load_robot(name)
+        entries.append({
+            'name': name,
+            'description': robot.description,
+            'joints': list(robot.joint_names),
+            'coefficients': [c.name for c in robot.coefficients],
+        })  # fmt: skip
+        progress((i + 1) / len(names))
+    width = max(map(len, names))
+    for entry in entries:
+        print(f'{entry["name"]:{width}s}  {entry["description"]}')
+        print(f'{"":{width}s}  joints: {", ".join(entry["joints"])}')
+    print('Any URDF, MJCF, SDF or robot YAML can be given instead of a name.')
+    return {'robots': entries}
