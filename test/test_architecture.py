@@ -49,10 +49,10 @@ LAYERS = {
         'errors',
     },
     'apps': {
-        'numpy', 'yaml', 'gp', 'physics', 'rigid', 'robots', 'simulation', 'engine', 'batch',
-        'recordings', 'diagnosis', 'report', 'errors',
+        'numpy', 'yaml', 'matplotlib', 'gp', 'physics', 'rigid', 'robots', 'simulation', 'engine',
+        'batch', 'recordings', 'diagnosis', 'report', 'errors',
     },
-    'cli': {'apps', 'errors'},
+    'cli': {'apps', 'argcomplete', 'errors'},
 }  # fmt: skip
 """Layer to what it may import beside the standard library, itself and the package's version."""
 

@@ -34,7 +34,7 @@ from sgp_ros.report.diagnosis_text import (
     why_it_lost,
 )
 from sgp_ros.report.files import replacing_results, write_text
-from sgp_ros.report.next_steps import Steps, after_diagnosis, ending
+from sgp_ros.report.next_steps import after_diagnosis, ending
 from sgp_ros.report.overlay import write_overlay
 from sgp_ros.report.verdict import simulated, verdict_sentence
 from sgp_ros.robots.bare import simulated_model
@@ -74,6 +74,29 @@ class DiagnoseOptions:
     static: bool = False
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Examined:
+    """A finished diagnosis, and what it was made from.
+
+    Attributes:
+        nominal: the robot that was taken for known.
+        found: the diagnosis.
+        events: of a motion that a node could meet; empty for settled points and position targets.
+        bag: the first recording.
+        robot: as it was given.
+        effort_source: setting `effort.source`.
+        gains: of drives that hold position targets; None where commands are efforts.
+    """
+
+    nominal: Nominal
+    found: Diagnosis
+    events: Sequence[Event]
+    bag: str
+    robot: str
+    effort_source: str
+    gains: Gains | None
+
+
 def run_diagnose(
     bag: str | Sequence[str], robot: str, out: Path, *, progress: Callable[[float], None],
     **options: Any,
@@ -84,6 +107,31 @@ def run_diagnose(
         bag: the recording, or several of one machine.
         robot: a URDF, or a robot YAML with one, or a built-in name.
         out: folder of the results.
+        progress: called with the share that is done.
+        options: fields of `DiagnoseOptions`.
+
+    Raises:
+        SgpError: as `examine` does.
+    """
+    examined = examine(bag, robot, progress=progress, **options)
+    content, found = write_examined(out, examined)
+    print_diagnosis(found)
+    print(ending(out, after_diagnosis(found, examined.bag, robot, out)))
+    return content
+
+
+def examine(
+    bag: str | Sequence[str],
+    robot: str,
+    *,
+    progress: Callable[[float], None] = lambda _share: None,
+    **options: Any,
+) -> Examined:
+    """Diagnose one or several recordings, write nothing.
+
+    Args:
+        bag: the recording, or several of one machine.
+        robot: a URDF, or a robot YAML with one, or a built-in name.
         progress: called with the share that is done.
         options: fields of `DiagnoseOptions`.
 
@@ -101,26 +149,24 @@ def run_diagnose(
         model, tree = nominal.robot, nominal.tree
     open_bodies(model.name, tree)  # refuses one that cannot move before much is read
     remarks = list(nominal.remarks)
-    events = _read([bag] if isinstance(bag, str) else bag, model, chosen, remarks)
+    bags = [bag] if isinstance(bag, str) else list(bag)
+    events = _read(bags, model, chosen, remarks)
     tests = _read(chosen.tests, model, chosen, remarks, taken=('train', *events))
     gains = _gains(chosen, nominal)
     simulation = None
     if chosen.sim is not None and simulated is None:
         simulation = _events(chosen.sim, model, chosen, remarks)
+    source = EFFORT_SOURCES[chosen.effort]
     found = diagnose(
         events, model, tree, tests, stated=nominal.stated, holds_out=not chosen.tests,
         is_static=chosen.static, gains=gains, simulation=simulation, simulated=simulated,
-        has_overlays=True,
-        progress=progress,
-        config=EngineConfig(effort_source=EFFORT_SOURCES[chosen.effort]),
+        has_overlays=True, progress=progress, config=EngineConfig(effort_source=source),
     )  # fmt: skip
     found = replace(found, remarks=(*found.remarks, *remarks))
     # a node meets one recording of a motion, as it is; settled points are none
     is_met = gains is None and not chosen.static and not found.setup
     first = next(iter(events.values())) if is_met else []
-    bags = [bag] if isinstance(bag, str) else list(bag)
-    steps = after_diagnosis(found, bags[0], robot, out)
-    return _written(out, nominal, found, first, EFFORT_SOURCES[chosen.effort], steps, gains)
+    return Examined(nominal, found, first, bags[0], robot, source, gains)
 
 
 def _gains(options: DiagnoseOptions, nominal: Nominal) -> Gains | None:
@@ -157,21 +203,19 @@ def _read(
     return found
 
 
-def _written(
-    out: Path,
-    nominal: Nominal,
-    found: Diagnosis,
-    events: Sequence[Event],
-    effort_source: str,
-    steps: Steps,
-    gains: Gains | None,
-) -> dict[str, Any]:
-    """Write all files, print the findings and return the content of diagnosis.json."""
+def write_examined(out: Path, examined: Examined) -> tuple[dict[str, Any], Diagnosis]:
+    """Write all files; return the content of diagnosis.json, and the diagnosis with new remarks.
+
+    Args:
+        out: folder of the results.
+        examined: the diagnosis.
+    """
+    nominal, found = examined.nominal, examined.found
     with replacing_results(out, 'diagnose'):
         write_predictions(out, found)
         bodies = nominal.without_stated(found.bodies)
-        write_diagnosed(out, nominal.robot, replace(found, bodies=bodies), gains)
-        online = replayed(out, found.findings, events, effort_source)
+        write_diagnosed(out, nominal.robot, replace(found, bodies=bodies), examined.gains)
+        online = replayed(out, found.findings, examined.events, examined.effort_source)
         if online is not None:
             said = online.remark(found.proofs['train'].nmse_after)
             found = replace(found, remarks=(*found.remarks, said))
@@ -180,10 +224,9 @@ def _written(
             content['online'] = online.content()
         write_text(out / 'diagnosis.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
         write_overlay(out, found)
+        steps = after_diagnosis(found, examined.bag, examined.robot, out)
         write_diagnosis(out, found, nominal.tree, steps)
-    print_diagnosis(found)
-    print(ending(out, steps))
-    return content
+    return content, found
 
 
 def print_diagnosis(found: Diagnosis) -> None:

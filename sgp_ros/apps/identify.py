@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from sgp_ros.apps.held_rollouts import best_coefficients, roll_out_held
 from sgp_ros.apps.identified_robot import nominal_coefficients, write_identified
 from sgp_ros.apps.terminal import strong, warned
 from sgp_ros.batch.identification import HELD_OUT, Identification, IdentificationOptions, identify
-from sgp_ros.batch.regression_data import FilteredData, smoothed_motion
-from sgp_ros.batch.rollout import cut_windows, joined
-from sgp_ros.batch.rollout_scores import RolloutScore, score_windows
 from sgp_ros.batch.signals import Signals, collect_signals
-from sgp_ros.batch.zero_phase import ZeroPhase
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import ConfigError, RecordingError
@@ -35,15 +31,9 @@ from sgp_ros.report.identification_text import (
     unknown,
     verdict,
 )
-from sgp_ros.report.next_steps import after_identification, ending
+from sgp_ros.report.next_steps import Steps, after_identification, ending
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
-
-Stretch = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-
-HORIZONS: tuple[float | None, ...] = (0.0, 0.3, None)
-"""One step, 0.3 s, the longest held-out stretch."""
-_STRIDE_S = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +74,23 @@ class IdentifyOptions:
         )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class IdentifiedRecording:
+    """A finished identification, and what is told of it.
+
+    Attributes:
+        found: the identification.
+        findings: the content of identification.json.
+        remarks: on the recordings.
+        robot: as it was given.
+    """
+
+    found: Identification
+    findings: dict[str, Any]
+    remarks: tuple[str, ...]
+    robot: str
+
+
 def run_identify(
     bag: str, robot: str, out: Path, *, progress: Callable[[float], None], **options: Any
 ) -> dict[str, Any]:
@@ -100,8 +107,23 @@ def run_identify(
         ConfigError: a wrong robot, method or hold-out.
         RecordingError: nothing in the recording can be used.
     """
-    chosen = IdentifyOptions(**options)
     require_folder(out)
+    identified = identify_recording(bag, robot, progress=progress, **options)
+    write_identified_recording(out, identified)
+    print_findings(identified.findings)
+    print(ending(out, _steps(out, identified)))
+    return identified.findings
+
+
+def identify_recording(
+    bag: str,
+    robot: str,
+    *,
+    progress: Callable[[float], None] = lambda _share: None,
+    **options: Any,
+) -> IdentifiedRecording:
+    """Identify a robot, write nothing; arguments and errors are those of `run_identify`."""
+    chosen = IdentifyOptions(**options)
     model = load_robot(robot)
     remarks: list[str] = []
     signals = read_signals(bag, model, chosen, remarks)
@@ -122,20 +144,27 @@ def run_identify(
     if signals.left_out:
         counts['states of stretches too short to be filtered'] = signals.left_out
     findings = collect_findings(found, Path(bag).name, rollouts, counts)
-    steps = after_identification(robot, out, has_bodies='urdf' in model.source)
+    progress(1.0)
+    return IdentifiedRecording(found, findings, tuple(remarks), robot)
+
+
+def write_identified_recording(out: Path, identified: IdentifiedRecording) -> None:
+    """Write findings, report, robot YAML and URDF into a folder."""
+    found, findings = identified.found, identified.findings
     with replacing_results(out, 'identify'):
-        write_text(
-            out / 'identification.json', json.dumps(findings, indent=1, allow_nan=False) + '\n'
-        )
+        text = json.dumps(findings, indent=1, allow_nan=False) + '\n'
+        write_text(out / 'identification.json', text)
         known = found.physics.coefficients
         std = np.where(known.is_identifiable, known.std, np.inf)
         values, has_bodies = best_coefficients(found), found.consistent is not None
-        write_identified(out, model, values, std, has_bodies=has_bodies)
-        write_identification(out, found, findings, remarks, steps)
-    progress(1.0)
-    print_findings(findings)
-    print(ending(out, steps))
-    return findings
+        write_identified(out, found.robot, values, std, has_bodies=has_bodies)
+        steps = _steps(out, identified)
+        write_identification(out, found, findings, identified.remarks, steps)
+
+
+def _steps(out: Path, identified: IdentifiedRecording) -> Steps:
+    source = identified.found.robot.source
+    return after_identification(identified.robot, out, has_bodies='urdf' in source)
 
 
 def require_folder(out: Path) -> None:
@@ -179,65 +208,6 @@ def read_signals(bag: str, robot: Robot, options: IdentifyOptions, remarks: list
     ]
     remarks += [f'{bag}: {remark}' for remark in signals.remarks]
     return signals
-
-
-def best_coefficients(found: Identification) -> np.ndarray:
-    """Return those of real bodies where there are bodies, else those of the physics."""
-    if found.consistent is not None:
-        return found.consistent.coefficients
-    return found.physics.coefficients.mean
-
-
-def roll_out_held(
-    found: Identification, signals: Signals, tests: Mapping[str, Signals]
-) -> dict[str, tuple[RolloutScore, ...]]:
-    """Simulate the identified robot over what was held out, from many starts.
-
-    Stretches too short for a horizon are left out, and so is a robot whose mass matrix the
-    coefficients leave singular.
-    """
-    scores = {}
-    for name, data in found.held.items():
-        stretches = _stretches(found, tests.get(name, signals), data)
-        done = [_scored(found, stretches, horizon) for horizon in HORIZONS]
-        scores[name] = tuple(score for score in done if score is not None)
-    return scores
-
-
-def _stretches(found: Identification, signals: Signals, data: FilteredData) -> list[Stretch]:
-    """Return time, position, velocity and effort at the full rate of each held-out stretch."""
-    plan = found.choice.plan
-    light = ZeroPhase(signals.rate, plan.state_cutoff)
-    motions = [
-        (signals.time[s], smoothed_motion(signals, s, plan.velocity_source, light), s)
-        for s in signals.segments
-    ]
-    stretches = []
-    for block in np.unique(data.block):
-        rows = data.time[data.block == block]
-        for time, motion, segment in motions:
-            kept = slice(*np.searchsorted(time, (rows[0], rows[-1])))
-            if kept.stop - kept.start > 1:
-                effort = signals.effort[segment][kept]
-                stretches.append(
-                    (time[kept], motion.position[kept], motion.velocity[kept], effort)
-                )
-    return stretches
-
-
-def _scored(
-    found: Identification, stretches: list[Stretch], horizon: float | None
-) -> RolloutScore | None:
-    if horizon is None:  # as long as the longest one
-        stretches = sorted(stretches, key=lambda s: len(s[0]))[-1:]
-    windows = []
-    for stretch in stretches:
-        with suppress(RecordingError):
-            windows.append(cut_windows(*stretch, horizon, _STRIDE_S))
-    try:
-        return score_windows(joined(windows), found.robot, best_coefficients(found))
-    except (ValueError, np.linalg.LinAlgError):
-        return None
 
 
 def print_findings(findings: Mapping[str, Any]) -> None:

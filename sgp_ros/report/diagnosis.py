@@ -77,7 +77,7 @@ def write_diagnosis(
     figures = {name: png(figure) for name, figure in draw_diagnosis(found).items()}
     for name, content in figures.items():
         write_bytes(out / f'{name}.png', content)
-    picture = '' if tree is None else _picture(found, tree)
+    picture = '' if tree is None else picture_of(found, tree)
     write_text(out / 'report.html', render(found, figures, picture, steps))
 
 
@@ -139,7 +139,7 @@ def render(
     )  # fmt: skip
 
 
-def _picture(found: Diagnosis, tree: Tree) -> str:
+def picture_of(found: Diagnosis, tree: Tree) -> str:
     """Return the robot as it stood in the middle of its motion; pale where nothing is wrong."""
     shares = dict(_shares(found)) if found.verdict != 'no_mismatch' else {}
     return robot_picture(tree, np.median(found.traces.position, axis=0), shares)

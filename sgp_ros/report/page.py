@@ -43,7 +43,7 @@ def render_page(
             for name, content in figures.items()
         },
         thinned=THINNED,
-        styles=Markup(_asset('uPlot.min.css') + _asset('report.css')),  # noqa: S704 - our own
+        styles=Markup(_asset('uPlot.min.css') + _asset('robot.css') + _asset('report.css')),  # noqa: S704 - our own
         scripts=Markup(_asset('uPlot.iife.min.js') + _asset('report.js')),  # noqa: S704 - as above
         **values,
     )
@@ -52,6 +52,11 @@ def render_page(
 def typeset(text: str) -> str:
     """Return text with the signs that a terminal may lack."""
     return text.replace('+-', '±').replace(' -> ', ' → ')
+
+
+def robot_styles() -> str:
+    """Return the styles of a picture of a robot, for pages that are none of ours."""
+    return f'<style>{_asset("robot.css")}</style>'
 
 
 def _asset(name: str) -> str:

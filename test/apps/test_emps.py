@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from sgp_ros.cli import main
+from sgp_ros.engine.results import REFUSALS
 
 ROOT = Path(__file__).parents[2]
 RECORDING = ROOT.parent / 'shared' / 'data' / 'emps' / 'emps_id.csv'
@@ -64,14 +65,14 @@ def test_metrics_follow_the_contract(replayed):
     assert metrics['seed'] is None
     samples = metrics['samples']
     assert samples['read'] == samples['used'] + sum(samples['refused'].values()) == 12000
-    assert set(samples['refused']) == {
-        'late', 'duplicate', 'nonfinite', 'unpaired', 'unknown_joint', 'gap',
-    }  # fmt: skip
+    assert set(samples['refused']) == set(REFUSALS)
     assert set(metrics['joints']['axis']['effort']) == {
         'nmse', 'nlpd', 'coverage95', 'raw_coverage95', 'n',
     }  # fmt: skip
     for parameter in metrics['parameters']:
-        assert set(parameter) == {'name', 'joint', 'value', 'std', 'unit', 'identifiable'}
+        assert set(parameter) == {
+            'name', 'meaning', 'joint', 'value', 'std', 'unit', 'identifiable',
+        }  # fmt: skip
         assert (parameter['std'] is None) == (not parameter['identifiable'])
     assert set(metrics['timing']['push_ms']) == {'p50', 'p99', 'max'}
     assert metrics['timing']['realtime_factor'] > 0

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sgp_ros.apps.identify import IdentifyOptions, _stretches, names_of_tests, read_signals
+from sgp_ros.apps.held_rollouts import stretches_of
+from sgp_ros.apps.identify import IdentifyOptions, names_of_tests, read_signals
 from sgp_ros.batch.identification import HELD_OUT, IdentificationOptions, identify
 from sgp_ros.cli import main
 from sgp_ros.engine.samples import frozen_array
@@ -142,7 +143,7 @@ def test_roll_outs_run_over_held_out_stretches_only(folder, holdout):
     options = IdentificationOptions(methods=('PR',), holdout=holdout, stretch_s=3.0)
     found = identify(signals, robot, {}, options)
     held = found.held[HELD_OUT]
-    stretches = _stretches(found, signals, held)
+    stretches = stretches_of(found, signals, held)
     assert len(stretches) == (1 if holdout == 'tail' else len(np.unique(held.block))) > 0
     for time, q, _, effort in stretches:
         learned = found.train.time
