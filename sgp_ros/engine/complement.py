@@ -47,6 +47,10 @@ class Complement:
         self.signals.begin()
         self.last_ns = None
 
+    def skip(self) -> None:
+        """Have what follows not continue an equation that was refused."""
+        self.signals.begin()
+
     def take(self, equation: Equation, hop_s: float) -> None:
         """Take the signals of an equation after they were predicted."""
         measured = self._measured(equation)[list(equation.complement_joints)]

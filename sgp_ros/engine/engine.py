@@ -41,16 +41,11 @@ RAISES_FAILURES = False
 
 
 class Engine(Fold):
-    """Identifies one robot from a stream of events. No clock, no file, no thread.
-
-    Attributes:
-        fits: of hyper-parameters, handed out so far.
-    """
+    """Identifies one robot from a stream of events. No clock, no file, no thread."""
 
     def __init__(self, robot: Robot, config: EngineConfig) -> None:
         super().__init__(robot, config)
         self._journal = Journal(vars(self), self._unchanging, self._fold)
-        self.fits = 0
 
     @property
     def is_ready(self) -> bool:

@@ -8,10 +8,13 @@ import numpy as np
 
 from sgp_ros.engine.complement import Complement
 from sgp_ros.engine.config import EngineConfig
-from sgp_ros.engine.hyperparameters import kernel_named
-from sgp_ros.engine.prediction import check_factor, predict_soundly, weighted
+from sgp_ros.engine.gate import Before, Gate, without_isolated
+from sgp_ros.engine.prediction import check_factor, estimated, predict_soundly, weighted
 from sgp_ros.engine.prior_knowledge import (
+    baseline_memory,
+    empty_baseline,
     empty_regression,
+    first_model,
     memory_of_settings,
     model_of_settings,
     prior_of_robot,
@@ -22,10 +25,8 @@ from sgp_ros.engine.scoring import Scoring
 from sgp_ros.engine.windows import Equation
 from sgp_ros.errors import NumericalError
 from sgp_ros.gp.information import Information
-from sgp_ros.gp.learning import initial_model
 from sgp_ros.gp.model import Model, Observations
-from sgp_ros.gp.online import OnlineRegression
-from sgp_ros.gp.regression import Memory, OnlinePrediction, Regression
+from sgp_ros.gp.regression import OnlinePrediction, Regression
 from sgp_ros.robots.robot import Robot
 
 Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -42,7 +43,10 @@ class Estimator:
         baseline: physics alone on the same samples; None where the method has no process.
         scoring: what the errors so far tell.
         complement: predicts the other side of the equation of motion.
-        waiting: equations gathered before the first model.
+        waiting, first_off: equations gathered before the first model, and how far samples were
+            off in each.
+        gate: refuses implausible equations.
+        before: what was learned before such equations persisted; None in the usual case.
     """
 
     def __init__(self, robot: Robot, config: EngineConfig, counts: Counts) -> None:
@@ -51,14 +55,17 @@ class Estimator:
         k = len(robot.joints)
         columns = robot.residual_columns(config.model_residual_inputs)
         self.inputs = (None,) * k if config.model_method == 'PR' else columns
-        self._prior = prior_of_robot(robot, config)
-        self._known = Information.of_prior(self._prior).coefficients
+        self.prior = prior_of_robot(robot, config)
+        self._known = Information.of_prior(self.prior).coefficients
         self.complement = Complement(robot, config, columns)
         self._config = config
         self.regression: Regression | None = None
         self.baseline: Regression | None = None
         self.waiting: list[Waiting] = []
+        self.first_off: list[np.ndarray] = []
         self.scoring = Scoring(k)
+        self.gate = Gate(k)
+        self.before: Before | None = None
         if not any(joint.is_automatic for joint in config.hyper):
             self._start([])
 
@@ -88,7 +95,7 @@ class Estimator:
             self._config = old
             raise
         if self.baseline is not None and config.forgetting_samples != old.forgetting_samples:
-            self.baseline.change(memory=_baseline_memory(config))
+            self.baseline.change(memory=baseline_memory(config))
         self._refresh_baseline()
 
     def _refresh_baseline(self) -> None:
@@ -102,24 +109,36 @@ class Estimator:
     def take(self, equation: Equation) -> Estimate:
         """Predict an equation, score the prediction, then learn it."""
         self._counts.estimated += 1
+        refused = self._counts.implausible
         estimate = self._estimate(equation)
-        self.complement.take(equation, self._config.filter_hop)
+        if self._counts.implausible > refused:
+            self.complement.skip()
+        else:
+            self.complement.take(equation, self._config.filter_hop)
         return estimate
 
     def _estimate(self, equation: Equation) -> Estimate:
+        is_rough = self.gate.is_rough(equation)
         if self.regression is None:
+            if self.gate.judge(equation, is_wrong=is_rough):
+                self._counts.implausible += 1
+                return estimated(self._robot, equation)
             u, f, y = self._arrays(equation)
             _, held = without_rest(equation.slack, f @ self._known[: f.shape[1]], y)
             self._counts.held += bool(held.any())
             if self._config.learning_enabled:
                 self.waiting.append((u, f, y, held))
+                self.first_off.append(equation.roughness[0])
                 if is_enough([row[3] for row in self.waiting], self._config.learning_initial):
                     self._start(self.waiting)
                     self.waiting = []
-            return self._unknown(equation, is_learned=not held.any())
-        return self._predict_score_learn(self.regression, equation)
+            is_learned = self._config.learning_enabled and not held.any()
+            return estimated(self._robot, equation, is_learned=is_learned)
+        return self._predict_score_learn(self.regression, equation, is_wrong=is_rough)
 
-    def _predict_score_learn(self, regression: Regression, equation: Equation) -> Estimate:
+    def _predict_score_learn(
+        self, regression: Regression, equation: Equation, *, is_wrong: bool
+    ) -> Estimate:
         u, f, y = self._arrays(equation)
         prediction = predict_soundly(regression, u, f, self._counts)
         model, physics = (regression, prediction), None
@@ -135,6 +154,20 @@ class Estimator:
         )
         measured, _ = without_rest(equation.slack, mean, y)
         y, held = without_rest(equation.slack, prediction.mean, y)
+        channels = {target_name: target, self._robot.complement: complement}
+        errors = measured - mean
+        is_wrong |= self.gate.is_surprised(errors, target.raw_variance, ~held)
+        if self.gate.judge(equation, is_wrong=is_wrong):
+            self._counts.implausible += 1
+            return estimated(self._robot, equation, channels)
+        if is_wrong and self.before is None and self._config.learning_enabled:
+            self.before = Before.of(regression, self.baseline, self.gate)
+        self.gate.take(errors, ~held)
+        if self.before is not None:
+            if self.before.is_better(errors, (u, f, y), ~held):
+                return self._revert(self.before, equation)
+            if not self.before.left:
+                self.before = None
         self._counts.held += bool(held.any())
         is_scored = self._score(replace(target, measured=measured), complement, held)
         if physics is not None:
@@ -142,18 +175,17 @@ class Estimator:
                 self._score_baseline(y, y - prediction.mean, physics[1], held)
             self._learn_baseline(physics[1], y, held)
         is_learned = self._learn(regression, prediction, y, held)
-        channels = {target_name: target, self._robot.complement: complement}
-        return Estimate(
-            equation.stamp_ns,
-            self._robot.joint_names,
-            equation.motion.position[0],
-            equation.motion.velocity[0],
-            channels['acceleration'],
-            channels['effort'],
-            is_scored,
-            is_learned,
-            None if physics is None else physics[1].mean,
+        found = estimated(
+            self._robot, equation, channels, is_scored=is_scored, is_learned=is_learned
         )
+        return found if physics is None else replace(found, physics=physics[1].mean)
+
+    def _revert(self, before: Before, equation: Equation) -> Estimate:
+        """Take what was learned before, and have it take the equation."""
+        self.regression, self.baseline, self.gate = before.regression, before.baseline, before.gate
+        self.before = None
+        self._counts.reverted += 1
+        return self._predict_score_learn(before.regression, equation, is_wrong=False)
 
     def _learn(
         self, regression: Regression, prediction: OnlinePrediction, y: np.ndarray, held: np.ndarray
@@ -195,8 +227,7 @@ class Estimator:
         return replace(values, variance=self.scoring.calibrated(channel, values.raw_variance))
 
     def _score(self, target: Channel, complement: Channel, held: np.ndarray) -> bool:
-        is_known = np.isfinite(target.raw_variance) & (target.raw_variance > 0.0)
-        if not is_known.all() or held.all():  # unknown: undetermined, or far outside all samples
+        if not np.isfinite(target.raw_variance).all() or held.all():  # undetermined
             return False
         self._counts.scored += 1
         adapts = self._adapts(self._config.intervals_calibration)
@@ -229,27 +260,25 @@ class Estimator:
         if sample is not None and self._config.learning_enabled:
             self.baseline.learn(*sample)
 
-    def make_regression(self, model: Model) -> Regression:
-        """Return an empty model with these hyper-parameters."""
-        return empty_regression(model, self._prior, self._config)
-
-    def make_baseline(self, model: Model) -> OnlineRegression:
-        """Return an empty model of the physics alone."""
-        return OnlineRegression(model, self._prior, _baseline_memory(self._config))
-
     def _start(self, waiting: list[Waiting]) -> None:
         """Make the first model from what was gathered, then learn that."""
+        values = [
+            np.concatenate([u, y, off])
+            for (u, _, y, _), off in zip(waiting, self.first_off, strict=True)
+        ]
+        kept = without_isolated(waiting, values)
+        self.first_off = []
+        self._counts.implausible += len(waiting) - len(kept)
+        waiting = kept
         columns = [np.array(column) for column in zip(*waiting, strict=True)]
         data = None
         if waiting:
             U, F, y, held_rows = columns
             data = Observations(U, F, free_targets(y, held_rows))
-        kernel = kernel_named(self._config.model_kernel)
-        start = None if data is None else initial_model(data, self.inputs, kernel=kernel)
-        model = model_of_settings(self._config, self.inputs, start)
-        self.regression = self.make_regression(model)
+        model = first_model(self._config, self.inputs, data)
+        self.regression = empty_regression(model, self.prior, self._config)
         if self._config.model_method == 'SGP':
-            self.baseline = self.make_baseline(Model((None,) * len(model.kernels), model.noise))
+            self.baseline = empty_baseline(model, self.prior, self._config)
         if data is None:
             return
         is_whole = not columns[3].any()
@@ -261,24 +290,8 @@ class Estimator:
                 self._counts.learned += len(data.U)
                 return
         except NumericalError:  # some repeat others to rounding: the rest is learned without them
-            self.regression = self.make_regression(model)
+            self.regression = empty_regression(model, self.prior, self._config)
         for u, f, y, held in waiting:
             if self.baseline is not None and not is_whole:
                 self._learn_baseline(self.baseline.predict(u, f), y, held)
             self._learn(self.regression, self.regression.predict(u, f), y, held)
-
-    def _unknown(self, equation: Equation, *, is_learned: bool) -> Estimate:
-        return Estimate(
-            equation.stamp_ns,
-            self._robot.joint_names,
-            equation.motion.position[0],
-            equation.motion.velocity[0],
-            Channel.unknown(self._measured(equation, 'acceleration')),
-            Channel.unknown(self._measured(equation, 'effort')),
-            is_scored=False,
-            is_learned=is_learned and self._config.learning_enabled,
-        )
-
-
-def _baseline_memory(config: EngineConfig) -> Memory:
-    return Memory(1, forgetting=config.forgetting_samples)

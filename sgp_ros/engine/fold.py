@@ -9,6 +9,7 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.estimator import Estimator
 from sgp_ros.engine.filter_choice import StateFilter
 from sgp_ros.engine.held_commands import MOST_COMMANDS
+from sgp_ros.engine.hyperparameters import settings_of
 from sgp_ros.engine.intake import Intake
 from sgp_ros.engine.ordering import ReorderBuffer
 from sgp_ros.engine.results import NOTHING, Counts, Estimate, Step
@@ -35,6 +36,8 @@ class Fold:
         delay_s: half the length of the last filter window [s].
         clock, order, intake, filter, estimator: the stages of the fold.
         began_ns: stamp of what is done before the first event of a segment leaves [ns].
+        fits: of hyper-parameters, handed out so far.
+        stale_fits: how many of these were made for a model that is not in force any more.
         next_fit: learned count at which the next fit of hyper-parameters is due.
     """
 
@@ -52,6 +55,7 @@ class Fold:
         self.began_ns = 0
         self._taking: Event | None = None
         self._is_fit_due = False
+        self.fits = self.stale_fits = 0
 
     def _fold(self, event: Event | None, failed: Collection[Event | None] = ()) -> Step:
         """Take an event, or the end of the stream for None.
@@ -161,8 +165,20 @@ class Fold:
         estimates = []
         for equation in equations:
             self.delay_s = 0.5 * equation.span_s
+            before = self.counts.reverted
             estimates.append(self.estimator.take(equation))
+            if self.counts.reverted > before:
+                changes.append(self._follow_model())
         return tuple(changes), tuple(estimates)
+
+    def _follow_model(self) -> SettingsChange:
+        """Take the hyper-parameters of the model that is in force again as settings."""
+        assert self.estimator.regression is not None
+        found = settings_of(self.robot.joint_names, self.estimator.regression.model)
+        self.config = self.config.changed(found, self.robot)
+        self.estimator.configure(self.config)
+        self.stale_fits = self.fits
+        return SettingsChange(self._now_ns, found)
 
     def _forget(self) -> None:
         self.estimator = Estimator(self.robot, self.config, self.counts)

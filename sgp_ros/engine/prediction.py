@@ -12,15 +12,17 @@ basis stay as they are, and equations enter its triangles by rotations alone: no
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from sgp_ros.engine.results import Counts
+from sgp_ros.engine.results import Channel, Counts, Estimate
+from sgp_ros.engine.windows import Equation
 from sgp_ros.errors import NumericalError
 from sgp_ros.gp.linear_algebra import covariance_factor, svd
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.regression import OnlinePrediction, Regression
+from sgp_ros.robots.robot import Robot
 
 TargetPrediction = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 """From complement signals (c,) to mean (k,) and covariance (k, k) of the target, with noise."""
@@ -176,3 +178,29 @@ def _least_squares(
         return None
     spread = Vt.T / S
     return spread @ (U.T @ (whitening @ residual)), spread @ spread.T
+
+
+def estimated(
+    robot: Robot,
+    equation: Equation,
+    channels: Mapping[str, Channel] | None = None,
+    *,
+    is_scored: bool = False,
+    is_learned: bool = False,
+) -> Estimate:
+    """Return the estimate of an equation; without channels nothing was predicted."""
+    motion = equation.motion
+    if channels is None:
+        channels = {
+            name: Channel.unknown(getattr(motion, name)[0]) for name in ('acceleration', 'effort')
+        }
+    return Estimate(
+        equation.stamp_ns,
+        robot.joint_names,
+        motion.position[0],
+        motion.velocity[0],
+        channels['acceleration'],
+        channels['effort'],
+        is_scored,
+        is_learned,
+    )

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.hyperparameters import kernel_named
 from sgp_ros.gp.inducing_regression import InducingPointRegression
 from sgp_ros.gp.kernel import Kernel
-from sgp_ros.gp.model import CoefficientPrior, Model
+from sgp_ros.gp.learning import initial_model
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.regression import Memory, Regression
 from sgp_ros.robots.robot import Robot
@@ -57,6 +59,28 @@ def empty_regression(model: Model, prior: CoefficientPrior, config: EngineConfig
     """Return the kind of model that the settings name, before any sample."""
     kind = InducingPointRegression if config.buffer_mode == 'basis' else OnlineRegression
     return kind(model, prior, memory_of_settings(config))
+
+
+def empty_baseline(
+    model: Model, prior: CoefficientPrior, config: EngineConfig
+) -> OnlineRegression:
+    """Return the model of the physics alone with the noise of `model`, before any sample."""
+    alone = Model((None,) * len(model.kernels), model.noise)
+    return OnlineRegression(alone, prior, baseline_memory(config))
+
+
+def baseline_memory(config: EngineConfig) -> Memory:
+    """Return what the model of the physics alone keeps of the stream."""
+    return Memory(1, forgetting=config.forgetting_samples)
+
+
+def first_model(
+    config: EngineConfig, inputs: tuple[tuple[int, ...] | None, ...], data: Observations | None
+) -> Model:
+    """Return the hyper-parameters to begin with, from the first samples where there are any."""
+    kernel = kernel_named(config.model_kernel)
+    start = None if data is None else initial_model(data, inputs, kernel=kernel)
+    return model_of_settings(config, inputs, start)
 
 
 def complement_columns(robot: Robot) -> set[int]:

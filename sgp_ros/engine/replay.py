@@ -36,7 +36,7 @@ class Swap:
         self.fit = fit
         self._engine = engine
         self._parts: list[dict[str, SettingValue]] = []
-        self.refusal = fit.refusal
+        self.refusal = 'outdated' if fit.number < engine.stale_fits else fit.refusal
         if self.refusal:
             engine.count_refit(self.refusal)
             return

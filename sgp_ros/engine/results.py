@@ -16,7 +16,7 @@ from sgp_ros.robots.robot import Robot
 
 REFUSALS = (
     'late', 'duplicate', 'nonfinite', 'unpaired', 'unknown_joint', 'gap', 'wrong_length', 'clock',
-    'error',
+    'implausible', 'error',
 )  # fmt: skip
 """Reasons for which a state is refused; each refused state has exactly one."""
 
@@ -28,9 +28,10 @@ COMMAND_REFUSALS = (
 CHANGE_REFUSALS = ('late', 'clock', 'invalid', 'no_factor', 'error')
 """Reasons for which a change of settings or a reset in a stream is refused."""
 
-REFIT_REFUSALS = ('diverged', 'no_better', 'no_factor')
+REFIT_REFUSALS = ('diverged', 'no_better', 'no_factor', 'outdated')
 """Reasons for which a fit is refused: it found nothing that has an evidence; it found none higher
-than the one in force; the buffer of by then has no factor under what it found."""
+than the one in force; the buffer of by then has no factor under what it found; what it was fitted
+to is forgotten."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,6 +139,9 @@ class Counts:
         held: equations that dry friction makes inequalities, as it holds a joint at rest: scored
             for the other joints, and learned from their rows only where no Z is learned.
         unlearnable: equations that repeat others to rounding.
+        implausible: equations that neither signals nor model make possible, see `gate`.
+        reverted: times at which what was learned before implausible equations took its place
+            again.
         refits: fits of hyper-parameters put in force.
         refits_refused_for: those refused by reason.
         factor_checks, factor_drift: factors compared with fresh ones, and the largest relative
@@ -162,6 +166,8 @@ class Counts:
     scored: int = 0
     held: int = 0
     unlearnable: int = 0
+    implausible: int = 0
+    reverted: int = 0
     refits: int = 0
     refits_refused_for: dict[str, int] = field(
         default_factory=lambda: dict.fromkeys(REFIT_REFUSALS, 0)

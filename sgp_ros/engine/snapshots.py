@@ -16,8 +16,10 @@ import numpy as np
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.estimator import Estimator
+from sgp_ros.engine.gate import Before, Gate
 from sgp_ros.engine.hyperparameters import kernel_named
 from sgp_ros.engine.intake import State
+from sgp_ros.engine.prior_knowledge import empty_baseline, empty_regression
 from sgp_ros.engine.samples import (
     CommandSample,
     Event,
@@ -32,20 +34,41 @@ from sgp_ros.gp.model import Model
 from sgp_ros.gp.regression import Regression
 from sgp_ros.robots.robot import Robot
 
-VERSION = 9
+VERSION = 10
 _WAITING = ('U', 'F', 'y', 'held')
 
 
 def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
     """Return the whole state of an engine as arrays without objects, for `numpy.savez`."""
+    estimator = engine.estimator
+    arrays = {'json': np.array(json.dumps(_plain(engine)))}
+    for i, name in enumerate(_WAITING):
+        rows = [row[i] for row in estimator.waiting]
+        arrays[f'waiting_{name}'] = np.array(rows) if rows else np.zeros(0)
+    if estimator.first_off:
+        arrays['waiting_off'] = np.array(estimator.first_off)
+    arrays |= {f'complement.{k}': array for k, array in estimator.complement.state().items()}
+    for name, regression in _regressions(estimator).items():
+        arrays[f'{name}_noise'] = np.array(regression.model.noise)
+        for key, array in regression.state().items():
+            arrays[f'{name}.{key}'] = array
+        for j, kernel in enumerate(regression.model.kernels):
+            if kernel is not None:
+                arrays[f'{name}_kernel{j}'] = kernel.values
+    return arrays
+
+
+def _plain(engine: Engine) -> dict[str, Any]:
+    """Return what is no array, as JSON holds it."""
     estimator, intake, order = engine.estimator, engine.intake, engine.order
-    text = {
+    return {
         'version': VERSION,
         'robot': engine.robot.name,
         'coefficients': [c.name for c in engine.robot.coefficients],
         'settings': engine.config.to_mapping(),
         'counts': asdict(engine.counts),
         'fits': engine.fits,
+        'stale_fits': engine.stale_fits,
         'next_fit': engine.next_fit,
         'delay_s': engine.delay_s,
         'released': None
@@ -68,21 +91,13 @@ def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
         else [None if s is None else _encode_state(s) for s in engine.filter.trial.states],
         'last_state_ns': intake.last_state_ns,
         'is_measured': intake.is_measured,
+        'impossible': intake.impossible,
         'scoring': estimator.scoring.state(),
+        'gate': estimator.gate.state(),
+        'before': None
+        if estimator.before is None
+        else [estimator.before.gate.state(), estimator.before.left, estimator.before.errors],
     }
-    arrays = {'json': np.array(json.dumps(text))}
-    for i, name in enumerate(_WAITING):
-        rows = [row[i] for row in estimator.waiting]
-        arrays[f'waiting_{name}'] = np.array(rows) if rows else np.zeros(0)
-    arrays |= {f'complement.{k}': array for k, array in estimator.complement.state().items()}
-    for name, regression in _regressions(estimator).items():
-        arrays[f'{name}_noise'] = np.array(regression.model.noise)
-        for key, array in regression.state().items():
-            arrays[f'{name}.{key}'] = array
-        for j, kernel in enumerate(regression.model.kernels):
-            if kernel is not None:
-                arrays[f'{name}_kernel{j}'] = kernel.values
-    return arrays
 
 
 def snapshot_config(snapshot: Mapping[str, np.ndarray], robot: Robot) -> EngineConfig:
@@ -120,6 +135,7 @@ def _fill(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
     for name, value in text['counts'].items():
         setattr(engine.counts, name, value)
     engine.fits, engine.next_fit = text['fits'], text['next_fit']
+    engine.stale_fits = text['stale_fits']
     engine.delay_s = text['delay_s']
     intake = engine.intake
     for stamp, effort in text['commands']:
@@ -131,6 +147,7 @@ def _fill(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
             engine.filter.trial.add(None if entry is None else _decode_state(entry))
     intake.last_state_ns = text['last_state_ns']
     intake.is_measured = text['is_measured']
+    intake.impossible = text['impossible']
     released = text['released']
     engine.order.resume(
         None if released is None else (released[0], released[1]),
@@ -142,15 +159,28 @@ def _fill(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
     estimator = engine.estimator
     estimator.scoring.restore(text['scoring'])
     estimator.waiting = list(zip(*(snapshot[f'waiting_{name}'] for name in _WAITING), strict=True))
+    estimator.first_off = list(snapshot.get('waiting_off', ()))
     estimator.complement.restore(_part('complement.', snapshot))
     if 'model_noise' in snapshot:
         estimator.regression = _read_regression('model', snapshot, engine)
     if 'baseline_noise' in snapshot:
         estimator.baseline = _read_regression('baseline', snapshot, engine)
+    estimator.gate.restore(text['gate'])
+    if text['before'] is not None:
+        gate = Gate(len(engine.robot.joints))
+        gate.restore(text['before'][0])
+        model = _read_regression('before_model', snapshot, engine)
+        baseline = None
+        if 'before_baseline_noise' in snapshot:
+            baseline = _read_regression('before_baseline', snapshot, engine)
+        estimator.before = Before(model, baseline, gate, *text['before'][1:])
 
 
 def _regressions(estimator: Estimator) -> dict[str, Regression]:
     found = {'model': estimator.regression, 'baseline': estimator.baseline}
+    if estimator.before is not None:
+        before = estimator.before
+        found |= {'before_model': before.regression, 'before_baseline': before.baseline}
     return {name: regression for name, regression in found.items() if regression is not None}
 
 
@@ -164,8 +194,9 @@ def _read_regression(name: str, snapshot: Mapping[str, np.ndarray], engine: Engi
             continue
         kernels.append(kernel.of_values(snapshot[key], columns))
     noise = tuple(float(x) for x in snapshot[f'{name}_noise'])
-    make = engine.estimator.make_regression if name == 'model' else engine.estimator.make_baseline
-    regression = make(Model(tuple(kernels), noise))
+    make = empty_baseline if name.endswith('baseline') else empty_regression
+    model = Model(tuple(kernels), noise)
+    regression: Regression = make(model, engine.estimator.prior, engine.config)
     regression.restore(_part(f'{name}.', snapshot))
     return regression
 

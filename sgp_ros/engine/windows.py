@@ -10,7 +10,7 @@ comes from the polynomial that follows the motion.
 from __future__ import annotations
 
 from bisect import bisect_left
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,6 +21,10 @@ from sgp_ros.engine.rest import friction_slack
 from sgp_ros.engine.weak_form import WeakForm, polynomial_smoother
 from sgp_ros.physics.term import Motion
 from sgp_ros.robots.robot import Robot
+
+_LEAST_SHARE = 1e-3
+_ROUNDING = 1e-12
+"""Distance from a polynomial, over the size of the signal, that is rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,6 +40,9 @@ class Equation:
         complement_joints: the c joints those signals belong to.
         slack: (2, k) least and largest effort by which the target may exceed the rows where dry
             friction holds a joint: the equation is then an inequality. None where it holds none.
+        roughness: (2, 2 k) largest distance of a sample from the polynomial that follows the
+            others, then the range of the samples: of the positions, and of measured velocities, 0
+            without.
     """
 
     stamp_ns: int
@@ -45,6 +52,7 @@ class Equation:
     slopes: np.ndarray
     complement_joints: tuple[int, ...]
     slack: np.ndarray | None = None
+    roughness: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))
 
     def regressor(self, complement: np.ndarray) -> np.ndarray:
         """Return f (k, p) for complement signals (c,)."""
@@ -129,13 +137,18 @@ class WindowFilter:
         if measured:
             source = np.array([state.velocity for state in window])
         velocity, acceleration = weights.derivatives(source, measured=measured)
+        smooth = weights.values @ position
+        signals, followed = position, smooth
+        if measured:
+            signals, followed = np.hstack([position, source]), np.hstack([smooth, velocity])
         return self._assemble(
             window,
             at,
             weights,
             acceleration,
+            _roughness(signals, followed, weights.values.diagonal(), 2 * position.shape[1]),
             Motion(
-                weights.values @ position,
+                smooth,
                 velocity,
                 (weights.form.weights @ source)[None],
                 self._effort(window, velocity, weights.form, commands)[None],
@@ -166,7 +179,13 @@ class WindowFilter:
         return now + effort_map.late_effort(commands.drive(span[0], form))[0]
 
     def _assemble(
-        self, window: list[State], at: int, weights: _Weights, within: np.ndarray, motion: Motion
+        self,
+        window: list[State],
+        at: int,
+        weights: _Weights,
+        within: np.ndarray,
+        roughness: np.ndarray,
+        motion: Motion,
     ) -> Equation:
         """Return the equation of a window, with accelerations (m, k) that follow the motion."""
         m, k = motion.position.shape
@@ -198,6 +217,7 @@ class WindowFilter:
             np.tensordot(shares, probed[:, 1:] - probed[:, :1], axes=1),
             joints,
             friction_slack(self._robot, motion, measured, weights.form),
+            roughness,
         )
 
     def _weights(self, offsets_ns: np.ndarray, *, measured: bool) -> _Weights:
@@ -209,6 +229,29 @@ class WindowFilter:
         weights = _Weights(form, form.nodes(), *polynomial_smoother(times, self._degree))
         self._cached = (offsets_ns, measured, weights)
         return weights
+
+
+def _roughness(
+    signals: np.ndarray, followed: np.ndarray, shares: np.ndarray, width: int
+) -> np.ndarray:
+    """Return how far a sample is from the polynomial of the others, and how far they move, (2, s).
+
+    Without a sample the polynomial would miss it by its distance over one less its own share in
+    what follows it (the deleted residual, Allen 1974).
+
+    Args:
+        signals: (m, s).
+        followed: by the polynomial, (m, s).
+        shares: of each sample in its own smoothed value, (m,).
+        width: of the result, filled up by zeros.
+    """
+    high, low = signals.max(axis=0), signals.min(axis=0)
+    distance = np.abs(signals - followed)
+    distance[distance <= _ROUNDING * np.maximum(np.abs(high), np.abs(low))] = 0.0
+    off = (distance / np.maximum(1.0 - shares, _LEAST_SHARE)[:, None]).max(axis=0)
+    found = np.zeros((2, width))
+    found[:, : len(off)] = off, high - low
+    return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -49,6 +49,7 @@ class Joint:
         lower: least position [rad or m], -inf where none is known.
         upper: greatest position [rad or m], inf where none is known.
         velocity_limit: [rad/s or m/s], inf where none is known.
+        effort_limit: [N m or N], inf where none is known.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Joint:
     lower: float = -math.inf
     upper: float = math.inf
     velocity_limit: float = math.inf
+    effort_limit: float = math.inf
 
     def unit(self, channel: str) -> str:
         """Return the unit of one of `INPUT_CHANNELS`."""

@@ -24,6 +24,7 @@ MEANINGS = {
     'gap': 'the first state after a pause longer than max_gap',
     'wrong_length': 'positions, velocities or efforts are not as many as names',
     'clock': 'a stamp far from those of the other states',
+    'implausible': 'far beyond the limits of position, speed or effort in the model file',
     'error': 'an internal error of this package struck on it; please report it',
 }
 

@@ -175,6 +175,8 @@ def _learning(counts: Counts) -> dict[str, Any]:
             'learned': counts.learned,
             'held': counts.held,
             'repeating': counts.unlearnable,
+            'implausible': counts.implausible,
+            'reverted': counts.reverted,
             'refits': counts.refits,
             'refits_refused': counts.refits_refused,
             'refits_refused_for': dict(counts.refits_refused_for),

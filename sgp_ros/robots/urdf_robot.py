@@ -223,6 +223,7 @@ def _joints(tree: Tree, gains: Mapping[str, float], problems: list[str]) -> tupl
             lower=float(tree.lower[i]),
             upper=float(tree.upper[i]),
             velocity_limit=float(tree.velocity_limit[i]),
+            effort_limit=float(tree.effort_limit[i]),
         )
         for i, name in enumerate(tree.moving_names)
     )

@@ -81,6 +81,7 @@ class Health:
             '': f'log evidence rose by {gain:.3g} nat',
             'diverged': 'refused: diverged, nothing that it tried has a usable covariance',
             'no_better': f'refused: no better, its log evidence is {-gain:.3g} nat lower',
+            'outdated': 'refused: what it was fitted to is forgotten',
             'no_factor': 'refused: the buffer has no factor under what it found for some joint',
         }[refusal]
 
@@ -228,7 +229,7 @@ class Health:
 
 def _flat(counts: Counts, unreadable: int) -> dict[str, int]:
     names = ('read', 'estimated', 'learned', 'scored', 'unlearnable', 'commands_read',
-             'commands_used', 'clock_jumps')  # fmt: skip
+             'commands_used', 'implausible', 'reverted', 'clock_jumps')  # fmt: skip
     return {
         **{name: getattr(counts, name) for name in names},
         **{f'refused.{reason}': n for reason, n in counts.refused.items()},

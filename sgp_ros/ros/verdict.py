@@ -158,6 +158,7 @@ def _state_remedy(reason: str, arrivals: Arrivals) -> str:
         'late': 'they come later than reorder_window permits; raise it, or look at the network',
         'clock': 'stamps lie far from those of the other states; check the clock of their source',
         'wrong_length': 'positions, velocities or efforts are not as many as names',
+        'implausible': 'they are far beyond the limits in the model file; check units and sensors',
         'error': 'an internal error; the log tells the first one, please report it',
         'duplicate': 'stamps repeat; several publishers, or a source without own stamps',
         'nonfinite': 'positions or velocities are not finite; check the sensors',
