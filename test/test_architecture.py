@@ -75,7 +75,8 @@ PROOF_ROOMS = {
 SUB_ROOMS = {
     'diagnosis': (
         'criteria', 'shown', 'result', 'compare', 'setup', 'explain', 'locate', 'decide',
-        'findings', 'prove', 'mapping', 'gathered', 'connected', 'reference', 'pipeline',
+        'unlisted', 'findings', 'prove', 'mapping', 'gathered', 'connected', 'reference',
+        'pipeline',
     ),
 }  # fmt: skip
 """Layer to its sub-rooms in their order: each imports itself and those that stand before it."""

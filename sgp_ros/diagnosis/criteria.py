@@ -83,6 +83,18 @@ NOTHING_EXPLAINED = 1.0 / ADEQUATE_REST
 STRUCTURE_LEAST_SHARE = 0.1
 """Joints that leave less, relative to the worst one, are not looked at for structure [1]."""
 
+UNNAMED_EXCESS = 4.0
+"""Excess of laws that a force without a name beats: as likely wrong as four in five [1].
+Convention."""
+NEARLY = 1.0 / 3.0
+"""A force without form leaves less than this part of what laws leave that say only nearly what
+there is [1]. Convention."""
+LACKING = 1.5
+"""Greatest ratio of what a formula leaves to what a spline that follows any law does, if it is
+not chance at `SIGNIFICANT` [1]. Convention."""
+LEAST_LAW = 0.7
+"""Probability from which a formula that was searched for is asserted [1]. Unlisted worlds."""
+
 TEMPER = 0.3
 """Weight of a nat of the worth of a model in the odds of rivals [1]. Drawn worlds."""
 LEAST_ODDS = 0.01

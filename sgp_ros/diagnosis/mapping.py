@@ -7,6 +7,7 @@ from typing import Any
 
 from sgp_ros.diagnosis.prove.rollouts import HORIZON_S
 from sgp_ros.diagnosis.result import Diagnosis, Difference, Finding, Parameter, Proof
+from sgp_ros.diagnosis.shown import LawSearch
 
 
 def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
@@ -37,6 +38,7 @@ def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
             for e in found.parameter_errors
         ],
         'visibility': _visibility(found),
+        'law_search': [_law_search(s) for s in found.law_searches],
         'fit': fit,
         'simulation': {name: _finite(x) for name, x in found.simulation.items()},
         'dependence': [
@@ -61,6 +63,24 @@ def _difference(d: Difference) -> dict[str, Any]:
         'parameters': {name: _parameter(p) for name, p in d.parameters.items()},
         'difference': {name: _parameter(p) for name, p in d.difference.items()},
         'probability': _finite(d.probability), 'share': _finite(d.share),
+    }  # fmt: skip
+
+
+def _law_search(s: LawSearch) -> dict[str, Any]:
+    return {
+        'joint': s.joint, 'words': s.words, 'is_asserted': not s.why_not, 'why_not': s.why_not,
+        'left': _finite(s.left), 'left_by_listed': _finite(s.left_listed),
+        'shape': {
+            'variable': s.variable, 'unit': s.unit, 'factor': s.factor, 'force_unit': s.force_unit,
+            **{name: [_finite(x) for x in values]
+               for name, values in (('x', s.x), ('mean', s.mean), ('half_band', s.half))},
+        },
+        'formulas': [
+            {'formula': t.formula, 'nearest': t.words, 'left': _finite(t.left),
+             'parameters': {name: {'value': _finite(x), 'unit': unit}
+                            for name, (x, unit) in t.parameters.items()}}
+            for t in s.formulas
+        ],
     }  # fmt: skip
 
 

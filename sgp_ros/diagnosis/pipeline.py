@@ -46,6 +46,7 @@ from sgp_ros.diagnosis.reference import (
 )
 from sgp_ros.diagnosis.result import Diagnosis, Proof
 from sgp_ros.diagnosis.shown import Predictions, Traces
+from sgp_ros.diagnosis.unlisted.told import extended
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import NumericalError
@@ -129,7 +130,8 @@ def diagnose(
 def _diagnosed(
     connected: Connected, robot: str, progress: Progress, *, replays: bool
 ) -> Diagnosis:
-    recordings, whole, several = connected.recordings, connected.equations, connected.several
+    recordings, whole = connected.recordings, connected.equations
+    several, laws = extended(connected.several)
     raw, tree, names = recordings.learned, whole.motion.tree, recordings.names
     several, sides, chances = _settled(several)
     equations = several.equations
@@ -143,8 +145,7 @@ def _diagnosed(
     doubts = reasons_to_doubt(proofs, recordings.still)
     on_all = replace(decision, model=model)
     findings, forces = asserted(whole, on_all, lags, learned, chances, depends)
-    findings = tuple(connected.against_rivals(f) for f in findings)
-    differ = differences(several, names)
+    findings, differ = tuple(map(connected.against_rivals, findings)), differences(several, names)
     certainty = certainty_of((*findings, *differ), equations, comparison)
     progress(1.0)
     if reasons_to_doubt({'train': proofs['train']}, recordings.still):
@@ -175,6 +176,7 @@ def _diagnosed(
         setup=connected.findings,
         visibility=visibility(equations, comparison, decision),
         overlays=overlays(final, parts if replays else {}, tree),
+        law_searches=laws,
     )
 
 

@@ -8,7 +8,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sgp_ros.diagnosis.shown import Band, Dependence, Overlay, Predictions, Rollouts, Traces
+from sgp_ros.diagnosis.shown import (
+    Band,
+    Dependence,
+    LawSearch,
+    Overlay,
+    Predictions,
+    Rollouts,
+    Traces,
+)
 
 VERDICTS = ('no_mismatch', 'parameters_only', 'setup_error', 'missing_physics', 'unexplained')
 
@@ -222,6 +230,7 @@ class Diagnosis:
         setup: errors of how the robot was connected or described, undone before all else.
         visibility: least that would show, infinite if nothing would; by joint, effect, parameter.
         overlays: motions of both models over the measured one, by stem; empty where not asked for.
+        law_searches: at joints that listed effects do not describe, or only nearly.
         bodies: (b, 10) inertial parameters of the final model, of bodies that can exist, in the
             order of the tree; None for the nominal ones.
     """
@@ -254,3 +263,4 @@ class Diagnosis:
     setup: tuple[Finding, ...] = ()
     visibility: Mapping[tuple[str, str, str], Parameter] = field(default_factory=dict)
     overlays: Mapping[str, Overlay] = field(default_factory=dict)
+    law_searches: tuple[LawSearch, ...] = ()

@@ -140,3 +140,55 @@ class Overlay:
     efforts: Mapping[str, np.ndarray]
     replays: Mapping[str, Mapping[str, Replay]]
     seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class TriedFormula:
+    """A formula of a force law that was fitted.
+
+    Attributes:
+        formula: `tau_x[J] = ...`.
+        parameters: values with their units, by name.
+        left: share of the mean squared effort of the joint that it leaves.
+        words: the nearest known physics.
+    """
+
+    formula: str
+    parameters: Mapping[str, tuple[float, str]]
+    left: float
+    words: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LawSearch:
+    """What a search for a law that no list has found at a joint.
+
+    Attributes:
+        joint: name.
+        variable: what the force depends on most, such as `dq[elbow]`.
+        factor: that the shape is multiplied by, such as `sign(dq[elbow])`; empty for none.
+        unit: of the variable.
+        force_unit: of the shape.
+        x: (p,) over the range that was seen.
+        mean: (p,) shape without a formula.
+        half: (p,) half the width of its 95 % band.
+        left: share of the mean squared effort that the shape leaves.
+        left_listed: the same of the best effects of the list.
+        formulas: best first; the first is asserted where `why_not` is empty.
+        why_not: why none is asserted.
+        words: the shape as a sentence.
+    """
+
+    joint: str
+    variable: str
+    factor: str
+    unit: str
+    force_unit: str
+    x: np.ndarray
+    mean: np.ndarray
+    half: np.ndarray
+    left: float
+    left_listed: float
+    formulas: tuple[TriedFormula, ...]
+    why_not: str
+    words: str

@@ -10,9 +10,8 @@ the built-in laws. `lag`, `play` and `delay` run over the grid of a recording.
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
@@ -21,46 +20,21 @@ from sgp_ros.physics.effect import Effect, Numbers
 from sgp_ros.physics.formula import Formula, read_formula
 from sgp_ros.physics.grammar import MEMORY, TIME
 from sgp_ros.physics.motion import SeenMotion, Structure
-from sgp_ros.physics.parts import Place, Placed, Quantity, Value, relative_scales
+from sgp_ros.physics.parts import (
+    LawParameter,
+    Place,
+    Placed,
+    Quantity,
+    Value,
+    relative_scales,
+)
 from sgp_ros.physics.term import Motion
 
 NAME = 'law'
-_SPREAD = 30.0
-"""Factor around its start within which a parameter without range is sought."""
 _DRAWN = {'dq': 'velocity', 'q': 'position', 'ddq': 'acceleration', 'tau': 'effort', TIME: 'time'}
 _PROBES = 64
-
-
-@dataclass(frozen=True)
-class LawParameter(Quantity):
-    """A parameter of a law, with its unit as it is on the law's own joint.
-
-    Attributes:
-        start: value from which a search starts.
-        high: greatest value that makes sense.
-        is_known: whether the value is part of the law.
-    """
-
-    start: float = 1.0
-    high: float = math.inf
-    is_known: bool = field(default=False, kw_only=True)
-
-    def of_kind(self, kind: str) -> Quantity:
-        return self
-
-    def unit_on(self, *, is_prismatic: bool) -> str:
-        return self.unit
-
-    @property
-    def ends(self) -> tuple[float, float]:
-        """Range of a search, finite."""
-        reach = max(abs(self.start), 1e-6)
-        low = self.start / _SPREAD if self.start > 0.0 else self.start - _SPREAD * reach
-        high = self.start + _SPREAD * reach
-        return (
-            self.low if math.isfinite(self.low) else low,
-            self.high if math.isfinite(self.high) else high,
-        )
+_BETWEEN = 4
+"""Starts between the ends of a range, beside the stated one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,15 +66,17 @@ class FormulaLaw(Effect):
         parameters: of the formula.
         words: for people.
         is_open: whether a robot may have it or not, and its numbers are not known.
+        price: what the choice of its formula among others takes [nats].
     """
 
     name = NAME
 
     def __init__(
         self, formula: Formula, joint: str, parameters: Sequence[LawParameter],
-        words: str = 'a law of its own', *, is_open: bool = False,
+        words: str = 'a law of its own', *, is_open: bool = False, price: float = 0.0,
     ) -> None:  # fmt: skip
         self.law, self.joint, self.words, self.is_open = formula, joint, words, is_open
+        self._price = price
         self.formula = f'tau_x[{joint}] = {formula.text}'
         self.source = 'stated by a formula'
         self.quantities = tuple(parameters)
@@ -136,6 +112,10 @@ class FormulaLaw(Effect):
         """Return nothing: a law comes in no variants."""
         return {}
 
+    def surprise(self, at: Placed) -> float:
+        """Return what the choice of its formula takes [nats]."""
+        return self._price
+
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
         """Return whether all parameters lie in their ranges."""
         values = self.report(at, motion)
@@ -153,12 +133,16 @@ class FormulaLaw(Effect):
         return [Place(j)] if j in motion.moving_joints else []
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
-        """Return the stated starts, and the thirds of the ranges around them."""
+        """Return the stated starts, and places between the ends of their ranges.
+
+        Even ones, or even ratios where the range has one sign.
+        """
         grid = []
         for name in self.shape_names():
             p = self._own[name]
             low, high = p.ends
-            grid.append([p.start, (2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0])
+            even = np.geomspace if low > 0.0 else np.linspace
+            grid.append([p.start, *even(low, high, 2 + _BETWEEN)[1:-1]])
         return np.array(list(itertools.product(*grid)), dtype=np.float64)
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:

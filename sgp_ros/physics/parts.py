@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Protocol
 
@@ -148,6 +148,42 @@ class Quantity:
         if not is_prismatic or self.name == 'phase':
             return self.unit
         return linear_unit(self.unit)
+
+
+_SPREAD = 30.0
+"""Factor around its start within which a parameter without range is sought."""
+
+
+@dataclass(frozen=True)
+class LawParameter(Quantity):
+    """A parameter of a law, with its unit as it is on the law's own joint.
+
+    Attributes:
+        start: value from which a search starts.
+        high: greatest value that makes sense.
+        is_known: whether the value is part of the law.
+    """
+
+    start: float = 1.0
+    high: float = math.inf
+    is_known: bool = field(default=False, kw_only=True)
+
+    def of_kind(self, kind: str) -> Quantity:
+        return self
+
+    def unit_on(self, *, is_prismatic: bool) -> str:
+        return self.unit
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Range of a search, finite."""
+        reach = max(abs(self.start), 1e-6)
+        low = self.start / _SPREAD if self.start > 0.0 else self.start - _SPREAD * reach
+        high = self.start + _SPREAD * reach
+        return (
+            self.low if math.isfinite(self.low) else low,
+            self.high if math.isfinite(self.high) else high,
+        )
 
 
 def linear_unit(unit: str) -> str:

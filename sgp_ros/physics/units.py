@@ -1,7 +1,7 @@
 """Units of formulas: read from text, and checked from the signals upwards.
 
 A unit is a product of powers of kilogram, metre and second. An angle has none, so that `sin(q)`
-and `q**2` may stand in one sum; a number has none either: what has a unit needs a name.
+and `q**2` may stand in one sum; a number but 0 has none either: what has a unit needs a name.
 """
 
 from __future__ import annotations
@@ -173,9 +173,10 @@ def _of_function(node: ast.Call, name: str, parts: list[Unit]) -> Unit:
             )  # fmt: skip
         return parts[0]
     if name in _KEPT:
-        for other in parts[1:]:
-            _require_same(node, parts[0], other)
-        return parts[0]
+        there = [x for x, part in zip(parts, node.args, strict=True) if not _is_zero(part)]
+        for other in there[1:]:
+            _require_same(node, there[0], other)
+        return there[0] if there else _NONE
     if name == 'sqrt':
         return parts[0][0] / 2, parts[0][1] / 2, parts[0][2] / 2
     if name in {'sign', 'step'}:
@@ -186,6 +187,11 @@ def _of_function(node: ast.Call, name: str, parts: list[Unit]) -> Unit:
             'an argument without unit: divide it by a parameter of the same unit',
         )
     return _NONE
+
+
+def _is_zero(node: ast.expr) -> bool:
+    """Return whether a node is the number 0, which has any unit."""
+    return isinstance(node, ast.Constant) and node.value == 0
 
 
 def _require_same(node: ast.expr, left: Unit, right: Unit) -> None:

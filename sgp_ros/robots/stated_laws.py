@@ -20,7 +20,8 @@ from typing import Any
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.formula import Formula, read_formula
-from sgp_ros.physics.law import NAME, FormulaLaw, LawParameter
+from sgp_ros.physics.law import NAME, FormulaLaw
+from sgp_ros.physics.parts import LawParameter
 from sgp_ros.physics.units import read_unit, unit_of, unit_text
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.entries import Entries, is_finite

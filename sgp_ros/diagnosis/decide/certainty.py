@@ -24,7 +24,8 @@ from sgp_ros.diagnosis.criteria import (
     PER_PARAMETER,
     TEMPER,
 )
-from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision, Scale, without
+from sgp_ros.diagnosis.decide.cross_validation import without
+from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision, Scale
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model

@@ -16,11 +16,15 @@ the others worse.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import STRUCTURE_LEAST_SHARE
+from sgp_ros.diagnosis.criteria import EVIDENCE, STRUCTURE_LEAST_SHARE
+from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.joint_search import is_credible
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.locate.remainder import (
     PARTS,
@@ -165,3 +169,40 @@ def support(columns: Columns, model: Model, floor: np.ndarray) -> list[float]:
         without = left_out(columns, model, rest) + floor
         found.append(float(0.5 * np.log(without / whole).sum(axis=1).mean()))
     return found
+
+
+def without(equations: Equations, model: Model, is_dropped: Callable[[EffectAt], bool]) -> Model:
+    """Return a model fitted again without some of its effects."""
+    kept = tuple(s for s in model.effects if not is_dropped(s))
+    if len(kept) == len(model.effects):
+        return model
+    return fit(
+        Columns(equations), kept, model.sigma, is_free=model.is_free, w=model.w, still=len(kept)
+    )
+
+
+def supported(
+    equations: Equations, rows: float, floor: np.ndarray, ranked: Sequence[Model]
+) -> Model | None:
+    """Return the first model whose effects all predict parts of the recording left out.
+
+    Of more than two effects those that do not are taken out.
+
+    Args:
+        equations: of the recording.
+        rows: that count as independent.
+        floor: (k,) mean squares below which residuals do not count [N^2 m^2 or N^2].
+        ranked: models, best first.
+    """
+    columns = Columns(equations)
+    for model in ranked:
+        found = model
+        while found.effects and is_credible(found):
+            told = rows * np.array(support(columns, found, floor))
+            if told.min() > EVIDENCE:
+                return found
+            if len(found.effects) <= 2:
+                break
+            weakest = found.effects[int(np.argmin(told))]
+            found = without(equations, found, lambda s, out=weakest: s is out)  # type: ignore[misc]
+    return None

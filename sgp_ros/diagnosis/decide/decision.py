@@ -14,8 +14,7 @@ with an unknown beside it, else `unexplained`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,14 +33,12 @@ from sgp_ros.diagnosis.criteria import (
     PER_PARAMETER,
     SHAPE_ERROR,
     SLIGHT_REST,
+    UNNAMED_EXCESS,
 )
-from sgp_ros.diagnosis.decide.cross_validation import repeatable, structure, support
-from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.decide.cross_validation import repeatable, structure, supported, without
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.joint_search import is_credible
-from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import JOINT, MOTOR
 
 UNKNOWN = 'unknown'
@@ -200,7 +197,12 @@ def decide(equations: Equations, comparison: Comparison) -> Decision:
     """Return the verdict on a recording."""
     scale, base = Scale.of(equations, comparison), comparison.base
     ranked = _ranked(comparison, scale)
-    best = _supported(equations, scale, [m for m in ranked if scale.worth(m) > scale.worth(base)])
+    best = supported(
+        equations,
+        scale.rows,
+        scale.floor * scale.power,
+        [m for m in ranked if scale.worth(m) > scale.worth(base)],
+    )
     rivals = tuple(m for m in ranked if m is not best)
     left = scale.shares(comparison.parameters)
     if best is not None:
@@ -232,10 +234,38 @@ def _judged(
     base = comparison.base
     told = repeatable(equations, best.residual, scale.excess(best) >= 1.0)
     excess = scale.excess(best, told)
-    open_ = np.flatnonzero(excess >= 1.0)
-    worst = int(np.argmax(scale.base))
-    if not len(open_):
+    if not (excess >= 1.0).any():
+        worst = int(np.argmax(scale.base))
         return Decision('missing_physics', best, rivals, excess, worst, against=base.score)
+    return _opened(equations, scale, comparison, best, rivals, excess)
+
+
+def refused(
+    equations: Equations, comparison: Comparison, decision: Decision, joint: int
+) -> Decision:
+    """Return a decision in which the laws of a joint, adequate by themselves, are not asserted.
+
+    Something without a name explains the joint better.
+    """
+    excess = decision.excess.copy()
+    excess[joint] = max(excess[joint], UNNAMED_EXCESS)
+    if decision.verdict != 'missing_physics':
+        return replace(decision, excess=excess)
+    scale, model = Scale.of(equations, comparison), decision.model
+    return _opened(equations, scale, comparison, model, decision.rivals, excess)
+
+
+def _opened(
+    equations: Equations,
+    scale: Scale,
+    comparison: Comparison,
+    best: Model,
+    rivals: tuple[Model, ...],
+    excess: np.ndarray,
+) -> Decision:
+    """Return the verdict where the best model does not describe the joints with an excess."""
+    base = comparison.base
+    open_, worst = np.flatnonzero(excess >= 1.0), int(np.argmax(scale.base))
     known = without(
         equations, best, lambda s: s.place.joint in open_ and s.effect.site in {JOINT, MOTOR}
     )
@@ -257,32 +287,3 @@ def _ordered(size: np.ndarray, first: int) -> tuple[int, ...]:
     """Return the joints of a size (k,) above zero, one of them first, then the largest."""
     rest = [int(j) for j in np.argsort(-size) if size[j] > 0.0 and j != first]
     return (first, *rest)
-
-
-def without(equations: Equations, model: Model, is_dropped: Callable[[EffectAt], bool]) -> Model:
-    """Return a model fitted again without some of its effects."""
-    kept = tuple(s for s in model.effects if not is_dropped(s))
-    if len(kept) == len(model.effects):
-        return model
-    return fit(
-        Columns(equations), kept, model.sigma, is_free=model.is_free, w=model.w, still=len(kept)
-    )
-
-
-def _supported(equations: Equations, scale: Scale, ranked: list[Model]) -> Model | None:
-    """Return the first model whose effects all predict parts of the recording left out.
-
-    Of more than two effects those that do not are taken out.
-    """
-    columns, floor = Columns(equations), scale.floor * scale.power
-    for model in ranked:
-        found = model
-        while found.effects and is_credible(found):
-            told = scale.rows * np.array(support(columns, found, floor))
-            if told.min() > EVIDENCE:
-                return found
-            if len(found.effects) <= 2:
-                break
-            weakest = found.effects[int(np.argmin(told))]
-            found = without(equations, found, lambda s, out=weakest: s is out)  # type: ignore[misc]
-    return None

@@ -1,0 +1,1 @@
+"""Laws that no list has: shapes without form first, then the shortest formula for one."""

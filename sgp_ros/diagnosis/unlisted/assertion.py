@@ -1,0 +1,123 @@
+"""Whether a law that a search found is asserted, and what is said where it is not.
+
+A formula is asserted where it is worth more than every listed effect, every shorter formula and
+the smooth force without form, predicts parts left out, describes its joint as any law must, has
+all its numbers inside their ranges, is finite over the range of the joints, and holds most of the
+odds against all formulas that would say something else in other motions. Else the joint is
+unexplained, and listed effects that explain it less well than the smooth force are not asserted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.criteria import LACKING, LEAST_LAW, SIGNIFICANT
+from sgp_ros.diagnosis.decide.certainty import probabilities
+from sgp_ros.diagnosis.decide.decision import Decision, Scale, decide, refused
+from sgp_ros.diagnosis.decide.equivalence import Contrasts, moved
+from sgp_ros.diagnosis.explain.comparison import Comparison
+from sgp_ros.diagnosis.unlisted.search import Searched, law_of, own_effects, search
+
+MOST_JOINTS = 3
+"""Joints at which a law is looked for, those first of which most is left or explained."""
+_RIVALS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """What is decided once laws were looked for.
+
+    Attributes:
+        comparison: with the models of formulas.
+        decision: on these.
+        searched: at each joint where a smooth force is worth more than listed effects.
+        why_not: by joint, why no formula is asserted there; absent where one is.
+    """
+
+    comparison: Comparison
+    decision: Decision
+    searched: tuple[Searched, ...]
+    why_not: dict[int, str]
+
+
+def with_laws(equations: Equations, comparison: Comparison, decision: Decision) -> Explained:
+    """Return the decision with laws that no list has, where effects of the list say too little.
+
+    Args:
+        equations: of one recording.
+        comparison: of listed effects.
+        decision: on these.
+    """
+    found = Explained(comparison, decision, (), {})
+    for joint in _joints(equations, comparison, decision):
+        listed = found.decision.tentative or found.decision.model
+        searched = search(equations, Scale.of(equations, comparison), listed, joint)
+        if searched is None:
+            continue
+        found = replace(found, searched=(*found.searched, searched))
+        found = _decided(equations, found, searched)
+    return found
+
+
+def _joints(equations: Equations, comparison: Comparison, decision: Decision) -> list[int]:
+    """Return the joints that are unexplained, then those with effects that are asserted."""
+    model = decision.tentative or decision.model
+    k = equations.d.shape[1]
+    named = [j for j in range(k) if own_effects(model, j)]
+    size = Scale.of(equations, comparison).found(model)
+    order = sorted(named, key=lambda j: -size[j])
+    return list(dict.fromkeys((*decision.unknown, *order)))[:MOST_JOINTS]
+
+
+def _decided(equations: Equations, found: Explained, searched: Searched) -> Explained:
+    """Return what is decided with the laws of one more joint."""
+    why = _objection(equations, found.comparison, searched)
+    if not why:
+        comparison = replace(
+            found.comparison, more=(*found.comparison.more, *searched.laws[:_RIVALS])
+        )
+        decision = decide(equations, comparison)
+        why = _doubt(equations, comparison, decision, searched)
+        if not why:
+            return replace(found, comparison=comparison, decision=decision)
+    decision = refused(equations, found.comparison, found.decision, searched.joint)
+    decision = replace(decision, rivals=(*searched.laws[:_RIVALS], *decision.rivals))
+    return replace(found, decision=decision, why_not=found.why_not | {searched.joint: why})
+
+
+def _objection(equations: Equations, comparison: Comparison, searched: Searched) -> str:
+    """Return what is wrong with the best formula by itself; empty for nothing."""
+    if not searched.laws:
+        return 'no formula that was tried can have such numbers'
+    best, scale = searched.laws[0], Scale.of(equations, comparison)
+    if scale.worth(best) < scale.worth(searched.smooth):
+        return 'no formula that was tried follows the shape within its band'
+    ratio, chance = searched.lack_of_fit
+    if ratio > LACKING and chance < SIGNIFICANT:
+        return 'the best formula follows the shape only nearly'
+    law = law_of(best, searched.joint)
+    assert law is not None
+    motion = equations.motion
+    if law.at_bounds(motion):
+        return 'the best formula has a number at the end of what this motion can tell'
+    wide = law.force(moved(motion, np.inf, 1.0, 0.0))
+    return '' if np.isfinite(wide).all() else 'the best formula is not finite over the range'
+
+
+def _doubt(
+    equations: Equations, comparison: Comparison, decision: Decision, searched: Searched
+) -> str:
+    """Return why the decision on all models does not assert the law; empty where it does."""
+    law = law_of(decision.model, searched.joint)
+    if decision.verdict != 'missing_physics' or law is None or searched.joint in decision.unknown:
+        return 'the best formula leaves more than chance does, or does not predict parts left out'
+    model = decision.model
+    contrasts = Contrasts(equations, model)
+    chances = probabilities(equations, comparison, decision, contrasts)
+    index = [s is law for s in model.effects].index(True)
+    if chances.of(model, index) < LEAST_LAW:
+        return 'other formulas fit this motion as well and differ in others'
+    return ''

@@ -1,0 +1,146 @@
+"""What a search for a law says: the shape with its band, the formulas, one sentence in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sgp_ros.batch.least_squares import correlation_factor
+from sgp_ros.diagnosis.criteria import INTERVAL
+from sgp_ros.diagnosis.decide.differences import Several
+from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.shown import LawSearch, TriedFormula
+from sgp_ros.diagnosis.unlisted.assertion import Explained, with_laws
+from sgp_ros.diagnosis.unlisted.search import Searched, law_of
+from sgp_ros.diagnosis.unlisted.shapes import SmoothForce, force_unit
+from sgp_ros.physics.effect_at import EffectAt
+
+POINTS = 41
+_FORMULAS = 3
+_CLEAR = 0.85
+"""A curve rises or falls where it leaves this part of its greatest value."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A smooth force over its variable.
+
+    Attributes:
+        x: (p,) over the range that was seen.
+        mean, std: (p,).
+    """
+
+    x: np.ndarray
+    mean: np.ndarray
+    std: np.ndarray
+
+
+def extended(several: Several) -> tuple[Several, tuple[LawSearch, ...]]:
+    """Return what is decided where laws that no list has are looked for, in one recording."""
+    if several.chances or several.equations.motion.is_static:
+        return several, ()
+    found = with_laws(several.equations, several.comparison, several.decision)
+    several = replace(
+        several, comparison=found.comparison, decision=found.decision, model=found.decision.model
+    )
+    return several, told(found)
+
+
+def told(found: Explained) -> tuple[LawSearch, ...]:
+    """Return what is said of each joint at which a law was looked for."""
+    return tuple(_search(found, s) for s in found.searched)
+
+
+def shape_of(searched: Searched) -> Shape:
+    """Return the smooth force of a joint; its error is that of least squares on coloured rows."""
+    model = searched.smooth
+    placed, smooth = _smooth(searched)
+    knots = smooth.knots
+    x = np.linspace(knots[0], knots[-1], POINTS)
+    B = smooth.basis(x)
+    equations = model.frame.equations
+    raw = placed.columns(equations.motion)
+    A = equations.compact(raw, searched.joint, is_inertial=False)
+    r = model.residual[:, searched.joint]
+    variance = float(r @ r) / len(r) * max(correlation_factor(r), 1.0)
+    C = variance * np.linalg.pinv(A.T @ A, rcond=1e-10)
+    std = np.sqrt(np.maximum(np.einsum('pi,ij,pj->p', B, C, B), 0.0))
+    return Shape(x, B @ placed.coefficients, std)
+
+
+def _smooth(searched: Searched) -> tuple[EffectAt, SmoothForce]:
+    placed = law_of(searched.smooth, searched.joint)
+    assert placed is not None
+    assert isinstance(placed.effect, SmoothForce)
+    return placed, placed.effect
+
+
+def _search(found: Explained, searched: Searched) -> LawSearch:
+    _, smooth = _smooth(searched)
+    shape, motion = shape_of(searched), searched.smooth.frame.equations.motion
+    tree = motion.tree
+    prismatic = bool(tree.is_prismatic[searched.joint])
+    length = 'm' if tree.is_prismatic[smooth.variable.index] else 'rad'
+    unit = length if smooth.variable.kind == 'q' else f'{length}/s'
+    per = force_unit(smooth.gate, is_prismatic=prismatic)
+    power = searched.smooth.frame.equations.power[searched.joint]
+
+    def left(model: Model) -> float:
+        return float(model.mean_square[searched.joint] / power)
+
+    tried: list[TriedFormula] = []
+    for model in searched.laws:
+        law = law_of(model, searched.joint)
+        assert law is not None
+        if len(tried) == _FORMULAS or law.effect.formula in {t.formula for t in tried}:
+            continue
+        units = {q.name: q.unit for q in law.effect.quantities}
+        numbers = {n: (float(x), units[n]) for n, x in law.report(motion).items()}
+        tried.append(TriedFormula(law.effect.formula, numbers, left(model), law.effect.words))
+    return LawSearch(
+        joint=tree.joint_names[searched.joint],
+        variable=smooth.variable.text, factor=smooth.factor, unit=unit, force_unit=per,
+        x=shape.x, mean=shape.mean, half=INTERVAL * shape.std,
+        left=left(searched.smooth), left_listed=left(searched.listed),
+        formulas=tuple(tried), why_not=found.why_not.get(searched.joint, ''),
+        words=sentence(smooth, shape, unit, per),
+    )  # fmt: skip
+
+
+def sentence(smooth: SmoothForce, shape: Shape, unit: str, per: str) -> str:
+    """Return a smooth force in words, such as `rises to 0.8 N m at 3 rad/s and then falls`."""
+    own = smooth.variable.kind == 'dq' and smooth.variable.index == smooth.joint
+    if not own:
+        return _course(shape.x, shape.mean, smooth, unit, per)
+    ahead = shape.x > 0.0
+    x, force = shape.x[ahead], -shape.mean[ahead]
+    if len(x) < 2:
+        return _course(shape.x, shape.mean, smooth, unit, per)
+    does = 'resists the motion' if force.mean() > 0.0 else 'drives the motion'
+    size = np.abs(force)
+    peak, at = float(size.max()), int(np.argmax(size))
+    ends = (
+        f'{size[0]:.2g} {per} at {x[0]:.2g} {unit}',
+        f'{size[-1]:.2g} {per} at {x[-1]:.2g} {unit}',
+    )
+    if size[0] < _CLEAR * peak and size[-1] < _CLEAR * peak:
+        how = f'rises to {peak:.2g} {per} at {x[at]:.2g} {unit} and then falls to {ends[1]}'
+    elif size[0] < _CLEAR * peak:
+        how = f'grows from {ends[0]} to {ends[1]}'
+    elif size[-1] < _CLEAR * peak:
+        how = f'falls from {ends[0]} to {ends[1]}'
+    else:
+        how = f'stays near {peak:.2g} {per}'
+    return f'{does} by a force that {how}'
+
+
+def _course(x: np.ndarray, f: np.ndarray, smooth: SmoothForce, unit: str, per: str) -> str:
+    """Return the ends of a curve and what is greater between them."""
+    places = [0, len(x) - 1]
+    inner = {int(np.argmax(f)), int(np.argmin(f))} - set(places)
+    reach = float(np.ptp(f))
+    clear = [i for i in inner if min(abs(f[i] - f[0]), abs(f[i] - f[-1])) > (1.0 - _CLEAR) * reach]
+    points = ', '.join(f'{f[i]:.2g} {per} at {x[i]:.2g} {unit}' for i in sorted([*places, *clear]))
+    times = f', times {smooth.factor}' if smooth.factor else ''
+    return f'follows the {smooth.variable.words}: {points}{times}'

@@ -1,0 +1,118 @@
+"""Laws that no list has: found with their numbers, or refused with what can be said."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.decide.decision import Scale, decide
+from sgp_ros.diagnosis.explain.comparison import compare_models
+from sgp_ros.diagnosis.mapping import diagnosis_mapping
+from sgp_ros.diagnosis.pipeline import diagnose
+from sgp_ros.diagnosis.unlisted.assertion import with_laws
+from sgp_ros.diagnosis.unlisted.formulas import formulas
+from sgp_ros.diagnosis.unlisted.search import law_of
+from sgp_ros.diagnosis.unlisted.shapes import GATES, smooth_forces
+from sgp_ros.physics.formula import read_formula
+from sgp_ros.physics.units import read_unit, unit_of
+from test.diagnosis.worlds import CHAINS, events_of, simulate
+
+
+def _brake(t, q, v):
+    return (-0.8 * v[0] / (1.0 + (v[0] / 1.5) ** 2),)
+
+
+@pytest.fixture(scope='module')
+def braked(robots):
+    """A link with a brake that grips less at speed, as a diagnosis tells it."""
+    robot, tree = robots[1]
+    events = events_of(simulate(CHAINS[1], 11, 10.0, force=_brake))
+    return diagnose(events, robot, tree, {}, holds_out=True)
+
+
+def test_a_law_is_found_with_its_numbers(braked):
+    """A formula with its units, that says the true force beyond the speeds that were seen."""
+    assert braked.verdict == 'missing_physics'
+    (finding,) = braked.findings
+    assert finding.effect == 'law'
+    assert finding.probability > 0.7
+    text = finding.formula.partition('=')[2]
+    values = {name: p.value for name, p in finding.parameters.items()}
+    force = read_formula(text, is_law=True).compiled(
+        lambda name: lambda _v: values[name], lambda kind, joint: lambda v: v
+    )
+    for v in (0.2, 1.5, 4.0, 12.0):
+        assert force(v) == pytest.approx(_brake(0.0, (0.0,), (v,))[0], rel=0.05)
+    assert braked.proofs['held_out'].nmse_after['joint0'] < 1e-3
+
+
+def test_the_shape_is_told_in_words_and_numbers(braked):
+    """With a band, in the file too."""
+    (search,) = braked.law_searches
+    assert search.why_not == ''
+    assert search.variable == 'dq[joint0]'
+    assert search.left < 0.1 * search.left_listed
+    assert search.factor in {'', 'sign(dq[joint0])'}
+    true = np.array([_brake(0.0, (0.0,), (v,))[0] for v in search.x])
+    true *= np.sign(search.x) if search.factor else 1.0
+    outside = np.abs(search.mean - true) > search.half + 0.02 * np.abs(true).max()
+    assert outside.mean() < 0.2
+    assert search.words.startswith('resists the motion by a force that rises to 0.6')
+    assert 'an eddy-current brake' in [t.words for t in search.formulas]
+    written = diagnosis_mapping(braked)['law_search']
+    json.dumps(written, allow_nan=False)
+    assert written[0]['is_asserted']
+    assert len(written[0]['shape']['mean']) == len(search.x)
+
+
+@pytest.mark.parametrize('name', ['noise', 'time'])
+def test_what_is_no_function_of_the_motion_has_no_law(equations_for, name):
+    """Neither a disturbance that wanders, nor one that comes and goes by the clock."""
+    rng = np.random.default_rng(5)
+    walk = np.cumsum(rng.normal(0.0, 0.05, 2000))
+
+    def force(t, q, v):
+        if name == 'time':
+            return (0.8 * math.sin(2.0 * math.pi * 0.37 * t) ** 3,)
+        return (float(np.interp(t, 0.006 * np.arange(2000), walk)),)
+
+    _, equations = equations_for(simulate(CHAINS[1], 12, 10.0, force=force))
+    comparison = compare_models(equations, lambda _share: None)
+    decision = decide(equations, comparison)
+    found = with_laws(equations, comparison, decision)
+    assert law_of(found.decision.model, 0) is None
+    assert found.decision.verdict == decision.verdict
+
+
+def test_a_listed_effect_keeps_its_name(equations_for, viscous):
+    """Where it says all, nothing without a name is worth more."""
+    _, equations = equations_for(viscous)
+    comparison = compare_models(equations, lambda _share: None)
+    decision = decide(equations, comparison)
+    found = with_laws(equations, comparison, decision)
+    assert found.searched == ()
+    assert found.decision is decision
+    assert Scale.of(equations, comparison).worth(decision.model) > 0.0
+
+
+def test_every_formula_has_the_unit_of_a_force(equations_for, perfect):
+    """As a user's own would be checked, and each is read again as it is written."""
+    _, equations = equations_for(perfect[2])
+    motion = equations.motion
+    seen = set()
+    for smooth in smooth_forces(motion, 1):
+        seen.add((smooth.gate, smooth.variable.kind, smooth.variable.index))
+        for law in formulas(smooth, motion):
+            units = {p.name: p.unit for p in law.quantities}
+            again = read_formula(law.formula.partition('=')[2], is_law=True)
+            assert unit_of(again, units, lambda _joint: 'rad') == read_unit('N m'), law.formula
+            starts = law.starts(motion, law.places(motion)[0])
+            low, high = law.bounds(motion, law.places(motion)[0])
+            assert ((starts >= low) & (starts <= high)).all()
+            columns = law.columns(motion, law.places(motion)[0], starts[0])
+            assert np.isfinite(columns).all()
+    assert {gate for gate, _, _ in seen} == set(GATES)
+    assert ('', 'q', 0) in seen
