@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from sgp_ros.apps.diagnosed_robot import replayed, write_diagnosed
+from sgp_ros.apps.finding_file import NAME as FINDING
+from sgp_ros.apps.finding_file import write_finding
 from sgp_ros.apps.terminal import strong, warned
 from sgp_ros.batch.acceptance import require_joints
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies
@@ -16,7 +18,7 @@ from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.result import Diagnosis, Finding, Proof
 from sgp_ros.engine.config import EngineConfig
-from sgp_ros.engine.samples import Event
+from sgp_ros.engine.samples import Event, JointSample
 from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.reader import open_recording
@@ -86,6 +88,7 @@ class Examined:
         robot: as it was given.
         effort_source: setting `effort.source`.
         gains: of drives that hold position targets; None where commands are efforts.
+        start_ns: stamp of its first state [ns].
     """
 
     nominal: Nominal
@@ -95,6 +98,7 @@ class Examined:
     robot: str
     effort_source: str
     gains: Gains | None
+    start_ns: int
 
 
 def run_diagnose(
@@ -166,7 +170,8 @@ def examine(
     # a node meets one recording of a motion, as it is; settled points are none
     is_met = gains is None and not chosen.static and not found.setup
     first = next(iter(events.values())) if is_met else []
-    return Examined(nominal, found, first, bags[0], robot, source, gains)
+    start_ns = min(e.stamp_ns for e in next(iter(events.values())) if isinstance(e, JointSample))
+    return Examined(nominal, found, first, bags[0], robot, source, gains, start_ns)
 
 
 def _gains(options: DiagnoseOptions, nominal: Nominal) -> Gains | None:
@@ -213,6 +218,7 @@ def write_examined(out: Path, examined: Examined) -> tuple[dict[str, Any], Diagn
     nominal, found = examined.nominal, examined.found
     with replacing_results(out, 'diagnose'):
         write_predictions(out, found)
+        write_finding(out / FINDING, found, nominal.tree, examined.start_ns)
         bodies = nominal.without_stated(found.bodies)
         write_diagnosed(out, nominal.robot, replace(found, bodies=bodies), examined.gains)
         online = replayed(out, found.findings, examined.events, examined.effort_source)

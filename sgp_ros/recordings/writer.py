@@ -94,6 +94,10 @@ class RecordingWriter:
             message = new_message(TEXT, data=change_to_text(event))
             self._write(self._changes_topic, TEXT, event.stamp_ns, message, log_ns)
 
+    def write(self, topic: str, kind: str, stamp_ns: int, message: Message) -> None:
+        """Write a message of type `kind`, log time `stamp_ns` [ns]."""
+        self._write(topic, kind, stamp_ns, message)
+
     def write_joint_state(self, topic: str, sample: JointSample) -> None:
         """Write a JointState; what the sample lacks stays empty."""
         message = joint_state_message(new_message, sample)

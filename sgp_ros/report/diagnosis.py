@@ -141,11 +141,11 @@ def render(
 
 def picture_of(found: Diagnosis, tree: Tree) -> str:
     """Return the robot as it stood in the middle of its motion; pale where nothing is wrong."""
-    shares = dict(_shares(found)) if found.verdict != 'no_mismatch' else {}
+    shares = dict(joint_shares(found)) if found.verdict != 'no_mismatch' else {}
     return robot_picture(tree, np.median(found.traces.position, axis=0), shares)
 
 
-def _shares(found: Diagnosis) -> list[tuple[str, float]]:
+def joint_shares(found: Diagnosis) -> list[tuple[str, float]]:
     """Return the share of each joint of all that the nominal robot leaves."""
     left = found.proofs['train'].nmse_before
     known = {name: x for name, x in left.items() if math.isfinite(x)}
@@ -157,7 +157,7 @@ def _share_rows(found: Diagnosis) -> list[dict[str, Any]]:
     left = found.proofs['train'].nmse_before
     return [
         {'joint': name, 'share': share, 'percent': percent(share), 'own': percent(left[name])}
-        for name, share in _shares(found)
+        for name, share in joint_shares(found)
     ]
 
 

@@ -33,8 +33,8 @@ def robot_picture(tree: Tree, posture: np.ndarray, shares: Mapping[str, float]) 
         posture: (k,) positions of the joints that move on their own [rad or m].
         shares: 0 to 1 by joint; a link has the share of the joint that carries it.
     """
-    rotations, origins = _places(tree, posture)
-    body, ends = _segments(tree, rotations, origins)  # (s,), (s, 2, 3)
+    rotations, origins = link_places(tree, posture)
+    body, ends = link_segments(tree, rotations, origins)  # (s,), (s, 2, 3)
     corners, joints = _on_paper(ends, origins[: tree.size])
     share = [shares.get(tree.joint_names[tree.follows[i]], 0.0) for i in range(len(tree.parents))]
     tone = [f'share{min(int(LEVELS * max(x, 0.0)), LEVELS - 1)}' for x in share]
@@ -65,7 +65,7 @@ def robot_picture(tree: Tree, posture: np.ndarray, shares: Mapping[str, float]) 
     )
 
 
-def _places(tree: Tree, posture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def link_places(tree: Tree, posture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the axes (b, 3, 3) and origins (b, 3) of all joints in the frame of the root [m]."""
     q = full_motion(tree, posture[None], np.zeros_like(posture)[None], posture[None])[0][0]
     b = len(tree.parents)
@@ -84,7 +84,7 @@ def _places(tree: Tree, posture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return rotations, origins
 
 
-def _segments(
+def link_segments(
     tree: Tree, rotations: np.ndarray, origins: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return bodies (s,), -1 for the root, and the two ends of the lines that draw them (s, 2, 3).
