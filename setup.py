@@ -63,10 +63,13 @@ setup(
         'models': ['xacro>=2', 'mujoco>=3.2'],
         # Parquet and HDF5 files in `sgp import`.
         'tables': ['pyarrow>=14', 'h5py>=3'],
+        # The dashboard of `sgp watch`.
+        'watch': ['rich>=13'],
         # The rivals of `sgp bench`.
         'bench': ['scikit-learn>=1.4', 'torch>=2', 'gpytorch>=1.11'],
         'test': [
             'mujoco>=3.2',
+            'rich>=13',
             'xacro>=2',
             'pyarrow>=14',
             'h5py>=3',

@@ -44,7 +44,7 @@ LAYERS = {
         'numpy', 'matplotlib', 'jinja2', 'markupsafe', 'gp', 'physics', 'rigid', 'robots',
         'engine', 'batch', 'diagnosis', 'errors',
     },
-    'ros': MESSAGES | {
+    'ros': MESSAGES | {'optional', 'report.layouts'} | {
         'numpy', 'yaml', 'engine', 'physics', 'robots', 'simulation', 'diagnosis', 'recordings',
         'errors',
     },

@@ -43,6 +43,7 @@ def test_commands_in_documents_exist(path):
                 'robots',
                 'reproduce',
                 'simulate',
+                'watch',
             }, name
         for name in re.findall(r'^\s*(?:\$ )?make (\w+)', block, re.MULTILINE):
             assert name in targets, name

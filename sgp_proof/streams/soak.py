@@ -29,7 +29,7 @@ from sgp_proof.streams.live_rate import Listener, Machine, node_pid, processor_s
 from sgp_ros.apps.live_processes import LiveProcesses, graph_environment
 from sgp_ros.recordings.model_files import load_parameters
 
-RATE_HZ, WARM_UP_S, PAUSE_S, BUDGET, DEPTH = 500.0, 40.0, 4.0, 300, 1000
+RATE_HZ, WARM_UP_S, PAUSE_S, BUDGET, DEPTH = 500.0, 40.0, 12.0, 300, 1000
 BLOCK_S = 60.0
 _START_LIMIT_S = 60.0
 _BUSY = 'while True: pass'

@@ -216,10 +216,26 @@ def _add_robots(add: AddCommand) -> None:
     )  # fmt: skip
 
 
+def _add_watch(add: AddCommand) -> None:
+    parser = add(
+        'watch', 'sgp_ros.ros.watching:run_watch',
+        'Show what a running node says: joints, parameters, warnings, verdict.',
+        'sgp watch --node /left/sgp_node',
+    )  # fmt: skip
+    parser.add_argument('--node', default='/sgp_node', metavar='NAME',
+                        help='full name of the node (default: %(default)s)')  # fmt: skip
+    parser.add_argument('--wait', type=_above(0.0), default=10.0, metavar='S',
+                        help='for its first word [s] (default: %(default)s)')  # fmt: skip
+    parser.add_argument('--once', action='store_true', help='print one picture and end')
+    parser.add_argument('--layouts', metavar='DIR', help='write layouts of PlotJuggler, '
+                        'Lichtblick and Foxglove for the node and its joints')  # fmt: skip
+
+
 GROUPS = (
     ('Look around', ('demo', 'robots', 'effects')),
     ('From your recording', ('import', 'check', 'diagnose', 'identify', 'replay')),
     ('With a model', ('simulate', 'export')),
+    ('Beside a running robot', ('watch',)),
 )
 """Titles and commands of the help; others come after them."""
 EXAMPLE = """example, which needs nothing but this package:
@@ -228,6 +244,6 @@ EXAMPLE = """example, which needs nothing but this package:
 
 COMMANDS = (
     _add_demo, _add_simulate, _add_replay, _add_identify, _add_diagnose, _add_effects,
-    _add_robots, _add_import, _add_export,
+    _add_robots, _add_import, _add_export, _add_watch,
 )  # fmt: skip
 """What adds each command of the package, in the order of its help."""

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sgp_ros.apps.diagnosed_robot import replayed, write_diagnosed
-from sgp_ros.apps.finding_file import NAME as FINDING
-from sgp_ros.apps.finding_file import write_finding
+from sgp_ros.apps.finding_file import write_viewed
 from sgp_ros.apps.terminal import strong, warned
 from sgp_ros.batch.acceptance import require_joints
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies
@@ -179,9 +178,7 @@ def _gains(options: DiagnoseOptions, nominal: Nominal) -> Gains | None:
     tree = nominal.tree
     names = tree.moving_names
     driven = [name for name, on in zip(names, tree.is_actuated, strict=False) if on]
-    if options.gains is not None:
-        return read_gains(Path(options.gains), names, driven)
-    return None
+    return None if options.gains is None else read_gains(Path(options.gains), names, driven)
 
 
 def _nominal(robot: str, options: DiagnoseOptions) -> Nominal:
@@ -218,7 +215,7 @@ def write_examined(out: Path, examined: Examined) -> tuple[dict[str, Any], Diagn
     nominal, found = examined.nominal, examined.found
     with replacing_results(out, 'diagnose'):
         write_predictions(out, found)
-        write_finding(out / FINDING, found, nominal.tree, examined.start_ns)
+        write_viewed(out, found, nominal.tree, examined.start_ns)
         bodies = nominal.without_stated(found.bodies)
         write_diagnosed(out, nominal.robot, replace(found, bodies=bodies), examined.gains)
         online = replayed(out, found.findings, examined.events, examined.effort_source)

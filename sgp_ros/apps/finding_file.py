@@ -29,6 +29,7 @@ from sgp_ros.recordings.typestore import new_message
 from sgp_ros.recordings.writer import RecordingWriter
 from sgp_ros.report.diagnosis import joint_shares
 from sgp_ros.report.diagnosis_text import phrase
+from sgp_ros.report.layouts import write_finding_layouts
 from sgp_ros.report.robot_picture import link_places, link_segments
 from sgp_ros.report.verdict import verdict_sentence
 from sgp_ros.rigid.tree import Tree
@@ -38,6 +39,12 @@ _MARKERS_HZ, _MOST_ROWS, _MOST_ENTRIES = 20.0, 50_000, 1000
 _LINE_LIST, _INFO, _WARN = 5, 20, 30
 _WIDTH_SHARE = 0.03
 """Width of a link in the picture, relative to the robot's extent."""
+
+
+def write_viewed(out: Path, found: Diagnosis, tree: Tree, start_ns: int) -> None:
+    """Write `finding.mcap` and the layouts that open on it, arguments as of `write_finding`."""
+    write_finding(out / NAME, found, tree, start_ns)
+    write_finding_layouts(out, found.joints)
 
 
 def write_finding(path: Path, found: Diagnosis, tree: Tree, start_ns: int) -> None:

@@ -24,7 +24,7 @@ from sgp_ros.engine.samples import JointSample
 _PERIODS = 31
 PAUSE_NS = 1_000_000_000
 """A source that is silent for longer, by the stamps of the others, is waited for no more."""
-_LONGEST_GAP_NS = 2_000_000_000
+_LONGEST_GAP_NS = 10_000_000_000
 """A longer gap is a pause of the source, and nothing of it is taken for lost."""
 _SLOWER = 1.5
 _RETURN = 4.0

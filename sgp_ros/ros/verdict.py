@@ -94,8 +94,8 @@ def _some_lost(arrivals: Arrivals) -> tuple[int, str] | None:
     if arrivals.lost > _LOST_SHARE * (arrivals.received + arrivals.lost):
         return WARN, (
             f'{arrivals.lost} of {arrivals.received + arrivals.lost} messages on '
-            f'{arrivals.joint_states} are missing by their period: raise qos.depth, or take load '
-            'from this computer or its network'
+            f'{arrivals.joint_states} are missing by their period: its source paused, or raise '
+            'qos.depth, or take load from this computer or its network'
         )
     if arrivals.unreadable:
         return WARN, f'{arrivals.unreadable} messages unreadable: {arrivals.unreadable_reason}'
