@@ -34,6 +34,7 @@ def test_commands_in_documents_exist(path):
         for name in re.findall(r'^\s*(?:\$ )?(?:\S*/)?sgp (\w+)', block, re.MULTILINE):
             assert name in {
                 'bench',
+                'check',
                 'demo',
                 'diagnose',
                 'export',

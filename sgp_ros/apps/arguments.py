@@ -181,6 +181,18 @@ def _add_import(add: AddCommand) -> None:
                         help='of the rows, where the table has no time')  # fmt: skip
 
 
+def _add_check(add: AddCommand) -> None:
+    parser = add(
+        'check', 'sgp_ros.apps.check:run_check',
+        'Say whether a recording is fit for a diagnosis: clock, channels, motion, connection.',
+        'sgp check real.mcap --robot robot.urdf',
+    )  # fmt: skip
+    _add_recording(parser)
+    parser.add_argument(
+        '--gains', metavar='YAML', help='kp and kd by joint: commands are then position targets'
+    )
+
+
 def _add_effects(add: AddCommand) -> None:
     parser = add(
         'effects', 'sgp_ros.apps.effects:run_effects',
@@ -244,6 +256,6 @@ EXAMPLE = """example, which needs nothing but this package:
 
 COMMANDS = (
     _add_demo, _add_simulate, _add_replay, _add_identify, _add_diagnose, _add_effects,
-    _add_robots, _add_import, _add_export, _add_watch,
+    _add_robots, _add_import, _add_export, _add_watch, _add_check,
 )  # fmt: skip
 """What adds each command of the package, in the order of its help."""

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from sgp_ros.apps.diagnosed_robot import replayed, write_diagnosed
 from sgp_ros.apps.finding_file import write_viewed
+from sgp_ros.apps.recorded import gains_of, read_events, refuse_moving_base
 from sgp_ros.apps.terminal import strong, warned
 from sgp_ros.batch.acceptance import require_joints
+from sgp_ros.batch.recording_check import RecordingCheck, check_recording
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
@@ -20,7 +22,6 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event, JointSample
 from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import RecordingError
-from sgp_ros.recordings.reader import open_recording
 from sgp_ros.report.diagnosis import (
     write_diagnosis,
     write_predictions,
@@ -39,7 +40,7 @@ from sgp_ros.report.next_steps import after_diagnosis, ending
 from sgp_ros.report.overlay import write_overlay
 from sgp_ros.report.verdict import simulated, verdict_sentence
 from sgp_ros.robots.bare import simulated_model
-from sgp_ros.robots.gains import Gains, read_gains
+from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.given_bodies import with_bodies
 from sgp_ros.robots.models.door import is_model
 from sgp_ros.robots.nominal import Nominal, nominal_model
@@ -88,6 +89,7 @@ class Examined:
         effort_source: setting `effort.source`.
         gains: of drives that hold position targets; None where commands are efforts.
         start_ns: stamp of its first state [ns].
+        checks: what each recording holds, by stem.
     """
 
     nominal: Nominal
@@ -98,6 +100,7 @@ class Examined:
     effort_source: str
     gains: Gains | None
     start_ns: int
+    checks: Mapping[str, RecordingCheck]
 
 
 def run_diagnose(
@@ -155,11 +158,16 @@ def examine(
     bags = [bag] if isinstance(bag, str) else list(bag)
     events = _read(bags, model, chosen, remarks)
     tests = _read(chosen.tests, model, chosen, remarks, taken=('train', *events))
-    gains = _gains(chosen, nominal)
+    gains = gains_of(chosen.gains, nominal, next(iter(events.values())), remarks)
     simulation = None
     if chosen.sim is not None and simulated is None:
         simulation = _events(chosen.sim, model, chosen, remarks)
     source = EFFORT_SOURCES[chosen.effort]
+    checks = {stem: check_recording(x, model) for stem, x in events.items()}
+    remarks += [
+        said if len(checks) == 1 else f'{stem}: {said}'
+        for stem, check in checks.items() for said in check.remarks
+    ]  # fmt: skip
     found = diagnose(
         events, model, tree, tests, stated=nominal.stated, holds_out=not chosen.tests,
         is_static=chosen.static, gains=gains, simulation=simulation, simulated=simulated,
@@ -170,15 +178,7 @@ def examine(
     is_met = gains is None and not chosen.static and not found.setup
     first = next(iter(events.values())) if is_met else []
     start_ns = min(e.stamp_ns for e in next(iter(events.values())) if isinstance(e, JointSample))
-    return Examined(nominal, found, first, bags[0], robot, source, gains, start_ns)
-
-
-def _gains(options: DiagnoseOptions, nominal: Nominal) -> Gains | None:
-    """Return the gains of drives that hold position targets, where they are stated."""
-    tree = nominal.tree
-    names = tree.moving_names
-    driven = [name for name, on in zip(names, tree.is_actuated, strict=False) if on]
-    return None if options.gains is None else read_gains(Path(options.gains), names, driven)
+    return Examined(nominal, found, first, bags[0], robot, source, gains, start_ns, checks)
 
 
 def _nominal(robot: str, options: DiagnoseOptions) -> Nominal:
@@ -222,7 +222,8 @@ def write_examined(out: Path, examined: Examined) -> tuple[dict[str, Any], Diagn
         if online is not None:
             said = online.remark(found.proofs['train'].nmse_after)
             found = replace(found, remarks=(*found.remarks, said))
-        content = diagnosis_mapping(found)
+        checks = {stem: check.content() for stem, check in examined.checks.items()}
+        content = {**diagnosis_mapping(found), 'check': checks}
         if online is not None:
             content['online'] = online.content()
         write_text(out / 'diagnosis.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
@@ -289,12 +290,7 @@ def _print_proof(stem: str, proof: Proof) -> None:
 
 def _events(bag: str, robot: Robot, options: DiagnoseOptions, remarks: list[str]) -> list[Event]:
     """Return what a recording holds of a robot."""
-    recording = open_recording(bag)
-    events = list(recording.events(options.joint_states, options.command))
+    refuse_moving_base(bag)
+    events = read_events(bag, options.joint_states, options.command, remarks)
     require_joints(events, robot, Path(bag).name)
-    remarks += recording.remarks
-    remarks += [
-        f'{count} messages of {Path(bag).name} could not be read: {why}'
-        for why, count in recording.unreadable.items()
-    ]
     return events

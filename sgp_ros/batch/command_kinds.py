@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
-from sgp_ros.batch.acceptance import Accepted
+from sgp_ros.batch.acceptance import USUAL, Accepted, accept
+from sgp_ros.engine.samples import EFFORT, POSITION, VELOCITY, CommandSample, Event
+from sgp_ros.errors import RecordingError
+from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.robot import Robot
 
 _COMMON_SHARE = 0.5
@@ -13,8 +18,40 @@ _LEAST_EXPLAINED = 0.5
 _GAINS = (0.25, 1.5)
 """Of a measured effort on an effort commanded: dead zone and saturation lower it."""
 
+_NEAR_TARGET = 0.9
+"""Share of a position on its target, where gains of a file say that there are targets."""
 _UNIT, _NEAR, _MOST_EXPLAINED = (0.95, 1.05), 0.2, 0.995
 """Slope, distance of the means in standard deviations, and share of a position on its target."""
+
+
+def hold_targets(events: Iterable[Event], robot: Robot) -> bool:
+    """Return whether the commands of a recording are targets of position or velocity.
+
+    The type of the messages says so. Numbers without names may be anything: these are targets
+    where positions follow them, delayed by at most 0.2 s, nearer than they would by chance.
+    """
+    known = list(events)
+    commands = [e for e in known if isinstance(e, CommandSample)]
+    named = [c.kind for c in commands if c.names is not None]
+    if named:
+        return all(kind != EFFORT for kind in named)
+    if not commands or len(commands[0].effort) != sum(j.is_actuated for j in robot.joints):
+        return False
+    return are_positions(accept(known, robot, USUAL, POSITION), robot, _NEAR_TARGET)
+
+
+def require_gains_of_velocity(events: Iterable[Event], gains: Gains) -> None:
+    """Refuse targets of velocity beside gains of a position, which they do not state.
+
+    Raises:
+        RecordingError: with what to write.
+    """
+    kinds = {e.kind for e in events if isinstance(e, CommandSample) and e.names is not None}
+    if VELOCITY in kinds and gains.kp.any():
+        raise RecordingError(
+            'commands that are targets of velocity', 'kp of 0 and the gain of the velocity as kd',
+            'write both into the file of --gains',
+        )  # fmt: skip
 
 
 def are_efforts(accepted: Accepted, robot: Robot) -> bool:
@@ -47,7 +84,7 @@ def are_efforts(accepted: Accepted, robot: Robot) -> bool:
     return bool(follows) and float(np.mean(follows)) > _COMMON_SHARE
 
 
-def are_positions(accepted: Accepted, robot: Robot) -> bool:
+def are_positions(accepted: Accepted, robot: Robot, least_explained: float | None = None) -> bool:
     """Return whether the commands are targets of position: the positions themselves follow them.
 
     On most of the actuated joints the position is the delayed command, on a line of slope one
@@ -56,8 +93,10 @@ def are_positions(accepted: Accepted, robot: Robot) -> bool:
     Args:
         accepted: with commands.
         robot: whose joints they are.
+        least_explained: share of the position on its target; None for what efforts never reach.
     """
     assert accepted.commands is not None
+    wanted = _MOST_EXPLAINED if least_explained is None else least_explained
     stamps, position = accepted.stamps_ns, accepted.position
     delays = np.round(np.linspace(0.0, _LONGEST_LAG_S * 1e9, _LAGS)).astype(np.int64)
     commands = np.array([accepted.commands.at(stamps - delay) for delay in delays])
@@ -68,7 +107,7 @@ def are_positions(accepted: Accepted, robot: Robot) -> bool:
             explained, slope = _best_line(u, q)
             apart = abs(float(u.mean() - q.mean())) < _NEAR * float(q.std())
             is_unit = _UNIT[0] <= slope <= _UNIT[1]
-            follows.append(is_unit and apart and explained > _MOST_EXPLAINED)
+            follows.append(is_unit and apart and explained > wanted)
     return bool(follows) and float(np.mean(follows)) > _COMMON_SHARE
 
 

@@ -20,10 +20,10 @@ def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
         'verdict': found.verdict,
         'certainty': _finite(found.certainty),
         'reference': found.reference,
-        'setup': [_finding(f) for f in found.setup],
-        'shared': [_finding(f) for f in found.shared],
-        'findings': [_finding(f) for f in found.findings],
-        'alternatives': [_finding(f) for f in found.alternatives],
+        'setup': [finding_content(f) for f in found.setup],
+        'shared': [finding_content(f) for f in found.shared],
+        'findings': [finding_content(f) for f in found.findings],
+        'alternatives': [finding_content(f) for f in found.alternatives],
         'equivalents': [
             {'effects': [{'joint': joint, 'effect': effect} for joint, effect in e.effects],
              'separating_motion': e.motion, 'contrast': _finite(e.contrast)}
@@ -91,7 +91,8 @@ def _visibility(found: Diagnosis) -> list[dict[str, Any]]:
     ]
 
 
-def _finding(f: Finding) -> dict[str, Any]:
+def finding_content(f: Finding) -> dict[str, Any]:
+    """Return a finding as JSON holds it."""
     return {
         'joint': f.joint,
         'effect': f.effect,

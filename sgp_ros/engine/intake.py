@@ -14,7 +14,14 @@ from sgp_ros.engine.clock import END_NS
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.held_commands import CommandHistory
 from sgp_ros.engine.results import Counts
-from sgp_ros.engine.samples import EFFORT, POSITION, CommandSample, Event, JointSample
+from sgp_ros.engine.samples import (
+    EFFORT,
+    POSITION,
+    VELOCITY,
+    CommandSample,
+    Event,
+    JointSample,
+)
 from sgp_ros.robots.robot import Robot
 
 GREATEST = 1e30
@@ -170,8 +177,9 @@ class Intake:
                 continue
             joint = self._joints.index(name)
             if is_target:
-                effort[joint] = command.effort[i]
-                effort[k + joint] = 0.0 if command.velocity is None else command.velocity[i]
+                asked, v = command.effort[i], command.velocity
+                both = (asked, 0.0 if v is None else v[i])
+                effort[[joint, k + joint]] = (0.0, asked) if command.kind == VELOCITY else both
             else:
                 effort[joint] = command.effort[i] * self._gains[joint]
         self.commands.add(command.stamp_ns, effort)
@@ -265,7 +273,7 @@ class Intake:
         return self._last_order[1]
 
     def _command_problem(self, command: CommandSample) -> str | None:
-        if command.names is not None and command.kind != self._commands_are:
+        if command.names and (command.kind != EFFORT) != (self._commands_are == POSITION):
             return 'wrong_kind'
         size = (len(command.names or self._command_joints),)
         if command.effort.shape != size or (

@@ -1,0 +1,108 @@
+"""`sgp check`: whether a recording is fit for a diagnosis, and how the robot is connected."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from sgp_ros.apps.recorded import gains_of, read_events, refuse_moving_base
+from sgp_ros.batch.recording_check import RecordingCheck, check_recording
+from sgp_ros.diagnosis.connected import Connected, connect
+from sgp_ros.diagnosis.gathered import Knowledge, gather
+from sgp_ros.diagnosis.mapping import finding_content
+from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.setting import EFFORT_SOURCES
+from sgp_ros.errors import SgpError
+from sgp_ros.report.diagnosis_text import phrase
+from sgp_ros.report.files import write_text
+from sgp_ros.robots.nominal import nominal_model
+from sgp_ros.robots.registry import load_robot
+
+
+def run_check(
+    bag: str, robot: str, out: Path, *, progress: Callable[[float], None],
+    joint_states: str | None = None, command: str | None = None, effort: str = 'auto',
+    gains: str | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Check a recording; write check.json.
+
+    Args:
+        bag: the recording.
+        robot: built-in name, robot YAML or model file.
+        out: folder of the results.
+        progress: called with the share that is done.
+        joint_states: topic of the states; None for the one there is.
+        command: topic of the commands; None for the one there is.
+        effort: the effort that acts, a key of `EFFORT_SOURCES`.
+        gains: YAML file of the gains of drives whose commands are positions.
+
+    Raises:
+        ConfigError: a robot without nominal bodies.
+        RecordingError: the recording cannot be read, or its base moves.
+    """
+    model = load_robot(robot)
+    remarks: list[str] = []
+    refuse_moving_base(bag)
+    events = read_events(bag, joint_states, command, remarks)
+    found = check_recording(events, model)
+    print_check(Path(bag).name, found)
+    content: dict[str, Any] = {'recording': Path(bag).name, 'robot': model.name,
+                               **found.content()}  # fmt: skip
+    content['remarks'] += remarks
+    progress(0.1)
+    try:
+        nominal = nominal_model(model)
+        known = Knowledge(
+            nominal.robot, nominal.stated, EngineConfig(effort_source=EFFORT_SOURCES[effort]),
+            gains_of(gains, nominal, events, remarks),
+        )  # fmt: skip
+        recordings = gather({'': events}, {}, nominal.tree, known, holds_out=False)
+        connected = connect(recordings, nominal.tree, lambda x: progress(0.1 + 0.8 * x))
+    except SgpError as error:
+        said = f'How the robot is connected cannot be checked: {error}'
+        content |= {'setup': None, 'is_fit': False}
+        content['remarks'].append(said)
+        print(f'  remark    {said}')
+    else:
+        content |= {
+            'setup': [finding_content(f) for f in connected.findings],
+            'equivalents': [[list(x) for x in e.effects] for e in connected.equivalents],
+            'is_fit': not found.missing,
+        }
+        content['remarks'] += connected.remarks
+        _print_setup(connected)
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / 'check.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
+    progress(1.0)
+    return content
+
+
+def print_check(name: str, found: RecordingCheck) -> None:
+    """Print what a recording holds."""
+    print(f'{name}: {found.states} states in {found.seconds:.4g} s, {found.rate_hz:.4g} Hz, '
+          f'jitter {100.0 * found.jitter:.2g} %')  # fmt: skip
+    if found.commands:
+        kinds = ', '.join(found.command_kinds)
+        print(f'  commands  {found.commands} at {found.command_rate_hz:.4g} Hz, {kinds}')
+    for joint, j in found.joints.items():
+        channels = [c for c in ('velocity', 'effort') if getattr(j, c) > 0.0]
+        share = '' if j.range_share != j.range_share else f' ({100.0 * j.range_share:.0f} %)'
+        print(f'  joint     {joint}: {j.lower:.4g} to {j.upper:.4g}{share}, {j.reversals} '
+              f'reversals, rms speed {j.speed:.3g}; position'
+              f'{"".join(f", {c}" for c in channels)}')  # fmt: skip
+    for remark in found.remarks:
+        print(f'  remark    {remark}')
+
+
+def _print_setup(connected: Connected) -> None:
+    if not connected.findings:
+        print('  set-up    no error of the connection explains more than physics does')
+    for f in connected.findings:
+        print(f'  set-up    p {f.probability:.2f}  {f.joint}: {phrase(f)}')
+    for e in connected.equivalents:
+        told: Sequence[str] = [f'{effect} of {joint}' for joint, effect in e.effects]
+        print(f'  or        {" and ".join(told)} explains as much')
+    for remark in connected.remarks:
+        print(f'  remark    {remark}')

@@ -1,0 +1,99 @@
+"""Recordings as commands read them, and what is refused before anything is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from sgp_ros.batch.command_kinds import hold_targets, require_gains_of_velocity
+from sgp_ros.engine.samples import Event
+from sgp_ros.errors import RecordingError
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.robots.gains import Gains, checked_gains, read_gains
+from sgp_ros.robots.nominal import Nominal
+
+_ODOMETRY = ('nav_msgs/Odometry', 'geometry_msgs/PoseStamped')
+_BASE_TOPICS = ('odom', 'base', 'floating')
+_FAR_M, _FAR_TURN = 0.02, 0.02
+"""Way [m] and change of the quaternion from which on a base moves."""
+
+
+def read_events(
+    bag: str, joint_states: str | None, command: str | None, remarks: list[str]
+) -> list[Event]:
+    """Return the events of a recording; what is wrong with it is appended to `remarks`."""
+    recording = open_recording(bag)
+    events = list(recording.events(joint_states, command))
+    remarks += recording.remarks
+    remarks += [
+        f'{count} messages of {recording.path.name} could not be read: {why}'
+        for why, count in recording.unreadable.items()
+    ]
+    return events
+
+
+def gains_of(
+    path: str | None, nominal: Nominal, events: Iterable[Event], remarks: list[str]
+) -> Gains | None:
+    """Return the gains of drives that hold targets: those given, or those of the robot's file.
+
+    The latter count where the commands are targets: by the type of their messages, or, where that
+    says nothing, because positions follow them.
+
+    Args:
+        path: of a file of gains; None without.
+        nominal: the robot.
+        events: of a recording.
+        remarks: what was decided is appended here.
+
+    Raises:
+        ConfigError: gains that are not those of the robot.
+        RecordingError: targets of velocity beside gains of a position.
+    """
+    tree, stated = nominal.tree, nominal.robot.source.get('gains')
+    names = tree.moving_names
+    driven = [name for name, on in zip(names, tree.is_actuated, strict=False) if on]
+    known = list(events)
+    if path is not None:
+        found = read_gains(Path(path), names, driven)
+    elif stated is None or not hold_targets(known, nominal.robot):
+        return None
+    else:
+        remarks.append('Commands are targets: the gains are those of the file of the robot.')
+        found = checked_gains(stated, 'gains of the robot', names, driven)
+    require_gains_of_velocity(known, found)
+    return found
+
+
+def refuse_moving_base(bag: str) -> None:
+    """Refuse a recording whose odometry moves: the base is taken to be fixed to the ground.
+
+    Raises:
+        RecordingError: with the topic and how far it moves.
+    """
+    recording = open_recording(bag)
+    for topic in recording.topics:
+        plain = topic.type.replace('/msg/', '/')
+        if plain not in _ODOMETRY or not any(word in topic.name for word in _BASE_TOPICS):
+            continue
+        poses = [
+            pose.pose if hasattr(pose, 'pose') else pose
+            for _, message in recording.messages(topic.name)
+            for pose in (message.pose,)
+        ]
+        if len(poses) < 2:
+            continue
+        place = np.array([[p.position.x, p.position.y, p.position.z] for p in poses])
+        turn = np.array([
+            [p.orientation.w, p.orientation.x, p.orientation.y, p.orientation.z] for p in poses
+        ])  # fmt: skip
+        way = float(np.linalg.norm(np.ptp(place, axis=0)))
+        turned = float(np.abs(1.0 - np.abs(turn @ turn[0])).max())
+        if way > _FAR_M or turned > _FAR_TURN:
+            raise RecordingError(
+                f'the base moves {way:.3g} m in {topic.name}',
+                'a base that is fixed to the ground',
+                'record the robot on a stand, or leave out the stretches in which it moves',
+            )  # fmt: skip
