@@ -9,6 +9,7 @@ from pathlib import Path
 from sgp_ros.engine.config import describe_settings
 from sgp_ros.gp.kernels import KERNELS
 from sgp_ros.robots.registry import load_robot
+from sgp_ros.ros.settings import FIRST, node_settings
 
 TARGET = Path(__file__).parent / 'settings.md'
 HEAD = """# Settings
@@ -20,6 +21,14 @@ changes nothing.
 
 The hyper-parameters shown are those of the default kernel; `model.kernel` chooses another one (see
 below), whose hyper-parameters then take their place.
+
+| setting | default | range | unit | what it does |
+|---|---|---|---|---|
+"""
+NODE_HEAD = """
+## The node alone
+
+Where the robot comes from, what is recorded and saved, how often the node says something. Commands ignore these.
 
 | setting | default | range | unit | what it does |
 |---|---|---|---|---|
@@ -58,11 +67,13 @@ def text():
         name = setting.name.replace('hyper.axis.', 'hyper.<joint>.')
         unit = setting.unit.replace('(N)^2', 'target squared')
         lines.append(_line(setting, name).replace(setting.unit or '\0', unit or '\0'))
+    node = [_line(setting, setting.name) for setting in (*FIRST, *node_settings())]
     kernels = [
         f'| `{name}` | {_summary(kernel)} | {", ".join(f"`{p.name}`" for p in kernel.parameters)} |'
         for name, kernel in KERNELS.items()
     ]
-    return HEAD + '\n'.join(lines) + '\n' + KERNEL_HEAD + '\n'.join(kernels) + '\n'
+    parts = ((HEAD, lines), (NODE_HEAD, node), (KERNEL_HEAD, kernels))
+    return ''.join(head + '\n'.join(rows) + '\n' for head, rows in parts)
 
 
 def _summary(kernel):

@@ -7,6 +7,7 @@ chance allows, just now.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -16,6 +17,7 @@ from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.monitoring import ExcursionMonitor
 from sgp_ros.engine.results import Estimate
 from sgp_ros.recordings.messages import Status
+from sgp_ros.robots.robot import Robot
 from sgp_ros.ros.verdict import OK, WARN
 
 _MEMORY = 100
@@ -41,18 +43,23 @@ class FitHealth:
         self._surprise = np.full(joints, np.nan)
         self._told: set[str] = set()
 
-    def take(self, estimates: Iterable[Estimate], target: str) -> bool:
-        """Take estimates; return whether an alarm began or ended."""
+    def take(self, estimates: Iterable[Estimate], robot: Robot) -> bool:
+        """Take estimates; return whether an alarm began or ended.
+
+        What the model refuses as implausible counts here: a collision is.
+        """
         has_changed = False
         for estimate in estimates:
-            if not estimate.is_scored:
-                continue
-            channel = getattr(estimate, target)
+            channel = getattr(estimate, robot.target)
             errors = channel.measured - channel.mean
-            self._follow(errors**2, channel.variance)
-            rows = zip(errors, channel.variance, channel.raw_variance, strict=True)
-            for monitor, (error, variance, raw) in zip(self.monitors, rows, strict=True):
-                if variance > 0.0 and raw > 0.0:  # not of a joint that friction holds, or unknown
+            if estimate.is_scored:
+                self._follow(errors**2, channel.variance)
+            rests = _rests(estimate, robot)
+            rows = zip(errors, channel.variance, channel.raw_variance, rests, strict=True)
+            for monitor, (error, variance, raw, is_resting) in zip(
+                self.monitors, rows, strict=True
+            ):
+                if 0.0 < variance < math.inf and 0.0 < raw < math.inf and not is_resting:
                     has_changed |= monitor.add(estimate.stamp_ns, error, variance, raw)
         return has_changed
 
@@ -137,6 +144,16 @@ class FitHealth:
             return OK, message, values
         self._told |= set(unknown)
         return WARN, f'{message}; move joints that stand still, faster and farther', values
+
+
+def _rests(estimate: Estimate, robot: Robot) -> np.ndarray:
+    """Return which joints stated dry friction may hold, (k,): their errors are its freedom."""
+    friction = robot.rest_friction
+    rests = np.zeros(len(robot.joints), dtype=bool)
+    if friction is not None:
+        joints = sorted(friction.joints)
+        rests[joints] = np.abs(estimate.velocity[joints]) < friction.coulomb_width
+    return rests
 
 
 def _excursion(joint: str, monitor: ExcursionMonitor) -> str:

@@ -177,7 +177,7 @@ class Session:
         for event in step.released:
             self._write_event(event)
         robot = self.engine.robot
-        self.has_alarm_changed |= self.fit_health.take(step.estimates, robot.target)
+        self.has_alarm_changed |= self.fit_health.take(step.estimates, robot)
         found = [o for o in map(outputs, step.estimates) if o is not None]
         for output in found:
             self._write(partial(Record.write_outputs, outputs=output))

@@ -26,7 +26,7 @@ def _fit_status(events):
     engine = Engine(PENDULUM, config(buffer__budget=60))
     health = FitHealth(1, 0.3, 1.0)
     for event in events:
-        health.take(engine.push(event).estimates, 'acceleration')
+        health.take(engine.push(event).estimates, PENDULUM)
     statuses = health.statuses(engine, 'node')
     return next(status for status in statuses if status.name == 'node: fit hinge')
 

@@ -1,0 +1,127 @@
+"""The monitor of the node: how often it alarms without cause, and how soon with one.
+
+    python -m sgp_proof.streams.alarms
+
+Simulated reaction wheels with encoders, through the whole engine in the settings of `config/`. An
+undisturbed stretch counts false alarms, for several rates that are asked for; an alarm of any
+joint counts. Then the motor loses a third of its gain for two seconds, again and again: the engine
+is told more than the wheel gets.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+
+from sgp_proof.result_files import ROOT, make_parser, write_result
+from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.engine import Engine
+from sgp_ros.engine.samples import CommandSample, JointSample
+from sgp_ros.recordings.model_files import load_parameters
+from sgp_ros.robots.registry import load_robot
+from sgp_ros.ros.fit_health import FitHealth
+from sgp_ros.simulation.assembly import make_simulation
+from sgp_ros.simulation.sensors import Sensors
+
+ASKED = (1.0, 10.0, 100.0)
+LEAST_S, WARM_UP_S = 0.3, 60.0
+EVERY_S, LASTING_S, GAIN = 30.0, 2.0, 1.5
+ROBOT = 'reaction_wheel'
+
+
+class Run:
+    """One wheel, its engine, and a monitor for each rate that is asked for."""
+
+    def __init__(self, seed):
+        robot = load_robot(ROBOT)
+        values = {**load_parameters(ROOT / 'config' / f'{ROBOT}.yaml'), 'refit.enabled': False}
+        self._engine = Engine(robot, EngineConfig.from_mapping(values, robot))
+        sensors = Sensors(resolution=(2.0 * math.pi / 4096,))
+        self._simulation = make_simulation(ROBOT, seed=seed, sensors=sensors)
+        self._robot = robot
+        self.health = {x: FitHealth(len(robot.joints), LEAST_S, x) for x in ASKED}
+        self.first_ns = None
+
+    def step(self, is_disturbed):
+        """Take one sample; return its time [s]."""
+        sample = self._simulation.step()
+        told = sample.command * (GAIN if is_disturbed else 1.0)
+        events = (
+            CommandSample(sample.stamp_ns, told, ('wheel',)),
+            JointSample(sample.stamp_ns, self._simulation.joint_names, sample.position),
+        )
+        self.first_ns = sample.stamp_ns if self.first_ns is None else self.first_ns
+        for event in events:
+            estimates = self._engine.push(event).estimates
+            for health in self.health.values():
+                health.take(estimates, self._robot)
+        return (sample.stamp_ns - self.first_ns) * 1e-9
+
+    def alarms(self, asked):
+        """Return the number of alarms so far, of all joints."""
+        return sum(monitor.alarms for monitor in self.health[asked].monitors)
+
+
+def measure(seed, undisturbed_s, disturbed_s):
+    """Return false alarms by the rate asked for, and the delays of alarms with a cause."""
+    run, t = Run(seed), 0.0
+    while t < WARM_UP_S:
+        t = run.step(is_disturbed=False)
+    before = {asked: run.alarms(asked) for asked in ASKED}
+    while t < WARM_UP_S + undisturbed_s:
+        t = run.step(is_disturbed=False)
+    false = {asked: run.alarms(asked) - before[asked] for asked in ASKED}
+    delays = {asked: [] for asked in ASKED}
+    start = t
+    while t < start + disturbed_s:
+        began, seen = t, {asked: run.alarms(asked) for asked in ASKED}
+        found = dict.fromkeys(ASKED)
+        while t < began + EVERY_S:
+            t = run.step(is_disturbed=t < began + LASTING_S)
+            for asked in ASKED:
+                if found[asked] is None and run.alarms(asked) > seen[asked]:
+                    found[asked] = t - began
+        for asked in ASKED:
+            delays[asked].append(found[asked])
+    return false, delays
+
+
+def main():
+    """Measure and write the result."""
+    parser = make_parser(__doc__, 'alarms')
+    parser.add_argument('--seeds', type=int, default=12)
+    parser.add_argument('--minutes', type=float, default=10.0)
+    arguments = parser.parse_args()
+    false, delays = dict.fromkeys(ASKED, 0), {asked: [] for asked in ASKED}
+    for seed in range(arguments.seeds):
+        found = measure(seed, 60.0 * arguments.minutes, 60.0 * arguments.minutes / 2.0)
+        for asked in ASKED:
+            false[asked] += found[0][asked]
+            delays[asked] += found[1][asked]
+        print(seed, json.dumps(false), flush=True)
+    hours = arguments.seeds * arguments.minutes / 60.0
+    result = {
+        'robot': ROBOT, 'hours': hours, 'least_s': LEAST_S, 'gain_lost': 1.0 - 1.0 / GAIN,
+        'lasting_s': LASTING_S,
+        'rates': {
+            str(asked): {
+                'false_alarms': false[asked], 'false_an_hour': false[asked] / hours,
+                **_detection(delays[asked]),
+            }
+            for asked in ASKED
+        },
+    }  # fmt: skip
+    write_result(arguments.out, result, schema=1)
+
+
+def _detection(delays):
+    """Return how many disturbances alarmed while they lasted, and their median delay [s]."""
+    seen = sorted(x for x in delays if x is not None and x <= LASTING_S + LEAST_S)
+    return {
+        'disturbances': len(delays), 'detected': len(seen),
+        'median_delay_s': seen[len(seen) // 2] if seen else None,
+    }  # fmt: skip
+
+
+if __name__ == '__main__':
+    main()
