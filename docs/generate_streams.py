@@ -149,8 +149,45 @@ def _live_text(result):
     )
 
 
+def _soak(result):
+    rows = []
+    for i, block in enumerate(result['blocks']):
+        callback = ', '.join(f'{block[f"callback_ms_{q}"]:.2f}' for q in ('p50', 'p99', 'max'))
+        rows.append(
+            f'| {i + 1} | {block["published"]} | {block["resident_mb"]:.0f} | {callback} '
+            f'| {block["load"]:.1f} |'
+        )
+    return '\n'.join(rows)
+
+
+def _soak_text(result):
+    p99 = statistics.median(block['callback_ms_p99'] for block in result['blocks'])
+    memory = [block['resident_mb'] for block in result['blocks']]
+    return (
+        f"{result['joints']} joints at {result['rate_hz']:g} Hz, Panda's model, a buffer of "
+        f'{result["budget"]}, refits, `qos.depth` {result["qos_depth"]}, {result["executor"]}; '
+        f'{result["minutes"]:.0f} minutes, of which the target wants 30. Of {result["published"]} '
+        f'messages {result["lost"]} did not arrive, and the node counted {result["counted_lost"]} '
+        f'as missing. {result["refits"]} refits; the node took '
+        f'{_percent(result["processor_share"], 0)} of a core. Resident memory went from '
+        f'{memory[0]:.0f} to {memory[-1]:.0f} MB. The p99 of the callback was {p99:.1f} ms in the '
+        'median minute (target: below 5 ms).'
+    )
+
+
+def _alarms(result):
+    return '\n'.join(
+        f'| {float(asked):g} | {row["false_alarms"]} | {row["false_an_hour"]:.1f} | '
+        f'{row["detected"]} of {row["disturbances"]} | '
+        + ('' if row['median_delay_s'] is None else f'{row["median_delay_s"]:.2f}')
+        + ' |'
+        for asked, row in result['rates'].items()
+    )
+
+
 def text():
     """Return the page."""
+    soak, alarms = _load('soak'), _load('alarms')
     long, accuracy, live = (_load(n) for n in ('long_stream', 'stream_accuracy', 'live_rate'))
     calibration = _load('calibration')
     worlds, wheels = calibration['worlds'], calibration['wheels']
@@ -169,7 +206,10 @@ def text():
         'SETTLED': '100', 'RECORDINGS': _recordings(calibration['recordings']),
         'WHEELS_COUNT': str(wheels['exact']['wheels']), 'FALSE_EXACT': drifting['exact'],
         'FALSE_BASIS': drifting['basis'], 'LIVE': _live(live), 'LIVE_TEXT': _live_text(live),
-        'LIVE_BUDGET': str(live['budget']),
+        'LIVE_BUDGET': str(live['budget']), 'SOAK': _soak(soak), 'SOAK_TEXT': _soak_text(soak),
+        'ALARMS': _alarms(alarms), 'ALARM_HOURS': f'{alarms["hours"]:.2g}',
+        'ALARM_GAIN': _percent(alarms['gain_lost'], 0),
+        'ALARM_LASTING': f'{alarms["lasting_s"]:g}',
         'LIVE_SECONDS': f'{live["seconds"]:g}', 'CORES': live['environment']['cores'],
     }  # fmt: skip
     page = PAGE

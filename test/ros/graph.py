@@ -143,6 +143,11 @@ class Graph:
         """Return a number of a status, 0 before the first."""
         return int(self.status(status, node).get(key, '0'))
 
+    def forget(self) -> None:
+        """Forget all statuses, of a node that is gone."""
+        self._statuses.clear()
+        self._messages.clear()
+
     def close(self) -> None:
         """Kill what still runs and leave the graph."""
         for process in self._processes:

@@ -1,0 +1,225 @@
+"""Streams as robots have them, over DDS: parts, several publishers, set-back clocks, restarts."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, String
+
+from sgp_ros.recordings.messages import header
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.robots.shipped import find_shipped, shipped_folder
+from sgp_ros.ros.messages import new_message
+from test.ros.graph import Graph
+from test.ros.stream import START_NS, Stream
+from test.ros.test_node import QUICK
+
+pytestmark = pytest.mark.ros
+KEPT = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+MEASURED = {**QUICK, 'command__type': 'none'}
+STEP_NS = 10**7
+
+
+def _state(t_ns: int, names: str = 'pole wheel', shift: float = 0.0, **fields: Any) -> JointState:
+    """Return a state of a slow motion with an effort; `fields` take the place of its arrays."""
+    joints = names.split()
+    t = t_ns * 1e-9
+    given = {
+        'position': [shift + np.sin(t + j) for j in range(len(joints))],
+        'effort': [np.cos(3.0 * t + j) for j in range(len(joints))],
+    } | fields
+    return JointState(header=header(new_message, START_NS + t_ns), name=joints, **given)
+
+
+def _publish_until(graph: Graph, send: Callable[[int], Any], is_done: Callable[[], Any]) -> int:
+    """Send one sample after the other until the node says what is waited for; return how many."""
+    sent = 0
+
+    def one_more() -> bool:
+        nonlocal sent
+        for _ in range(5):
+            send(sent)
+            sent += 1
+        return bool(is_done())
+
+    graph.wait_until(one_more, 'what the stream leads to')
+    return sent
+
+
+def test_two_drivers_with_a_part_of_the_joints_each_are_one_robot(graph: Graph) -> None:
+    """And a gripper with a driver of its own is no warning."""
+    graph.start('sgp_node', **MEASURED)
+    pole, wheel, gripper = (
+        graph.client.create_publisher(JointState, 'joint_states', 100) for _ in range(3)
+    )
+
+    def send(i: int) -> None:
+        pole.publish(_state(i * STEP_NS, 'pole'))
+        wheel.publish(_state(i * STEP_NS + 10**6, 'wheel'))
+        gripper.publish(_state(i * STEP_NS, 'finger'))
+
+    _publish_until(graph, send, lambda: graph.status('model').get('ready') == '1')
+    graph.wait_until(lambda: graph.count('of_other_joints'), 'the gripper')
+    assert graph.count('refused.unknown_joint') == 0
+
+
+def test_two_publishers_of_one_joint_are_named(graph: Graph) -> None:
+    graph.start('sgp_node', **MEASURED)
+    one, other = (graph.client.create_publisher(JointState, 'joint_states', 100) for _ in range(2))
+
+    def send(i: int) -> None:
+        one.publish(_state(i * STEP_NS))
+        other.publish(_state(i * STEP_NS + 10**6, shift=1.0))
+
+    _publish_until(graph, send, lambda: 'several publishers' in graph.message('samples'))
+    assert "['pole', 'wheel']" in graph.message('samples')
+    assert '/client' in graph.message('samples')
+
+
+@pytest.mark.parametrize('effort', [[], [float('nan')] * 2])
+def test_states_without_effort_name_the_joints_and_the_remedy(
+    graph: Graph, effort: list[float]
+) -> None:
+    graph.start('sgp_node', **MEASURED)
+    states = graph.client.create_publisher(JointState, 'joint_states', 100)
+    _publish_until(
+        graph,
+        lambda i: states.publish(_state(i * STEP_NS, effort=effort)),
+        lambda: 'no effort of joints' in graph.message('samples'),
+    )
+    assert 'state_interface' in graph.message('samples')
+
+
+def test_a_bag_that_is_played_in_a_loop_costs_nothing_that_was_learned(graph: Graph) -> None:
+    """The clock goes back, a new segment begins, the model goes on."""
+    graph.start('sgp_node', **MEASURED)
+    states = graph.client.create_publisher(JointState, 'joint_states', 100)
+    length = 400
+
+    def send(i: int) -> None:
+        states.publish(_state((i % length) * STEP_NS))
+
+    _publish_until(graph, send, lambda: graph.count('clock_jumps') >= 2)
+    learned = graph.count('learned')
+    assert learned > 100
+    _publish_until(graph, send, lambda: graph.count('learned') > learned)
+
+
+def test_lost_messages_are_counted(graph: Graph) -> None:
+    graph.start('sgp_node', **MEASURED)
+    states = graph.client.create_publisher(JointState, 'joint_states', 100)
+
+    def send(i: int) -> None:
+        if i < 100 or i % 4:
+            states.publish(_state(i * STEP_NS))
+
+    _publish_until(graph, send, lambda: 'missing by their period' in graph.message('samples'))
+    assert graph.count('lost') > 0
+
+
+@pytest.mark.parametrize(
+    'reliability', [ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.RELIABLE]
+)
+def test_a_publisher_that_is_restarted_is_heard_again(graph: Graph, reliability: str) -> None:
+    graph.start('sgp_node', **MEASURED)
+    quality = QoSProfile(depth=100, reliability=ReliabilityPolicy[reliability])
+    for turn in range(2):
+        states = graph.client.create_publisher(JointState, 'joint_states', quality)
+        before = graph.count('used')
+        _publish_until(
+            graph,
+            lambda i, turn=turn, states=states: states.publish(
+                _state((turn * 10**4 + i) * STEP_NS)
+            ),
+            lambda before=before: graph.count('used') > before + 20,
+        )
+        graph.client.destroy_publisher(states)
+
+
+def test_residual_lies_in_its_band_and_an_alarm_is_said(graph: Graph) -> None:
+    """By name and with the stamp of the prediction; calm while nothing happens."""
+    graph.start('sgp_node', **QUICK)
+    residuals = graph.collect(JointState, '/sgp_node/residual')
+    overlays = graph.collect(JointState, '/sgp_node/predicted_joint_states')
+    bands = [graph.collect(JointState, f'/sgp_node/band/{end}') for end in ('lower', 'upper')]
+    values = graph.collect(JointState, '/sgp_node/parameter_values', KEPT)
+    alarms = graph.collect(Bool, '/sgp_node/alarm', KEPT)
+    stream = Stream(graph)
+
+    def is_all_heard() -> bool:
+        stream.publish(20)
+        return all((len(residuals) > 50, *bands, overlays, values, alarms))
+
+    graph.wait_until(is_all_heard, 'every topic')
+    lower, upper = ({str(m.header.stamp): m for m in band} for band in bands)
+    predicted = {str(m.header.stamp): m for m in overlays}
+    inside = []
+    for residual in residuals:
+        key = str(residual.header.stamp)
+        if not {key} <= set(lower) & set(upper) & set(predicted):
+            continue
+        assert list(residual.name) == ['pole', 'wheel']
+        low, high, mean = (np.array(m[key].effort) for m in (lower, upper, predicted))
+        error, driven = np.array(residual.effort), ~np.isnan(mean)
+        assert driven.tolist() == [False, True]  # a passive joint has no effort
+        assert (low <= mean)[driven].all()
+        inside += ((low <= mean + error) & (mean + error <= high))[driven].tolist()
+    assert np.mean(inside) > 0.8
+    assert set(values[-1].name) == {f'w{i}' for i in range(1, 11)}
+    low, high = np.array(values[-1].velocity), np.array(values[-1].effort)
+    known = ~np.isnan(low)
+    assert (low[known] <= np.array(values[-1].position)[known]).all()
+    assert (high[known] >= np.array(values[-1].position)[known]).all()
+
+
+def test_a_node_that_is_killed_goes_on_from_its_last_save(graph: Graph, tmp_path: Path) -> None:
+    """And records into a file of its own."""
+    settings = {
+        **QUICK, 'save__path': tmp_path / '{node}', 'save__period': 0.2, 'save__restore': True,
+        'record__path': tmp_path / 'run.mcap',
+    }  # fmt: skip
+    node = graph.start('sgp_node', **settings)
+    stream = Stream(graph)
+    while graph.status('model').get('ready') != '1':
+        stream.publish_until_read(50)
+    saved = tmp_path / 'sgp_node.npz'
+    graph.wait_until(saved.is_file, 'a save')
+    first = saved.stat().st_mtime_ns
+    graph.wait_until(lambda: saved.stat().st_mtime_ns > first, 'another save')
+    run = tmp_path / 'run.mcap'
+    size = run.stat().st_size
+    graph.wait_until(lambda: run.stat().st_size > size or size > 10_000, 'a flush')
+    assert node.stop(signal.SIGKILL) == -signal.SIGKILL
+    graph.forget()
+    graph.start('sgp_node', **settings)
+    graph.wait_until(lambda: graph.count('buffer', 'model') > 0, 'the saved model')
+    assert {'run.mcap', 'run_2.mcap'} <= {path.name for path in tmp_path.iterdir()}
+    assert len(list(open_recording(run).events())) > 50
+
+
+def test_the_file_of_the_bringup_page_works(graph: Graph, tmp_path: Path) -> None:
+    """Beside a robot_state_publisher and a joint_state_broadcaster, which this client plays."""
+    file = find_shipped('bringup/ros2_control.yaml')
+    assert file is not None
+    graph.start(
+        'sgp_node', file=file, record__path=tmp_path / '{node}', save__path=tmp_path / '{node}',
+        diagnostics__period=0.1,
+    )  # fmt: skip
+    urdf = (shipped_folder() / 'robots' / 'double_pendulum_a0.urdf').read_text()
+    description = graph.client.create_publisher(String, 'robot_description', KEPT)
+    description.publish(String(data=urdf))
+    graph.wait_until(lambda: graph.status('model'), 'the robot')
+    states = graph.client.create_publisher(JointState, 'joint_states', 100)
+    _publish_until(
+        graph,
+        lambda i: states.publish(_state(i * STEP_NS, 'shoulder elbow')),
+        lambda: graph.status('model').get('ready') == '1',
+    )
+    assert (tmp_path / 'sgp_node' / 'sgp_node_0.mcap').is_file()
