@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sgp_proof.concealed.unknown import NAME
+from sgp_proof.concealed.unknown import NAME, OF_TIME
 from sgp_ros.physics.catalogue import (
     ARMATURE,
     ASYMMETRIC_COULOMB,
@@ -17,6 +17,7 @@ from sgp_ros.physics.catalogue import (
     POSITION_FRICTION,
     TORQUE_GAIN,
 )
+from sgp_ros.physics.law import NAME as LAW
 
 
 def effects_entry(concealed, bodies):
@@ -44,6 +45,8 @@ def accepted(concealed, bodies, motion):
     is_fixed_axis = body.parent < 0 and joint == body.joint
     verdict = 'unexplained' if name == NAME else 'missing_physics'
     answers = [_answer(verdict, name, joint, 'true')]
+    if name == NAME and concealed.parameters['kind'] not in OF_TIME:
+        answers.append(_answer('missing_physics', LAW, joint, 'its law'))
     same = 'same motion'
     if name == ASYMMETRIC_COULOMB.name:
         both = (COULOMB_FRICTION.name, CONSTANT_LOAD.name)

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 from sgp_proof.concealed.unknown import NAME, UNKNOWN
+from sgp_proof.concealed.unlisted import BUILDERS
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 
@@ -39,4 +40,4 @@ class Concealed:
     def unlisted(self, joints):
         if self.name != NAME:
             return ()
-        return UNKNOWN[self.parameters['kind']](self.index, self.parameters, joints)
+        return (UNKNOWN | BUILDERS)[self.parameters['kind']](self.index, self.parameters, joints)

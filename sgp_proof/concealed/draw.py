@@ -22,7 +22,7 @@ import numpy as np
 
 from sgp_proof.concealed import answers, balance, sizes
 from sgp_proof.concealed import world as worlds
-from sgp_proof.concealed.kinds import draw_effect
+from sgp_proof.concealed.kinds import draw_effect, draw_unlisted
 from sgp_proof.concealed.robots import urdf
 from sgp_ros.apps.simulation import write_simulated
 from sgp_ros.physics.catalogue import PAYLOAD, VELOCITY_FILTER_LAG
@@ -32,6 +32,7 @@ from sgp_ros.simulation.sensors import Sensors
 from sgp_ros.simulation.transport import Transport
 
 NOTHING, PARAMETERS, UNKNOWN, PAIR = 'none', 'parameters', 'unknown', 'pair'
+UNLISTED = 'unlisted'
 FIRST_LAWS = list(LAWS)[:27]
 """Those from which the worlds of the committed results are drawn."""
 FIRST_PLAN = [
@@ -55,7 +56,7 @@ def main():
     parser.add_argument('--seeds', default='0:40', help='FIRST:LAST+1')
     parser.add_argument('--tier', choices=('A', 'B'), default='A')
     parser.add_argument('--out', type=Path, required=True)
-    parser.add_argument('--only', choices=(*LAWS, NOTHING, PARAMETERS, UNKNOWN, PAIR))
+    parser.add_argument('--only', choices=(*LAWS, NOTHING, PARAMETERS, UNKNOWN, UNLISTED, PAIR))
     arguments = parser.parse_args()
     first, last = (int(x) for x in arguments.seeds.split(':'))
     for folder in ('cases', 'answers'):
@@ -90,7 +91,11 @@ def _attempt(seed, rng, tier, wanted, out):
     world, motion, relative = observed(
         rng, world, tier, needs_velocity=VELOCITY_FILTER_LAG.name in names
     )
-    concealed = [draw_effect(rng, name, world.bodies, motion, tier == 'B') for name in names]
+    concealed = [
+        draw_unlisted(rng, seed, world.bodies, motion) if name == UNLISTED
+        else draw_effect(rng, name, world.bodies, motion, tier == 'B')
+        for name in names
+    ]  # fmt: skip
     for effect in concealed:
         low, high = _TARGETS[tier]
         sizes.sized(world, effect, math.exp(rng.uniform(math.log(low), math.log(high))))

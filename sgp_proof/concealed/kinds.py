@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sgp_proof.concealed.concealed_effect import Concealed
 from sgp_proof.concealed.unknown import NAME, UNKNOWN
+from sgp_proof.concealed.unlisted import family_of
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.drawing import Scene
 from sgp_ros.physics.parts import MOTOR
@@ -29,9 +30,17 @@ def draw_effect(rng, name, bodies, motion, is_hard):
     return Concealed(name, place, j, drawn.values, drawn.size, drawn.power, drawn.largest, where)
 
 
-def _unknown(scene):
+def draw_unlisted(rng, seed, bodies, motion):
+    """Return a law of the families that are scored, on a random joint."""
+    family = family_of(seed, has_others=len(bodies) > 1)
+    return _unknown(
+        Scene(rng, bodies, motion, int(rng.integers(len(bodies))), is_hard=False), family
+    )
+
+
+def _unknown(scene, family=''):
     rng, bodies, motion, j = scene.rng, scene.bodies, scene.motion, scene.joint
-    kind = str(rng.choice(list(UNKNOWN)))
+    kind = family or str(rng.choice(list(UNKNOWN)))
     if kind == 'position_gain':
         j = int(rng.choice(scene.motors))
     others = [i for i in range(len(bodies)) if i != j]

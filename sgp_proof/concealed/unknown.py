@@ -15,15 +15,15 @@ NAME = 'unknown'
 """Name of all of them."""
 
 
-def _force(law):
+def force(law):
     """Return an effect whose force is `a law(q, v, moment, parameters)`."""
 
     def build(joint, p, _joints):
-        def force(moment):
+        def exerted(moment):
             q, v = float(moment.position[joint]), float(moment.velocity[joint])
             return p['a'] * law(q, v, moment, p)
 
-        return (Action(joint, force=force),)
+        return (Action(joint, force=exerted),)
 
     return build
 
@@ -51,17 +51,19 @@ def _other_gain(_q, v, moment, p):
 
 
 UNKNOWN = {
-    'sine_friction': _force(
+    'sine_friction': force(
         lambda q, v, _m, p: -math.sin(3.0 * q / p['reach']) * math.tanh(v / (0.2 * p['v']))
     ),
-    'cubic_drag': _force(lambda _q, v, _m, p: -0.4 * (v / p['v']) ** 3),
-    'position_times_velocity': _force(lambda q, v, _m, p: -(q / p['reach']) * v / p['v']),
-    'hardening_spring': _force(lambda q, _v, _m, p: 3.0 * (q / p['reach']) ** 3 - q / p['reach']),
-    'square_law_wind': _force(lambda _q, v, _m, p: -0.6 * (v / p['v']) ** 2),
+    'cubic_drag': force(lambda _q, v, _m, p: -0.4 * (v / p['v']) ** 3),
+    'position_times_velocity': force(lambda q, v, _m, p: -(q / p['reach']) * v / p['v']),
+    'hardening_spring': force(lambda q, _v, _m, p: 3.0 * (q / p['reach']) ** 3 - q / p['reach']),
+    'square_law_wind': force(lambda _q, v, _m, p: -0.6 * (v / p['v']) ** 2),
     'position_gain': _position_gain,
-    'other_velocity': _force(_other_velocity),
-    'other_position_gain': _force(_other_gain),
-    'burst': _force(_burst),
-    'periodic': _force(lambda _q, _v, m, p: math.sin(2.0 * math.pi * p['hz'] * m.time_s)),
+    'other_velocity': force(_other_velocity),
+    'other_position_gain': force(_other_gain),
+    'burst': force(_burst),
+    'periodic': force(lambda _q, _v, m, p: math.sin(2.0 * math.pi * p['hz'] * m.time_s)),
 }
 """Name to what builds the actions from joint, parameters and all joints."""
+OF_TIME = ('burst', 'periodic', 'walk')
+"""Those that are no function of the motion: there is no law to be found."""

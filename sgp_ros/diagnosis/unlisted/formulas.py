@@ -139,6 +139,8 @@ def _texts(smooth: SmoothForce) -> Iterator[tuple[str, str]]:
         plain = shape.replace('X', x.text)
         if not smooth.factor:
             yield plain, shape
+            if 'exp(' in shape or 'max(' in shape:  # others have a zero where they need one
+                yield f'{plain} + d', shape
             continue
         for factor in factors:
             yield f'({plain} + d)*{factor}', shape

@@ -1,0 +1,192 @@
+"""Laws that no list has, kept apart from those that the search was developed on (`unknown`).
+
+    python -m sgp_proof.concealed.draw --seeds 6000:6024 --tier A --only unlisted --out DIR
+    python -m sgp_proof.concealed.unlisted DIR --seal
+    python -m sgp_proof.concealed.unlisted DIR [--outputs DIR]
+
+The first writes worlds, each seed a family in turn. The second writes the hashes of the answers
+to `sgp_proof/results/unlisted_hashes.json`, which is committed before anything is scored. The
+third diagnoses what was not diagnosed yet, scores what `diagnosis.json` says, and refuses answers
+with other hashes. A tool of another kind enters by the same file: verdict, joint, and findings
+with effect `law`, a formula and its parameters.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import math
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from sgp_proof.concealed.unknown import OF_TIME, force
+from sgp_proof.result_files import RESULTS, write_result
+from sgp_ros.physics.formula import read_formula
+
+HASHES = RESULTS / 'unlisted_hashes.json'
+SAME = 0.02
+"""Greatest error of a law that is the true one, relative, over the states of the joint."""
+STATES = 2000
+
+
+def _contact(q, _v, _m, p):
+    return -2.0 * max(q / p['reach'] - 0.3, 0.0) ** 1.5
+
+
+def _gas_spring(q, _v, _m, p):
+    angle = 1.7 * q / p['reach']
+    return -math.sin(angle) / (1.0 + 0.5 * math.cos(angle))
+
+
+def _detent(q, _v, _m, p):
+    u = q / p['reach']
+    return 2.0 * u / (1.0 + 4.0 * u * u) ** 2
+
+
+def _speed_of_other(_q, v, m, p):
+    other = abs(float(m.velocity[p['source']])) / p['source_v']
+    return -other * math.tanh(v / (0.2 * p['v']))
+
+
+def _walk(_q, _v, m, p):
+    steps = np.random.default_rng(round(1e6 * p['hz'])).normal(size=400).cumsum() / 10.0
+    return float(np.interp(m.time_s, 0.1 * np.arange(400), steps))
+
+
+FAMILIES = {
+    'magnetic_brake': lambda _q, v, _m, p: -2.0 * (v / p['v']) / (1.0 + (v / (0.7 * p['v'])) ** 2),
+    'log_friction': lambda _q, v, _m, p: -math.copysign(math.log1p(abs(v) / (0.3 * p['v'])), v),
+    'one_sided_contact': _contact,
+    'exponential_spring': lambda q, _v, _m, p: -0.6 * math.expm1(q / p['reach']),
+    'capstan': lambda q, v, _m, p: -0.5 * math.exp(q / p['reach']) * math.tanh(v / (0.1 * p['v'])),
+    'damping_off_centre': lambda q, v, _m, p: -((q / p['reach']) ** 2) * v / p['v'],
+    'gas_spring': _gas_spring,
+    'detent': _detent,
+    'fifth_power': lambda q, _v, _m, p: -2.0 * (q / p['reach']) ** 5,
+    'speed_of_other': _speed_of_other,
+    'wave_of_other': lambda _q, _v, m, p: -math.sin(2.0 * float(m.position[p['source']])),
+    'walk': _walk,
+}
+"""Name to force over its size. The last is no function of the motion: nothing is to be found."""
+BUILDERS = {name: force(law) for name, law in FAMILIES.items()}
+
+
+def family_of(seed, *, has_others):
+    """Return the family that a seed conceals."""
+    kind = list(FAMILIES)[seed % len(FAMILIES)]
+    return kind if has_others or not kind.endswith('other') else 'gas_spring'
+
+
+def true_force(parameters, q, v):
+    """Return the force of a family at states (n,), those of its own joint and of the source."""
+    law = FAMILIES[parameters['kind']]
+    return np.array([
+        parameters['a'] * law(q[0][i], v[0][i], SimpleNamespace(
+            position={parameters['source']: q[1][i]}, velocity={parameters['source']: v[1][i]},
+            time_s=0.0,
+        ), parameters)
+        for i in range(len(q[0]))
+    ])  # fmt: skip
+
+
+def law_error(effect, finding):
+    """Return the error of a found law, relative, over states as in the motion; inf for no law."""
+    p = effect['parameters']
+    if p['kind'] in OF_TIME:
+        return math.inf
+    rng = np.random.default_rng(0)
+    q = [p['reach'] * rng.uniform(-1.0, 1.0, STATES), rng.uniform(-1.0, 1.0, STATES)]
+    v = [s * rng.normal(0.0, 1.2, STATES) for s in (p['v'], p['source_v'])]
+    names = [effect['joint'], p['source'] if isinstance(p['source'], str) else '']
+    true = true_force(p, q, v)
+    numbers = {name: x['value'] for name, x in finding['parameters'].items()}
+    formula = read_formula(finding['formula'].partition('=')[2], is_law=True)
+    if not {j for _, j in formula.signals} <= set(names) or 't' in {k for k, _ in formula.signals}:
+        return math.inf
+
+    def signal(kind, joint):
+        return lambda _at: {'q': q, 'dq': v}.get(kind, v)[names.index(joint)]
+
+    if 'tau' in {k for k, _ in formula.signals}:
+        return math.inf
+    found = formula.compiled(lambda name: lambda _at: numbers[name], signal)(None)
+    return float(np.sqrt(np.mean((found - true) ** 2) / np.mean(true**2)))
+
+
+def score(answer, diagnosis):
+    """Return what was said of one world, from plain files."""
+    (effect,) = answer['effects']
+    findings = [f for f in diagnosis['findings'] if f['probability'] >= 0.5]
+    laws = [f for f in findings if f['effect'] == 'law']
+    errors = [law_error(effect, f) for f in laws]
+    listed = [[f['effect'], f['joint']] for f in findings if f['effect'] not in {'law', 'unknown'}]
+    said = diagnosis['findings'][0]['joint'] if diagnosis['findings'] else ''
+    is_found = not listed and len(errors) == 1 and errors[0] <= SAME
+    is_found = is_found and laws[0]['joint'] == effect['joint']
+    far = diagnosis['fit'].get('real_far', {})
+    ratio = {
+        when: far.get(f'nmse_{when}', {}).get(effect['joint']) for when in ('before', 'after')
+    }  # fmt: skip
+    return {
+        'case': answer['case'], 'kind': effect['parameters']['kind'],
+        'verdict': diagnosis['verdict'], 'right_joint': said == effect['joint'],
+        'formulas': [f['formula'] for f in laws],
+        'law_error': [e if math.isfinite(e) else None for e in errors],
+        'listed': listed, 'found': is_found,
+        'wrong': bool(listed) or any(e > SAME for e in errors), 'far': ratio,
+    }  # fmt: skip
+
+
+def summary(rows):
+    """Return the rates over all worlds with a law, and of wrong names over all."""
+    lawful = [r for r in rows if r['kind'] not in OF_TIME]
+    n = max(len(lawful), 1)
+    return {
+        'worlds': len(rows), 'with_a_law': len(lawful),
+        'found': sum(r['found'] for r in lawful) / n,
+        'right_joint': sum(r['right_joint'] for r in lawful) / n,
+        'wrong_names': sum(r['wrong'] for r in rows) / max(len(rows), 1),
+    }  # fmt: skip
+
+
+def hash_of(path):
+    """Return the hash of an answer."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def main():
+    from sgp_proof.concealed.run import diagnose_case  # noqa: PLC0415 - only to score
+
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
+    parser.add_argument('worlds', type=Path)
+    parser.add_argument('--seal', action='store_true', help='write the hashes of the answers')
+    parser.add_argument('--outputs', type=Path, help='where diagnoses are kept')
+    arguments = parser.parse_args()
+    answers = sorted((arguments.worlds / 'answers').glob('*.json'))
+    if arguments.seal:
+        write_result(HASHES, {path.stem: hash_of(path) for path in answers})
+        return
+    sealed = json.loads(HASHES.read_text(encoding='utf-8'))
+    outputs = arguments.outputs or arguments.worlds / 'out'
+    rows = []
+    for path in answers:
+        if sealed.get(path.stem) != hash_of(path):
+            raise SystemExit(f'{path.name} is not the answer that was sealed')
+        out = outputs / path.stem
+        if not (out / 'outcome.json').exists():
+            diagnose_case(arguments.worlds / 'cases' / path.stem, out)
+        if not (out / 'diagnosis.json').exists():
+            continue
+        diagnosis = json.loads((out / 'diagnosis.json').read_text(encoding='utf-8'))
+        rows.append(score(json.loads(path.read_text(encoding='utf-8')), diagnosis))
+        print(json.dumps(rows[-1]), flush=True)
+    report = {'summary': summary(rows), 'cases': rows}
+    write_result(RESULTS / 'unlisted.json', report)
+    print(json.dumps(report['summary'], indent=1))
+
+
+if __name__ == '__main__':
+    main()

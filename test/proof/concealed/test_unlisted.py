@@ -1,0 +1,68 @@
+"""Worlds with laws of families apart: their answers are sealed, and formulas are scored."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+
+import pytest
+
+from sgp_proof.concealed import unlisted
+from sgp_proof.concealed.unknown import OF_TIME, UNKNOWN
+from sgp_proof.concealed.unlisted import FAMILIES, family_of, law_error, score, summary
+
+P = {'kind': 'magnetic_brake', 'a': 0.5, 'v': 1.5, 'reach': 1.0, 'source': -1.0, 'source_v': 1.0}
+EFFECT = {'effect': 'unknown', 'joint': 'elbow', 'parameters': P}
+RIGHT = {
+    'effect': 'law', 'joint': 'elbow', 'probability': 0.9,
+    'formula': 'tau_x[elbow] = a*dq[elbow]/(1 + (dq[elbow]/v0)**2)',
+    'parameters': {'a': {'value': -1.0 / 1.5}, 'v0': {'value': 1.05}},
+}  # fmt: skip
+WRONG = {**RIGHT, 'formula': 'tau_x[elbow] = a*tanh(dq[elbow]/v0)'}
+UNNAMED = {'effect': 'unknown', 'joint': 'elbow', 'probability': 0.9, 'parameters': {}}
+LISTED = {**UNNAMED, 'effect': 'coulomb_friction'}
+
+
+def _scored(*findings):
+    answer = {'case': 'case_1', 'effects': [EFFECT]}
+    verdict = 'missing_physics'
+    return score(answer, {'verdict': verdict, 'findings': [*findings], 'fit': {}})
+
+
+def test_a_formula_is_compared_with_the_true_force():
+    """The same law in other letters is right; one that saturates is not."""
+    assert law_error(EFFECT, RIGHT) < 1e-12
+    assert law_error(EFFECT, WRONG) > 0.1
+    assert law_error(EFFECT, {**RIGHT, 'formula': 'tau_x[elbow] = a*dq[wrist]'}) == math.inf
+
+
+@pytest.mark.parametrize(
+    ('findings', 'found', 'wrong'),
+    [((RIGHT,), 1, 0), ((WRONG,), 0, 1), ((UNNAMED,), 0, 0), ((RIGHT, LISTED), 0, 1)],
+)
+def test_names_are_right_wrong_or_withheld(findings, found, wrong):
+    """A listed effect beside the law is a wrong name too."""
+    row = _scored(*findings)
+    assert (row['found'], row['wrong'], row['right_joint']) == (found, wrong, True)
+    rates = summary([row])
+    assert (rates['found'], rates['wrong_names']) == (found, wrong)
+
+
+def test_the_families_are_apart():
+    """From those that the search was developed on; every one is drawn in turn."""
+    assert not set(FAMILIES) & set(UNKNOWN)
+    assert {family_of(s, has_others=True) for s in range(len(FAMILIES))} == set(FAMILIES)
+    assert set(OF_TIME) & set(FAMILIES)
+
+
+def test_another_answer_than_the_sealed_one_is_refused(tmp_path, monkeypatch):
+    """Nothing is scored then."""
+    (tmp_path / 'answers').mkdir()
+    (tmp_path / 'answers' / 'case_1.json').write_text(json.dumps({'case': 'case_1'}))
+    sealed = tmp_path / 'hashes.json'
+    sealed.write_text(json.dumps({'case_1': 'another'}))
+    monkeypatch.setattr(unlisted, 'HASHES', sealed)
+    monkeypatch.setattr(sys, 'argv', ['unlisted', str(tmp_path)])
+    with pytest.raises(SystemExit, match='not the answer that was sealed'):
+        unlisted.main()
