@@ -13,7 +13,7 @@ unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 endif
 
-.PHONY: demo test busy lint format coverage oldest bench reproduce docs venv clean
+.PHONY: demo test busy lint format coverage oldest bench reproduce docs site venv clean
 
 demo: venv
 	$(BIN)/sgp demo
@@ -26,6 +26,7 @@ lint: $(VENV)/.lint
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 format: $(VENV)/.lint
 	$(BIN)/ruff format .
@@ -58,6 +59,10 @@ reproduce: venv
 docs: $(VENV)/.test
 	$(BIN)/python -m pytest test/test_documents.py
 
+# The documentation as static pages, warnings are errors.
+site: $(VENV)/.lint
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
 venv: $(VENV)/.package
 
 # Each stamp says that the step before it ended well.
@@ -79,7 +84,7 @@ $(VENV)/.test: setup.py | $(VENV)/.made
 	@touch $(VENV)/.package $@
 
 $(VENV)/.lint: setup.py | $(VENV)/.made
-	$(BIN)/python -m pip install --quiet --editable '.[wheels,test,lint]'
+	$(BIN)/python -m pip install --quiet --editable '.[wheels,test,lint,docs]'
 	@touch $(VENV)/.package $(VENV)/.test $@
 
 # The numeric layers alone, on what Ubuntu 24.04 ships; without ROS, and without Pinocchio, of which

@@ -88,6 +88,8 @@ setup(
             'colcon-common-extensions==0.3.0',
             'setuptools>=68,<80',
         ],
+        # The documentation as a site: `make site`.
+        'docs': ['mkdocs>=1.6,<2', 'mkdocs-material>=9.5,<10'],
         'lint': ['ruff==0.17.5', 'mypy==2.4.1', 'types-PyYAML'],
     },
     entry_points={

@@ -10,8 +10,10 @@ from pathlib import Path
 import pytest
 
 from sgp_proof.concealed.promises import FACTOR
+from sgp_ros.cli import _parser
 
 ROOT = Path(__file__).parents[1]
+COMMANDS = set(_parser([]).summaries)
 DOCUMENTS = sorted([*ROOT.glob('*.md'), *(ROOT / 'docs').rglob('*.md')])
 
 
@@ -32,20 +34,7 @@ def test_commands_in_documents_exist(path):
     targets = set(re.findall(r'^(\w+):', makefile, re.MULTILINE))
     for block in re.findall(r'```(?:bash|console)\n(.*?)```', text, re.DOTALL):
         for name in re.findall(r'^\s*(?:\$ )?(?:\S*/)?sgp (\w+)', block, re.MULTILINE):
-            assert name in {
-                'bench',
-                'check',
-                'demo',
-                'diagnose',
-                'export',
-                'identify',
-                'import',
-                'replay',
-                'robots',
-                'reproduce',
-                'simulate',
-                'watch',
-            }, name
+            assert name in COMMANDS, name
         for name in re.findall(r'^\s*(?:\$ )?make (\w+)', block, re.MULTILINE):
             assert name in targets, name
 

@@ -251,8 +251,8 @@ GROUPS = (
 )
 """Titles and commands of the help; others come after them."""
 EXAMPLE = """example, which needs nothing but this package:
-  sgp simulate simple_pendulum --effect coulomb_friction:joint=pendulum,level=0.2 --out out/real
-  sgp diagnose out/real/simple_pendulum.mcap --robot simple_pendulum"""
+  sgp simulate double_pendulum --effect coulomb_friction:joint=elbow,level=0.05 --out out/real
+  sgp diagnose out/real/double_pendulum.mcap --robot double_pendulum"""
 
 COMMANDS = (
     _add_demo, _add_simulate, _add_replay, _add_identify, _add_diagnose, _add_effects,

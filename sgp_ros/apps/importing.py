@@ -38,7 +38,7 @@ def run_import(
         print(f'columns were guessed: look at {summary.map_path}, mend it, and give it as --map')
     if summary.gains_path is not None:
         print(f'gains of the drives in {summary.gains_path}')
-    print(next_lines(after_import(summary.path, robot)))
+    print(next_lines(after_import(summary.path, robot, summary.gains_path)))
     return summary.to_mapping()
 
 

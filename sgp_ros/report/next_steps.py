@@ -73,11 +73,12 @@ def after_demo(bag: Path) -> Steps:
     ]  # fmt: skip
 
 
-def after_import(path: Path, robot: str | None) -> Steps:
+def after_import(path: Path, robot: str | None, gains: Path | None = None) -> Steps:
     """Return what to do with an imported recording of a robot; None where it is not known."""
-    named = 'ROBOT.urdf' if robot is None else quote(robot)
-    return [('Ask what physics the model lacks:',
-             f'sgp diagnose {_path(path)} --robot {named}')]  # fmt: skip
+    command = f'sgp diagnose {_path(path)} --robot ' + (quote(robot) if robot else 'ROBOT.urdf')
+    if gains is not None:
+        command += f' --gains {_path(gains)}'
+    return [('Ask what physics the model lacks:', command)]
 
 
 def after_simulation(path: Path, robot: str) -> Steps:

@@ -1,0 +1,275 @@
+"""Write docs/reference from the code: `python docs/generate_reference.py`."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import inspect
+import json
+import textwrap
+from pathlib import Path
+
+from sgp_ros.apps import api
+from sgp_ros.apps.arguments import COMMANDS, GROUPS
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.robots import lumped, urdf_robot
+from sgp_ros.robots.registry import _KEYS, _URDF_KEYS
+
+ROOT = Path(__file__).parents[1]
+FOLDER = Path(__file__).parent / 'reference'
+NOTE = 'Generated from the code by `python docs/generate_reference.py`.'
+
+TOPICS = {
+    '~/prediction': 'mean of accelerations and efforts, made before the measurement',
+    '~/prediction_variance': 'its variance, calibrated by earlier errors',
+    '~/prediction_raw_variance': 'its variance as the model states it',
+    '~/predicted_joint_states': 'predicted effort under the names of the joints, to lay over the measured one',
+    '~/residual': 'measured minus predicted effort',
+    '~/band/lower': 'lower end of the 95 % interval of the effort',
+    '~/band/upper': 'upper end of it',
+    '~/parameters': 'value, standard deviation and unit of every parameter',
+    '~/parameter_values': 'the values alone, to plot',
+    '~/monitor': 'how far the robot is from what was learned of it',
+    '~/alarm': 'whether that is too far',
+    '~/diagnosis': 'the last verdict, the content of diagnosis.json',
+    '~/diagnosis_status': 'how far a running diagnosis is',
+    '/diagnostics': 'rate, refused samples by reason, timing, quality of the fit, findings',
+}
+SERVICES = {
+    'refit': 'fit the hyper-parameters to the buffer now',
+    'reset': 'forget what was learned, keep the settings',
+    'save': 'write the model to `save.path`',
+    'diagnose': 'look for missing physics in the last `diagnosis.window` seconds, in another process',
+    'cancel_diagnosis': 'stop that',
+    'learn': 'learn, or only predict',
+}
+
+
+def commands():
+    """Return the page of the commands."""
+    parsers = {}
+
+    def add(name, _function, summary, example):
+        parser = argparse.ArgumentParser(prog=f'sgp {name}', add_help=False)
+        parsers[name] = parser, summary, example
+        return parser
+
+    for add_one in COMMANDS:
+        add_one(add)
+    lines = [
+        '# Commands',
+        '',
+        NOTE,
+        '',
+        'Each command also takes `--out DIR` (folder of the results), `--json` (the result as JSON, alone on stdout), `--quiet`,',
+        '`--force` (write beside files of somebody else) and `--help`. Exit status: 0; 2 for what a user can mend, with one',
+        'line on stderr; 130 if interrupted. Names complete with the Tab key after `pip install argcomplete` and',
+        '`eval "$(register-python-argcomplete sgp)"`.',
+        '',
+    ]
+    listed = [name for _, names in GROUPS for name in names if name in parsers]
+    for name in [*listed, *(n for n in parsers if n not in listed)]:
+        parser, summary, example = parsers[name]
+        lines += [f'## sgp {name}', '', summary, '', '```text', example, '```', '']
+        rows = [_argument(action) for action in parser._actions]
+        if rows:
+            lines += ['| argument | |', '|---|---|', *rows, '']
+    return '\n'.join(lines)
+
+
+def _argument(action):
+    name = ', '.join(action.option_strings) or action.metavar or action.dest
+    if action.option_strings and action.nargs != 0:
+        name += f' {action.metavar or "{" + ",".join(map(str, action.choices or ())) + "}"}'
+    said = (action.help or '').replace('%(default)s', str(action.default)).replace('|', '\\|')
+    return f'| `{name}` | {said} |'
+
+
+def topics():
+    """Return the page of topics and services of the node."""
+    published = _literals('publishers.py', 'publisher')
+    lines = [
+        '# Topics and services',
+        '',
+        NOTE,
+        '',
+        '## Heard',
+        '',
+        '| topic | type | |',
+        '|---|---|---|',
+        '| `joint_states` | sensor_msgs/JointState | any order of joints; velocity and effort optional |',
+        '| `command` | as `command.type` | the commands, where efforts are not measured |',
+        '| `robot_description` | std_msgs/String | the robot, where `robot` names none |',
+        '',
+        '## Published',
+        '',
+        '| topic | |',
+        '|---|---|',
+    ]
+    lines += [f'| `{name}` | {TOPICS[name]} |' for name in published]
+    offered = _offered()
+    lines += ['', '## Services', '', '| service | type | |', '|---|---|---|']
+    lines += [f'| `~/{name}` | std_srvs/{kind} | {SERVICES[name]} |' for name, kind in offered]
+    return '\n'.join([*lines, '', 'Settings are ROS parameters: [settings](../settings.md).', ''])
+
+
+def _tree(name):
+    return ast.parse((ROOT / 'sgp_ros' / 'ros' / name).read_text(encoding='utf-8'))
+
+
+def _literals(file, function):
+    """Return the topics that a function is called with, bands with both of their ends."""
+    found = []
+    for node in ast.walk(_tree(file)):
+        if isinstance(node, ast.Call) and getattr(node.func, 'id', '') == function:
+            topic = node.args[1]
+            if isinstance(topic, ast.Constant):
+                found.append(topic.value)
+            else:
+                found += ['~/band/lower', '~/band/upper']
+    return found
+
+
+def _offered():
+    for node in ast.walk(_tree('services.py')):
+        if isinstance(node, ast.FunctionDef) and node.name == '_all':
+            entries = node.body[-1].value.elts
+            return [(entry.elts[0].value, entry.elts[1].id) for entry in entries]
+    raise LookupError('services')
+
+
+def robot_files():
+    """Return the page of robot files."""
+    return '\n'.join([
+        '# Robot files', '', NOTE, '',
+        'A robot is given by a name (`sgp robots`), a model file ([URDF, MJCF, SDF](../model_files.md)) or a robot YAML, of which',
+        'there are three kinds. Editors complete and check all of them by [robot.schema.json](robot.schema.json); put this in the',
+        'first line: `# yaml-language-server: $schema=robot.schema.json`.', '',
+        '## A URDF and what is stated beside it', '', _code(urdf_robot), '',
+        '## Lumped coefficients by formulas', '', _code(lumped), '',
+        '## A known robot, changed', '',
+        '```yaml', 'schema: 1', 'robot: linear_axis', 'joints: [slide]', 'parameters:',
+        '  M: {value: 95.1, std: 0.2, unit: kg}', '```', '',
+        'Effects and their parameters: [effects](../effects.md).', '',
+    ])  # fmt: skip
+
+
+def _code(module):
+    text = inspect.getdoc(module) or ''
+    blocks = text.split('\n    ', 1)
+    head, rest = blocks[0], '    ' + blocks[1]
+    body, after = [], []
+    for line in rest.splitlines():
+        (after if after or (line and not line.startswith('    ')) else body).append(line)
+    yaml = textwrap.dedent('\n'.join(body)).strip('\n')
+    return f'{head.strip()}\n\n```yaml\n{yaml}\n```\n\n' + '\n'.join(after)
+
+
+def schema():
+    """Return the JSON schema of robot files, for editors."""
+    number = {'type': ['number', 'string'], 'description': 'a number or a formula'}
+    joints = {'type': 'array', 'items': {'type': ['string', 'object']}}
+    quantity = {
+        'type': 'object', 'additionalProperties': False,
+        'properties': {'value': {'type': ['number', 'string']}, 'std': {'type': ['number', 'null']},
+                       'unit': {'type': 'string'}},
+    }  # fmt: skip
+    effect = {
+        'type': 'object',
+        'properties': {
+            'effect': {'enum': sorted(EFFECTS)}, 'joint': {'type': 'string'},
+            'parameters': {'type': 'object', 'additionalProperties': quantity},
+            'law': {'type': 'object'},
+        },
+    }  # fmt: skip
+    known = {
+        'schema': {'const': 1}, 'joints': joints,
+        'effects': {'type': 'array', 'items': effect},
+        'parameters': {'type': 'object', 'additionalProperties': quantity},
+        'coefficients': {'type': 'object', 'additionalProperties': {
+            'type': 'object', 'required': ['columns'], 'additionalProperties': False,
+            'properties': {'unit': {'type': 'string'}, 'columns': {'type': 'object'},
+                           'value': number, 'source': {'type': 'string'},
+                           'meaning': {'type': 'string'}},
+        }},
+        'target': {'enum': ['acceleration', 'effort']},
+    }  # fmt: skip
+    kinds = [
+        ('of a URDF', _URDF_KEYS, ['urdf']), ('of coefficients', lumped.LUMPED_KEYS, ['coefficients']),
+        ('a known one, changed', _KEYS, ['robot']),
+    ]  # fmt: skip
+    content = {
+        '$schema': 'https://json-schema.org/draft/2020-12/schema', 'title': 'robot of sgp_ros',
+        'anyOf': [
+            {'title': title, 'type': 'object', 'required': ['schema', *required],
+             'additionalProperties': False,
+             'properties': {key: known.get(key, {}) for key in sorted(keys)}}
+            for title, keys, required in kinds
+        ],
+    }  # fmt: skip
+    return json.dumps(content, indent=1) + '\n'
+
+
+def python():
+    """Return the page of the Python API."""
+    lines = ['# Python', '', NOTE, '', inspect.getdoc(api).split('\n\n')[0], '']
+    lines += [
+        '```python',
+        'import sgp_ros as sgp',
+        '',
+        "d = sgp.diagnose('real.mcap', robot='arm.urdf', tests=['other.mcap'])",
+        'print(d)',
+        '```',
+        '',
+        'Nothing is printed by these functions. What a user can cause raises an `SgpError` in one line. A',
+        '[notebook](../notebook.ipynb) shows them.',
+        '',
+    ]
+    for name in ('diagnose', 'identify', 'simulate'):
+        lines += _member(name, getattr(api, name))
+    for kind in (api.Diagnosed, api.Identified):
+        lines += [
+            f'## {kind.__name__}',
+            '',
+            inspect.getdoc(kind).split('\n\n')[0],
+            '',
+            '| | |',
+            '|---|---|',
+        ]
+        for name, member in vars(kind).items():
+            if name.startswith('_') or not (
+                isinstance(member, property) or inspect.isfunction(member)
+            ):
+                continue
+            call = '' if isinstance(member, property) else _signature(member)
+            said = inspect.getdoc(member).split('\n\n')[0].replace('\n', ' ')
+            lines.append(f'| `{name}{call}` | {said} |')
+        lines.append('')
+    return '\n'.join(lines)
+
+
+def _member(name, function):
+    text = inspect.getdoc(function).replace('Args:', 'Arguments:')
+    return [f'## sgp_ros.{name}{_signature(function)}', '', '```text', text, '```', '']
+
+
+def _signature(function):
+    found = inspect.signature(function)
+    parameters = [
+        p.replace(annotation=p.empty) for p in found.parameters.values() if p.name != 'self'
+    ]
+    return str(found.replace(parameters=parameters, return_annotation=found.empty))
+
+
+def pages():
+    """Return the text of each page by its path."""
+    return {
+        FOLDER / 'commands.md': commands(), FOLDER / 'topics.md': topics(),
+        FOLDER / 'robot_files.md': robot_files(), FOLDER / 'robot.schema.json': schema(),
+        FOLDER / 'python.md': python(),
+    }  # fmt: skip
+
+
+if __name__ == '__main__':
+    for path, text in pages().items():
+        path.write_text(text, encoding='utf-8')
