@@ -12,11 +12,14 @@ from sgp_ros.batch.recording_check import RecordingCheck, check_recording
 from sgp_ros.diagnosis.connected import Connected, connect
 from sgp_ros.diagnosis.gathered import Knowledge, gather
 from sgp_ros.diagnosis.mapping import finding_content
+from sgp_ros.diagnosis.result import Finding
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import SgpError
+from sgp_ros.report.check import render_check
 from sgp_ros.report.diagnosis_text import phrase
-from sgp_ros.report.files import write_text
+from sgp_ros.report.files import replacing_results, write_text
+from sgp_ros.report.next_steps import after_check, ending
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.registry import load_robot
 
@@ -26,7 +29,7 @@ def run_check(
     joint_states: str | None = None, command: str | None = None, effort: str = 'auto',
     gains: str | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Check a recording; write check.json.
+    """Check a recording; write check.json and a page.
 
     Args:
         bag: the recording.
@@ -51,6 +54,7 @@ def run_check(
     content: dict[str, Any] = {'recording': Path(bag).name, 'robot': model.name,
                                **found.content()}  # fmt: skip
     content['remarks'] += remarks
+    setup: Sequence[Finding] = ()
     progress(0.1)
     try:
         nominal = nominal_model(model)
@@ -72,9 +76,13 @@ def run_check(
             'is_fit': not found.missing,
         }
         content['remarks'] += connected.remarks
+        setup = connected.findings
         _print_setup(connected)
-    out.mkdir(parents=True, exist_ok=True)
-    write_text(out / 'check.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
+    steps = after_check(bag, robot, is_fit=content['is_fit'] and not setup)
+    with replacing_results(out, 'check'):
+        write_text(out / 'check.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
+        write_text(out / 'report.html', render_check(content, events, model, setup, steps))
+    print(ending(out, steps))
     progress(1.0)
     return content
 

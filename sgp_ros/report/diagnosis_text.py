@@ -171,8 +171,8 @@ def why_it_lost(rival: Finding, best: Finding | None) -> str:
         return rival.why
     gap = rival.log_bayes_factor - best.log_bayes_factor
     count, fewer = _count(rival), _count(best)
-    if gap > 0.0:
-        return 'fits hardly better, with more parameters'
+    if gap > 0.0 and count > fewer:
+        return f'fits hardly better, with {count} numbers instead of {fewer}'
     if gap > -_SIMILAR_NATS and count > fewer:
         return f'fits no better, with {count} numbers instead of {fewer}'
     return rival.why

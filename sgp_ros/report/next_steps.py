@@ -81,6 +81,13 @@ def after_import(path: Path, robot: str | None, gains: Path | None = None) -> St
     return [('Ask what physics the model lacks:', command)]
 
 
+def after_check(bag: str, robot: str, *, is_fit: bool) -> Steps:
+    """Return what to do with a recording that was checked."""
+    verb = 'diagnose' if is_fit else 'check'
+    said = 'Ask what physics the model lacks:' if is_fit else 'Mend this, then look again:'
+    return [(said, f'sgp {verb} {quote(bag)} --robot {quote(robot)}')]
+
+
 def after_simulation(path: Path, robot: str) -> Steps:
     """Return what to do with a simulated recording of a robot."""
     return [('Find out what was put in:',

@@ -26,6 +26,7 @@ from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.typestore import new_message
 from sgp_ros.recordings.writer import RecordingWriter
 from sgp_ros.robots.registry import load_robot
+from test.report.pages import content_of
 
 MJCF = """<mujoco model="swing"><compiler angle="radian"/><worldbody><body pos="0 0 1">
 <joint name="hinge" axis="0 1 0" damping="0.2" range="-3 3" limited="true"/>
@@ -134,6 +135,9 @@ def test_the_command_writes_json_with_the_set_up(tmp_path, capsys):
     words = ['check', str(tmp_path / 'turned.mcap'), '--robot', robot, '--out', str(out)]
     assert main(words) == 0
     found = json.loads((out / 'check.json').read_text())
+    page = content_of((out / 'report.html').read_text())
+    assert 'is fit for a diagnosis' in page
+    assert 'cannot tell physics from' in page
     assert found['setup'] == []
     assert found['equivalents'] == [[['hinge', 'encoder_offset']]]
     assert 'encoder_offset of hinge explains as much' in capsys.readouterr().out

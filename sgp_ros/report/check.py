@@ -1,0 +1,109 @@
+"""The page of a check: what a recording holds, joint by joint, and how the robot is connected."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from sgp_ros.diagnosis.result import Finding
+from sgp_ros.engine.samples import Event, JointSample
+from sgp_ros.report.charts import Chart, Series, kept, spoken
+from sgp_ros.report.diagnosis_text import phrase, place, plain_name
+from sgp_ros.report.metrics import versions
+from sgp_ros.report.next_steps import Steps
+from sgp_ros.report.page import render_page
+from sgp_ros.robots.robot import Robot
+
+_MOST_JOINTS = 12
+
+
+def render_check(
+    content: Mapping[str, Any],
+    events: Sequence[Event],
+    robot: Robot,
+    setup: Sequence[Finding],
+    steps: Steps,
+) -> str:
+    """Return the page as HTML; every text in it is escaped.
+
+    Args:
+        content: of check.json.
+        events: of the recording.
+        robot: whose joints are looked for.
+        setup: errors of the connection.
+        steps: what to do next.
+    """
+    charts = position_charts(events, robot)
+    return render_page(
+        'check.html', charts, {},
+        title=f'Check of {content["recording"]} for {content["robot"]}',
+        verdict=check_sentence(content, setup),
+        is_fit=content['is_fit'],
+        setup=[{'place': place(f), 'text': phrase(f), 'p': f'{f.probability:.2f}'} for f in setup],
+        joints=content['joints'].items(),
+        units={joint.name: joint.unit('position') for joint in robot.joints},
+        shown=list(charts),
+        counts=_counts(content),
+        remarks=content['remarks'],
+        next_steps=list(steps),
+        versions=list(versions().items()),
+    )  # fmt: skip
+
+
+def _counts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    kinds = ', '.join(content['command_kinds']) or 'no kind'
+    jitter = 100.0 * content['jitter'] if content['jitter'] is not None else 0.0
+    stamps = ', '.join(f'{content[name]} {name}' for name in ('gaps', 'backward', 'repeated'))
+    return [
+        ('states', f'{content["states"]} in {content["seconds"]:.4g} s'),
+        ('rate', f'{content["rate_hz"]:.4g} Hz, jitter {jitter:.2g} %'),
+        ('commands', f'{content["commands"]}, {kinds}'),
+        ('stamps', stamps),
+    ]
+
+
+def check_sentence(content: Mapping[str, Any], setup: Sequence[Finding]) -> str:
+    """Say whether a recording is fit for a diagnosis, and what is wrong with it first."""
+    name = content['recording']
+    if content['missing']:
+        return f'{name} is not fit: it names no state of {", ".join(content["missing"])}.'
+    if not content['is_fit']:
+        return f'{name} is not fit for a diagnosis: {content["remarks"][-1]}'
+    still = [joint for joint, j in content['joints'].items() if not j['moves']]
+    text = f'{name} is fit for a diagnosis'
+    if still:
+        text += f', but of {", ".join(still)} it shows nothing: no motion beyond the noise'
+    if setup:
+        text += f'. First mend how the robot is connected: {place(setup[0])}, {phrase(setup[0])}'
+    told = [
+        f'{plain_name(e)} of {j}' for pairs in content.get('equivalents', ()) for j, e in pairs
+    ]
+    if told:
+        text += f'; this motion cannot tell physics from {" or ".join(told)}'
+    return f'{text}.'
+
+
+def position_charts(events: Sequence[Event], robot: Robot) -> dict[str, Chart]:
+    """Return the position of each joint over time, by name; of the first twelve joints."""
+    states = [e for e in events if isinstance(e, JointSample)]
+    charts = {}
+    for joint in robot.joints[:_MOST_JOINTS]:
+        own = [
+            (s.stamp_ns, s.position[s.names.index(joint.name)])
+            for s in states
+            if joint.name in s.names and len(s.position) == len(s.names)
+        ]
+        if len(own) < 2:
+            continue
+        stamps, q = (np.array(x) for x in zip(*sorted(own), strict=True))
+        time, unit = (stamps - stamps[0]) * 1e-9, joint.unit('position')
+        rows = kept([q])
+        charts[f'position {joint.name}'] = Chart(
+            f'Position of {joint.name}',
+            f'Between {spoken(np.nanmin(q))} and {spoken(np.nanmax(q))} {unit}.',
+            'time [s]', f'position [{unit}]', time[rows],
+            [Series('measured', q[rows], 'final')], group='check',
+        )  # fmt: skip
+    return charts
