@@ -50,6 +50,7 @@ setup(
         'mcap>=1.6',
         'rosbags>=0.11',
         'zstandard>=0.22',
+        'lz4>=4.0',
         'pin>=3',
     ],
     extras_require={

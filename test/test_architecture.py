@@ -25,8 +25,11 @@ LAYERS = {
     'optional': {'errors'},
     'gp': NUMERIC | {'numba', 'errors'},
     'physics': {'numpy', 'numba', 'errors'},
-    'rigid': NUMERIC | {'numba', 'pinocchio', 'clarabel', 'gp', 'physics', 'errors'},
-    'robots': {'numpy', 'yaml', 'physics', 'rigid', 'optional', 'errors'},
+    'strangers': {'yaml', 'errors'},
+    'rigid': NUMERIC | {
+        'numba', 'pinocchio', 'clarabel', 'gp', 'physics', 'strangers', 'errors',
+    },
+    'robots': {'numpy', 'yaml', 'physics', 'rigid', 'optional', 'strangers', 'errors'},
     'simulation': NUMERIC | {
         'mujoco', 'physics.catalogue', 'physics.effect', 'physics.effect_at', 'physics.parts',
         'physics.law', 'physics.grammar', 'rigid', 'optional', 'errors',
@@ -36,8 +39,8 @@ LAYERS = {
         'numba', 'gp', 'physics', 'rigid', 'robots', 'engine', 'errors',
     },
     'recordings': {
-        'numpy', 'scipy', 'yaml', 'rosbags', 'mcap', 'zstandard', 'engine.samples',
-        'engine.results', 'optional', 'errors',
+        'numpy', 'scipy', 'yaml', 'rosbags', 'mcap', 'lz4', 'zstandard', 'engine.samples',
+        'engine.results', 'optional', 'strangers', 'errors',
     },
     'diagnosis': NUMERIC | {'gp', 'physics', 'rigid', 'robots', 'engine', 'batch', 'errors'},
     'report': {
@@ -46,11 +49,11 @@ LAYERS = {
     },
     'ros': MESSAGES | {'optional', 'report.layouts'} | {
         'numpy', 'yaml', 'engine', 'physics', 'robots', 'simulation', 'diagnosis', 'recordings',
-        'errors',
+        'strangers', 'errors',
     },
     'apps': {
         'numpy', 'yaml', 'matplotlib', 'gp', 'physics', 'rigid', 'robots', 'simulation', 'engine',
-        'batch', 'recordings', 'diagnosis', 'report', 'errors',
+        'batch', 'recordings', 'diagnosis', 'report', 'strangers', 'errors',
     },
     'cli': {'apps', 'argcomplete', 'errors'},
 }  # fmt: skip

@@ -69,7 +69,7 @@ def test_every_requirement_stands_in_the_manifest(monkeypatch):
     keys = {
         'numpy': 'python3-numpy', 'scipy': 'python3-scipy', 'numba': 'python3-numba',
         'pyyaml': 'python3-yaml', 'jinja2': 'python3-jinja2', 'matplotlib': 'python3-matplotlib',
-        'pin': 'pinocchio',
+        'pin': 'pinocchio', 'lz4': 'python3-lz4',
     }  # fmt: skip
     manifest = ET.parse(ROOT / 'package.xml').getroot()
     present = {entry.text for entry in manifest.findall('exec_depend')}

@@ -60,7 +60,7 @@ def run(seed: int, events: int, faults: Faults) -> Engine:
             step = engine.push(event)
             _fit_if_due(engine)
         except Exception as error:  # noqa: BLE001 - any escape is what is looked for
-            faults.note(_place(error), seed)
+            faults.note(place_of(error), seed)
             return engine
         if time.perf_counter() - began > LONGEST_S:
             faults.note('longer than 10 s', seed)
@@ -71,7 +71,7 @@ def run(seed: int, events: int, faults: Faults) -> Engine:
         for fault in check(engine, end, None) + check_end(engine):
             faults.note(fault, seed)
     except Exception as error:  # noqa: BLE001 - any escape is what is looked for
-        faults.note(_place(error), seed)
+        faults.note(place_of(error), seed)
     return engine
 
 
@@ -90,7 +90,7 @@ def check(engine: Engine, step: Step, _event: Event | None) -> list[str]:
     if held > MOST_HELD:
         found.append('memory grows without bound')
     if step.failures:
-        found += [f'failed: {_place(failure.error)}' for failure in step.failures]
+        found += [f'failed: {place_of(failure.error)}' for failure in step.failures]
     for estimate in step.estimates:
         for channel in (estimate.acceleration, estimate.effort):
             for variance in (channel.variance, channel.raw_variance):
@@ -121,7 +121,8 @@ def _fit_if_due(engine: Engine) -> None:
         Swap(engine, fit(request)).finish()
 
 
-def _place(error: BaseException) -> str:
+def place_of(error: BaseException) -> str:
+    """Return kind, place and text of an error."""
     frames = traceback.extract_tb(error.__traceback__)
     at = frames[-1]
     own = next((f for f in reversed(frames) if 'sgp_ros' in f.filename), at)

@@ -100,7 +100,7 @@ def _replay_into(
     progress: Callable[[float], None],
 ) -> dict[str, Any]:
     """Write all files of a replay and return the content of metrics.json."""
-    remarks, asked = list(recording.remarks), engine.config
+    asked = engine.config
     history, timing = History(), Timing()
     failures: list[str] = []
     with RecordingWriter(out / 'predictions.mcap') as writer:
@@ -115,6 +115,7 @@ def _replay_into(
 
         run_events(engine, recording, options, keep, timing, progress)
         _check_use(engine, recording, options)
+    remarks = [*recording.remarks]
     remarks += [f'{count} messages could not be read: {reason}'
                 for reason, count in recording.unreadable.items()]  # fmt: skip
     remarks += stream_remarks(engine, failures)

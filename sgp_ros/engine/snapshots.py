@@ -125,7 +125,13 @@ def restored(robot: Robot, snapshot: Mapping[str, np.ndarray]) -> Engine:
         ConfigError: no snapshot, or one of another version or robot.
     """
     engine = Engine(robot, snapshot_config(snapshot, robot))
-    _fill(engine, snapshot)
+    try:
+        _fill(engine, snapshot)
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
+        raise ConfigError(
+            f'a snapshot whose parts do not fit each other ({type(error).__name__}: {error})',
+            'a model saved by this version',
+        ) from error
     return engine
 
 
@@ -208,7 +214,12 @@ def _part(prefix: str, snapshot: Mapping[str, np.ndarray]) -> dict[str, np.ndarr
 def _text(snapshot: Mapping[str, np.ndarray]) -> dict[str, Any]:
     if 'json' not in snapshot:
         raise ConfigError(f'a file with {sorted(snapshot)}', 'a model saved by this package')
-    text: dict[str, Any] = json.loads(str(snapshot['json']))
+    try:
+        text = json.loads(str(snapshot['json']))
+    except (ValueError, RecursionError) as error:
+        raise ConfigError('a snapshot without its description', 'a saved model') from error
+    if not isinstance(text, dict) or not {'robot', 'coefficients', 'settings'} <= set(text):
+        raise ConfigError('a snapshot with another description', 'a saved model')
     return text
 
 

@@ -9,9 +9,7 @@ from contextlib import closing
 from pathlib import Path
 
 from rosbags.rosbag1 import Reader as Ros1Reader
-from rosbags.rosbag1 import ReaderError as Ros1Error
 from rosbags.rosbag2 import Reader as Ros2Reader
-from rosbags.rosbag2 import ReaderError as Ros2Error
 
 from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.topics import RawMessage, Topic
@@ -34,6 +32,7 @@ class SqliteSource:
         self._paths = tuple(paths)
         counts: dict[tuple[str, str, str], int] = {}
         for path in self._paths:
+            self._require_tables(path)
             for name, kind, encoding, count in self._rows(path, _COUNT_QUERY):
                 key = (str(name), short_type(str(kind)), str(encoding))
                 counts[key] = counts.get(key, 0) + int(str(count))
@@ -53,9 +52,19 @@ class SqliteSource:
         self, path: Path, query: str, names: tuple[str, ...]
     ) -> Iterator[RawMessage]:
         for log_ns, name, data in self._rows(path, query, names):
-            assert isinstance(log_ns, int)
-            assert isinstance(data, bytes)
+            if not isinstance(log_ns, int) or not isinstance(data, bytes):
+                raise RecordingError(
+                    f'{path}: a message with {type(log_ns).__name__} and {type(data).__name__}',
+                    'a number for its time, and bytes',
+                )
             yield RawMessage(log_ns, str(name), data)
+
+    def _require_tables(self, path: Path) -> None:
+        """Refuse views and virtual tables, which may compute without end."""
+        found = {str(name): str(sql) for name, sql in self._rows(path, _TABLES_QUERY)}
+        wrong = [n for n in ('topics', 'messages') if not found.get(n, '').startswith(_TABLE)]
+        if wrong:
+            raise RecordingError(f'{path} has no plain tables {wrong}', 'a .db3 file of rosbag2')
 
     def _rows(
         self, path: Path, query: str, values: tuple[str, ...] = ()
@@ -71,6 +80,8 @@ class SqliteSource:
             ) from error
 
 
+_TABLE = 'CREATE TABLE'
+_TABLES_QUERY = "SELECT name, sql FROM sqlite_master WHERE name IN ('topics', 'messages')"
 _COUNT_QUERY = (
     'SELECT name, type, serialization_format, count(messages.id) FROM topics '
     'LEFT JOIN messages ON topics.id == messages.topic_id GROUP BY topics.id'
@@ -102,7 +113,9 @@ class RosbagsSource:
                     Topic(name, short_type(info.msgtype or ''), info.msgcount, self._encoding)
                     for name, info in sorted(reader.topics.items())
                 )
-        except (Ros1Error, Ros2Error) as error:
+        except RecordingError:
+            raise
+        except Exception as error:  # the library raises what its parsers do
             raise self._broken(error) from error
 
     def messages(self, topics: Collection[Topic]) -> Iterator[RawMessage]:
@@ -113,7 +126,9 @@ class RosbagsSource:
                 connections = [c for c in reader.connections if c.topic in names]
                 for connection, log_ns, data in reader.messages(connections):
                     yield RawMessage(log_ns, connection.topic, data)
-        except (Ros1Error, Ros2Error) as error:
+        except RecordingError:
+            raise
+        except Exception as error:  # the library raises what its parsers do
             raise self._broken(error) from error
 
     def _reader(self) -> Ros1Reader | Ros2Reader:

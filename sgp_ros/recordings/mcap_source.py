@@ -12,25 +12,30 @@ import struct
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from io import BytesIO
 from operator import itemgetter
 from pathlib import Path
 from typing import IO, NamedTuple
 
 import zstandard
+from lz4.frame import LZ4FrameDecompressor
 from mcap.exceptions import EndOfFile, McapError
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.records import Channel, McapRecord, Message, Schema
-from mcap.stream_reader import StreamReader
+from mcap.records import Channel, Chunk, McapRecord, Message, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
 
 from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.topics import RawMessage, Topic
 from sgp_ros.recordings.typestore import short_type
+from sgp_ros.strangers import bound, require_within
 
 MAGIC = b'\x89MCAP0\r\n'
-_DAMAGE = (McapError, struct.error, ValueError, RuntimeError, KeyError, zstandard.ZstdError)
+_DAMAGE = (
+    McapError, struct.error, ValueError, RuntimeError, KeyError, TypeError, AttributeError,
+    IndexError, OverflowError, MemoryError, EOFError, zstandard.ZstdError,
+)  # fmt: skip
 """What reading damaged records raises."""
 
 _LOOSE_BYTES = 1 << 20
@@ -50,6 +55,7 @@ class McapSource:
     def __init__(self, paths: Sequence[Path]) -> None:
         self._paths = tuple(paths)
         self._files = [_index_file(path, number) for number, path in enumerate(self._paths)]
+        self._damage: dict[tuple[int, int], str] = {}
 
     @property
     def topics(self) -> tuple[Topic, ...]:
@@ -66,13 +72,12 @@ class McapSource:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What was wrong with the files, one sentence each."""
-        return tuple(file.remark for file in self._files if file.remark)
+        return (*(file.remark for file in self._files if file.remark), *self._damage.values())
 
     def messages(self, topics: Collection[Topic]) -> Iterator[RawMessage]:
         """Yield the messages of `topics` by log time; equal times keep the order of the file.
 
-        Raises:
-            RecordingError: a damaged segment.
+        What is damaged is left out, and said in `remarks` from then on.
         """
         wanted = {(topic.name, topic.type, topic.encoding) for topic in topics}
         segments = [segment for file in self._files for segment in file.segments]
@@ -103,11 +108,12 @@ class McapSource:
                 if isinstance(record, Message) and record.channel_id in names:
                     yield RawMessage(record.log_time, names[record.channel_id], record.data)
         except _DAMAGE as error:
-            raise RecordingError(
-                f'{path}: damaged data at byte {segment.offset} ({error})',
-                'an intact file',
-                'copy it again from the recorder',
-            ) from error
+            place = path.name, segment.offset
+            self._damage[segment.file, segment.offset] = (
+                f'{place[0]}: damaged from byte {place[1]} on, up to byte '
+                f'{segment.offset + segment.length} ({" ".join(str(error).split())[:80]}); '
+                'what is intact before and behind it was used'
+            )
 
 
 class _Segment(NamedTuple):
@@ -249,11 +255,32 @@ class _Walk:
 
 def _read_records(data: bytes) -> Iterator[McapRecord]:
     """Yield the records in `data`, those of chunks included; a wrong checksum raises."""
-    reader = StreamReader(BytesIO(data), skip_magic=True, validate_crcs=True)
+    reader = StreamReader(BytesIO(data), skip_magic=True, validate_crcs=True, emit_chunks=True)
     try:
-        yield from reader.records
+        for record in reader.records:
+            if isinstance(record, Chunk):
+                yield from breakup_chunk(_unpacked(record), validate_crc=True)
+            else:
+                yield record
     except EndOfFile:
         return
+
+
+def _unpacked(chunk: Chunk) -> Chunk:
+    """Return a chunk whose data are plain, or can be unpacked to what it says itself.
+
+    Raises:
+        TooMuchError: it unpacks to more than `CHUNK_MB`, whatever it says.
+    """
+    most = bound('CHUNK_MB') << 20
+    size = chunk.uncompressed_size
+    if chunk.compression == 'zstd':
+        size = max(size, zstandard.frame_content_size(chunk.data))
+    elif chunk.compression == 'lz4' and size <= most:
+        data = LZ4FrameDecompressor().decompress(chunk.data, max_length=most + 1)
+        chunk, size = replace(chunk, compression='', data=data), len(data)
+    require_within(size / (1 << 20), 'CHUNK_MB', 'size of a chunk in MB')
+    return chunk
 
 
 def _describe(channel: Channel, schemas: dict[int, Schema]) -> tuple[str, str, str]:

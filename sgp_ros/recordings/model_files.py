@@ -5,6 +5,7 @@ Settings stand in ROS 2 parameter files, the same for the node and for the comma
 
 from __future__ import annotations
 
+import hashlib
 import os
 import zipfile
 from collections.abc import Callable, Mapping
@@ -16,6 +17,7 @@ import yaml
 
 from sgp_ros.engine.samples import SettingValue
 from sgp_ros.errors import ConfigError
+from sgp_ros.strangers import load_yaml, readable, require_file, require_within
 
 NODE_ONLY = frozenset({
     'command.type', 'diagnosis.window', 'diagnostics.period', 'joints', 'model.path',
@@ -25,6 +27,7 @@ NODE_ONLY = frozenset({
 })  # fmt: skip
 """Parameters of the node that mean nothing to a command; a test holds them to the node's."""
 
+_HASH = 'sha256'
 _EXPECTED = 'a ROS 2 parameter file: /**: ros__parameters: name: value'
 
 
@@ -47,7 +50,7 @@ def save_model(
     if settings is not None:
         text = yaml.safe_dump(_parameter_file(settings), sort_keys=False)
         _replace(path.with_suffix('.yaml'), lambda file: file.write(text.encode()))
-    arrays: dict[str, Any] = dict(snapshot)
+    arrays: dict[str, Any] = {**snapshot, _HASH: np.array(_hash(snapshot))}
     _replace(path, lambda file: np.savez(file, **arrays))
 
 
@@ -55,19 +58,50 @@ def load_model(path: Path) -> dict[str, np.ndarray]:
     """Read a saved snapshot.
 
     Raises:
-        ConfigError: no such file, or none that `save_model` wrote.
+        ConfigError: no such file, none that `save_model` wrote, or one that was changed since.
     """
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
-    except FileNotFoundError as error:
+    expected = 'a model.npz of `sgp replay` or ~/save'
+    if not path.exists():
+        raise ConfigError(f'no model file {path}', expected)
+    require_file(path, 'TABLE_MB')
+    with readable(path, ConfigError, expected):
+        try:
+            require_unpacked(path)
+            with np.load(path, allow_pickle=False) as file:
+                arrays = {name: file[name] for name in file.files}
+        except (ValueError, EOFError, AttributeError, OSError, zipfile.BadZipFile) as error:
+            raise ConfigError(f'{path} is no saved model', expected) from error
+    kept = arrays.pop(_HASH, None)
+    if kept is None or str(kept) != _hash(arrays):
         raise ConfigError(
-            f'no model file {path}', 'a model.npz of `sgp replay` or ~/save'
-        ) from error
-    except (ValueError, EOFError, AttributeError, OSError, zipfile.BadZipFile) as error:
-        raise ConfigError(
-            f'{path} is no saved model', 'a model.npz of `sgp replay` or ~/save'
-        ) from error
+            f'{path} is damaged or was changed: its hash is another one', expected, 'save it again'
+        )
+    wrong = [n for n, x in arrays.items() if x.dtype.kind == 'f' and not np.isfinite(x).all()]
+    if wrong:
+        raise ConfigError(f'{path} holds numbers that are not finite in {wrong}', expected)
+    return arrays
+
+
+def require_unpacked(path: Path) -> None:
+    """Refuse an archive that unpacks to more than `UNPACKED_MB`.
+
+    Raises:
+        TooMuchError: it does.
+        zipfile.BadZipFile: it is no archive.
+    """
+    with zipfile.ZipFile(path) as archive:
+        size = sum(entry.file_size for entry in archive.infolist())
+    require_within(size / (1 << 20), 'UNPACKED_MB', f'unpacked size of {path} in MB')
+
+
+def _hash(arrays: Mapping[str, np.ndarray]) -> str:
+    """Return the SHA-256 of names, types, shapes and bytes of all arrays."""
+    found = hashlib.sha256()
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        found.update(f'{name} {array.dtype.str} {array.shape} '.encode())
+        found.update(array.tobytes())
+    return found.hexdigest()
 
 
 def load_parameters(path: str | Path) -> dict[str, object]:
@@ -79,8 +113,14 @@ def load_parameters(path: str | Path) -> dict[str, object]:
     source = Path(path)
     if not source.is_file():
         raise ConfigError(f'no parameter file {source}', _EXPECTED)
+    require_file(source, 'TEXT_MB')
+    with readable(source, ConfigError, _EXPECTED):
+        return _parameters_of(source)
+
+
+def _parameters_of(source: Path) -> dict[str, object]:
     try:
-        document = yaml.safe_load(source.read_text(encoding='utf-8'))
+        document = load_yaml(source.read_text(encoding='utf-8'))
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ConfigError(f'{source} is not YAML ({error})', _EXPECTED) from error
     if not isinstance(document, dict):

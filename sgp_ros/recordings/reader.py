@@ -7,6 +7,7 @@ which it is. `Recording.events` yields what a node would have consumed, in the o
 from __future__ import annotations
 
 import re
+import struct
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
@@ -28,8 +29,19 @@ from sgp_ros.recordings.topics import (
     choose_joint_states,
 )
 from sgp_ros.recordings.typestore import decoder
+from sgp_ros.strangers import load_yaml, readable, require_file
 
 _TABLES = ('.csv', '.npz', '.mat', '.parquet', '.h5', '.json', '.jsonl')
+_WRONG = (
+    struct.error,
+    ValueError,
+    IndexError,
+    OverflowError,
+    AttributeError,
+    TypeError,
+    MemoryError,
+)
+"""What the decoding of a damaged message raises, beside `MessageError`."""
 _KINDS = 'an .mcap file, a rosbag2 directory or a ROS 1 .bag'
 
 
@@ -54,7 +66,6 @@ class Recording:
     Attributes:
         path: where it lies.
         topics: its topics with type and number of messages.
-        remarks: sentences for the user, such as what was recovered of a truncated file.
         unreadable: "topic: reason" to the number of messages that the latest pass of `events`
             skipped.
     """
@@ -63,8 +74,14 @@ class Recording:
         self._source = source
         self.path = path
         self.topics = source.topics
-        self.remarks = remarks
+        self._remarks = remarks
+        self._missing: dict[str, str] = {}
         self.unreadable: Counter[str] = Counter()
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Sentences for the user: what was recovered of the file, what the last pass missed."""
+        return (*self._remarks, *self._source.remarks, *self._missing.values())
 
     def events(
         self,
@@ -105,8 +122,9 @@ class Recording:
             found = [topic.name for topic in self.topics]
             raise RecordingError(f'{self.path} has topics {found}', f'topic {name}')
         decode = decoder(topics[0].type, topics[0].encoding)
-        for log_ns, _, data in self._source.messages(topics):
-            yield log_ns, decode(data)
+        with readable(self.path, RecordingError, _KINDS):
+            for log_ns, _, data in self._source.messages(topics):
+                yield log_ns, decode(data)
 
     def _convert(
         self, chosen: dict[str, tuple[Topic, Callable[[Message, int], Event]]]
@@ -115,13 +133,29 @@ class Recording:
         decoders = {
             name: decoder(topic.type, topic.encoding) for name, (topic, _) in chosen.items()
         }
-        for log_ns, name, data in self._source.messages([topic for topic, _ in chosen.values()]):
-            try:
-                event = chosen[name][1](decoders[name](data), log_ns)
-            except MessageError as error:  # noqa: PERF203 - each message fails on its own
-                unreadable[f'{name}: {error.found}'] += 1
-            else:
-                yield event
+        found = Counter[str]()
+        topics = [topic for topic, _ in chosen.values()]
+        with readable(self.path, RecordingError, _KINDS):
+            for log_ns, name, data in self._source.messages(topics):
+                found[name] += 1
+                try:
+                    event = chosen[name][1](decoders[name](data), log_ns)
+                except (MessageError, *_WRONG) as error:
+                    reason = (
+                        error.found if isinstance(error, MessageError) else type(error).__name__
+                    )
+                    unreadable[f'{name}: {reason}'] += 1
+                else:
+                    yield event
+        self._compare(topics, found)
+
+    def _compare(self, topics: Collection[Topic], found: Counter[str]) -> None:
+        """Say where the file holds another number of messages than it says it does."""
+        self._missing = {
+            topic.name: f'{topic.name}: {found[topic.name]} of {topic.count} messages readable'
+            for topic in topics
+            if topic.count is not None and found[topic.name] != topic.count
+        }
 
 
 def open_recording(path: str | Path) -> Recording:
@@ -137,13 +171,15 @@ def open_recording(path: str | Path) -> Recording:
     path = Path(path)
     if not path.exists():
         raise RecordingError(f'no recording at {path}', _KINDS, 'check the path')
-    source, remarks = _directory_source(path) if path.is_dir() else (_file_source(path), ())
+    with readable(path, RecordingError, _KINDS):
+        source, remarks = _directory_source(path) if path.is_dir() else (_file_source(path), ())
     if not any(topic.count for topic in source.topics):
         raise RecordingError(f'{path} holds no message', 'a recording with joint states')
-    return Recording(path, source, remarks + source.remarks)
+    return Recording(path, source, remarks)
 
 
 def _file_source(path: Path) -> Source:
+    require_file(path)
     with path.open('rb') as stream:
         head = stream.read(16)
     if not head:
@@ -159,7 +195,7 @@ def _file_source(path: Path) -> Source:
 
 
 def _directory_source(path: Path) -> tuple[Source, tuple[str, ...]]:
-    listed, is_compressed = _metadata(path)
+    listed, is_compressed, counts = _metadata(path)
     if is_compressed or any(path.glob('*.zstd')):
         return RosbagsSource(path), ()
     missing = [name for name in listed if not (path / name).is_file()]
@@ -168,24 +204,45 @@ def _directory_source(path: Path) -> tuple[Source, tuple[str, ...]]:
         (file for file in path.iterdir() if file.suffix in {'.mcap', '.db3'}), key=_natural_order
     )
     if files and all(file.suffix == '.mcap' for file in files):
-        return McapSource(files), remarks
+        return _counted(McapSource(files), counts, remarks)
     if files and all(file.suffix == '.db3' for file in files):
-        return SqliteSource(files), remarks
+        return _counted(SqliteSource(files), counts, remarks)
     raise RecordingError(f'directory {path} without .mcap files or .db3 files', _KINDS)
 
 
-def _metadata(path: Path) -> tuple[list[str], bool]:
-    """Return the files that metadata.yaml lists, and whether rosbag2 compressed them.
+def _counted(
+    source: Source, counts: dict[str, int], remarks: tuple[str, ...]
+) -> tuple[Source, tuple[str, ...]]:
+    """Compare the numbers of messages with those that metadata.yaml has."""
+    found = {topic.name: topic.count or 0 for topic in source.topics}
+    wrong = [
+        f'metadata.yaml counts {count} messages of {name}, the files hold {found.get(name, 0)}'
+        for name, count in counts.items()
+        if found.get(name, 0) != count
+    ]
+    return source, (*remarks, *wrong)
+
+
+def _metadata(path: Path) -> tuple[list[str], bool, dict[str, int]]:
+    """Return files that metadata.yaml lists, whether they are compressed, and counts by topic.
 
     A missing or broken metadata.yaml, as after a crash of the recorder, lists nothing.
     """
+    place = path / 'metadata.yaml'
     try:
-        content = yaml.safe_load((path / 'metadata.yaml').read_text(encoding='utf-8'))
+        require_file(place, 'TEXT_MB')
+        content = load_yaml(place.read_text(encoding='utf-8'))
         information = content['rosbag2_bagfile_information']
         names = [Path(str(name)).name for name in information['relative_file_paths']]
-        return names, bool(information.get('compression_format'))
-    except (FileNotFoundError, yaml.YAMLError, KeyError, TypeError, UnicodeDecodeError):
-        return [], False
+        counts = {
+            str(entry['topic_metadata']['name']): int(entry['message_count'])
+            for entry in information.get('topics_with_message_count') or ()
+        }
+        return names, bool(information.get('compression_format')), counts
+    except (
+        FileNotFoundError, yaml.YAMLError, KeyError, TypeError, AttributeError, ValueError,
+    ):  # fmt: skip
+        return [], False, {}
 
 
 def _natural_order(path: Path) -> list[tuple[int, str]]:

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import io
 import re
+import resource
+import subprocess
+import sys
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.io import loadmat
 from scipy.io.matlab import MatReadError
 
-from sgp_ros.errors import RecordingError
+from sgp_ros.errors import RecordingError, SgpError
+from sgp_ros.recordings.model_files import require_unpacked
 from sgp_ros.recordings.table_formats import load_hdf5, load_json, load_parquet, refuse
+from sgp_ros.strangers import TooMuchError, bound, readable, require_file, require_within
 
 Columns = dict[str, np.ndarray]
 ENDINGS = (
@@ -25,6 +33,7 @@ _DELIMITERS = (';', '\t', ',', ' ')
 _COMMENTS = '#%'
 _IN_BRACKETS = re.compile(r'\[[^\]]*\]')
 _APART = re.compile(r'\[[^\]]*\]|\S+')
+_SAID, _BYTES_PER_S = 1, 20e6
 _TIME = re.compile(r'\d{4}-\d\d-\d\d[T ]\d')
 
 
@@ -41,13 +50,18 @@ def load_columns(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]
         RecordingError: no such file, another format, or a damaged one.
     """
     refuse(path)
-    if not path.is_file():
+    if not path.exists() or path.is_dir():
         raise RecordingError(f'no table at {path}', 'a CSV, NPZ or MAT file', 'check the path')
-    suffix = path.suffix.lower()
+    require_file(path, 'TABLE_MB')
+    with readable(path, RecordingError, f'one of {", ".join(ENDINGS)}'):
+        return _load(path, path.suffix.lower(), remarks)
+
+
+def _load(path: Path, suffix: str, remarks: list[str]) -> tuple[Columns, Sequence[int]]:
     if suffix == '.npz':
         return _load_npz(path), ()
     if suffix == '.mat':
-        return _load_mat(path), ()
+        return _load_apart(path), ()
     if suffix in {'.h5', '.hdf5', '.hdf'}:
         return load_hdf5(path), ()
     if suffix in {'.parquet', '.pq'}:
@@ -65,7 +79,7 @@ def _load_csv(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]]:
     except UnicodeDecodeError as error:
         raise RecordingError(f'{path} is no text ({error})', 'a CSV file in UTF-8') from error
     header, mark, rest = _header(path, lines)
-    names = [name.strip().strip('"') for name in _cells(header, mark)]
+    names = _names(path, header, mark, rest)
     rows: list[list[str]] = []
     taken: list[int] = []
     skipped, last = [], rest[-1][0] if rest else 0
@@ -89,6 +103,9 @@ def _load_csv(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]]:
         raise RecordingError(f'{path} holds no row', 'a header row, then rows of numbers')
     if skipped:
         remarks.append(f'{path.name}: lines {skipped} hold no number and are taken for header')
+    longest = max(len(cell) for row in rows for cell in row)
+    megabytes = 4e-6 * longest * len(rows) * len(names)  # NumPy keeps the longest for all
+    require_within(megabytes, 'UNPACKED_MB', f'size of the cells of {path} in MB')
     table = np.char.strip(np.array(rows, dtype=str))  # (n, number of columns)
     if mark == ';':
         table = np.char.replace(table, ',', '.')  # a decimal comma goes with semicolons
@@ -117,6 +134,18 @@ def _header(path: Path, lines: list[str]) -> tuple[str, str, list[tuple[int, str
             )
         return (fitting or comments or [''])[-1], mark, plain
     return first[1], mark, plain[1:]
+
+
+def _names(path: Path, header: str, mark: str, rest: list[tuple[int, str]]) -> list[str]:
+    """Return the names of the columns, once it is sure that the text can be a table."""
+    if '\0' in header or any('\0' in line for _, line in rest):
+        raise RecordingError(f'{path} holds NUL characters', 'a CSV file in UTF-8')
+    require_within(max((len(line) for _, line in rest), default=0), 'LINE', f'a line of {path}')
+    names = [name.strip().strip('"') for name in _cells(header, mark)]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise RecordingError(f'{path} has columns {twice} more than once', 'one name each')
+    return names
 
 
 def _mark(line: str) -> str:
@@ -156,6 +185,7 @@ def _column(cells: np.ndarray) -> np.ndarray:
 
 def _load_npz(path: Path) -> Columns:
     try:
+        require_unpacked(path)
         with np.load(path, allow_pickle=False) as content:
             return dict(_plain_arrays(content))
     except (ValueError, OSError, zipfile.BadZipFile, EOFError, AttributeError) as error:
@@ -170,6 +200,47 @@ def _plain_arrays(content: np.lib.npyio.NpzFile) -> Iterator[tuple[str, np.ndarr
         except ValueError:
             continue
         yield name, np.atleast_1d(array)
+
+
+def _load_apart(path: Path) -> Columns:
+    """Read a MAT file in a process of its own: some files end the interpreter inside SciPy."""
+    program = f'from {__name__} import send_mat; import sys; send_mat(sys.argv[1])'
+    seconds = bound('SECONDS') + path.stat().st_size / _BYTES_PER_S
+    try:
+        done = subprocess.run(  # noqa: S603  # this interpreter, this package
+            [sys.executable, '-c', program, str(path)], capture_output=True, timeout=seconds,
+            check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired as error:
+        raise TooMuchError(
+            f'{path} is not read within {seconds:.0f} s', 'an intact MAT file',
+            'raise SGP_MOST_SECONDS if it is meant',
+        ) from error  # fmt: skip
+    if done.returncode == 0:
+        with np.load(io.BytesIO(done.stdout), allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in arrays.files}
+    said = done.stderr.decode(errors='replace').strip().splitlines()
+    if done.returncode == _SAID and said:
+        raise RecordingError(said[-1])
+    raise RecordingError(
+        f'{path} cannot be read: its reader ended with status {done.returncode}',
+        'a MATLAB .mat file', 'save it again, or as CSV',
+    )  # fmt: skip
+
+
+def send_mat(path: str) -> None:
+    """Write the arrays of a MAT file to stdout as NPZ, within the bound of what it unpacks to."""
+    most = 2 * bound('UNPACKED_MB') * (1 << 20)
+    with contextlib.suppress(ValueError, OSError):
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+    try:
+        with readable(path, RecordingError, 'a MATLAB .mat file'):
+            columns = _load_mat(Path(path))
+    except SgpError as error:
+        sys.exit(str(error))
+    arrays: dict[str, Any] = dict(columns)
+    with open(1, 'wb', closefd=False) as stream:
+        np.savez(stream, **arrays)
 
 
 def _load_mat(path: Path) -> Columns:

@@ -39,7 +39,6 @@ from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from sgp_ros.engine.samples import CommandSample
 from sgp_ros.errors import ConfigError
@@ -47,6 +46,7 @@ from sgp_ros.recordings.command_types import COMMAND_TYPES, FLOAT64_ARRAY
 from sgp_ros.recordings.messages import JOINT_STATE
 from sgp_ros.recordings.table_files import Columns
 from sgp_ros.recordings.typestore import new_message
+from sgp_ros.strangers import YAMLError, load_yaml, read_text
 
 _ANGLE = math.pi / 180.0
 _POSITION = {'m': 1.0, 'mm': 1e-3, 'rad': 1.0, 'deg': _ANGLE, 'rev': 2.0 * math.pi}
@@ -130,8 +130,8 @@ def read_map(path: str | Path) -> Mapping[str, object]:
     if not path.is_file():
         raise ConfigError(f'no map at {path}', 'a YAML file', 'see config/import for examples')
     try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        content = load_yaml(read_text(path))
+    except (YAMLError, UnicodeDecodeError) as error:
         raise ConfigError(f'map {path} is not YAML ({error})', 'a YAML file') from error
     if not isinstance(content, dict):
         raise ConfigError(f'map {path} holds no mapping', 'keys time and joints')

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal, InvalidOperation, Overflow
 from pathlib import Path
 
 import numpy as np
@@ -234,8 +234,9 @@ def _stamp(value: float | str, unit_ns: Decimal, start_ns: int) -> int | None:
         return _iso_stamp(value.strip())
     try:
         stamp = Decimal(str(value)) * unit_ns + start_ns
-        return round(stamp) if stamp.is_finite() else None
-    except InvalidOperation:
+        # before rounding: 1e999999999 is a number of a billion digits
+        return round(stamp) if abs(stamp) < _LATEST_NS else None
+    except (InvalidOperation, Overflow):
         return None
 
 
@@ -249,7 +250,7 @@ def _iso_stamp(text: str) -> int | None:
     day, clock, decimals, zone = match.groups()
     try:
         whole = datetime.fromisoformat(f'{day}T{clock}{(zone or "+00:00").replace("Z", "+00:00")}')
-    except ValueError:
+    except (ValueError, OverflowError):
         return None
     return int(whole.timestamp()) * 10**9 + int((decimals or '').ljust(9, '0')[:9])
 

@@ -21,6 +21,7 @@ from sgp_ros.rigid.urdf_model import (
     commanded_joints,
     mimic_parameters,
 )
+from sgp_ros.strangers import parse_xml, require_file, require_within
 
 _KNOWN = (*MOVING, 'fixed')
 _INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
@@ -38,7 +39,7 @@ def parse_urdf(path_or_text: str | Path) -> Urdf:
     if '<!DOCTYPE' in text or '<!ENTITY' in text:
         raise ConfigError(f'{place} declares a document type', 'a URDF', 'remove <!DOCTYPE ...>')
     try:
-        root = ET.fromstring(text)  # noqa: S314  # no document type, so no entity to expand
+        root = parse_xml(text)
     except (ET.ParseError, ValueError) as error:
         raise ConfigError(f'{place} is no XML ({error})', 'a URDF') from error
     if root.tag != 'robot':
@@ -47,6 +48,7 @@ def parse_urdf(path_or_text: str | Path) -> Urdf:
         )
     reading = _Reading(place, mimic_parameters(root))
     links = [reading.name(link) for link in root.findall('link')]
+    require_within(len(links), 'LINKS', f'links of {place}')
     joints = [reading.joint(joint) for joint in root.findall('joint')]
     reading.check_tree(links, joints)
     by_name = {joint.name: joint for joint in joints}
@@ -61,9 +63,10 @@ def _text(path_or_text: str | Path) -> tuple[str, str]:
     if isinstance(path_or_text, str) and path_or_text.lstrip('\ufeff \t\r\n').startswith('<'):
         return 'URDF text', path_or_text.lstrip('\ufeff \t\r\n')
     path = Path(path_or_text)
-    if not path.is_file():
+    if not path.exists():
         raise ConfigError(f'no file {path}', 'a URDF')
     try:
+        require_file(path, 'TEXT_MB')
         text = path.read_text(encoding='utf-8-sig')
     except UnicodeDecodeError as error:
         raise ConfigError(f'URDF {path} is not UTF-8 ({error})', 'a URDF in UTF-8') from error

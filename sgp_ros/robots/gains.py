@@ -19,6 +19,7 @@ import numpy as np
 import yaml
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.strangers import load_yaml
 
 _KEYS = ('kp', 'kd', 'feedforward')
 _FEEDFORWARD = ('none', 'gravity')
@@ -65,7 +66,7 @@ def read_gains(path: Path, joints: Sequence[str], actuated: Sequence[str]) -> Ga
         ConfigError: no such file, or not one number of each kind for each drive.
     """
     try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
+        content = load_yaml(path.read_text(encoding='utf-8'))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         reason = str(error).splitlines()[0]
         raise ConfigError(

@@ -32,6 +32,7 @@ from sgp_ros.robots.lumped import LUMPED_KEYS, build_lumped_robot
 from sgp_ros.robots.models.door import MODEL_ENDINGS, find_file, read_model
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.shipped import shipped_folder
+from sgp_ros.strangers import load_yaml, readable, require_file
 
 _KEYS = frozenset({'schema', 'robot', 'joints', 'parameters'})
 _URDF_KEYS = frozenset({
@@ -64,6 +65,12 @@ def load_robot(name_or_path: str) -> Robot:
     expected = f'one of {list(robot_names())} or a robot file (.yaml, {", ".join(MODEL_ENDINGS)})'
     if not path.is_file():
         raise ConfigError(f'robot {name_or_path!r} is no built-in name and no file', expected)
+    require_file(path, 'TEXT_MB')
+    with readable(path, ConfigError, 'a robot file'):
+        return _from_file(path, expected)
+
+
+def _from_file(path: Path, expected: str) -> Robot:
     if path.suffix.lower() in MODEL_ENDINGS:
         return _plain(path)
     if path.suffix not in ('.yaml', '.yml'):
@@ -111,7 +118,7 @@ def _build(path: Path) -> Robot:
 
 def _from_document(text: str, path: Path) -> Robot:
     try:
-        document = yaml.safe_load(text)
+        document = load_yaml(text)
     except yaml.YAMLError as error:
         raise ConfigError(f'robot file {path} is not YAML ({error})', 'a robot YAML') from error
     if not isinstance(document, dict):

@@ -16,6 +16,7 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.optional import optional_package
 from sgp_ros.robots.models.mjcf import read_mjcf
 from sgp_ros.robots.models.sdf import read_sdf
+from sgp_ros.strangers import parse_xml
 
 READ = (
     ('link; inertial mass, origin, inertia', 'link with mass, centre and inertia'),
@@ -112,7 +113,7 @@ def _kind_of(path: Path) -> str:
     """Return the format of an XML file by its root element."""
     text = _text(path)
     try:
-        tag = ET.fromstring(text).tag  # noqa: S314  # entities are refused by `_text`
+        tag = parse_xml(text).tag
     except ET.ParseError as error:
         raise ConfigError(f'{path.name} is no XML ({error})', 'URDF, MJCF or SDF') from error
     if tag not in _ROOTS:
@@ -150,7 +151,7 @@ def _expanded(path: Path) -> str:
 def _remarks(text: str) -> Mapping[str, list[str]]:
     """Say what a URDF says of dynamics that has no place here."""
     try:
-        root = ET.fromstring(text)  # noqa: S314  # entities are refused by `_text`
+        root = parse_xml(text)
     except ET.ParseError:
         return {}  # who reads the URDF says so
     found = []

@@ -21,6 +21,7 @@ from sgp_ros.physics.catalogue import SPRING
 from sgp_ros.rigid.rotations import of_quaternion, of_rpy
 from sgp_ros.rigid.tree import GRAVITY
 from sgp_ros.robots.models.model import Body, Model, ModelJoint, Pose, counted, stated
+from sgp_ros.strangers import parse_xml
 
 READ = (
     ('link; inertial mass, inertia, pose', 'link with mass, centre and inertia'),
@@ -66,7 +67,7 @@ def read_sdf(path: Path) -> Model:
             several degrees of freedom, or links that form no tree.
     """
     try:
-        root = ET.fromstring(_text(path))  # noqa: S314  # no document type, so no entity to expand
+        root = parse_xml(_text(path))
     except (ET.ParseError, ValueError) as error:
         raise ConfigError(f'{path.name} is no XML ({error})', 'SDF') from error
     if root.tag != 'sdf':

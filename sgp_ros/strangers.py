@@ -1,0 +1,142 @@
+"""Files of strangers: bounds of size, depth and count, and one error for whatever reading raises.
+
+A user who means such a file raises the bound that the message names, by an environment variable:
+`SGP_MOST_TEXT_MB=64 sgp identify ...`.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import yaml
+
+from sgp_ros.errors import SgpError
+
+DEFAULTS = {
+    'TEXT_MB': 16, 'TABLE_MB': 512, 'UNPACKED_MB': 1024, 'CHUNK_MB': 256, 'DEPTH': 100,
+    'ENTRIES': 1_000_000, 'ALIASES': 100, 'LINKS': 500, 'LINE': 100_000, 'SECONDS': 10,
+}  # fmt: skip
+"""Bound to its default: sizes of robot and settings files, of tables, of what a table unpacks to,
+of one chunk of a recording [MB]; nesting, entries and aliases of YAML or XML; links of a robot;
+characters of a line; time for a file that is read in a process of its own [s]."""
+_MEGABYTE = 1 << 20
+YAMLError = yaml.YAMLError
+
+
+class TooMuchError(SgpError):
+    """A file is beyond a bound; it may be raised by the environment."""
+
+
+def bound(name: str) -> int:
+    """Return a bound out of `DEFAULTS`, or what the environment has in its place."""
+    given = os.environ.get(f'SGP_MOST_{name}', '')
+    return int(given) if given.isdecimal() else DEFAULTS[name]
+
+
+def require_within(value: float, name: str, what: str) -> None:
+    """Refuse what is beyond a bound.
+
+    Raises:
+        TooMuchError: it is.
+    """
+    if value > bound(name):
+        raise TooMuchError(
+            f'{what}: {value:.6g}',
+            f'at most {bound(name)}',
+            f'raise SGP_MOST_{name} if it is meant',
+        )
+
+
+def require_file(path: Path, name: str = '') -> None:
+    """Refuse what is no plain file, such as a pipe that never ends, and what is too large.
+
+    Args:
+        path: that exists.
+        name: of the bound of its size, a number of MB; empty for any size.
+
+    Raises:
+        TooMuchError: it is.
+    """
+    found = path.stat()
+    if not stat.S_ISREG(found.st_mode):
+        raise TooMuchError(f'{path} is no plain file', 'a file', 'copy its content into one')
+    if name:
+        require_within(found.st_size / _MEGABYTE, name, f'size of {path} in MB')
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a file of settings or of a map.
+
+    Raises:
+        TooMuchError: no plain file, or a larger one than `TEXT_MB`.
+    """
+    require_file(path, 'TEXT_MB')
+    return path.read_text(encoding='utf-8')
+
+
+def load_yaml(text: str) -> Any:
+    """Return what a YAML text holds.
+
+    Raises:
+        TooMuchError: more nesting, entries or aliases than a settings file has.
+        yaml.YAMLError: no YAML.
+    """
+    depth = aliases = 0
+    for entries, event in enumerate(yaml.parse(text, Loader=yaml.SafeLoader)):
+        if isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent)):
+            depth += 1
+            require_within(depth, 'DEPTH', 'nesting of YAML')
+        elif isinstance(event, (yaml.MappingEndEvent, yaml.SequenceEndEvent)):
+            depth -= 1
+        elif isinstance(event, yaml.AliasEvent):
+            aliases += 1
+            require_within(aliases, 'ALIASES', 'aliases in YAML')
+        require_within(entries, 'ENTRIES', 'entries of YAML')
+    return yaml.safe_load(text)
+
+
+def parse_xml(text: str) -> ET.Element:
+    """Return the root of an XML text without entities.
+
+    Raises:
+        TooMuchError: more nesting or elements than a robot has.
+        ET.ParseError: no XML.
+    """
+    parser: Any = ET.XMLPullParser(('start', 'end'))
+    depth = entries = 0
+    for start in range(0, len(text), _MEGABYTE):
+        parser.feed(text[start : start + _MEGABYTE])
+        for kind, _ in parser.read_events():
+            depth += 1 if kind == 'start' else -1
+            entries += 1
+            require_within(depth, 'DEPTH', 'nesting of XML')
+            require_within(entries, 'ENTRIES', 'elements of XML')
+    parser.close()
+    return ET.fromstring(text)  # noqa: S314  # callers refuse document types and entities
+
+
+@contextmanager
+def readable(path: object, error: type[SgpError], expected: str) -> Iterator[None]:
+    """Turn whatever the reading of a stranger's file raises into one error with one line.
+
+    Args:
+        path: of the file.
+        error: the kind to raise.
+        expected: what it should be.
+
+    Raises:
+        SgpError: of that kind; those raised on purpose, and errors of the disk, pass.
+    """
+    try:
+        yield
+    except (SgpError, OSError):
+        raise
+    except Exception as problem:
+        text = ' '.join(f'{type(problem).__name__}: {problem}'.split())[:200]
+        raise error(f'{path} cannot be read ({text})', expected) from problem

@@ -1,0 +1,134 @@
+"""The fuzzer of files, short and with fixed seeds, and files made to harm."""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+import struct
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import zstandard
+
+from sgp_proof.robustness import files
+from sgp_proof.robustness.events import Faults
+from sgp_ros.errors import SgpError
+from sgp_ros.recordings.model_files import load_model, load_parameters
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.recordings.table_files import load_columns
+from sgp_ros.robots.registry import load_robot
+
+
+@pytest.fixture(scope='module')
+def samples(tmp_path_factory):
+    return files.make_samples(tmp_path_factory.mktemp('samples'))
+
+
+def test_intact_files_are_read(samples):
+    for kind, path in samples.items():
+        files.read(kind, path)
+
+
+def test_damaged_files_are_read_or_refused_in_one_line(samples, tmp_path):
+    """Seeds of the formats that are read in this process."""
+    faults = Faults()
+    others = {kind: path for kind, path in samples.items() if kind != 'mat'}
+    outcomes = [files.run(seed, others, tmp_path, faults)[1] for seed in range(120)]
+    assert dict(faults) == {}
+    assert {'read', 'refused'} == set(outcomes)
+
+
+def _long_urdf(path, n=5000):
+    links = ''.join(f'<link name="l{i}"/>' for i in range(n + 1))
+    joints = ''.join(
+        f'<joint name="j{i}" type="revolute"><parent link="l{i}"/><child link="l{i + 1}"/>'
+        '<axis xyz="0 0 1"/></joint>'
+        for i in range(n)
+    )
+    path.write_text(f'<robot name="x">{links}{joints}</robot>')
+
+
+def _view(path):
+    with sqlite3.connect(path) as base:
+        base.execute('CREATE TABLE topics(id, name, type, serialization_format)')
+        base.execute('CREATE VIEW messages AS WITH RECURSIVE m(id, topic_id, timestamp, data) AS '
+                     "(SELECT 1, 1, 1, x'00' UNION ALL SELECT id + 1, 1, 1, data FROM m) "
+                     'SELECT * FROM m')  # fmt: skip
+    base.close()
+
+
+def _bomb(path):
+    """A chunk that says little of what it unpacks to."""
+    packed = zstandard.ZstdCompressor().compress(bytes(1 << 21))
+    body = struct.pack('<QQQII', 0, 1, 100, 0, 4) + b'zstd' + struct.pack('<Q', len(packed))
+    chunk = b'\x06' + struct.pack('<Q', len(body) + len(packed)) + body + packed
+    path.write_bytes(b'\x89MCAP0\r\n' + chunk)
+
+
+def _zip(path):
+    np.savez_compressed(path, t=np.zeros(1 << 18))
+
+
+@pytest.mark.parametrize(
+    ('name', 'make', 'read', 'says'),
+    [
+        ('x.urdf', _long_urdf, lambda p: load_robot(str(p)), 'SGP_MOST_LINKS'),
+        ('deep.urdf', lambda p: p.write_text('<robot>' + '<a>' * 3000),
+         lambda p: load_robot(str(p)), 'SGP_MOST_DEPTH'),
+        ('deep.yaml', lambda p: p.write_text('[' * 3000), load_parameters, 'SGP_MOST_DEPTH'),
+        ('many.yaml', lambda p: p.write_text('a: &a [1]\nb: [' + '*a,' * 200 + ']'),
+         load_parameters, 'SGP_MOST_ALIASES'),
+        ('x.db3', _view, open_recording, 'no plain tables'),
+        ('x.mcap', _bomb, open_recording, 'SGP_MOST_CHUNK_MB'),
+        ('x.npz', _zip, lambda p: load_columns(p, []), 'SGP_MOST_UNPACKED_MB'),
+        ('pipe.mcap', os.mkfifo, open_recording, 'no plain file'),
+        ('pipe.npz', os.mkfifo, load_model, 'no plain file'),
+        ('twice.csv', lambda p: p.write_text('t,q,q\n1,2,3\n'), lambda p: load_columns(p, []),
+         'more than once'),
+        ('nul.csv', lambda p: p.write_text('t,q\n1,2\0\n'), lambda p: load_columns(p, []), 'NUL'),
+        ('long.csv', lambda p: p.write_text('t,q\n1,' + '2' * 200_000),
+         lambda p: load_columns(p, []), 'SGP_MOST_LINE'),
+    ],
+)  # fmt: skip
+def test_files_made_to_harm_are_refused(tmp_path, monkeypatch, name, make, read, says):
+    for size in ('CHUNK', 'UNPACKED'):
+        monkeypatch.setenv(f'SGP_MOST_{size}_MB', '1')
+    path = tmp_path / name
+    make(path)
+    with pytest.raises(SgpError, match=says):
+        read(path)
+
+
+def test_a_bound_may_be_raised(tmp_path, monkeypatch):
+    monkeypatch.setenv('SGP_MOST_ALIASES', '1000')
+    (tmp_path / 'x.yaml').write_text(
+        '/**: {ros__parameters: {a: &a 1.0, b: [' + '*a,' * 200 + ']}}'
+    )
+    assert len(load_parameters(tmp_path / 'x.yaml')['b']) == 200
+
+
+def test_a_mat_file_that_ends_its_reader_ends_nothing_else(samples, tmp_path, monkeypatch):
+    """It is read in a process of its own, here by one that is killed at once."""
+    monkeypatch.setattr(sys, 'executable', '/bin/false')
+    with pytest.raises(SgpError, match='its reader ended with status'):
+        load_columns(samples['mat'], [])
+
+
+def test_quoted_numbers_are_read(tmp_path):
+    (tmp_path / 'x.csv').write_text('"t","q"\n"0.0","1.5"\n"0.1","2.5"\n')
+    columns, _ = load_columns(tmp_path / 'x.csv', [])
+    assert columns['q'].tolist() == ['1.5', '2.5']
+
+
+def test_a_command_ends_with_status_2_and_one_line(tmp_path):
+    _view(tmp_path / 'x.db3')
+    done = subprocess.run(
+        [sys.executable, '-m', 'sgp_ros.cli', 'replay', str(tmp_path / 'x.db3'), '--robot',
+         'toy_pendulum', '--out', str(tmp_path / 'out')],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.count('\n') == 1
+    assert not (tmp_path / 'out').exists()
