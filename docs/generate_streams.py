@@ -166,7 +166,7 @@ def _soak_text(result):
     return (
         f"{result['joints']} joints at {result['rate_hz']:g} Hz, Panda's model, a buffer of "
         f'{result["budget"]}, refits, `qos.depth` {result["qos_depth"]}, {result["executor"]}; '
-        f'{result["minutes"]:.0f} minutes, of which the target wants 30. Of {result["published"]} '
+        f'{result["minutes"]:.0f} minutes (the target wants 30). Of {result["published"]} '
         f'messages {result["lost"]} did not arrive, and the node counted {result["counted_lost"]} '
         f'as missing. {result["refits"]} refits; the node took '
         f'{_percent(result["processor_share"], 0)} of a core. Resident memory went from '
@@ -207,7 +207,7 @@ def text():
         'WHEELS_COUNT': str(wheels['exact']['wheels']), 'FALSE_EXACT': drifting['exact'],
         'FALSE_BASIS': drifting['basis'], 'LIVE': _live(live), 'LIVE_TEXT': _live_text(live),
         'LIVE_BUDGET': str(live['budget']), 'SOAK': _soak(soak), 'SOAK_TEXT': _soak_text(soak),
-        'ALARMS': _alarms(alarms), 'ALARM_HOURS': f'{alarms["hours"]:.2g}',
+        'ALARM_BOUND': f'{-math.log(0.05) / alarms["hours"]:.0f}', 'ALARMS': _alarms(alarms), 'ALARM_HOURS': f'{alarms["hours"]:.2g}',
         'ALARM_GAIN': _percent(alarms['gain_lost'], 0),
         'ALARM_LASTING': f'{alarms["lasting_s"]:g}',
         'LIVE_SECONDS': f'{live["seconds"]:g}', 'CORES': live['environment']['cores'],
