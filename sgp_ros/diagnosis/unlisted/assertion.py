@@ -18,12 +18,23 @@ from sgp_ros.diagnosis.criteria import LACKING, LEAST_LAW, SIGNIFICANT
 from sgp_ros.diagnosis.decide.certainty import probabilities
 from sgp_ros.diagnosis.decide.decision import Decision, Scale, decide, refused
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, moved
+from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
+from sgp_ros.diagnosis.explain.fitted_model import Model, floors
+from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.unlisted.search import Searched, law_of, own_effects, search
+from sgp_ros.physics.catalogue import CONSTANT_LOAD, COULOMB_FRICTION, VISCOUS_FRICTION
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 
 MOST_JOINTS = 3
 """Joints at which a law is looked for, those first of which most is left or explained."""
 _RIVALS = 8
+_STEPS = 8
+_PLAIN = (COULOMB_FRICTION, VISCOUS_FRICTION, CONSTANT_LOAD)
+_NONE = 2.0
+"""Standard deviations from zero below which a coefficient cannot be told from none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +85,10 @@ def _joints(equations: Equations, comparison: Comparison, decision: Decision) ->
 
 def _decided(equations: Equations, found: Explained, searched: Searched) -> Explained:
     """Return what is decided with the laws of one more joint."""
+    if _says_less(equations, searched):
+        plain = _with_plain_laws(equations, searched)
+        comparison = replace(found.comparison, more=(*found.comparison.more, *plain))
+        return replace(found, comparison=comparison, decision=decide(equations, comparison))
     why = _objection(equations, found.comparison, searched)
     if not why:
         comparison = replace(
@@ -86,6 +101,42 @@ def _decided(equations: Equations, found: Explained, searched: Searched) -> Expl
     decision = refused(equations, found.comparison, found.decision, searched.joint)
     decision = replace(decision, rivals=(*searched.laws[:_RIVALS], *decision.rivals))
     return replace(found, decision=decision, why_not=found.why_not | {searched.joint: why})
+
+
+def _says_less(equations: Equations, searched: Searched) -> bool:
+    """Return whether the best formula has a coefficient that cannot be told from none.
+
+    It then says what a shorter one says, which is a listed effect.
+    """
+    law = law_of(searched.laws[0], searched.joint) if searched.laws else None
+    if law is None:
+        return False
+    model = searched.laws[0]
+    index = [s is law for s in model.effects].index(True)
+    std = reported_std(model, Columns(equations))[index]
+    numbers = law.report(equations.motion)
+    names = [q.name for q in law.effect.coefficient_quantities(law.kind)]
+    return any(
+        abs(float(numbers[name])) < _NONE * std[name]
+        for name in names
+        if name in numbers and name in std and np.isfinite(std[name])
+    )
+
+
+def _with_plain_laws(equations: Equations, searched: Searched) -> tuple[Model, ...]:
+    """Return the model of the best formula with one plain law of friction or load in its place."""
+    best, columns = searched.laws[0], Columns(equations)
+    law = law_of(best, searched.joint)
+    others = tuple(s for s in best.effects if s is not law)
+    start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
+    return tuple(
+        fit(
+            columns, (*others, EffectAt(effect, Place(searched.joint))), start,
+            is_free=is_free, steps=_STEPS,
+        )
+        for effect in _PLAIN
+        for is_free in dict.fromkeys((False, best.is_free))
+    )  # fmt: skip
 
 
 def _objection(equations: Equations, comparison: Comparison, searched: Searched) -> str:
