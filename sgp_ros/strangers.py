@@ -1,4 +1,4 @@
-"""Files of strangers: bounds of size, depth and count, and one error for whatever reading raises.
+"""Files among strangers: bounds of size, depth and count, one error for whatever reading raises.
 
 A user who means such a file raises the bound that the message names, by an environment variable:
 `SGP_MOST_TEXT_MB=64 sgp identify ...`.
@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import os
 import stat
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 from xml.etree import ElementTree as ET
 
 import yaml
@@ -26,6 +27,7 @@ DEFAULTS = {
 of one chunk of a recording [MB]; nesting, entries and aliases of YAML or XML; links of a robot;
 characters of a line; time for a file that is read in a process of its own [s]."""
 _MEGABYTE = 1 << 20
+_GROWING = '.sgp_growing_'
 YAMLError = yaml.YAMLError
 
 
@@ -68,6 +70,45 @@ def require_file(path: Path, name: str = '') -> None:
         raise TooMuchError(f'{path} is no plain file', 'a file', 'copy its content into one')
     if name:
         require_within(found.st_size / _MEGABYTE, name, f'size of {path} in MB')
+
+
+def create_beside(path: Path) -> tuple[BinaryIO, Path]:
+    """Make a new file of an unguessable name beside `path`, to be renamed once it is complete.
+
+    It is nobody's link and no other run's file, also in a folder that everybody may write to.
+    """
+    prefix = f'{_GROWING}{os.getpid()}_'
+    handle, name = tempfile.mkstemp(prefix=prefix, suffix=f'.{path.name}', dir=path.parent)
+    mask = os.umask(0)
+    os.umask(mask)
+    os.fchmod(handle, 0o666 & ~mask)
+    return os.fdopen(handle, 'wb'), Path(name)
+
+
+def take_place(stream: BinaryIO, growing: Path, path: Path) -> None:
+    """Close a complete file and give it its name; the disk has it before the name is seen."""
+    stream.flush()
+    os.fsync(stream.fileno())
+    stream.close()
+    growing.replace(path)
+
+
+def remove_growing(folder: Path) -> None:
+    """Remove what runs that were killed have left in a folder."""
+    for path in folder.glob(f'{_GROWING}*'):
+        process = path.name.removeprefix(_GROWING).partition('_')[0]
+        if process.isdecimal() and not _is_alive(int(process)):
+            path.unlink(missing_ok=True)
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
 
 
 def read_text(path: Path) -> str:

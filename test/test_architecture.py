@@ -45,7 +45,7 @@ LAYERS = {
     'diagnosis': NUMERIC | {'gp', 'physics', 'rigid', 'robots', 'engine', 'batch', 'errors'},
     'report': {
         'numpy', 'matplotlib', 'jinja2', 'markupsafe', 'gp', 'physics', 'rigid', 'robots',
-        'engine', 'batch', 'diagnosis', 'errors',
+        'engine', 'batch', 'diagnosis', 'strangers', 'errors',
     },
     'ros': MESSAGES | {'optional', 'report.layouts'} | {
         'numpy', 'yaml', 'engine', 'physics', 'robots', 'simulation', 'diagnosis', 'recordings',

@@ -244,7 +244,7 @@ def test_results_replace_older_ones_and_leave_no_parts(wheel, tmp_path):
     first = (tmp_path / 'out' / 'robot_identified.yaml').read_text()
     assert main(arguments) == 0
     assert (tmp_path / 'out' / 'robot_identified.yaml').read_text() == first
-    assert not list((tmp_path / 'out').glob('*.part'))
+    assert not list((tmp_path / 'out').glob('.sgp_growing_*'))
 
 
 def test_help_shows_an_example(capsys):

@@ -6,7 +6,6 @@ Settings stand in ROS 2 parameter files, the same for the node and for the comma
 from __future__ import annotations
 
 import hashlib
-import os
 import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -17,7 +16,14 @@ import yaml
 
 from sgp_ros.engine.samples import SettingValue
 from sgp_ros.errors import ConfigError
-from sgp_ros.strangers import load_yaml, readable, require_file, require_within
+from sgp_ros.strangers import (
+    create_beside,
+    load_yaml,
+    readable,
+    require_file,
+    require_within,
+    take_place,
+)
 
 NODE_ONLY = frozenset({
     'command.type', 'diagnosis.window', 'diagnostics.period', 'joints', 'model.path',
@@ -164,12 +170,10 @@ def _parameter_file(settings: Mapping[str, SettingValue]) -> dict[str, object]:
 
 
 def _replace(path: Path, write: Callable[[BinaryIO], object]) -> None:
-    part = path.with_name(f'{path.name}.{os.getpid()}.part')
+    stream, growing = create_beside(path)
     try:
-        with part.open('wb') as file:
-            write(file)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
+        write(stream)
+        take_place(stream, growing, path)
     finally:
-        part.unlink(missing_ok=True)
+        stream.close()
+        growing.unlink(missing_ok=True)

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
 from types import TracebackType
+from typing import BinaryIO
 
 import numpy as np
 from mcap.writer import Writer
@@ -33,6 +34,7 @@ from sgp_ros.recordings.messages import (
 )
 from sgp_ros.recordings.topics import CHANGES_TOPIC
 from sgp_ros.recordings.typestore import definition, full_type, new_message, serialize
+from sgp_ros.strangers import create_beside, take_place
 
 
 class RecordingWriter:
@@ -68,8 +70,11 @@ class RecordingWriter:
         self._changes_topic = changes_topic
         self._schemas: dict[str, int] = {}
         self._channels: dict[tuple[str, str], int] = {}
-        self._growing = self.path if is_live else self.path.with_name(self.path.name + '.part')
-        self._file = self._growing.open('wb')
+        self._file: BinaryIO
+        if is_live:
+            self._file, self._growing = self.path.open('wb'), self.path
+        else:
+            self._file, self._growing = create_beside(self.path)
         self._writer = Writer(self._file)
         self._writer.start(profile='ros2', library='sgp_ros')
         _prepare(command_type)
@@ -126,10 +131,10 @@ class RecordingWriter:
             return
         try:
             self._writer.finish()  # type: ignore[no-untyped-call] # mcap leaves it without types
+            if self._growing != self.path:
+                take_place(self._file, self._growing, self.path)
         finally:
             self._file.close()
-        if self._growing != self.path:
-            self._growing.replace(self.path)
 
     def __enter__(self) -> Self:
         """Return the writer itself."""

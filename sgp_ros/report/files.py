@@ -8,20 +8,25 @@ an earlier verdict. A file that was changed since is somebody else's and stays.
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
 
+from sgp_ros.errors import ConfigError
+from sgp_ros.strangers import create_beside, remove_growing, take_place
+
 
 def write_bytes(path: Path, content: bytes) -> None:
     """Write `content` to a temporary name beside `path`, then rename it."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    growing = path.with_name(f'{path.name}.part')
+    stream, growing = create_beside(path)
     try:
-        growing.write_bytes(content)
-        os.replace(growing, path)  # noqa: PTH105 - atomic, also over an existing file
+        stream.write(content)
+        take_place(stream, growing, path)
     except BaseException:
+        stream.close()
         growing.unlink(missing_ok=True)
         raise
 
@@ -35,13 +40,46 @@ def write_text(path: Path, content: str) -> None:
 def replacing_results(out: Path, command: str) -> Iterator[None]:
     """Let the results that are written inside take the place of those of the last run.
 
-    After an error nothing is removed.
+    After an error nothing is removed. Two runs into one folder would mix their results, so the
+    second one is refused; the lock ends with its process, however that ends.
 
     Args:
         out: folder of the results, which is made.
         command: whose results they are; those of other commands stay.
+
+    Raises:
+        ConfigError: another run writes there.
     """
     out.mkdir(parents=True, exist_ok=True)
+    with _locked(out / f'.sgp_{command}.lock'):
+        remove_growing(out)
+        with _listing_results(out, command):
+            yield
+
+
+@contextlib.contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
+    handle = os.open(path, flags, 0o644)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            who = os.pread(handle, 200, 0).decode(errors='replace').strip() or 'unknown'
+            raise ConfigError(
+                f'{path.parent} is being written to by another run ({who})',
+                'a folder of its own for each', 'choose another one with --out, or wait',
+            ) from error  # fmt: skip
+        os.ftruncate(handle, 0)
+        os.pwrite(handle, f'process {os.getpid()}\n'.encode(), 0)
+        yield
+        path.unlink(missing_ok=True)
+    finally:
+        os.close(handle)
+
+
+@contextlib.contextmanager
+def _listing_results(out: Path, command: str) -> Iterator[None]:
     listing = out / f'.sgp_{command}.json'
     before = _marks(out)
     yield
@@ -56,5 +94,9 @@ def replacing_results(out: Path, command: str) -> Iterator[None]:
 
 def _marks(folder: Path) -> dict[str, list[int]]:
     """Return time of change [ns] and size of every file in a folder, folders in it left out."""
-    stats = {path.name: path.stat() for path in folder.iterdir() if path.is_file()}
+    stats = {
+        path.name: path.stat()
+        for path in folder.iterdir()
+        if path.is_file() and path.suffix != '.lock'
+    }
     return {name: [found.st_mtime_ns, found.st_size] for name, found in stats.items()}

@@ -174,7 +174,7 @@ def test_a_recording_that_tells_nothing_ends_in_one_line(
     error = capsys.readouterr().err.strip()
     assert said in error
     assert '\n' not in error
-    assert not list((tmp_path).rglob('*.part'))
+    assert not list((tmp_path).rglob('.sgp_growing_*'))
     assert not (tmp_path / 'out').exists()
 
 

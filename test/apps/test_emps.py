@@ -78,7 +78,7 @@ def test_metrics_follow_the_contract(replayed):
     assert metrics['timing']['realtime_factor'] > 0
     for name in ('predictions.mcap', 'report.html', 'robot_identified.yaml', 'model.npz'):
         assert (out / name).is_file()
-    assert not list(out.glob('*.part'))
+    assert not list(out.glob('.sgp_growing_*'))
 
 
 def test_the_report_is_one_self_contained_page(replayed):

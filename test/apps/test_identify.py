@@ -169,7 +169,7 @@ def test_a_result_of_an_earlier_run_does_not_pass_for_one_of_this(tmp_path):
     assert main(['simulate', 'linear_axis', '--duration', '10', '--out', str(tmp_path)]) == 0
     assert main(_command(tmp_path / 'linear_axis.mcap', 'linear_axis', tmp_path)) == 0
     assert not (tmp_path / 'robot_identified.urdf').exists()
-    assert not list(tmp_path.glob('*.part'))
+    assert not list(tmp_path.glob('.sgp_growing_*'))
 
 
 def test_recordings_to_score_on_keep_apart_where_their_names_do_not():

@@ -195,7 +195,7 @@ def test_the_page_opens_with_the_sentence_and_needs_no_other_file(tmp_path):
     stems = {path.stem for path in tmp_path.glob('*.png')}
     assert stems == {'location', 'others', 'time', 'bands', 'law', 'dependence', 'proof'}
     assert page.count('src="data:image/png;base64,') == len(stems - {'dependence'})
-    assert not list(tmp_path.glob('*.part'))
+    assert not list(tmp_path.glob('.sgp_growing_*'))
 
 
 @pytest.mark.parametrize(

@@ -53,7 +53,7 @@ def test_the_page_says_the_finding_first_and_compares_with_the_truth(finished, t
     assert 'true value' in page
     content_of(page)
     assert {p.name for p in paths} >= {'report.html', 'parameters.png', 'calibration.png'}
-    assert not list(tmp_path.glob('*.part'))
+    assert not list(tmp_path.glob('.sgp_growing_*'))
 
 
 def test_texts_from_outside_are_escaped(finished, tmp_path):
