@@ -123,7 +123,7 @@ def doubted_if_none(finding: Finding, effect: EffectAt) -> Finding:
 
 
 def alternatives(decision: Decision, chances: Probabilities) -> tuple[Finding, ...]:
-    """Return the rivals of the asserted findings, best first."""
+    """Return the rivals of the asserted findings, best first; what was refused is doubted."""
     taken = {s.key for s in decision.model.effects}
     found: list[Finding] = []
     for model in decision.rivals:
@@ -131,7 +131,8 @@ def alternatives(decision: Decision, chances: Probabilities) -> tuple[Finding, .
             if candidate.key in taken or len(found) >= MOST_ALTERNATIVES:
                 continue
             taken.add(candidate.key)
-            found.append(_finding(decision, model, i, {}, chances, why=chances.why(model)))
+            rival = _finding(decision, model, i, {}, chances, why=chances.why(model))
+            found.append(replace(rival, probability=min(rival.probability, DOUBTED)))
     return tuple(found)
 
 

@@ -28,8 +28,8 @@ from sgp_ros.diagnosis.decide.cross_validation import without
 from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision, Scale
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
 from sgp_ros.diagnosis.explain.comparison import Comparison
+from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.joint_search import is_credible
 from sgp_ros.diagnosis.result import Difference, Finding
 from sgp_ros.physics.parts import JOINT, MOTOR
 

@@ -23,8 +23,8 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import EVIDENCE, STRUCTURE_LEAST_SHARE
 from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.joint_search import is_credible
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.locate.remainder import (
     PARTS,

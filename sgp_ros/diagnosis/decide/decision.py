@@ -37,8 +37,8 @@ from sgp_ros.diagnosis.criteria import (
 )
 from sgp_ros.diagnosis.decide.cross_validation import repeatable, structure, supported, without
 from sgp_ros.diagnosis.explain.comparison import Comparison
+from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.joint_search import is_credible
 from sgp_ros.physics.parts import JOINT, MOTOR
 
 UNKNOWN = 'unknown'
@@ -149,8 +149,9 @@ class Scale:
         return np.asarray((told * self.shares(model) / limits).max(axis=0))
 
     def counts(self, model: Model) -> bool:
-        """Return whether effects are large enough and do not cancel each other, or the bodies."""
-        return self.is_sound(model) and min(model.shares) > COUNTED_SHARE
+        """Return whether effects are large enough, credible, and do not cancel each other."""
+        is_large = self.is_sound(model) and min(model.shares) > COUNTED_SHARE
+        return is_large and is_credible(model)
 
     def is_sound(self, model: Model) -> bool:
         """Return whether effects do not merely cancel each other, or the bodies."""

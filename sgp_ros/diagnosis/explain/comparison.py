@@ -11,7 +11,7 @@ from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
-from sgp_ros.diagnosis.explain.joint_search import by_joint, uncoupled
+from sgp_ros.diagnosis.explain.joint_search import by_joint, uncoupled, usual
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.effect_at import EffectAt
@@ -93,14 +93,12 @@ def _plain(columns: Columns, models: Iterable[Model]) -> Iterator[Model]:
 def _more(columns: Columns, best: Model) -> list[Model]:
     """Return models of a search joint by joint, where the best model leaves physics.
 
-    With bodies as the best model has them, and free.
+    From that model, and from what nearly every joint has, with bodies that may differ.
     """
     if (best.mean_square / best.frame.equations.power).max() < COUNTED_SHARE:
         return []
-    found = by_joint(columns, best)
-    if not best.is_free:
-        free = fit(columns, (), best.sigma, is_free=True)
-        found += by_joint(columns, free)
+    free = fit(columns, (), best.sigma, is_free=True)
+    found = [*by_joint(columns, best), *by_joint(columns, usual(columns, free))]
     return _ranked(m for m in found if len(m.effects) > 2)
 
 

@@ -16,27 +16,35 @@ from dataclasses import dataclass
 import numpy as np
 
 from sgp_ros.batch.least_squares import correlation_factor
+from sgp_ros.diagnosis.compare.settled import shows
 from sgp_ros.diagnosis.criteria import (
     COUNTED_SHARE,
     INDEPENDENT_ROWS,
     PER_EFFECT,
     PER_PARAMETER,
-    SLIGHT_REST,
 )
 from sgp_ros.diagnosis.explain.candidates import fit
-from sgp_ros.diagnosis.explain.fitted_model import Model, beyond_plain
+from sgp_ros.diagnosis.explain.credibility import is_credible
+from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.diagnosis.explain.screening import WIDEST, Trial, are_apart, screen
-from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.diagnosis.explain.screening import Trial, screen
+from sgp_ros.physics.catalogue import (
+    ARMATURE,
+    CONSTANT_LOAD,
+    COULOMB_FRICTION,
+    EFFECTS,
+    VISCOUS_FRICTION,
+)
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import JOINT, MOTOR, PLACES, Place
-from sgp_ros.robots.observed_motion import ObservedMotion
 
 SWEEPS = 4
 """Most sweeps over the joints."""
 TRIALS = 3
 """Screened candidates that are fitted."""
+USUAL = (COULOMB_FRICTION, VISCOUS_FRICTION, ARMATURE, CONSTANT_LOAD)
+"""Laws that nearly every motorised joint has."""
 
 
 def gain(trial: Model, model: Model, *, is_whole: bool = True) -> float:
@@ -97,13 +105,39 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
         for block in _blocks(model):
             model = _shrunk(columns, _grown(columns, model, block), block)
         if model.key == before:
-            break
-    if model is start:
+            coupled = _best(model, _coupled(columns, model))
+            if coupled is None:
+                break
+            model = coupled
+    if model is start and len(model.effects) <= 2:
         return []
     model = fit(columns, model.effects, model.sigma, is_free=model.is_free, w=model.w, rounds=2,
                 steps=6)  # fmt: skip
     rivals = [t for block in _blocks(model) for t in _changes(columns, model, block)]
     return [m for m in (model, *rivals) if m.effects and is_credible(m)]
+
+
+def usual(columns: Columns, base: Model) -> Model:
+    """Return the model with the laws that nearly every joint has, where they can be seen.
+
+    A search that starts from nothing adds first what stands best for all of them together.
+    """
+    motion = base.frame.equations.motion
+    effects = tuple(
+        EffectAt(law, place)
+        for law in USUAL
+        for place in law.places(motion)
+        if motion.moves[place.joint] and shows(law, place, motion)
+    )
+    while True:
+        model = fit(columns, effects, base.sigma, is_free=base.is_free, w=base.w)
+        pairs = list(zip(model.effects, model.filtered_shares, strict=True))
+        kept = [s for s, _ in pairs if s.is_possible(motion)]
+        if len(kept) == len(pairs):
+            kept = [s for s, share in pairs if share > COUNTED_SHARE]
+        if len(kept) == len(pairs):
+            return model
+        effects = tuple(EffectAt(s.effect, s.place) for s in kept)
 
 
 def _blocks(model: Model) -> Iterator[_Block]:
@@ -136,39 +170,6 @@ def _best(model: Model, trials: Iterable[Model], *, is_whole: bool = True) -> Mo
     gains = {t: gain(t, model, is_whole=is_whole) for t in trials if is_credible(t)}
     best = max(gains, key=lambda t: gains[t], default=None)
     return best if best is not None and gains[best] > 0.0 else None
-
-
-def is_credible(model: Model) -> bool:
-    """Return whether all effects have signs, sizes and regions that they can have."""
-    motion = model.frame.equations.motion
-    is_finite = model.is_possible() and bool(np.isfinite(model.score))
-    is_finite = is_finite and are_apart(model.effects, motion)
-    power = model.frame.equations.power
-    return is_finite and all(
-        _is_confined(s, motion) and _is_needed(s, motion, power) for s in model.effects
-    )
-
-
-def _is_needed(s: EffectAt, motion: ObservedMotion, power: np.ndarray) -> bool:
-    """Return whether plain laws would leave more of a law than is adequate in any case.
-
-    Not so one whose shape is at its lower bound: there it is one of them.
-    """
-    if not s.effect.plain or s.place.source >= 0:
-        return True
-    if s.is_least(motion):
-        return False
-    left = beyond_plain(s, s.columns(motion) @ s.coefficients, motion)
-    return float((left**2).mean()) > SLIGHT_REST * float(power[s.place.joint])
-
-
-def _is_confined(s: EffectAt, motion: ObservedMotion) -> bool:
-    """Return whether an effect of a region of positions has one: a stop everywhere is a spring."""
-    inside = s.effect.interval(s, motion)
-    if inside is None or inside[0] != 'position':
-        return True
-    q = motion.wrapped[:, s.place.joint]
-    return float(sum(((q >= a) & (q <= b)).mean() for a, b in inside[1])) < WIDEST
 
 
 def _grown(columns: Columns, model: Model, block: _Block) -> Model:
@@ -239,6 +240,37 @@ def uncoupled(columns: Columns, without: Model, coupled: EffectAt) -> Iterator[M
                 yield trial
                 break
             alone = kept
+
+
+def _coupled(columns: Columns, model: Model) -> Iterator[Model]:
+    """Yield models with a law that couples two joints in place of what stands for it there.
+
+    The inverse of `uncoupled`: several laws, none of which could go alone, make room for one.
+    """
+    blocks = [b for b in _blocks(model) if b.joints]
+    for block in blocks:
+        laws = [e for e in block.effects if e.plain and e.has_source]
+        for s in _distinct(screen(columns, model, laws, block.joints), 1):
+            ends = {s.place.joint, s.place.source}
+            kept = tuple(o for o in model.effects if not _is_part(o, s, ends))
+            trial = fit(columns, kept, model.sigma, is_free=model.is_free, w=model.w,
+                        still=len(kept))  # fmt: skip
+            found = screen(columns, trial, [s.effect], block.joints)
+            for best in _distinct([t for t in found if t[1].place == s.place], 1):
+                trial = _fitted(columns, trial, (kept, len(kept)), best)
+                for other in blocks:
+                    if ends & set(other.joints or ()):
+                        trial = _grown(columns, trial, other)
+                yield trial
+
+
+def _is_part(other: EffectAt, coupled: EffectAt, ends: set[int]) -> bool:
+    """Return whether a law could stand for a part of one that couples two joints.
+
+    Couplings of the two, and what it says of its own joint; the source may have that beside it.
+    """
+    is_own = other.name in coupled.effect.plain and other.place.joint == coupled.place.joint
+    return is_own or {other.place.joint, other.place.source} == ends
 
 
 def _distinct(found: Sequence[Trial], count: int) -> list[EffectAt]:

@@ -8,8 +8,14 @@ import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.criteria import EVIDENCE, INDEPENDENT_ROWS
-from sgp_ros.diagnosis.decide.cross_validation import LEAST_ROWS, left_out, structure, support
-from sgp_ros.diagnosis.decide.decision import Scale, _supported, decide
+from sgp_ros.diagnosis.decide.cross_validation import (
+    LEAST_ROWS,
+    left_out,
+    structure,
+    support,
+    supported,
+)
+from sgp_ros.diagnosis.decide.decision import Scale, decide
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.locate.remainder import PARTS, PIECES, parts_of
@@ -138,8 +144,9 @@ def test_a_model_with_an_effect_without_support_gives_way(damped):
         for names in (('viscous_friction', 'cogging'), ('viscous_friction',))
     )
     scale = Scale.of(damped, Comparison(*bases, (right,), (rich,)))
-    assert _supported(damped, scale, [rich, right]) is right
-    assert _supported(damped, scale, [rich]) is None
+    floor = scale.floor * scale.power
+    assert supported(damped, scale.rows, floor, [rich, right]) is right
+    assert supported(damped, scale.rows, floor, [rich]) is None
 
 
 def test_an_effect_without_support_is_not_asserted(equations_for):

@@ -102,8 +102,8 @@ def test_effects_that_cancel_each_other_do_not_count(damped):
     scale = Scale.of(damped, _comparison(damped))
     opposed.__dict__['shares'] = agreeing.__dict__['shares'] = [1.0, 1.0]
     assert opposed.net_share == pytest.approx(agreeing.net_share)
-    assert scale.counts(agreeing)
-    assert not scale.counts(opposed)
+    assert scale.is_sound(agreeing)
+    assert not scale.is_sound(opposed)
 
 
 def test_a_share_is_measured_before_the_filter(equations_for):

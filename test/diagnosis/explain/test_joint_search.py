@@ -9,8 +9,9 @@ import pytest
 
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE
 from sgp_ros.diagnosis.explain.candidates import fit, residual_of
+from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import floors
-from sgp_ros.diagnosis.explain.joint_search import by_joint, gain, is_credible, uncoupled
+from sgp_ros.diagnosis.explain.joint_search import by_joint, gain, uncoupled, usual
 from sgp_ros.diagnosis.explain.regression import Columns, Frame
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
@@ -169,3 +170,33 @@ def test_several_waves_are_found_at_one_joint(equations_for):
     assert is_credible(both)
     near = both.effects[0].with_shape(both.effects[1].shape + 0.1)
     assert not is_credible(replace(both, effects=(near, both.effects[1])))
+
+
+def test_the_usual_laws_of_every_joint_are_those_that_can_be_there(equations):
+    """None pushes, none is smaller than what counts as physics."""
+    columns, base = _start(equations)
+    found = usual(columns, base)
+    assert {('viscous_friction', 0), ('viscous_friction', 1)} <= _keys(found)
+    assert all(s.is_possible(equations.motion) for s in found.effects)
+    assert min(found.filtered_shares) > COUNTED_SHARE
+
+
+def test_a_coupling_law_takes_the_place_of_all_that_stands_for_it(equations_for):
+    """Friction of both joints and two couplings imitate a motor that turns with both."""
+
+    def force(_t, q, v):
+        both = 0.5 * np.tanh((v[0] + v[1]) / 1e-3) + 0.4 * (v[0] + v[1])
+        return -both - 0.6 * v[0], -both
+
+    _, equations = equations_for(simulate(CHAINS[2], 7, 10.0, force=force))
+    columns, base = _start(equations)
+    plain = [
+        EffectAt(EFFECTS[n], Place(j))
+        for n in ('coulomb_friction', 'viscous_friction') for j in (0, 1)
+    ]  # fmt: skip
+    couplings = [
+        EffectAt(EFFECTS['joint_coupling'], Place(j, 'torque', source=1 - j)) for j in (0, 1)
+    ]
+    imitation = fit(columns, (*plain, *couplings), base.sigma)
+    found, *_ = by_joint(columns, imitation)
+    assert _keys(found) in ({('coupled_friction', j), ('viscous_friction', 0)} for j in (0, 1))

@@ -1,0 +1,44 @@
+"""Whether the laws of a fitted model are what their names say."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sgp_ros.diagnosis.criteria import SLIGHT_REST
+from sgp_ros.diagnosis.explain.fitted_model import Model, beyond_plain
+from sgp_ros.diagnosis.explain.screening import WIDEST, are_apart
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.robots.observed_motion import ObservedMotion
+
+
+def is_credible(model: Model) -> bool:
+    """Return whether all effects have signs, sizes and regions that they can have."""
+    motion = model.frame.equations.motion
+    is_finite = model.is_possible() and bool(np.isfinite(model.score))
+    is_finite = is_finite and are_apart(model.effects, motion)
+    power = model.frame.equations.power
+    return is_finite and all(
+        _is_confined(s, motion) and _is_needed(s, motion, power) for s in model.effects
+    )
+
+
+def _is_needed(s: EffectAt, motion: ObservedMotion, power: np.ndarray) -> bool:
+    """Return whether plain laws would leave more of a law than is adequate in any case.
+
+    Not so one whose shape is at its lower bound: there it is one of them.
+    """
+    if not s.effect.plain or s.place.source >= 0:
+        return True
+    if s.is_least(motion):
+        return False
+    left = beyond_plain(s, s.columns(motion) @ s.coefficients, motion)
+    return float((left**2).mean()) > SLIGHT_REST * float(power[s.place.joint])
+
+
+def _is_confined(s: EffectAt, motion: ObservedMotion) -> bool:
+    """Return whether an effect of a region of positions has one: a stop everywhere is a spring."""
+    inside = s.effect.interval(s, motion)
+    if inside is None or inside[0] != 'position':
+        return True
+    q = motion.wrapped[:, s.place.joint]
+    return float(sum(((q >= a) & (q <= b)).mean() for a, b in inside[1])) < WIDEST
