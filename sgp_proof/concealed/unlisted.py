@@ -164,6 +164,7 @@ def main():
     parser.add_argument('worlds', type=Path)
     parser.add_argument('--seal', action='store_true', help='write the hashes of the answers')
     parser.add_argument('--outputs', type=Path, help='where diagnoses are kept')
+    parser.add_argument('--diagnosed', action='store_true', help='score what was diagnosed alone')
     arguments = parser.parse_args()
     answers = sorted((arguments.worlds / 'answers').glob('*.json'))
     if arguments.seal:
@@ -176,14 +177,14 @@ def main():
         if sealed.get(path.stem) != hash_of(path):
             raise SystemExit(f'{path.name} is not the answer that was sealed')
         out = outputs / path.stem
-        if not (out / 'outcome.json').exists():
+        if not (out / 'outcome.json').exists() and not arguments.diagnosed:
             diagnose_case(arguments.worlds / 'cases' / path.stem, out)
         if not (out / 'diagnosis.json').exists():
             continue
         diagnosis = json.loads((out / 'diagnosis.json').read_text(encoding='utf-8'))
         rows.append(score(json.loads(path.read_text(encoding='utf-8')), diagnosis))
         print(json.dumps(rows[-1]), flush=True)
-    report = {'summary': summary(rows), 'cases': rows}
+    report = {'sealed': len(answers), 'summary': summary(rows), 'cases': rows}
     write_result(RESULTS / 'unlisted.json', report)
     print(json.dumps(report['summary'], indent=1))
 
