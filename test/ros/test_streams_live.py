@@ -124,9 +124,7 @@ def test_lost_messages_are_counted(graph: Graph) -> None:
     assert graph.count('lost') > 0
 
 
-@pytest.mark.parametrize(
-    'reliability', [ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.RELIABLE]
-)
+@pytest.mark.parametrize('reliability', ['BEST_EFFORT', 'RELIABLE'])
 def test_a_publisher_that_is_restarted_is_heard_again(graph: Graph, reliability: str) -> None:
     graph.start('sgp_node', **MEASURED)
     quality = QoSProfile(depth=100, reliability=ReliabilityPolicy[reliability])
