@@ -62,13 +62,13 @@ def test_an_arm_with_urdf_and_bag():
 
 
 def test_a_mujoco_model_and_a_log_of_its_drives():
-    """The friction that MuJoCo had and the file has not, in the corrected file."""
+    """The damping that MuJoCo had beyond that of the file, and its sum in the corrected file."""
     run('mujoco')
     _, found = _found()
-    assert found['elbow', 'coulomb_friction']['level']['value'] == pytest.approx(0.4, rel=0.15)
+    assert found['elbow', 'viscous_friction']['b']['value'] == pytest.approx(0.5, rel=0.1)
     text = next(Path('out/export').glob('*.xml')).read_text()
-    loss = re.search(r'<joint[^>]*name="elbow"[^>]*frictionloss="([\d.]+)"', text)
-    assert float(loss[1]) == pytest.approx(0.4, rel=0.15)
+    damping = re.search(r'<joint[^>]*name="elbow"[^>]*damping="([\d.]+)"', text)
+    assert float(damping[1]) == pytest.approx(0.6, rel=0.1)
 
 
 def test_a_law_of_ones_own(capsys):
