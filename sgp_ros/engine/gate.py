@@ -7,8 +7,8 @@ Two tests, each with room for what real streams do:
   window, which no impact and no reversal of a real motion comes near.
 * **Innovations.** An error larger than `LARGEST` deviations, where a deviation is the larger one
   of what the model expects and of the root mean square of the errors so far. By Chebyshev's
-  inequality no distribution of errors whatever exceeds it more often than once in
-  `LARGEST^2` = 400 samples; what simulated streams do is measured by
+  inequality errors whose mean square stays the same exceed it at most once in `LARGEST^2` = 400
+  samples, whatever their distribution; what simulated streams do is measured by
   `sgp_proof.robustness.gates`.
 
 A robot may change: once half of the last `PATIENCE` times hold a refusal, equations are learned

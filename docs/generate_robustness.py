@@ -1,0 +1,71 @@
+"""Write docs/robustness.md from the committed results: `python docs/generate_robustness.py`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from sgp_ros.engine.gate import LARGEST
+
+ROOT = Path(__file__).parents[1]
+TARGET = Path(__file__).parent / 'robustness.md'
+TEMPLATE = Path(__file__).parent / 'templates' / 'robustness.txt'
+
+
+def _load(name):
+    path = ROOT / 'sgp_proof/results' / f'{name}.json'
+    return json.loads(path.read_text(encoding='utf-8'))
+
+
+def _table(title, counts):
+    lines = [f'| {title} | number |', '|---|---|']
+    return '\n'.join([*lines, *(f'| {name} | {n} |' for name, n in counts.items())])
+
+
+def _faults(result):
+    found = result['faults']
+    return 'none' if not found else '; '.join(f'{what}: {n}' for what, n in found.items())
+
+
+def _garbage(summary):
+    rows = {name: found for name, found in summary.items() if isinstance(found, dict)}
+    lines = [
+        '| garbage | streams | within 10 % | median ratio | worst ratio |', '|---|---|---|---|---|',
+        *(
+            f'| {name} | {x["streams"]} | {x["within_10_percent"]} | {x["median"]:.3g} | '
+            f'{x["worst"]:.3g} |'
+            for name, x in rows.items()
+        ),
+    ]  # fmt: skip
+    return (
+        '\n'.join(lines)
+        if rows
+        else 'Not run yet: `python -m sgp_proof.robustness.gates garbage`.'
+    )
+
+
+def text() -> str:
+    """Return the page."""
+    events, files, gates = (_load(f'robust_{n}') for n in ('events', 'files', 'gates'))
+    summary = gates['summary']
+    rate = summary['falsely_refused'] / summary['equations']
+    machine = events['environment']
+    return TEMPLATE.read_text(encoding='utf-8').format(
+        EVENTS=events['events'], EVENT_RUNS=len(events['runs']), EVENT_FAULTS=_faults(events),
+        EVENT_MB=events['peak_megabytes'], EVENT_COUNTS=_table('event', events['counts']),
+        FILES=files['files'], FILE_FAULTS=_faults(files), FILE_MB=files['peak_megabytes'],
+        FILE_COUNTS=_table('format and outcome', files['outcomes']),
+        EQUATIONS=summary['equations'], REFUSED=summary['falsely_refused'], RATE=f'{1e2 * rate:.2g}',
+        LARGEST=f'{LARGEST:g}', BOUND=f'{1e2 / LARGEST**2:.2g}', STREAMS=len(gates['clean']),
+        GARBAGE=_garbage(summary),
+        MACHINE=f'{machine["processor"]}, Python {machine["python"]}, NumPy {machine["numpy"]}',
+    )  # fmt: skip
+
+
+def main() -> None:
+    """Write it."""
+    TARGET.write_text(text(), encoding='utf-8')
+
+
+if __name__ == '__main__':
+    main()
