@@ -26,6 +26,8 @@ _FAST = 'solref_friction', (0.004, 1.0)
 _HARD = 'solimp_friction', (0.99, 0.999, 0.001, 0.5, 2.0)
 _STEP_S = 0.001
 """Of a simulation whose file is made here: gains of stiff drives stay stable."""
+_MARGIN = 1e-4
+"""Of the triangle inequality of principal moments, above the rounding of a file."""
 _SMALLEST = '1e-9'
 
 
@@ -113,10 +115,25 @@ def _change_bodies(library: Any, spec: Any, handed: Handover, *, is_original: bo
         same = np.allclose(now, inertia, rtol=1e-6, atol=1e-9 * max(mass, 1e-9))
         if same and np.allclose([model.body_mass[b], *model.body_ipos[b]], [mass, *centre]):
             continue
+        inertia = _rounded_safely(inertia)
         body.explicitinertial = True
         body.mass, body.ipos = mass, centre
         body.fullinertia = [inertia[i, j] for i, j in
                             ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]  # fmt: skip
+
+
+def _rounded_safely(inertia: np.ndarray) -> np.ndarray:
+    """Return an inertia whose principal moments obey A + B >= C also after rounding, (3, 3).
+
+    A flat body lies on the boundary, and the file holds six digits.
+    """
+    moments, axes = np.linalg.eigh(inertia)
+    lack = moments[2] * (1.0 + _MARGIN) - moments[0] - moments[1]
+    if lack <= 0.0:
+        return inertia
+    moments[:2] += 0.5 * lack
+    raised: np.ndarray = axes @ np.diag(moments) @ axes.T
+    return raised
 
 
 def _shifts(library: Any, model: Any) -> list[np.ndarray]:
