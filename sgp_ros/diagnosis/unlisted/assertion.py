@@ -14,13 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import LACKING, LEAST_LAW, SIGNIFICANT
+from sgp_ros.diagnosis.criteria import LACKING, LEAST_LAW, SIGNIFICANT, SLIGHT_REST
 from sgp_ros.diagnosis.decide.certainty import probabilities
 from sgp_ros.diagnosis.decide.decision import Decision, Scale, decide, refused
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, moved
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
-from sgp_ros.diagnosis.explain.fitted_model import Model, floors
+from sgp_ros.diagnosis.explain.fitted_model import Model, floors, imbalance
+from sgp_ros.diagnosis.explain.joint_search import USUAL
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.unlisted.search import Searched, law_of, own_effects, search
@@ -66,11 +67,24 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
     for joint in _joints(equations, comparison, decision):
         listed = found.decision.tentative or found.decision.model
         searched = search(equations, Scale.of(equations, comparison), listed, joint)
-        if searched is None:
+        if searched is None or _is_slight(equations, listed, searched):
             continue
         found = replace(found, searched=(*found.searched, searched))
         found = _decided(equations, found, searched)
     return found
+
+
+def _is_slight(equations: Equations, listed: Model, searched: Searched) -> bool:
+    """Return whether the smooth force differs from usual laws by less than counts.
+
+    Friction that creeps a little near rest is friction.
+    """
+    joint, motion = searched.joint, equations.motion
+    if not all(s.effect in USUAL for s in own_effects(listed, joint)):
+        return False
+    ends = (imbalance(m, equations, motion)[:, joint] for m in (listed, searched.smooth))
+    apart = np.subtract(*ends)
+    return bool((apart**2).mean() < SLIGHT_REST * equations.power[joint])
 
 
 def _joints(equations: Equations, comparison: Comparison, decision: Decision) -> list[int]:

@@ -14,7 +14,7 @@ from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.unlisted.assertion import with_laws
 from sgp_ros.diagnosis.unlisted.formulas import formulas
-from sgp_ros.diagnosis.unlisted.search import law_of
+from sgp_ros.diagnosis.unlisted.search import law_of, search
 from sgp_ros.diagnosis.unlisted.shapes import GATES, smooth_forces
 from sgp_ros.physics.formula import read_formula
 from sgp_ros.physics.units import read_unit, unit_of
@@ -96,6 +96,21 @@ def test_a_listed_effect_keeps_its_name(equations_for, viscous):
     assert found.searched == ()
     assert found.decision is decision
     assert Scale.of(equations, comparison).worth(decision.model) > 0.0
+
+
+def test_friction_that_is_hardly_different_keeps_its_name(equations_for):
+    """A force without form says it better, but by less than counts."""
+
+    def force(_t, _q, v):
+        return (-0.6 * math.tanh(v[0] / 0.02) * (1.0 + 0.05 * math.cos(2.0 * v[0])),)
+
+    _, equations = equations_for(simulate(CHAINS[1], 11, 10.0, force=force))
+    comparison = compare_models(equations, lambda _share: None)
+    decision = decide(equations, comparison)
+    assert [s.name for s in decision.model.effects] == ['coulomb_friction']
+    scale = Scale.of(equations, comparison)
+    assert search(equations, scale, decision.model, 0) is not None
+    assert with_laws(equations, comparison, decision).decision is decision
 
 
 def test_every_formula_has_the_unit_of_a_force(equations_for, perfect):
