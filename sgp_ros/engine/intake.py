@@ -31,7 +31,9 @@ over nanoseconds, would not be finite."""
 LIMIT_MARGIN = 3.0
 """Speeds and efforts beyond this many times their limit are impossible."""
 PERSISTENT = 100
-"""States in a row after which the limits are taken for wrong, not the states."""
+"""States too many beyond the limits, from which on these are taken for wrong, not the states."""
+RARE = 10
+"""States within the limits that make up for one beyond: a sensor may err in one of eleven."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +108,7 @@ class Intake:
         commands: those taken.
         last_state_ns: stamp of the last state that was not a duplicate [ns]; None before.
         is_measured: whether a state with a measured effort has been accepted.
-        impossible: states in a row beyond the limits of the robot.
+        impossible: `RARE` for each state beyond the limits, less one for each within.
     """
 
     def __init__(
@@ -213,10 +215,15 @@ class Intake:
     def _is_possible(
         self, position: np.ndarray, velocity: np.ndarray | None, effort: np.ndarray | None
     ) -> bool:
-        """Whether a state is within the limits, or has been outside for `PERSISTENT` states."""
+        """Whether a state is within the limits, or the limits are wrong.
+
+        Those of many files stand for none. A motion passes them again and again, a glitch is rare.
+        """
+        if self.impossible > RARE * PERSISTENT:
+            return True
         is_within = self._limits.permit(position, velocity, effort)
-        self.impossible = 0 if is_within else self.impossible + 1
-        return is_within or self.impossible > PERSISTENT
+        self.impossible = max(self.impossible - 1, 0) if is_within else self.impossible + RARE
+        return is_within
 
     def _effort(
         self, sample: JointSample, order: np.ndarray | None

@@ -45,6 +45,7 @@ def test_it_writes_the_files_of_the_command(diagnosed, tmp_path):
     """The page, the content of diagnosis.json, and a robot that can be loaded."""
     assert diagnosed.save(tmp_path).is_file()
     content = json.loads((tmp_path / 'diagnosis.json').read_text())
+    assert set(content.pop('check')) == {'simple_pendulum'}
     assert content == json.loads(json.dumps(diagnosis_mapping(diagnosed.result)))
     assert sgp.load_robot(str(tmp_path / 'robot_diagnosed.yaml')).joint_names == ('pendulum',)
 

@@ -133,7 +133,8 @@ def test_no_half_written_file_is_left(finished):
     """Pictures, numbers, page, and the diagnosed robot with its URDF."""
     _, out, _ = finished
     suffixes = {path.suffix for path in out.iterdir()}
-    assert suffixes == {'.json', '.html', '.png', '.csv', '.yaml', '.urdf'}
+    shown = {'.html', '.png', '.mcap', '.xml'}  # the page, its pictures, a recording with layout
+    assert suffixes == {'.json', '.csv', '.npz', '.yaml', '.urdf'} | shown
 
 
 @pytest.fixture(scope='module')

@@ -225,7 +225,8 @@ def test_what_a_node_does_not_model_is_said_with_what_a_replay_leaves(tmp_path):
     robot = load_robot(str(out / YAML_NAME))
     engine = Engine(robot, EngineConfig.from_mapping({}, robot))
     replay(engine, events, lambda _: None)
-    scores = {joint: x['effort'].nmse for joint, x in engine.scores().items()}
+    scores = {j: x['effort'].nmse for j, x in engine.scores().items() if 'effort' in x}
+    assert scores
     assert found.content() == {
         'left_out': [{'joint': 'elbow', 'effect': 'backlash'},
                      {'joint': 'shoulder', 'effect': 'unknown'}],

@@ -109,6 +109,7 @@ def test_each_refused_state_is_counted_for_one_reason():
     signals = collect_signals([*good, *bad], LINEAR_AXIS, EngineConfig(max_gap=0.1))
     assert signals.refused == {
         'late': 0, 'duplicate': 1, 'nonfinite': 2, 'unpaired': 1, 'unknown_joint': 1, 'gap': 0,
+        'clock': 0, 'error': 0, 'implausible': 0, 'wrong_length': 0,
     }  # fmt: skip
     assert len(signals.time) == 50
 
@@ -161,6 +162,7 @@ def test_refused_commands_are_counted_by_reason():
     signals = collect_signals([*events, *bad], CART, EngineConfig(max_gap=0.1))
     assert signals.commands_refused == {
         'late': 0, 'wrong_length': 1, 'unknown_joint': 1, 'wrong_kind': 0, 'nonfinite': 1,
+        'clock': 0, 'error': 0,
     }  # fmt: skip
     assert signals.effort[3:-3] == pytest.approx(1.0)
 

@@ -123,7 +123,24 @@ def test_states_far_beyond_the_limits_are_refused_until_they_persist():
         assert take(i, *values) is None
     assert intake._counts.refused['implausible'] == 4
     found = [take(10 + i, 20.0) for i in range(120)]
-    assert found.index(next(filter(None, found))) == PERSISTENT - 4
+    assert found.index(next(filter(None, found))) == PERSISTENT - 3
+    assert take(130, 0.0)
+    assert take(131, 20.0)  # wrong for good
+
+
+@pytest.mark.parametrize(('every', 'is_learned'), [(5, True), (20, False)])
+def test_limits_that_a_motion_passes_now_and_then_are_wrong(every, is_learned):
+    """A motion does so again and again; a sensor that errs seldom stays refused."""
+    joint = replace(PENDULUM.joints[0], velocity_limit=1.0)
+    intake = Intake(replace(PENDULUM, joints=(joint,)), config(), Counts())
+    for i in range(2000):
+        speed = 8.0 if i % every == 0 else 0.5
+        values = (frozen_array([x]) for x in (0.0, speed, 0.0))
+        taken = intake.take_state(JointSample(START_NS + i * 10**7, ('hinge',), *values))
+    assert i % every != 0
+    assert taken
+    refused = intake._counts.refused['implausible']
+    assert (refused < 2000 // every) == is_learned
 
 
 def test_only_what_returns_is_isolated():

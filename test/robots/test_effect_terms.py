@@ -221,7 +221,7 @@ def _efforts(robot, stamps, values):
     engine = Engine(robot, EngineConfig.from_mapping(settings, robot))
     states = [
         JointSample(t, robot.joint_names, frozen_array([1e-9 * t, 0.0, 0.0]))
-        for t in range(0, 1_000_000_000, 7_000_000)
+        for t in range(10**9, 2 * 10**9, 7_000_000)
     ]
     commands = [
         CommandSample(int(t), frozen_array(u), robot.joint_names)
@@ -237,7 +237,7 @@ def _efforts(robot, stamps, values):
 def test_a_stated_delay_is_that_of_commands_that_come_later(tmp_path, joint):
     """In each window exactly, whenever the commands change; other joints are not delayed."""
     rng = np.random.default_rng(3)
-    stamps = np.concatenate([[-200_000_000], np.sort(rng.integers(0, 10**9, size=60))])
+    stamps = 10**9 + np.concatenate([[-(10**8)], np.sort(rng.integers(0, 10**9, size=60))])
     values = rng.normal(size=(61, 3))
     entry, _ = _entry('command_delay', '')
     entry |= {'joint': joint, 'parameters': {'delay': {'value': 0.023}}}
