@@ -13,6 +13,7 @@ import numpy as np
 from sgp_ros.engine.clock import END_NS
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.held_commands import CommandHistory
+from sgp_ros.engine.limits import Limits
 from sgp_ros.engine.results import Counts
 from sgp_ros.engine.samples import (
     EFFORT,
@@ -27,13 +28,6 @@ from sgp_ros.robots.robot import Robot
 GREATEST = 1e30
 """From here on a number is no measurement: products of what follows from it, such as accelerations
 over nanoseconds, would not be finite."""
-
-LIMIT_MARGIN = 3.0
-"""Speeds and efforts beyond this many times their limit are impossible."""
-PERSISTENT = 100
-"""States too many beyond the limits, from which on these are taken for wrong, not the states."""
-RARE = 10
-"""States within the limits that make up for one beyond: a sensor may err in one of eleven."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,43 +45,6 @@ class State:
     position: np.ndarray
     velocity: np.ndarray | None
     effort: np.ndarray | None
-
-
-class Limits:
-    """What the joints of a robot cannot do: far more than its model file permits.
-
-    Limits of model files are those of controllers, and often conservative; so `LIMIT_MARGIN` times
-    them is impossible, and a position as far beyond its range as the range is long.
-    """
-
-    def __init__(self, robot: Robot) -> None:
-        joints = robot.joints
-        lower, upper = (np.array([getattr(j, n) for j in joints]) for n in ('lower', 'upper'))
-        is_bounded = np.isfinite(lower) & np.isfinite(upper) & (upper > lower)
-        reach = np.where(is_bounded, upper - lower, 0.0)
-        self._low = np.where(is_bounded, lower - reach, -np.inf)
-        self._high = np.where(is_bounded, upper + reach, np.inf)
-        self._speed, self._effort = (
-            np.array([_margin(getattr(joint, name)) for joint in joints])
-            for name in ('velocity_limit', 'effort_limit')
-        )
-        limits = np.concatenate([self._high, self._speed, self._effort])
-        self.are_any = bool(np.isfinite(limits).any())
-
-    def permit(
-        self, position: np.ndarray, velocity: np.ndarray | None, effort: np.ndarray | None
-    ) -> bool:
-        """Whether a state (k,) each is possible."""
-        return not (
-            (position < self._low).any()
-            or (position > self._high).any()
-            or (velocity is not None and (np.abs(velocity) > self._speed).any())
-            or (effort is not None and (np.abs(effort) > self._effort).any())
-        )
-
-
-def _margin(limit: float) -> float:
-    return LIMIT_MARGIN * limit if limit > 0.0 else np.inf  # 0 stands for none in many files
 
 
 class Intake:
@@ -108,7 +65,7 @@ class Intake:
         commands: those taken.
         last_state_ns: stamp of the last state that was not a duplicate [ns]; None before.
         is_measured: whether a state with a measured effort has been accepted.
-        impossible: `RARE` for each state beyond the limits, less one for each within.
+        limits: what the joints cannot do.
     """
 
     def __init__(
@@ -124,8 +81,7 @@ class Intake:
         self.commands = CommandHistory(robot.effort_map.memory_s if robot.effort_map else 0.0)
         self.last_state_ns: int | None = None
         self.is_measured = False
-        self.impossible = 0
-        self._limits = Limits(robot)
+        self.limits = Limits(robot)
         self.configure(config)
 
     def configure(self, config: EngineConfig) -> None:
@@ -206,24 +162,11 @@ class Intake:
         if velocity is not None and not np.isfinite(velocity).all():
             velocity = None
         position = sample.position[order]
-        if self._limits.are_any and not self._is_possible(position, velocity, effort):
+        if not self.limits.permit(position, velocity, effort):
             self._counts.refused['implausible'] += 1
             return None
         self._counts.used += 1
         return State(sample.stamp_ns, position, velocity, effort)
-
-    def _is_possible(
-        self, position: np.ndarray, velocity: np.ndarray | None, effort: np.ndarray | None
-    ) -> bool:
-        """Whether a state is within the limits, or the limits are wrong.
-
-        Those of many files stand for none. A motion passes them again and again, a glitch is rare.
-        """
-        if self.impossible > RARE * PERSISTENT:
-            return True
-        is_within = self._limits.permit(position, velocity, effort)
-        self.impossible = max(self.impossible - 1, 0) if is_within else self.impossible + RARE
-        return is_within
 
     def _effort(
         self, sample: JointSample, order: np.ndarray | None

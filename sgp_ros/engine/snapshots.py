@@ -91,7 +91,7 @@ def _plain(engine: Engine) -> dict[str, Any]:
         else [None if s is None else _encode_state(s) for s in engine.filter.trial.states],
         'last_state_ns': intake.last_state_ns,
         'is_measured': intake.is_measured,
-        'impossible': intake.impossible,
+        'impossible': intake.limits.impossible,
         'scoring': estimator.scoring.state(),
         'gate': estimator.gate.state(),
         'before': None
@@ -153,7 +153,7 @@ def _fill(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
             engine.filter.trial.add(None if entry is None else _decode_state(entry))
     intake.last_state_ns = text['last_state_ns']
     intake.is_measured = text['is_measured']
-    intake.impossible = text['impossible']
+    intake.limits.impossible = text['impossible']
     released = text['released']
     engine.order.resume(
         None if released is None else (released[0], released[1]),

@@ -10,7 +10,8 @@ import pytest
 
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.gate import PATIENCE, without_isolated
-from sgp_ros.engine.intake import PERSISTENT, Intake
+from sgp_ros.engine.intake import Intake
+from sgp_ros.engine.limits import PERSISTENT
 from sgp_ros.engine.results import Counts
 from sgp_ros.engine.samples import JointSample, frozen_array
 from sgp_ros.engine.snapshots import restored, take_snapshot

@@ -1,0 +1,63 @@
+"""States that the joints of a robot cannot have, by the limits of its model file."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sgp_ros.robots.robot import Robot
+
+LIMIT_MARGIN = 3.0
+"""Speeds and efforts beyond this many times their limit are impossible."""
+PERSISTENT = 100
+"""States too many beyond the limits, from which on these are taken for wrong, not the states."""
+RARE = 10
+"""States within the limits that make up for one beyond: a sensor may err in one of eleven."""
+
+
+class Limits:
+    """What the joints of a robot cannot do: far more than its model file permits.
+
+    Limits of model files are those of controllers, and often conservative; so `LIMIT_MARGIN` times
+    them is impossible, and a position as far beyond its range as the range is long. Those of many
+    files stand for none: a motion passes them again and again, and then they hold no more.
+
+    Attributes:
+        impossible: `RARE` for each state beyond the limits, less one for each within.
+
+    Args:
+        robot: of k joints.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        joints = robot.joints
+        lower, upper = (np.array([getattr(j, n) for j in joints]) for n in ('lower', 'upper'))
+        is_bounded = np.isfinite(lower) & np.isfinite(upper) & (upper > lower)
+        reach = np.where(is_bounded, upper - lower, 0.0)
+        self._low = np.where(is_bounded, lower - reach, -np.inf)
+        self._high = np.where(is_bounded, upper + reach, np.inf)
+        self._speed, self._effort = (
+            np.array([_margin(getattr(joint, name)) for joint in joints])
+            for name in ('velocity_limit', 'effort_limit')
+        )
+        limits = np.concatenate([self._high, self._speed, self._effort])
+        self._are_any = bool(np.isfinite(limits).any())
+        self.impossible = 0
+
+    def permit(
+        self, position: np.ndarray, velocity: np.ndarray | None, effort: np.ndarray | None
+    ) -> bool:
+        """Whether a state, (k,) each, is possible, or the limits are wrong."""
+        if not self._are_any or self.impossible > RARE * PERSISTENT:
+            return True
+        is_within = not (
+            (position < self._low).any()
+            or (position > self._high).any()
+            or (velocity is not None and (np.abs(velocity) > self._speed).any())
+            or (effort is not None and (np.abs(effort) > self._effort).any())
+        )
+        self.impossible = max(self.impossible - 1, 0) if is_within else self.impossible + RARE
+        return is_within
+
+
+def _margin(limit: float) -> float:
+    return LIMIT_MARGIN * limit if limit > 0.0 else np.inf  # 0 stands for none in many files
