@@ -193,7 +193,8 @@ def test_a_node_that_is_killed_goes_on_from_its_last_save(graph: Graph, tmp_path
     graph.wait_until(lambda: saved.stat().st_mtime_ns > first, 'another save')
     run = tmp_path / 'run.mcap'
     size = run.stat().st_size
-    graph.wait_until(lambda: run.stat().st_size > size or size > 10_000, 'a flush')
+    stream.publish_until_read(50)
+    graph.wait_until(lambda: run.stat().st_size > size, 'a flush')
     assert node.stop(signal.SIGKILL) == -signal.SIGKILL
     graph.forget()
     graph.start('sgp_node', **settings)
