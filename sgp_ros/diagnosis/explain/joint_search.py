@@ -105,10 +105,10 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
         for block in _blocks(model):
             model = _shrunk(columns, _grown(columns, model, block), block)
         if model.key == before:
-            coupled = _best(model, _coupled(columns, model))
-            if coupled is None:
+            better = _best(model, coupled(columns, model))
+            if better is None:
                 break
-            model = coupled
+            model = better
     if model is start and len(model.effects) <= 2:
         return []
     model = fit(columns, model.effects, model.sigma, is_free=model.is_free, w=model.w, rounds=2,
@@ -242,7 +242,7 @@ def uncoupled(columns: Columns, without: Model, coupled: EffectAt) -> Iterator[M
             alone = kept
 
 
-def _coupled(columns: Columns, model: Model) -> Iterator[Model]:
+def coupled(columns: Columns, model: Model) -> Iterator[Model]:
     """Yield models with a law that couples two joints in place of what stands for it there.
 
     The inverse of `uncoupled`: several laws, none of which could go alone, make room for one.

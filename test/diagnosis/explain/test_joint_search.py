@@ -11,7 +11,7 @@ from sgp_ros.diagnosis.criteria import COUNTED_SHARE
 from sgp_ros.diagnosis.explain.candidates import fit, residual_of
 from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import floors
-from sgp_ros.diagnosis.explain.joint_search import by_joint, gain, uncoupled, usual
+from sgp_ros.diagnosis.explain.joint_search import by_joint, coupled, gain, uncoupled, usual
 from sgp_ros.diagnosis.explain.regression import Columns, Frame
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
@@ -198,5 +198,8 @@ def test_a_coupling_law_takes_the_place_of_all_that_stands_for_it(equations_for)
         EffectAt(EFFECTS['joint_coupling'], Place(j, 'torque', source=1 - j)) for j in (0, 1)
     ]
     imitation = fit(columns, (*plain, *couplings), base.sigma)
+    trials = [t for t in coupled(columns, imitation) if gain(t, imitation) > 0.0]
+    assert trials
+    assert all('joint_coupling' not in {name for name, _ in _keys(t)} for t in trials)
     found, *_ = by_joint(columns, imitation)
     assert _keys(found) in ({('coupled_friction', j), ('viscous_friction', 0)} for j in (0, 1))
