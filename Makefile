@@ -5,6 +5,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OLDEST := .venv-oldest
+# A test that hangs is named and ends the run; none takes a tenth of this.
+PYTEST := -m pytest -o faulthandler_timeout=900 -o faulthandler_exit_on_timeout=true
 NUMERIC := test/gp test/contracts test/physics test/rigid test/robots test/engine test/batch test/simulation
 
 # rclpy of .venv and a ROS that was sourced before do not mix: forget the other one.
@@ -18,9 +20,10 @@ endif
 demo: venv
 	$(BIN)/sgp demo
 
-# One process a core; a file's tests stay together, so that they share what they prepare.
+# One process a core; a file's tests stay together, so that they share what they prepare. A process
+# that dies is named and not replaced: pytest-xdist 3.8 may wait for ever on the one that takes over.
 test: $(VENV)/.test
-	$(BIN)/python -m pytest -n auto --dist loadfile
+	$(BIN)/python $(PYTEST) -n auto --dist loadfile --max-worker-restart 0
 
 lint: $(VENV)/.lint
 	$(BIN)/ruff format --check .
@@ -35,18 +38,18 @@ format: $(VENV)/.lint
 # A robot's computer is never idle: the tests of the graph once more, beside two busy loops.
 busy: $(VENV)/.test
 	@while :; do :; done & one=$$!; while :; do :; done & two=$$!; \
-	    trap 'kill $$one $$two' EXIT; $(BIN)/python -m pytest -q test/ros; exit $$?
+	    trap 'kill $$one $$two' EXIT; $(BIN)/python $(PYTEST) -q test/ros; exit $$?
 
 # Layers whose branches the tests must enter; the pattern keeps those that exist.
 MEASURED := $(patsubst sgp_ros/%/__init__.py,--cov=sgp_ros.%,\
     $(wildcard $(patsubst %,sgp_ros/%/__init__.py,gp engine diagnosis)))
 coverage: $(VENV)/.test
-	$(BIN)/python -m pytest -q test/gp test/rigid test/contracts test/engine $(wildcard test/diagnosis) \
+	$(BIN)/python $(PYTEST) -q test/gp test/rigid test/contracts test/engine $(wildcard test/diagnosis) \
 	    $(MEASURED) --cov-branch --cov-fail-under=95 --cov-report=term:skip-covered
 
 oldest: $(OLDEST)/.made
 	$(OLDEST)/bin/python -c 'import numpy, scipy; print("numpy", numpy.__version__, "scipy", scipy.__version__)'
-	$(OLDEST)/bin/python -m pytest -q $(NUMERIC)
+	$(OLDEST)/bin/python $(PYTEST) -q $(NUMERIC)
 
 bench: $(VENV)/.test
 	$(BIN)/sgp bench
@@ -57,7 +60,7 @@ reproduce: venv
 	$(BIN)/sgp reproduce
 
 docs: $(VENV)/.test
-	$(BIN)/python -m pytest test/test_documents.py
+	$(BIN)/python $(PYTEST) test/test_documents.py
 
 # The documentation as static pages, warnings are errors.
 site: $(VENV)/.lint

@@ -74,7 +74,7 @@ setup(
             'xacro>=2',
             'pyarrow>=14',
             'h5py>=3',
-            'pytest>=8',
+            'pytest>=9',
             'pytest-cov>=5',
             'pytest-xdist>=3.6',
             'hypothesis>=6.100',
