@@ -8,20 +8,23 @@ from pathlib import Path
 from typing import Any
 
 from sgp_ros.apps.recorded import gains_of, read_events, refuse_moving_base
+from sgp_ros.batch.contradictions import require_sense
 from sgp_ros.batch.recording_check import RecordingCheck, check_recording
 from sgp_ros.diagnosis.connected import Connected, connect
 from sgp_ros.diagnosis.gathered import Knowledge, gather
 from sgp_ros.diagnosis.mapping import finding_content
 from sgp_ros.diagnosis.result import Finding
 from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.samples import Event
 from sgp_ros.engine.setting import EFFORT_SOURCES
-from sgp_ros.errors import SgpError
+from sgp_ros.errors import ConfigError, SgpError
 from sgp_ros.report.check import render_check
 from sgp_ros.report.diagnosis_text import phrase
 from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.report.next_steps import after_check, ending
-from sgp_ros.robots.nominal import nominal_model
+from sgp_ros.robots.nominal import Nominal, nominal_model
 from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.robot import Robot
 
 
 def run_check(
@@ -49,19 +52,18 @@ def run_check(
     remarks: list[str] = []
     refuse_moving_base(bag)
     events = read_events(bag, joint_states, command, remarks)
-    found = check_recording(events, model)
+    nominal, known, unknown = _known(model, gains, events, effort, remarks)
+    found = check_recording(events, model, None if known is None else known.gains)
     print_check(Path(bag).name, found)
     content: dict[str, Any] = {'recording': Path(bag).name, 'robot': model.name,
                                **found.content()}  # fmt: skip
-    content['remarks'] += remarks
+    content['remarks'] += [*remarks, *found.refusals]
     setup: Sequence[Finding] = ()
     progress(0.1)
     try:
-        nominal = nominal_model(model)
-        known = Knowledge(
-            nominal.robot, nominal.stated, EngineConfig(effort_source=EFFORT_SOURCES[effort]),
-            gains_of(gains, nominal, events, remarks),
-        )  # fmt: skip
+        if nominal is None or known is None:
+            raise ConfigError(unknown)
+        require_sense(Path(bag).name, found.refusals)
         recordings = gather({'': events}, {}, nominal.tree, known, holds_out=False)
         connected = connect(recordings, nominal.tree, lambda x: progress(0.1 + 0.8 * x))
     except SgpError as error:
@@ -85,6 +87,19 @@ def run_check(
     print(ending(out, steps))
     progress(1.0)
     return content
+
+
+def _known(
+    model: Robot, gains: str | None, events: Sequence[Event], effort: str, remarks: list[str]
+) -> tuple[Nominal | None, Knowledge | None, str]:
+    """Return what is known of the machine; None and why where it is not enough."""
+    try:
+        nominal = nominal_model(model)
+        stated = gains_of(gains, nominal, events, remarks)
+    except SgpError as error:
+        return None, None, str(error)
+    config = EngineConfig(effort_source=EFFORT_SOURCES[effort])
+    return nominal, Knowledge(nominal.robot, nominal.stated, config, stated), ''
 
 
 def print_check(name: str, found: RecordingCheck) -> None:

@@ -10,10 +10,10 @@ from typing import Any
 
 from sgp_ros.apps.diagnosed_robot import replayed, write_diagnosed
 from sgp_ros.apps.finding_file import write_viewed
-from sgp_ros.apps.recorded import gains_of, read_events, refuse_moving_base
+from sgp_ros.apps.recorded import checked, gains_of, read_events, refuse_moving_base
 from sgp_ros.apps.terminal import strong, warned
 from sgp_ros.batch.acceptance import require_joints
-from sgp_ros.batch.recording_check import RecordingCheck, check_recording
+from sgp_ros.batch.recording_check import RecordingCheck
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
@@ -163,11 +163,8 @@ def examine(
     if chosen.sim is not None and simulated is None:
         simulation = _events(chosen.sim, model, chosen, remarks)
     source = EFFORT_SOURCES[chosen.effort]
-    checks = {stem: check_recording(x, model) for stem, x in events.items()}
-    remarks += [
-        said if len(checks) == 1 else f'{stem}: {said}'
-        for stem, check in checks.items() for said in check.remarks
-    ]  # fmt: skip
+    compared = None if chosen.static else simulation
+    checks = checked(events, model, gains, remarks, compared)
     found = diagnose(
         events, model, tree, tests, stated=nominal.stated, holds_out=not chosen.tests,
         is_static=chosen.static, gains=gains, simulation=simulation, simulated=simulated,

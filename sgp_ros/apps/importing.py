@@ -6,10 +6,12 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from sgp_ros.batch.contradictions import require_units
 from sgp_ros.recordings.imports import ImportSummary, import_table
 from sgp_ros.recordings.table_entries import JointHint
 from sgp_ros.report.next_steps import after_import, next_lines
 from sgp_ros.robots.registry import load_robot
+from sgp_ros.robots.robot import Robot
 
 
 def run_import(
@@ -26,7 +28,11 @@ def run_import(
         robot: whose joints these are; None where that is not known.
         rate: of the rows of a table without times [Hz].
     """
-    summary = import_table(table, map_path, out, _hints(robot), rate)
+    model = None if robot is None else load_robot(robot)
+    summary = import_table(
+        table, map_path, out, _hints(model), rate,
+        lambda events: None if model is None else require_units(events, model),
+    )  # fmt: skip
     progress(1.0)
     for remark in summary.remarks:
         sys.stderr.write(f'remark: {remark}\n')
@@ -42,11 +48,10 @@ def run_import(
     return summary.to_mapping()
 
 
-def _hints(robot: str | None) -> list[JointHint]:
+def _hints(robot: Robot | None) -> list[JointHint]:
     if robot is None:
         return []
-    joints = load_robot(robot).joints
-    return [JointHint(j.name, j.kind == 'prismatic', j.lower, j.upper) for j in joints]
+    return [JointHint(j.name, j.kind == 'prismatic', j.lower, j.upper) for j in robot.joints]
 
 
 def _counts(summary: ImportSummary) -> str:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
 
 from sgp_ros.batch.command_kinds import hold_targets, require_gains_of_velocity
+from sgp_ros.batch.contradictions import require_sense, require_shared_motion
+from sgp_ros.batch.recording_check import RecordingCheck, check_recording
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.gains import Gains, checked_gains, read_gains
 from sgp_ros.robots.nominal import Nominal
+from sgp_ros.robots.robot import Robot
 
 _ODOMETRY = ('nav_msgs/Odometry', 'geometry_msgs/PoseStamped')
 _BASE_TOPICS = ('odom', 'base', 'floating')
@@ -32,6 +35,33 @@ def read_events(
         for why, count in recording.unreadable.items()
     ]
     return events
+
+
+def checked(
+    recordings: Mapping[str, Iterable[Event]], robot: Robot, gains: Gains | None,
+    remarks: list[str], simulation: Iterable[Event] | None = None,
+) -> dict[str, RecordingCheck]:  # fmt: skip
+    """Return what recordings hold, by stem; what should be looked at is appended to `remarks`.
+
+    Args:
+        recordings: events by stem.
+        robot: whose joints are looked for.
+        gains: of drives whose commands are targets; None where they are not known.
+        remarks: of the user.
+        simulation: events of a simulation that is to be compared; None without.
+
+    Raises:
+        RecordingError: one contradicts itself, or shares no motion with the simulation.
+    """
+    found = {stem: check_recording(events, robot, gains) for stem, events in recordings.items()}
+    for stem, check in found.items():
+        require_sense(stem, check.refusals)
+        head = '' if len(found) == 1 else f'{stem}: '
+        remarks += [f'{head}{said}' for said in check.remarks]
+    if simulation is not None:
+        theirs = check_recording(simulation, robot, gains).moving
+        remarks += require_shared_motion([c.moving for c in found.values()], theirs)
+    return found
 
 
 def gains_of(

@@ -77,8 +77,8 @@ def are_efforts(accepted: Accepted, robot: Robot) -> bool:
     for j, joint in enumerate(robot.joints):
         u = commands[:, :, j]
         if joint.is_actuated and (np.ptp(u) > 0.0 or np.ptp(effort[:, j]) > 0.0):
-            explained, slope = _best_line(u, effort[:, j])
-            rival, _ = _best_line(u, position[:, j])
+            explained, slope = best_line(u, effort[:, j])
+            rival, _ = best_line(u, position[:, j])
             is_unit = _GAINS[0] <= slope <= _GAINS[1]
             follows.append(is_unit and explained > max(_LEAST_EXPLAINED, rival))
     return bool(follows) and float(np.mean(follows)) > _COMMON_SHARE
@@ -95,23 +95,35 @@ def are_positions(accepted: Accepted, robot: Robot, least_explained: float | Non
         robot: whose joints they are.
         least_explained: share of the position on its target; None for what efforts never reach.
     """
-    assert accepted.commands is not None
     wanted = _MOST_EXPLAINED if least_explained is None else least_explained
-    stamps, position = accepted.stamps_ns, accepted.position
-    delays = np.round(np.linspace(0.0, _LONGEST_LAG_S * 1e9, _LAGS)).astype(np.int64)
-    commands = np.array([accepted.commands.at(stamps - delay) for delay in delays])
-    follows = []
-    for j, joint in enumerate(robot.joints):
-        u, q = commands[:, :, j], position[:, j]
-        if joint.is_actuated and np.ptp(q) > 0.0:
-            explained, slope = _best_line(u, q)
-            apart = abs(float(u.mean() - q.mean())) < _NEAR * float(q.std())
-            is_unit = _UNIT[0] <= slope <= _UNIT[1]
-            follows.append(is_unit and apart and explained > wanted)
+    follows = [
+        followed(accepted, j, j, wanted) for j, joint in enumerate(robot.joints)
+        if joint.is_actuated and np.ptp(accepted.position[:, j]) > 0.0
+    ]  # fmt: skip
     return bool(follows) and float(np.mean(follows)) > _COMMON_SHARE
 
 
-def _best_line(u: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+def followed(accepted: Accepted, i: int, j: int, least: float = _NEAR_TARGET) -> bool:
+    """Return whether the position of joint i is the target of joint j, delayed by at most 0.2 s.
+
+    On a line of slope one through zero, which an effort is only by accident.
+
+    Args:
+        accepted: with commands.
+        i: whose position is looked at.
+        j: whose command.
+        least: share of the position that is explained.
+    """
+    assert accepted.commands is not None
+    delays = np.round(np.linspace(0.0, _LONGEST_LAG_S * 1e9, _LAGS)).astype(np.int64)
+    stamps, q = accepted.stamps_ns, accepted.position[:, i]
+    u = np.array([accepted.commands.at(stamps - delay)[:, j] for delay in delays])
+    explained, slope = best_line(u, q)
+    apart = abs(float(u.mean() - q.mean())) < _NEAR * float(q.std())
+    return _UNIT[0] <= slope <= _UNIT[1] and apart and explained > least
+
+
+def best_line(u: np.ndarray, y: np.ndarray) -> tuple[float, float]:
     """Return the share of the variance of y (n,) that a line on a row of u (m, n) explains.
 
     The best row is taken, and its slope returned.

@@ -8,12 +8,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from sgp_ros.batch.contradictions import (
+    has_targets,
+    target_contradictions,
+    unit_contradictions,
+)
 from sgp_ros.engine.samples import CommandSample, Event, JointSample
+from sgp_ros.errors import RecordingError
+from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.robot import Robot
 
 _GAP = 5.0
@@ -38,6 +45,7 @@ class JointCheck:
         motion_to_noise: range over the noise of the position.
         velocity, effort: share of the states with one.
         effort_rms: without its mean [N m or N], NaN without.
+        effort_most: without sign, less one of a hundred [N m or N], 0 without.
     """
 
     lower: float
@@ -50,6 +58,7 @@ class JointCheck:
     velocity: float
     effort: float
     effort_rms: float
+    effort_most: float
 
     @property
     def moves(self) -> bool:
@@ -72,6 +81,7 @@ class RecordingCheck:
         missing, unknown: joints of the robot that no state names; joints that it does not know.
         joints: by name, of those that were seen.
         remarks: what should be looked at.
+        refusals: contradictions that no diagnosis could stand on.
     """
 
     states: int
@@ -88,6 +98,12 @@ class RecordingCheck:
     unknown: tuple[str, ...]
     joints: dict[str, JointCheck] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    refusals: tuple[str, ...] = ()
+
+    @property
+    def moving(self) -> dict[str, tuple[float, float]]:
+        """Least and greatest position of each joint that moves."""
+        return {name: (j.lower, j.upper) for name, j in self.joints.items() if j.moves}
 
     def content(self) -> dict[str, Any]:
         """Return the check as JSON holds it; what is not known is None."""
@@ -106,12 +122,15 @@ class RecordingCheck:
         return {**lists, 'joints': joints, 'remarks': list(self.remarks)}
 
 
-def check_recording(events: Iterable[Event], robot: Robot) -> RecordingCheck:
+def check_recording(
+    events: Iterable[Event], robot: Robot, gains: Gains | None = None
+) -> RecordingCheck:
     """Return what a recording holds of a robot. O(n k).
 
     Args:
         events: in the order in which they come.
         robot: whose joints are looked for.
+        gains: of drives whose commands are targets; None where they are not known.
     """
     known = list(events)
     states = [e for e in known if isinstance(e, JointSample)]
@@ -141,8 +160,12 @@ def check_recording(events: Iterable[Event], robot: Robot) -> RecordingCheck:
         tuple(n for n in robot.joint_names if n not in seen),
         tuple(sorted(seen - set(robot.joint_names))), joints,
     )  # fmt: skip
-    remarks = (*_clock(found), *_motion(found, robot), *_targets(states, commands, robot))
-    return RecordingCheck(**{k: getattr(found, k) for k in found.__slots__} | {'remarks': remarks})
+    said, refusals = _followed(known, robot, gains)
+    remarks = (
+        *_clock(found), *_motion(found, robot), *_units(states, found, robot),
+        *_targets(states, commands, robot), *said,
+    )  # fmt: skip
+    return replace(found, remarks=remarks, refusals=tuple(refusals))
 
 
 def _joint(states: Sequence[JointSample], name: str, limits: tuple[float, float]) -> JointCheck:
@@ -172,6 +195,7 @@ def _joint(states: Sequence[JointSample], name: str, limits: tuple[float, float]
         extent / max(noise, 1e-12 * max(extent, 1e-300)) if extent > 0.0 else 0.0,
         float(np.isfinite(v).mean()) * len(v) / len(rows) if v else 0.0,
         len(u) / len(rows) if rows else 0.0, float(u.std()) if len(u) else math.nan,
+        float(np.quantile(np.abs(u), 0.99)) if len(u) else 0.0,
     )  # fmt: skip
 
 
@@ -206,6 +230,31 @@ def _motion(found: RecordingCheck, robot: Robot) -> list[str]:
     if one:
         said.append(f'One direction only: {", ".join(one)}. Friction and load look alike there.')
     return said
+
+
+def _units(states: Sequence[JointSample], found: RecordingCheck, robot: Robot) -> list[str]:
+    """Say which numbers the limits of the robot, or each other, contradict."""
+    said = []
+    for joint in robot.joints:
+        check = found.joints.get(joint.name)
+        if check is None or not math.isfinite(check.lower):
+            continue
+        ends, most = (check.lower, check.upper), check.effort_most * joint.effort_gain
+        for texts in unit_contradictions(states, joint, ends, most):
+            said += [f'{text[0].upper()}{text[1:]}.' for text in texts]
+    return said
+
+
+def _followed(
+    events: Sequence[Event], robot: Robot, gains: Gains | None
+) -> tuple[list[str], list[str]]:
+    """Return what is odd about targets of position, and what is refused."""
+    if not has_targets(events, gains):
+        return [], []
+    try:
+        return target_contradictions(events, robot, gains)
+    except RecordingError:  # nothing is accepted, which is said where it is needed
+        return [], []
 
 
 def _targets(

@@ -34,10 +34,11 @@ _UNITS = {
     'rad': 'rad', 'radians': 'rad', 'deg': 'deg', 'degs': 'deg', 'degree': 'deg',
     'degrees': 'deg', 'rev': 'rev', 'turns': 'rev', 'm': 'm', 'mm': 'mm', 'rpm': 'rpm',
     'nm': 'N m', 'mnm': 'mN m', 'n': 'N', 'kn': 'kN', 'a': 'A', 'ma': 'mA', 'ticks': 'counts',
-    'counts': 'counts',
+    'counts': 'counts', 'nmm': 'N mm', 'ncm': 'N cm', 'kgfcm': 'kgf cm', 'kgcm': 'kgf cm',
 }  # fmt: skip
 _LONG_UNITS = frozenset({
-    'rad', 'deg', 'degrees', 'rpm', 'counts', 'ticks', 'mm', 'nm', 'ms', 'ns', 'us',
+    'rad', 'deg', 'degrees', 'rpm', 'counts', 'ticks', 'mm', 'nm', 'nmm', 'ncm', 'kgfcm', 'kgcm',
+    'ms', 'ns', 'us',
 })  # fmt: skip
 """Units that nothing else means, wherever they stand."""
 _FILLER = frozenset({

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from sgp_ros.engine.samples import CommandSample, JointSample
 from sgp_ros.errors import ConfigError
 from sgp_ros.recordings.table_entries import JointHint
 from sgp_ros.recordings.table_files import load_columns
@@ -66,6 +67,7 @@ class ImportSummary:
 def import_table(
     path: str | Path, map_path: str | Path | None, out: str | Path,
     hints: Sequence[JointHint] = (), rate_hz: float | None = None,
+    require: Callable[[Iterable[JointSample | CommandSample]], None] = lambda _: None,
 ) -> ImportSummary:  # fmt: skip
     """Write a table as an MCAP recording.
 
@@ -76,6 +78,7 @@ def import_table(
             is made; an existing file is replaced.
         hints: joints of the robot, for a guess.
         rate_hz: of a table without times, for a guess; None where it has some.
+        require: called with what is to be written; what it raises is raised.
 
     Raises:
         ConfigError: what is wrong with the map.
@@ -91,6 +94,7 @@ def import_table(
     else:
         content = dict(read_map(map_path))
     table = read_table(path, content, loaded)
+    require(table.events())
     out_path = out if out.suffix == '.mcap' else out / f'{path.stem}.mcap'
     out_path.parent.mkdir(parents=True, exist_ok=True)
     with RecordingWriter(out_path, command_type=table.command_type) as writer:

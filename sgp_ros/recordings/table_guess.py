@@ -34,6 +34,7 @@ from sgp_ros.recordings.table_entries import (
     entries_of,
     joint_names,
 )
+from sgp_ros.recordings.table_map import UNITS
 from sgp_ros.recordings.table_units import (
     as_numbers,
     follows,
@@ -43,6 +44,7 @@ from sgp_ros.recordings.table_units import (
     velocity_unit,
 )
 
+_EFFORTS = {unit for unit, factor in UNITS['effort'].items() if factor}
 _RATES = {'fs', 'rate', 'hz', 'freq', 'frequency', 'sampling_rate', 'fps'}
 _STEPS = {'dt', 'ts', 'step', 'timestep', 'sample_time'}
 
@@ -205,7 +207,7 @@ def _add_efforts(
             found[joints[label]]['effort'] = e.place('A', **more)
         else:
             usual = 'N' if _hint(joints[label], hinted).slides else 'N m'
-            unit = e.said.unit if e.said.unit in {'N m', 'mN m', 'N', 'kN'} else usual
+            unit = e.said.unit if e.said.unit in _EFFORTS else usual
             found[joints[label]]['effort'] = e.place(unit)
     if currents:
         guess.unsure.append(
@@ -259,7 +261,7 @@ def _add_commands(
             )
     elif named[EFFORT]:
         guess.content['commands'] = {
-            joints[x]: e.place(e.said.unit if e.said.unit in {'N m', 'mN m', 'N', 'kN'} else 'N m')
+            joints[x]: e.place(e.said.unit if e.said.unit in _EFFORTS else 'N m')
             for x, e in named[EFFORT].items()
         }
 

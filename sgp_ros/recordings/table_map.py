@@ -24,9 +24,8 @@ Keys of a quantity: `column`, `unit`, `index` (which column of a matrix in NPZ o
 
     value in SI = scale * (column in unit) + offset
 
-Units are m, mm, rad, deg, rev and counts for positions, the same `/s` and rpm for velocities; N,
-kN, N m, mN m, A, V and counts for efforts. counts, A and V need a `scale` that leads to SI, or to
-the unit of effort that the robot states. A member of a MAT structure is written `data.q`.
+Units are those of `UNITS`. counts, A and V need a `scale` that leads to SI, or to the unit of
+effort that the robot states. A member of a MAT structure is written `data.q`.
 """
 
 from __future__ import annotations
@@ -49,16 +48,17 @@ from sgp_ros.recordings.typestore import new_message
 from sgp_ros.strangers import YAMLError, load_yaml, read_text
 
 _ANGLE = math.pi / 180.0
+_KGF = 9.80665
 _POSITION = {'m': 1.0, 'mm': 1e-3, 'rad': 1.0, 'deg': _ANGLE, 'rev': 2.0 * math.pi}
 UNITS: dict[str, dict[str, float | None]] = {
     'position': {**_POSITION, 'counts': None},
     'velocity': {
         **{f'{unit}/s': factor for unit, factor in _POSITION.items()},
-        'rpm': 2.0 * math.pi / 60.0,
-        'counts/s': None,
+        'rpm': 2.0 * math.pi / 60.0, 'counts/s': None,
     },
     'effort': {
         'N': 1.0, 'kN': 1e3, 'N m': 1.0, 'Nm': 1.0, 'mN m': 1e-3, 'mNm': 1e-3,
+        'N mm': 1e-3, 'N cm': 1e-2, 'kgf cm': _KGF * 1e-2, 'kgf': _KGF,
         'A': None, 'V': None, 'counts': None,
     },
 }  # fmt: skip

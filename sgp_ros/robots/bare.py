@@ -41,6 +41,13 @@ def simulated_model(file: str, robot: Nominal) -> tuple[Nominal, tuple[EffectAt,
         )  # fmt: skip
     if sim.tree.moving_names != names:
         sim = nominal_model(_with(sim.robot, joints=list(names)))
+    kinds = {j.name: j.kind for j in robot.robot.joints}
+    other = [f'{j.name} is {j.kind}' for j in sim.robot.joints if j.kind != kinds[j.name]]
+    if other:
+        raise ConfigError(
+            f'simulation {Path(file).name} of another machine: {", ".join(other)} there',
+            'joints of the same kind as those of the robot', 'give the model of the same machine',
+        )  # fmt: skip
     effects = tuple(e for e in sim.effects if e.is_complete and not e.effect.is_on_tree)
     return nominal_model(_bare(sim, robot.robot)), (*joint_friction(sim.tree), *effects)
 
