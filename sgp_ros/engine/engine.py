@@ -203,7 +203,7 @@ class Engine(Fold):
         failures: tuple[Failure, ...] = ()
         while True:
             self._journal.begin(self.counts.learned)
-            failed = tuple(failure.event for failure in failures)
+            failed = tuple(failure.event for failure in failures) if failures else ()
             try:
                 step = self._fold(event, failed)
             except Exception as error:

@@ -76,30 +76,33 @@ class Gate:
 
     def is_rough(self, equation: Equation) -> bool:
         """Whether a sample of the window is far off the others; otherwise the window is usual."""
-        off, span = equation.roughness
-        suspects = np.flatnonzero(off > SHARE * span)
+        distances, spans = equation.roughness.tolist()
         is_rough = any(
-            len(self.usual[i]) >= _LEAST_USUAL and off[i] > ROUGH * median(self.usual[i])
-            for i in suspects.tolist()
-            if span[i] > 0.0
+            distance > SHARE * span > 0.0
+            and len(known) >= _LEAST_USUAL
+            and distance > ROUGH * median(known)
+            for known, distance, span in zip(self.usual, distances, spans, strict=True)
         )
         if not is_rough or not self.is_patient:
-            for known, distance in zip(self.usual, off.tolist(), strict=True):
+            for known, distance in zip(self.usual, distances, strict=True):
                 if distance > 0.0:  # else a joint that rests shows one value only
                     known.append(distance)
                     del known[:-_USUAL]
         return is_rough
 
-    def deviations(self, variance: np.ndarray) -> np.ndarray:
-        """Return what errors are measured by, (k,), for variances (k,) of the model; inf early."""
-        return np.array([
-            math.sqrt(max(v, square)) if n >= FIRST else math.inf
-            for v, square, n in zip(variance.tolist(), self.mean_square, self.n, strict=True)
-        ])  # fmt: skip
-
     def is_surprised(self, errors: np.ndarray, variance: np.ndarray, is_told: np.ndarray) -> bool:
-        """Whether an error (k,) is beyond all that the model, or those before it, let expect."""
-        return bool((np.abs(errors) > LARGEST * self.deviations(variance))[is_told].any())
+        """Whether an error (k,) is beyond all that the model, or those before it, let expect.
+
+        Args:
+            errors: of the joints.
+            variance: that the model expects of them, (k,).
+            is_told: joints that the equation tells of, (k,).
+        """
+        columns = (errors.tolist(), variance.tolist(), self.mean_square, self.n, is_told.tolist())
+        return any(
+            told and n >= FIRST and abs(error) > LARGEST * math.sqrt(max(v, square))
+            for error, v, square, n, told in zip(*columns, strict=True)
+        )
 
     def judge(self, equation: Equation, *, is_wrong: bool) -> bool:
         """Note whether an equation is implausible; return whether it is refused."""
@@ -114,9 +117,11 @@ class Gate:
 
     def take(self, errors: np.ndarray, is_told: np.ndarray) -> None:
         """Take the errors (k,) of an equation that is not refused, of the joints it tells of."""
-        for j in np.flatnonzero(is_told):
+        for j, (error, told) in enumerate(zip(errors.tolist(), is_told.tolist(), strict=True)):
+            if not told:
+                continue
             self.n[j] += 1
-            square = float(errors[j]) ** 2
+            square = error**2
             self.mean_square[j] += (square - self.mean_square[j]) / min(self.n[j], MEMORY)
 
     def state(self) -> dict[str, Any]:

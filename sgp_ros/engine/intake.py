@@ -76,6 +76,7 @@ class Intake:
         self._commands_are = commands_are
         self._counts = counts
         self._actuated = np.array([joint.is_actuated for joint in robot.joints])
+        self._is_driven = bool(self._actuated.any())
         self._gains = np.array([joint.effort_gain for joint in robot.joints])
         self._last_order: tuple[tuple[str, ...], np.ndarray | None] = ((), None)
         self.commands = CommandHistory(robot.effort_map.memory_s if robot.effort_map else 0.0)
@@ -159,7 +160,7 @@ class Intake:
             self._counts.refused['unpaired'] += 1
             return None
         velocity = _chosen(sample.velocity, order)
-        if velocity is not None and not np.isfinite(velocity).all():
+        if velocity is not None and not (_are_numbers(velocity) or np.isfinite(velocity).all()):
             velocity = None
         position = sample.position[order]
         if not self.limits.permit(position, velocity, effort):
@@ -172,11 +173,13 @@ class Intake:
         self, sample: JointSample, order: np.ndarray | None
     ) -> tuple[bool, np.ndarray | None]:
         """Return whether an effort belongs to a state, and the measured one where it counts."""
-        if not self._actuated.any():
+        if not self._is_driven:
             return True, np.zeros(len(self._actuated))
         source = self._config.effort_source
         effort = None if source == 'command' else _chosen(sample.effort, order)
-        if effort is not None and np.isfinite(effort[self._actuated]).all():
+        if effort is not None and (
+            _are_numbers(effort) or np.isfinite(effort[self._actuated]).all()
+        ):
             self.is_measured = True
             return True, np.where(self._actuated, effort * self._gains, 0.0)
         if source == 'state' or (source == 'auto' and self.is_measured):
@@ -201,14 +204,20 @@ class Intake:
         order = self._order(sample.names)
         if order is None:
             return 'unknown_joint'
-        is_missing = velocity is None or bool(np.isnan(velocity[order]).any())
+        if self._config.filter_velocity == 'measured' and (
+            velocity is None or np.isnan(velocity[order]).any()
+        ):
+            return 'nonfinite'
+        # Joints that are not the robot's may hold anything; numbers throughout are the usual case.
         is_number = (
-            _are_numbers(sample.position[order])
-            and (velocity is None or _are_numbers(velocity[order], or_missing=True))
-            and (effort is None or _are_numbers(effort[order][self._actuated], or_missing=True))
-            and not (self._config.filter_velocity == 'measured' and is_missing)
+            (_are_numbers(sample.position) or _are_numbers(sample.position[order]))
+            and (velocity is None or _are_numbers(velocity) or _may_count(velocity[order]))
+            and (effort is None or _are_numbers(effort) or self._may_act(effort[order]))
         )
         return None if is_number else 'nonfinite'
+
+    def _may_act(self, effort: np.ndarray) -> bool:
+        return _may_count(effort[self._actuated])
 
     def _order(self, names: tuple[str, ...]) -> np.ndarray | None:
         """Return the places of the robot's joints among `names`, (k,); None where one is missing.
@@ -242,9 +251,14 @@ def _chosen(values: np.ndarray | None, order: np.ndarray | None) -> np.ndarray |
     return None if values is None else values[order]
 
 
-def _are_numbers(values: np.ndarray, *, or_missing: bool = False) -> bool:
-    """Return whether all numbers are smaller than `GREATEST`, or NaN where they may be missing."""
-    size = np.abs(values)
-    if or_missing:
-        return not (size >= GREATEST).any()
-    return bool((size < GREATEST).all())
+def _are_numbers(values: np.ndarray) -> bool:
+    """Return whether all numbers (m,) are smaller than `GREATEST`.
+
+    A sum of squares tells it of all at once, in the usual case.
+    """
+    return bool(values.dot(values) < GREATEST) or bool((np.abs(values) < GREATEST).all())
+
+
+def _may_count(values: np.ndarray) -> bool:
+    """Return whether all numbers are smaller than `GREATEST`, or NaN, which is none."""
+    return not (np.abs(values) >= GREATEST).any()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from operator import le
+
 import numpy as np
 
 from sgp_ros.robots.robot import Robot
@@ -33,13 +36,13 @@ class Limits:
         lower, upper = (np.array([getattr(j, n) for j in joints]) for n in ('lower', 'upper'))
         is_bounded = np.isfinite(lower) & np.isfinite(upper) & (upper > lower)
         reach = np.where(is_bounded, upper - lower, 0.0)
-        self._low = np.where(is_bounded, lower - reach, -np.inf)
-        self._high = np.where(is_bounded, upper + reach, np.inf)
+        self._low = np.where(is_bounded, lower - reach, -np.inf).tolist()
+        self._high = np.where(is_bounded, upper + reach, np.inf).tolist()
         self._speed, self._effort = (
-            np.array([_margin(getattr(joint, name)) for joint in joints])
+            [_margin(getattr(joint, name)) for joint in joints]
             for name in ('velocity_limit', 'effort_limit')
         )
-        limits = np.concatenate([self._high, self._speed, self._effort])
+        limits = [*self._high, *self._speed, *self._effort]
         self._are_any = bool(np.isfinite(limits).any())
         self.impossible = 0
 
@@ -49,14 +52,19 @@ class Limits:
         """Whether a state, (k,) each, is possible, or the limits are wrong."""
         if not self._are_any or self.impossible > RARE * PERSISTENT:
             return True
-        is_within = not (
-            (position < self._low).any()
-            or (position > self._high).any()
-            or (velocity is not None and (np.abs(velocity) > self._speed).any())
-            or (effort is not None and (np.abs(effort) > self._effort).any())
+        places = position.tolist()
+        is_within = (
+            _are_below(self._low, places)
+            and _are_below(places, self._high)
+            and (velocity is None or _are_below(map(abs, velocity.tolist()), self._speed))
+            and (effort is None or _are_below(map(abs, effort.tolist()), self._effort))
         )
         self.impossible = max(self.impossible - 1, 0) if is_within else self.impossible + RARE
         return is_within
+
+
+def _are_below(numbers: Iterable[float], bounds: Iterable[float]) -> bool:
+    return all(map(le, numbers, bounds))  # of a few numbers, faster than arrays
 
 
 def _margin(limit: float) -> float:

@@ -37,7 +37,7 @@ class ReorderBuffer:
 
     def is_late(self, event: Event) -> bool:
         """Whether something that belongs after `event` has already left."""
-        if self.released_ns is None:
+        if self.released_ns is None or event.stamp_ns > self.released_ns:
             return False
         return (event.stamp_ns, _rank(event)) < (self.released_ns, self.released_rank)
 
@@ -48,8 +48,8 @@ class ReorderBuffer:
     def push(self, event: Event) -> list[Event]:
         """Take an event that is not late and return those that leave, in order. O(log n)."""
         self._hold(event)
-        newest = event.stamp_ns if self.newest_ns is None else self.newest_ns
-        self.newest_ns = max(newest, event.stamp_ns)
+        if self.newest_ns is None or event.stamp_ns > self.newest_ns:
+            self.newest_ns = event.stamp_ns
         released = self._release(self.newest_ns - self.window_ns)
         while len(self._heap) > MOST_HELD:  # a clock that stands still, or a flood
             released.append(self._pop())
@@ -88,8 +88,9 @@ class ReorderBuffer:
         heapq.heappush(self._heap, (event.stamp_ns, _rank(event), self._arrivals, event))
 
     def _release(self, until_ns: int) -> list[Event]:
-        released = []
-        while self._heap and self._heap[0][0] <= until_ns:
+        released: list[Event] = []
+        heap = self._heap
+        while heap and heap[0][0] <= until_ns:
             released.append(self._pop())
         return released
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from dataclasses import dataclass, field
+from operator import attrgetter
 
 import numpy as np
 
@@ -22,6 +23,8 @@ from sgp_ros.engine.weak_form import WeakForm, polynomial_smoother
 from sgp_ros.physics.term import Motion
 from sgp_ros.robots.robot import Robot
 
+_stamp = attrgetter('stamp_ns')
+_LEAST_STATES = 3
 _LEAST_SHARE = 1e-3
 _ROUNDING = 1e-12
 """Distance from a polynomial, over the size of the signal, that is rounding."""
@@ -104,21 +107,23 @@ class WindowFilter:
         return equations
 
     def _ready_centre(self) -> int | None:
-        newest = self.states[-1].stamp_ns
+        newest, states = self.states[-1].stamp_ns, self.states
         assert self.next_ns is not None
-        for index in range(1, len(self.states) - 1):
-            stamp = self.states[index].stamp_ns
-            if stamp >= self.next_ns:
-                return index if newest >= stamp + self._half_ns else None
-        return None
+        if newest < self.next_ns + self._half_ns or len(states) < _LEAST_STATES:
+            return None
+        index = bisect_left(states, self.next_ns, 1, len(states) - 1, key=_stamp)
+        if index == len(states) - 1 or newest < states[index].stamp_ns + self._half_ns:
+            return None
+        return index
 
     def _forget(self, commands: CommandHistory) -> None:
         assert self.next_ns is not None
         first = self.next_ns - self._half_ns
-        keep = bisect_left(self.states, first, key=lambda state: state.stamp_ns)
+        keep = bisect_left(self.states, first, key=_stamp)
         # One state before the window may still be the left neighbour of its centre.
-        del self.states[: max(keep - 1, 0)]
-        commands.forget_before(self.states[0].stamp_ns)
+        if keep > 1 or len(self.states) == 1:
+            del self.states[: max(keep - 1, 0)]
+            commands.forget_before(self.states[0].stamp_ns)
 
     def _equation(self, centre: int, commands: CommandHistory) -> Equation:
         stamp = self.states[centre].stamp_ns
