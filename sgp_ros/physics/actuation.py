@@ -1,4 +1,4 @@
-"""Drives that change their command: gain, dead zone, saturation, lag and delay."""
+"""Drives that change their command: gain, dead zone, limits of torque, lag and delay."""
 
 from __future__ import annotations
 
@@ -20,6 +20,9 @@ _FITTING = 20.0
 """Times that the longest delay or lag fits into a recording; a longer one is seen too seldom."""
 _LATER = 1.35
 """Ratio of delays from which searches start."""
+
+_NO_LIMIT = 20.0
+"""Ranges of torque and speed up to which a motor's limits are sought."""
 
 SPREAD = 0.25
 """Prior standard deviation of the logarithm of a gain [1]. Convention, that of bodies."""
@@ -147,6 +150,67 @@ class Saturation(_Drive):
     def draw(self, scene: Scene) -> Drawn:
         force = scene.motion.effort[scene.joint]
         return Drawn(0.7, lambda s: {'limit': force / s}, 2.0, 5.0)
+
+
+class MotorSpeedLimit(Effect):
+    """A motor whose supply has no voltage left for its full torque at speed.
+
+    Only a torque that drives falls with the speed, `sign(tau) = sign(v)`. One that brakes has the
+    voltage of the motor on its side: the current of the standing motor limits it. Shape is
+    (stall_torque, no_load_speed).
+    """
+
+    name = 'motor_speed_limit'
+    words = 'a motor torque that falls with speed'
+    formula = 'driving torque at most stall_torque max(1 - |v| / no_load_speed, 0)'
+    source = 'Hughes and Drury 2019, Electric Motors and Drives'
+    appearance = 'large efforts at high speed have less consequence than they should'
+    quantities = (
+        Quantity('stall_torque', 'N m', low=0.0, is_positive=True),
+        Quantity('no_load_speed', 'rad/s', low=0.0, is_positive=True),
+    )  # fmt: skip
+    site = MOTOR
+    drawn_over = 'velocity'
+    is_of_command = True
+
+    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        u, v = motion.effort[:, place.joint], motion.velocity[:, place.joint]
+        driving = np.maximum(1.0 - np.abs(v) / max(shape[1], 1e-300), 0.0)
+        most = shape[0] * np.where(u * v > 0.0, driving, 1.0)
+        return (np.clip(u, -most, most) - u)[:, None]
+
+    def effort_columns(self, kind: str) -> tuple[int, ...]:
+        return (0,)
+
+    def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
+        """Return lines that part of the driving torques are above."""
+        u, v = motion.effort[:, place.joint], motion.velocity[:, place.joint]
+        u, v = np.abs(u[u * v > 0.0]), np.abs(v[u * v > 0.0])
+        if not len(u):
+            return np.zeros((0, 2))
+        found = []
+        for ratio in (0.8, 1.1, 1.5, 2.2, 4.0):
+            w = ratio * v.max()
+            stall = np.quantile(
+                u / np.maximum(1.0 - v / w, 0.1), (0.3, 0.5, 0.7, 0.85, 0.93, 0.98)
+            )
+            found += [[s, w] for s in stall]
+        low, high = self.bounds(motion, place)
+        return np.clip(found, low, high)
+
+    def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
+        """Return a part of the greatest torque and speed, and many times them: no limit at all."""
+        most = np.array([np.ptp(x[:, place.joint]) for x in (motion.effort, motion.velocity)])
+        return 1e-3 * most, _NO_LIMIT * most
+
+    def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        return np.maximum(shape, 1e-3 * self.bounds(motion, place)[1])
+
+    def sized(self, x: JointScene) -> Drawn:
+        speed = 1.5 * x.mean * x.velocity
+        return Drawn(
+            0.7, lambda s: {'stall_torque': 1.5 * x.force / s, 'no_load_speed': speed}, 3.0, 5.0
+        )
 
 
 class _Late(_Drive):

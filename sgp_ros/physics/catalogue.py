@@ -63,6 +63,7 @@ EFFECTS: dict[str, Effect] = {
         sensing.EncoderEccentricity(),
         VELOCITY_FILTER_LAG,
         coupled.CoupledFriction(),
+        actuation.MotorSpeedLimit(),
     )
 }
 

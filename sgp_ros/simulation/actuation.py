@@ -60,6 +60,23 @@ def saturation(
     return (Action(joint, current=lambda m: min(max(float(m.drive[joint]), -limit), limit)),)
 
 
+def speed_limit(
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
+) -> tuple[Action, ...]:
+    """Return a motor that drives with at most `stall_torque (1 - |v| / no_load_speed)`.
+
+    A force against the motion is at most `stall_torque`.
+    """
+    stall, fastest = float(values['stall_torque']), float(values['no_load_speed'])
+
+    def current(moment: Moment) -> float:
+        u, v = float(moment.drive[joint]), float(moment.velocity[joint])
+        most = stall if u * v <= 0.0 else max(stall - stall / fastest * abs(v), 0.0)
+        return math.copysign(min(abs(u), most), u)
+
+    return (Action(joint, current=current),)
+
+
 def gain(
     _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:

@@ -51,5 +51,6 @@ LAWS: dict[str, Law] = {
     'encoder_eccentricity': Law(actuation.eccentricity),
     'velocity_filter_lag': Law(actuation.velocity_lag),
     'coupled_friction': Law(friction.coupled),
+    'motor_speed_limit': Law(actuation.speed_limit),
 }
 """Several effects in a motor act in this order, from the command to the joint."""

@@ -75,6 +75,7 @@ EFFECT_VALUES = {
     'constant_load': {'force': 0.2},
     'tip_force': {'fx': 0.5, 'fy': -0.3, 'fz': 1.0},
     'load_friction': {'level': 0.05, 'mu': 0.1},
+    'motor_speed_limit': {'stall_torque': 0.6, 'no_load_speed': 3.0},
     'end_stop': {'position': 0.1, 'stiffness': 30.0, 'damping': 0.0, 'side': 'lower'},
 }  # fmt: skip
 """For an arm with forces of a newton metre. The model of a stop is linear: a damped one would pull
@@ -84,7 +85,7 @@ FORCE = {'reaction_wheel': 0.01, 'reaction_wheel_6': 0.01, 'linear_axis': 100.0}
 MOTOR_SHARE = 0.3
 """Of what a joint with backlash moves while the others are free, the part of the motor."""
 OF_MOTORS = {'torque_gain', 'dead_zone', 'saturation', 'actuator_lag', 'command_delay', 'backlash',
-             'load_friction'}  # fmt: skip
+             'load_friction', 'motor_speed_limit'}  # fmt: skip
 
 
 def written(folder, name):
@@ -185,9 +186,9 @@ class Simulated:
         )
 
 
-APPLICABLE = {'arm': 28, 'turned': 28, 'underactuated': 28, 'forearm': 26, 'reaction_wheel': 26,
-              'reaction_wheel_6': 26, 'toy_pendulum': 17, 'linear_axis': 24, 'simple_pendulum': 24,
-              'double_pendulum': 26}  # fmt: skip
+APPLICABLE = {'arm': 29, 'turned': 29, 'underactuated': 29, 'forearm': 27, 'reaction_wheel': 27,
+              'reaction_wheel_6': 27, 'toy_pendulum': 17, 'linear_axis': 25, 'simple_pendulum': 25,
+              'double_pendulum': 27}  # fmt: skip
 """Robot to how many effects it can have."""
 
 

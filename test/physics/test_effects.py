@@ -161,7 +161,7 @@ def test_no_place_on_a_joint_that_does_not_move(effect):
 
 @pytest.mark.parametrize('name', [
     'torque_gain', 'dead_zone', 'saturation', 'actuator_lag', 'command_delay', 'load_friction',
-    'backlash',
+    'backlash', 'motor_speed_limit',
 ])  # fmt: skip
 def test_what_a_motor_does_has_no_place_on_a_passive_joint(name):
     """And every motor has one."""
@@ -169,7 +169,9 @@ def test_what_a_motor_does_has_no_place_on_a_passive_joint(name):
     assert places == {0, 2, 3}
 
 
-@pytest.mark.parametrize('name', ['dead_zone', 'saturation', 'actuator_lag', 'command_delay'])
+@pytest.mark.parametrize(
+    'name', ['dead_zone', 'saturation', 'actuator_lag', 'command_delay', 'motor_speed_limit']
+)
 def test_without_commands_nothing_is_said_of_the_drive(name):
     """A measured effort is behind the drive."""
     assert EFFECTS[name].places(_motion(drive=False)) == []
@@ -584,6 +586,18 @@ def test_what_a_drive_does_is_the_effort_it_gives_less_the_command(name, shape, 
         together = columns(name, -3, [shape])[:, :, 0]
         np.testing.assert_array_equal(together[:, 2], change)
         assert not together[:, PASSIVE].any()
+
+
+def test_a_motor_at_speed_loses_what_drives_above_its_line_alone():
+    """What brakes is limited as at rest; nothing drives beyond the speed without load."""
+    u = np.array([1.0, 1.0, 1.0, -1.0, -1.0, 0.3, 1.0])
+    v = np.array([0.0, 2.0, -2.0, 2.0, -2.0, 2.0, 5.0])
+    n = len(u)
+    flat = np.zeros((n, 1))
+    motion = ObservedMotion(TREE, STEP * np.arange(n), STEP, flat, v[:, None], flat,
+                            u[:, None], None)  # fmt: skip
+    lost = columns('motor_speed_limit', 0, [0.8, 4.0], motion)[:, 0]
+    np.testing.assert_allclose(lost, [-0.2, -0.6, -0.2, 0.2, 0.6, 0.0, -1.0])
 
 
 def test_hysteresis_solves_its_equation():

@@ -25,7 +25,8 @@ from test.physics.test_stated import URDF
 
 WIDTH = 0.01
 TREE = read_urdf(URDF)
-OF_EFFORT = ('torque_gain', 'dead_zone', 'saturation', 'load_friction', 'joint_coupling')
+OF_EFFORT = ('torque_gain', 'dead_zone', 'saturation', 'load_friction', 'joint_coupling',
+             'motor_speed_limit')  # fmt: skip
 ON_TREE = ('gravity_tilt', 'payload')
 JOINTS = {
     'gravity_tilt': 'base', 'tip_force': 'tool', 'payload': 'grip', 'limit_friction': 'shoulder'

@@ -106,7 +106,16 @@ LAWS = {
     'saturation:limit=0.3': lambda t, q, v, r: (
         np.clip(r.command[:, ELBOW], -0.3, 0.3) - r.command[:, ELBOW]
     ),
+    'motor_speed_limit:stall_torque=0.6,no_load_speed=3': lambda t, q, v, r: (
+        _at_speed(r.command[:, ELBOW], v) - r.command[:, ELBOW]
+    ),
 }
+
+
+def _at_speed(u, v):
+    """What drives is below the line, what brakes below the torque of the standing motor."""
+    most = np.where(u * v < 0.0, 0.6, np.maximum(0.6 - 0.2 * np.abs(v), 0.0))
+    return np.sign(u) * np.minimum(np.abs(u), most)
 
 
 @pytest.mark.parametrize('text', LAWS)

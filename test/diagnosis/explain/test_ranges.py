@@ -95,6 +95,7 @@ CASES = [
     *_levels('actuator_lag', 'time_constant', (0.0005, 0.004, 0.05, 0.3, 0.7)),
     *_levels('dead_zone', 'width', (0.01, 0.3, 1.5)),
     *_levels('saturation', 'limit', (0.05, 0.5, 1.5)),
+    *_levels('motor_speed_limit', 'no_load_speed', (2.5, 4.0, 20.0), stall_torque=1.0),
     *_levels('torque_gain', 'gain', (0.07, 0.5, 0.97, 4.0, 30.0)),
     *_levels('backlash', 'gap', (0.002, 0.03, 0.4), motor_share=0.3),
     *_levels('payload', 'mass', (0.05, 0.6, 2.8, 12.0), x=0.02, y=0.0, z=-0.25),
