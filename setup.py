@@ -66,6 +66,8 @@ setup(
         'tables': ['pyarrow>=14', 'h5py>=3'],
         # The dashboard of `sgp watch`.
         'watch': ['rich>=13'],
+        # Many recordings on many processes, and their results as one table: `sgp campaign`.
+        'campaign': ['distributed>=2024.5', 'pyarrow>=14'],
         # The rivals of `sgp bench`.
         'bench': ['scikit-learn>=1.4', 'torch>=2', 'gpytorch>=1.11'],
         'test': [
@@ -74,6 +76,8 @@ setup(
             'xacro>=2',
             'pyarrow>=14',
             'h5py>=3',
+            'distributed>=2024.5',
+            'duckdb>=1',
             'pytest>=9',
             'pytest-cov>=5',
             'pytest-xdist>=3.6',

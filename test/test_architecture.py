@@ -43,9 +43,10 @@ LAYERS = {
         'engine.results', 'optional', 'strangers', 'errors',
     },
     'diagnosis': NUMERIC | {'gp', 'physics', 'rigid', 'robots', 'engine', 'batch', 'errors'},
+    'campaign': NUMERIC | {'gp.scores', 'recordings.table_files', 'optional', 'errors'},
     'report': {
         'numpy', 'matplotlib', 'jinja2', 'markupsafe', 'gp', 'physics', 'rigid', 'robots',
-        'engine', 'batch', 'diagnosis', 'strangers', 'errors',
+        'engine', 'batch', 'diagnosis', 'campaign', 'strangers', 'errors',
     },
     'ros': MESSAGES | {'optional', 'report.layouts'} | {
         'numpy', 'yaml', 'engine', 'physics', 'robots', 'simulation', 'diagnosis', 'recordings',
@@ -53,7 +54,7 @@ LAYERS = {
     },
     'apps': {
         'numpy', 'yaml', 'matplotlib', 'gp', 'physics', 'rigid', 'robots', 'simulation', 'engine',
-        'batch', 'recordings', 'diagnosis', 'report', 'strangers', 'errors',
+        'batch', 'recordings', 'diagnosis', 'campaign', 'report', 'strangers', 'errors',
     },
     'cli': {'apps', 'argcomplete', 'errors'},
 }  # fmt: skip
@@ -85,7 +86,7 @@ SUB_ROOMS = {
 """Layer to its sub-rooms in their order: each imports itself and those that stand before it."""
 
 PURE = ('gp', 'physics', 'rigid', 'engine', 'robots', 'simulation', 'batch')
-SILENT = ('errors', 'optional', *PURE, 'recordings', 'diagnosis')
+SILENT = ('errors', 'optional', *PURE, 'recordings', 'diagnosis', 'campaign')
 IMPURE_MODULES = {
     'asyncio', 'concurrent', 'datetime', 'multiprocessing', 'os', 'random', 'secrets', 'socket',
     'subprocess', 'threading', 'time', 'uuid',

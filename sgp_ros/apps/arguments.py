@@ -52,12 +52,19 @@ def _seed(text: str) -> int:
     return int(text)
 
 
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f'{text!r}, expected an integer from 1')
+    return int(text)
+
+
 def _add_recording(
-    parser: argparse.ArgumentParser, metavar: str = 'BAG', *, takes_several: bool = False
+    parser: argparse.ArgumentParser, metavar: str = 'BAG', several: str | None = None
 ) -> None:
-    more = '; several of one machine are one diagnosis' if takes_several else ''
-    parser.add_argument('bag', metavar=metavar, nargs='+' if takes_several else None,
-                        help=f'.mcap file, rosbag2 directory or ROS 1 .bag{more}')  # fmt: skip
+    """Add what is read of a robot; `several` says what more than one recording means."""
+    parser.add_argument('bag', metavar=metavar, nargs=None if several is None else '+',
+                        help=f'.mcap file, rosbag2 directory or ROS 1 .bag{several or ""}'
+                        )  # fmt: skip
     parser.add_argument(
         '--robot', required=True, metavar='ROBOT', help='a built-in robot, a robot YAML or a URDF'
     )
@@ -67,6 +74,15 @@ def _add_recording(
         '--effort', choices=('auto', 'measured', 'commanded', 'state', 'command'), default='auto',
         help='the effort that acts; auto: the measured one where there is one (default: auto)',
     )  # fmt: skip
+
+
+def _add_gains(parser: argparse.ArgumentParser, *, has_sim: bool = True) -> None:
+    if has_sim:
+        parser.add_argument('--sim', metavar='SIM', help='recording or model file of the '
+                            'simulation to compare with')  # fmt: skip
+    parser.add_argument(
+        '--gains', metavar='YAML', help='kp and kd by joint: commands are then position targets'
+    )
 
 
 def _add_demo(add: AddCommand) -> None:
@@ -149,21 +165,40 @@ def _add_diagnose(add: AddCommand) -> None:
         'Locate, name and model the physics that the nominal robot lacks.',
         'sgp diagnose real.mcap --robot robot.urdf --test real_test.mcap --out out/diagnose',
     )  # fmt: skip
-    _add_recording(parser, 'REAL', takes_several=True)
-    parser.add_argument(
-        '--sim', metavar='SIM', help='recording or model file of the simulation to compare with'
-    )
+    _add_recording(parser, 'REAL', '; several of one machine are one diagnosis')
+    _add_gains(parser)
     parser.add_argument('--test', dest='tests', action='append', default=[], metavar='BAG',
                         help='held-out recording for the proof; may be repeated; without any, '
                         'a quarter of REAL is held out')  # fmt: skip
-    parser.add_argument(
-        '--gains', metavar='YAML', help='kp and kd by joint: commands are then position targets'
-    )
     parser.add_argument('--static', action='store_true',
                         help='rows are settled points, one a pose, without clock')  # fmt: skip
     parser.add_argument('--bodies', metavar='YAML',
                         help='mass, com and inertia of links of which the URDF has none; else '
                         'they are estimated from REAL')  # fmt: skip
+
+
+def _add_campaign(add: AddCommand) -> None:
+    parser = add(
+        'campaign', 'sgp_ros.apps.campaign:run_campaign',
+        'Diagnose and identify many recordings; tabulate them and find trends and changes.',
+        'sgp campaign bags --robot robot.urdf --covariates bags.csv --out out/campaign',
+    )  # fmt: skip
+    _add_recording(parser, 'PLACE', ", folder of them, or pattern such as 'bags/*/*.mcap'")
+    parser.add_argument('--task', choices=('both', 'diagnose', 'identify'), default='both',
+                        help='what is done with each recording (default: both)')  # fmt: skip
+    _add_gains(parser)
+    parser.add_argument('--covariates', metavar='CSV',
+                        help='table with a column recording; robot, session and time are known, '
+                        'other columns of numbers are covariates')  # fmt: skip
+    parser.add_argument('--covariate-topic', dest='topics', action='append', default=[],
+                        metavar='TOPIC', help='of numbers, such as a temperature, whose mean over '
+                        'a recording is a covariate; may be repeated')  # fmt: skip
+    parser.add_argument('--scheduler', metavar='ADDRESS',
+                        help='of a Dask cluster, such as tcp://host:8786 (default: one of this '
+                        'computer)')  # fmt: skip
+    parser.add_argument('--workers', type=_count, metavar='N',
+                        help='processes of a cluster of this computer (default: one a core)'
+                        )  # fmt: skip
 
 
 def _add_import(add: AddCommand) -> None:
@@ -188,9 +223,7 @@ def _add_check(add: AddCommand) -> None:
         'sgp check real.mcap --robot robot.urdf',
     )  # fmt: skip
     _add_recording(parser)
-    parser.add_argument(
-        '--gains', metavar='YAML', help='kp and kd by joint: commands are then position targets'
-    )
+    _add_gains(parser, has_sim=False)
 
 
 def _add_effects(add: AddCommand) -> None:
@@ -246,6 +279,7 @@ def _add_watch(add: AddCommand) -> None:
 GROUPS = (
     ('Look around', ('demo', 'robots', 'effects')),
     ('From your recording', ('import', 'check', 'diagnose', 'identify', 'replay')),
+    ('From many recordings', ('campaign',)),
     ('With a model', ('simulate', 'export')),
     ('Beside a running robot', ('watch',)),
 )
@@ -256,6 +290,6 @@ EXAMPLE = """example, which needs nothing but this package:
 
 COMMANDS = (
     _add_demo, _add_simulate, _add_replay, _add_identify, _add_diagnose, _add_effects,
-    _add_robots, _add_import, _add_export, _add_watch, _add_check,
+    _add_robots, _add_import, _add_export, _add_watch, _add_check, _add_campaign,
 )  # fmt: skip
 """What adds each command of the package, in the order of its help."""

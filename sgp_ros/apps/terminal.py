@@ -13,7 +13,7 @@ from sgp_ros.errors import ConfigError
 
 _LISTING = '.sgp_'
 """Beginning of the names of the files that list the results of a command, see `report.files`."""
-_LISTED = ('check', 'diagnose', 'identify', 'replay')
+_LISTED = ('campaign', 'check', 'diagnose', 'identify', 'replay')
 """Commands that keep such a list, and take the results of their last run away."""
 
 
