@@ -11,6 +11,7 @@ import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, BinaryIO
 from xml.etree import ElementTree as ET
@@ -29,6 +30,9 @@ characters of a line; time for a file that is read in a process of its own [s]."
 _MEGABYTE = 1 << 20
 _GROWING = '.sgp_growing_'
 YAMLError = yaml.YAMLError
+Waiting = dict[Path, Path]
+"""Name in the end to the name of the complete file that waits for it."""
+_WAITING: ContextVar[tuple[Path, Waiting] | None] = ContextVar('_WAITING', default=None)
 
 
 class TooMuchError(SgpError):
@@ -86,11 +90,43 @@ def create_beside(path: Path) -> tuple[BinaryIO, Path]:
 
 
 def take_place(stream: BinaryIO, growing: Path, path: Path) -> None:
-    """Close a complete file and give it its name; the disk has it before the name is seen."""
+    """Close a complete file and give it its name; the disk has it before the name is seen.
+
+    Inside `waiting_files` of its folder it waits for the others.
+    """
     stream.flush()
     os.fsync(stream.fileno())
     stream.close()
-    growing.replace(path)
+    folder, waiting = _WAITING.get() or (None, {})
+    if path.parent.absolute() != folder:
+        growing.replace(path)
+        return
+    if path in waiting:
+        waiting[path].unlink(missing_ok=True)
+    waiting[path] = growing
+
+
+@contextmanager
+def waiting_files(folder: Path) -> Iterator[Waiting]:
+    """Yield the files of a folder that become complete inside; the caller gives them their names.
+
+    After an error there are none.
+    """
+    waiting: Waiting = {}
+    token = _WAITING.set((folder.absolute(), waiting))
+    try:
+        yield waiting
+    except BaseException:
+        for growing in waiting.values():
+            growing.unlink(missing_ok=True)
+        raise
+    finally:
+        _WAITING.reset(token)
+
+
+def is_growing(name: str) -> bool:
+    """Whether a file has a name of `create_beside`."""
+    return name.startswith(_GROWING) and '/' not in name
 
 
 def remove_growing(folder: Path) -> None:

@@ -210,15 +210,17 @@ def write_examined(out: Path, examined: Examined) -> tuple[dict[str, Any], Diagn
         examined: the diagnosis.
     """
     nominal, found = examined.nominal, examined.found
+    diagnosed = replace(found, bodies=nominal.without_stated(found.bodies))
+    online = replayed(
+        nominal.robot, diagnosed, examined.gains, examined.events, examined.effort_source
+    )
+    if online is not None:
+        said = online.remark(found.proofs['train'].nmse_after)
+        found = replace(found, remarks=(*found.remarks, said))
     with replacing_results(out, 'diagnose'):
         write_predictions(out, found)
         write_viewed(out, found, nominal.tree, examined.start_ns)
-        bodies = nominal.without_stated(found.bodies)
-        write_diagnosed(out, nominal.robot, replace(found, bodies=bodies), examined.gains)
-        online = replayed(out, found.findings, examined.events, examined.effort_source)
-        if online is not None:
-            said = online.remark(found.proofs['train'].nmse_after)
-            found = replace(found, remarks=(*found.remarks, said))
+        write_diagnosed(out, nominal.robot, diagnosed, examined.gains)
         checks = {stem: check.content() for stem, check in examined.checks.items()}
         content = {**diagnosis_mapping(found), 'check': checks}
         if online is not None:

@@ -8,6 +8,7 @@ Where a node does not model all that was found, a replay measures what it leaves
 from __future__ import annotations
 
 import math
+import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -121,29 +122,36 @@ class Online:
 
 
 def replayed(
-    out: Path, findings: Iterable[Finding], events: Sequence[Event], effort_source: str
+    robot: Robot,
+    found: Diagnosis,
+    gains: Gains | None,
+    events: Sequence[Event],
+    effort_source: str,
 ) -> Online | None:
     """Return what a node would leave of what was diagnosed; None where nothing is left out.
 
     Args:
-        out: folder with the diagnosed robot.
-        findings: of the diagnosis.
+        robot: nominal robot from a URDF.
+        found: the diagnosis of a recording of it.
+        gains: of its drives; None where their commands are efforts.
         events: of a motion that was diagnosed; none of settled points.
         effort_source: setting `effort.source`.
     """
-    left_out = tuple(f for f in findings if not _is_online(f))
+    left_out = tuple(f for f in found.findings if not _is_online(f))
     if not left_out or not events:
         return None
-    robot = load_robot(str(out / YAML_NAME))
+    with tempfile.TemporaryDirectory() as name:
+        write_diagnosed(Path(name), robot, found, gains)
+        robot = load_robot(str(Path(name) / YAML_NAME))
     engine = Engine(robot, EngineConfig.from_mapping({'effort.source': effort_source}, robot))
     stamps = [event.stamp_ns for event in events]
     end_ns = min(stamps) + round(_REPLAYED_S * 1e9)
     replay(engine, (e for e in events if e.stamp_ns <= end_ns), lambda _: None)
-    found = {
+    errors = {
         joint: scores['effort'].nmse for joint, scores in engine.scores().items()
         if 'effort' in scores and math.isfinite(scores['effort'].nmse)
     }  # fmt: skip
-    return Online(left_out, found, math.inf if max(stamps) <= end_ns else _REPLAYED_S)
+    return Online(left_out, errors, math.inf if max(stamps) <= end_ns else _REPLAYED_S)
 
 
 def _is_online(finding: Finding) -> bool:

@@ -38,7 +38,6 @@ def write_identified(
         has_bodies: the values are those of real bodies; no URDF can hold others.
     """
     text = robot_urdf(robot, values) if has_bodies and len(values) else None
-    (out / URDF_NAME).unlink(missing_ok=True)  # of an earlier run
     if text is not None:
         write_text(out / URDF_NAME, text)
     urdf = str(robot.source.get('urdf', ''))

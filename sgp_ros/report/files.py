@@ -1,8 +1,11 @@
-"""Result files: each appears under its name only when it is complete, and none outlives its run.
+"""Result files: those of a run appear together, once all are complete, and none outlives its run.
 
 What a run of a command wrote is listed in `.sgp_<command>.json` beside it. The next run of the
 command into the same folder removes what is listed there and not written anew, such as pictures of
 an earlier verdict. A file that was changed since is somebody else's and stays.
+
+The files of a run are renamed one after the other at its end. What is to be renamed is noted
+first, in `.sgp_<command>.moves`, so that the next run completes what a kill cuts off there.
 """
 
 from __future__ import annotations
@@ -11,11 +14,20 @@ import contextlib
 import fcntl
 import json
 import os
+import signal
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.strangers import create_beside, remove_growing, take_place
+from sgp_ros.strangers import (
+    Waiting,
+    create_beside,
+    is_growing,
+    remove_growing,
+    take_place,
+    waiting_files,
+)
 
 
 def write_bytes(path: Path, content: bytes) -> None:
@@ -40,8 +52,8 @@ def write_text(path: Path, content: str) -> None:
 def replacing_results(out: Path, command: str) -> Iterator[None]:
     """Let the results that are written inside take the place of those of the last run.
 
-    After an error nothing is removed. Two runs into one folder would mix their results, so the
-    second one is refused; the lock ends with its process, however that ends.
+    After an error or a kill those are as they were. Two runs into one folder would mix their
+    results, so the second one is refused; the lock ends with its process, however that ends.
 
     Args:
         out: folder of the results, which is made.
@@ -52,9 +64,13 @@ def replacing_results(out: Path, command: str) -> Iterator[None]:
     """
     out.mkdir(parents=True, exist_ok=True)
     with _locked(out / f'.sgp_{command}.lock'):
+        _make_moves(out, command)
         remove_growing(out)
-        with _listing_results(out, command):
+        with waiting_files(out) as waiting:
             yield
+        with _undisturbed():
+            _note_moves(out, command, waiting)
+            _make_moves(out, command)
 
 
 @contextlib.contextmanager
@@ -79,24 +95,61 @@ def _locked(path: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _listing_results(out: Path, command: str) -> Iterator[None]:
-    listing = out / f'.sgp_{command}.json'
-    before = _marks(out)
-    yield
-    after = _marks(out)
-    with contextlib.suppress(OSError, ValueError, AttributeError):  # no listing, or none of ours
-        for name, mark in json.loads(listing.read_text(encoding='utf-8')).items():
-            if after.get(name) == mark == before.get(name):
-                (out / name).unlink()
-    written = {name: mark for name, mark in after.items() if before.get(name) != mark}
-    write_text(listing, json.dumps(written, indent=1) + '\n')
+def _undisturbed() -> Iterator[None]:
+    """Let signals that end a run wait."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _marks(folder: Path) -> dict[str, list[int]]:
-    """Return time of change [ns] and size of every file in a folder, folders in it left out."""
-    stats = {
-        path.name: path.stat()
-        for path in folder.iterdir()
-        if path.is_file() and path.suffix != '.lock'
+def _note_moves(out: Path, command: str, waiting: Waiting) -> None:
+    """Note the new names of files, and which results of the last run are to go."""
+    new = {path.name: _mark(growing) for path, growing in waiting.items()}
+    old = _read(out / f'.sgp_{command}.json')
+    content = {
+        'moves': {growing.name: path.name for path, growing in waiting.items()},
+        'stale': [
+            name for name, mark in old.items() if name not in new and _mark(out / name) == mark
+        ],
+        'listing': new,
     }
-    return {name: [found.st_mtime_ns, found.st_size] for name, found in stats.items()}
+    write_text(out / f'.sgp_{command}.moves', json.dumps(content) + '\n')
+
+
+def _make_moves(out: Path, command: str) -> None:
+    """Give files their names as noted; nothing where nothing is noted."""
+    note = out / f'.sgp_{command}.moves'
+    content = _read(note)
+    moves, stale, listing = (content.get(key) for key in ('moves', 'stale', 'listing'))
+    if isinstance(moves, dict) and isinstance(stale, list):
+        for growing, name in moves.items():
+            if is_growing(growing) and _is_plain(name) and (out / growing).exists():
+                (out / growing).replace(out / name)
+        for name in filter(_is_plain, stale):
+            (out / name).unlink(missing_ok=True)
+        write_text(out / f'.sgp_{command}.json', json.dumps(listing, indent=1) + '\n')
+    note.unlink(missing_ok=True)
+
+
+def _is_plain(name: object) -> bool:
+    """Whether a name is that of a file in the folder itself."""
+    return isinstance(name, str) and Path(name).name == name
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """Return what a note of ours holds; nothing where there is none."""
+    with contextlib.suppress(OSError, ValueError):
+        content = json.loads(path.read_text(encoding='utf-8'))
+        return content if isinstance(content, dict) else {}
+    return {}
+
+
+def _mark(path: Path) -> list[int] | None:
+    """Return time of change [ns] and size of a file, which no renaming changes."""
+    try:
+        found = path.lstat()
+    except OSError:
+        return None
+    return [found.st_mtime_ns, found.st_size]

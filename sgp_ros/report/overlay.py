@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.result import Diagnosis
 from sgp_ros.diagnosis.shown import Overlay
-from sgp_ros.report.files import write_text
+from sgp_ros.report.files import write_bytes, write_text
 
 
 def write_overlay(folder: Path, found: Diagnosis) -> None:
@@ -19,9 +20,9 @@ def write_overlay(folder: Path, found: Diagnosis) -> None:
     if not found.overlays:
         return
     arrays: dict[str, Any] = _series(found.overlays)
-    growing = folder / 'overlay.part.npz'
-    np.savez(growing, **arrays)
-    growing.replace(folder / 'overlay.npz')
+    stream = io.BytesIO()
+    np.savez(stream, **arrays)
+    write_bytes(folder / 'overlay.npz', stream.getvalue())
     text = json.dumps(overlay_content(found), indent=1, allow_nan=False)
     write_text(folder / 'overlay.json', text + '\n')
 

@@ -40,7 +40,7 @@ from sgp_ros.ros.start import build_engine
 from sgp_ros.ros.verdict import OK, WARN
 
 _POLL_S = 0.05
-_FLUSH_S = 1.0
+_FLUSH_S = 0.5
 _QUIET_NS = 30 * 10**9
 
 

@@ -212,16 +212,15 @@ def _stream(joints, n=400):
 
 def test_what_a_node_does_not_model_is_said_with_what_a_replay_leaves(tmp_path):
     """Backlash needs more than one time, and the process of an unknown effect is in no file."""
-    (tmp_path / 'known').mkdir()
     coulomb = _finding('coulomb_friction', 'elbow', {'level': 0.3})
-    known = _written(tmp_path / 'known', URDF, [coulomb])
     events = _stream(3)
-    assert replayed(known, [coulomb], events, 'auto') is None
 
     backlash = _finding('backlash', 'elbow', {'gap': 0.01, 'motor_inertia': 0.02})
     unknown = _finding('unknown', 'shoulder', {})
     out = _written(tmp_path, URDF, [backlash, unknown])
-    found = replayed(out, [backlash, unknown], events, 'auto')
+    nominal = load_robot(str(tmp_path / 'nominal.urdf'))
+    assert replayed(nominal, _diagnosis([coulomb], None), None, events, 'auto') is None
+    found = replayed(nominal, _diagnosis([backlash, unknown], None), None, events, 'auto')
     robot = load_robot(str(out / YAML_NAME))
     engine = Engine(robot, EngineConfig.from_mapping({}, robot))
     replay(engine, events, lambda _: None)

@@ -14,6 +14,7 @@ from sgp_ros.batch.identification import HELD_OUT, IdentificationOptions, identi
 from sgp_ros.cli import main
 from sgp_ros.engine.samples import frozen_array
 from sgp_ros.physics.term import Motion
+from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import nominal_robot
 from test.batch.arm_world import (
@@ -165,7 +166,8 @@ def test_json_prints_the_findings_alone_on_stdout(folder, tmp_path, capsys):
 
 def test_a_result_of_an_earlier_run_does_not_pass_for_one_of_this(tmp_path):
     """A robot without URDF leaves none behind in the same folder."""
-    (tmp_path / 'robot_identified.urdf').write_text('old')
+    with replacing_results(tmp_path, 'identify'):
+        write_text(tmp_path / 'robot_identified.urdf', 'old')
     assert main(['simulate', 'linear_axis', '--duration', '10', '--out', str(tmp_path)]) == 0
     assert main(_command(tmp_path / 'linear_axis.mcap', 'linear_axis', tmp_path)) == 0
     assert not (tmp_path / 'robot_identified.urdf').exists()

@@ -10,6 +10,7 @@ from sgp_ros.apps.replay import write_identified_robot
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.samples import JointSample
+from sgp_ros.report.files import replacing_results
 from sgp_ros.rigid import consistent
 from sgp_ros.robots.registry import load_robot
 
@@ -32,10 +33,12 @@ def test_bodies_that_are_not_found_do_not_cost_the_replay(monkeypatch, tmp_path)
         found.max_iter = 1
         return found
 
-    assert write_identified_robot(tmp_path, engine) == ''
+    with replacing_results(tmp_path, 'replay'):
+        assert write_identified_robot(tmp_path, engine) == ''
     assert (tmp_path / 'robot_identified.urdf').exists()
     monkeypatch.setattr(consistent.clarabel, 'DefaultSettings', impatient)
-    remark = write_identified_robot(tmp_path, engine)
+    with replacing_results(tmp_path, 'replay'):
+        remark = write_identified_robot(tmp_path, engine)
     assert 'may not exist' in remark
     assert '\n' not in remark
     assert not (tmp_path / 'robot_identified.urdf').exists()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -53,3 +54,75 @@ def test_nothing_is_written_through_a_link(tmp_path):
     with pytest.raises(OSError, match='symbolic links'), replacing_results(tmp_path, 'replay'):
         pass
     assert victim.read_text() == 'mine'
+
+
+def _replace(out, **content):
+    with replacing_results(out, 'replay'):
+        for name, text in content.items():
+            write_text(out / name, text)
+
+
+def _fail(out, **content):
+    with replacing_results(out, 'replay'):
+        for name, text in content.items():
+            write_text(out / name, text)
+        1 / 0  # noqa: B018 - any error
+
+
+def test_results_appear_together_or_not_at_all(tmp_path):
+    """Until the last of them is complete those of the run before are all there."""
+    _replace(tmp_path, a='old', b='old')
+    with replacing_results(tmp_path, 'replay'):
+        write_text(tmp_path / 'a', 'half')
+        write_text(tmp_path / 'a', 'new')
+        write_text(tmp_path / 'c', 'new')
+        assert {path.name for path in tmp_path.glob('[a-c]')} == {'a', 'b'}
+        assert (tmp_path / 'a').read_text() == 'old'
+    assert {path.name: path.read_text() for path in tmp_path.glob('[a-c]')} == {
+        'a': 'new', 'c': 'new',
+    }  # fmt: skip
+    assert [path.name for path in tmp_path.glob('.*')] == ['.sgp_replay.json']
+    with pytest.raises(ZeroDivisionError):
+        _fail(tmp_path, a='newer')
+    assert (tmp_path / 'a').read_text() == 'new'
+    assert not list(tmp_path.glob('.sgp_growing_*'))
+
+
+def test_the_next_run_completes_what_was_cut_off_between_two_names(tmp_path, monkeypatch):
+    """Also where that run fails: the results of one run are whole again."""
+    _replace(tmp_path, a='old', b='old')
+    replace, count = Path.replace, 0
+
+    def cut_off(self, target):
+        nonlocal count
+        count += target.name in ('a', 'c')
+        if count == 2:
+            raise KeyboardInterrupt
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, 'replace', cut_off)
+    with pytest.raises(KeyboardInterrupt):
+        _replace(tmp_path, a='new', c='new')
+    assert {path.name for path in tmp_path.glob('[a-c]')} == {'a', 'b'}
+    with pytest.raises(ZeroDivisionError):
+        _fail(tmp_path)
+    assert {path.name: path.read_text() for path in tmp_path.glob('[a-c]')} == {
+        'a': 'new', 'c': 'new',
+    }  # fmt: skip
+    assert not list(tmp_path.glob('.sgp_growing_*'))
+    assert not list(tmp_path.glob('.sgp_*.moves'))
+
+
+def test_a_note_of_moves_reaches_no_other_folder(tmp_path):
+    """It may be somebody else's, in a folder that everybody may write to."""
+    out, victim = tmp_path / 'out', tmp_path / 'victim'
+    out.mkdir()
+    victim.write_text('mine')
+    (out / '.sgp_growing_1_x').write_text('theirs')
+    (out / '.sgp_replay.moves').write_text(
+        '{"moves": {".sgp_growing_1_x": "../victim", "../victim": "y"}, "stale": ["../victim"]}'
+    )
+    with replacing_results(out, 'replay'):
+        pass
+    assert victim.read_text() == 'mine'
+    assert not (out / 'y').exists()
