@@ -27,7 +27,7 @@ from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.recordings.messages import header
 from sgp_ros.recordings.typestore import new_message
 from sgp_ros.recordings.writer import RecordingWriter
-from sgp_ros.report.diagnosis import joint_shares
+from sgp_ros.report.diagnosis_cards import joint_shares
 from sgp_ros.report.diagnosis_text import phrase
 from sgp_ros.report.layouts import write_finding_layouts
 from sgp_ros.report.robot_picture import link_places, link_segments

@@ -14,7 +14,6 @@ from sgp_ros.diagnosis.shown import (
     LawSearch,
     Overlay,
     Predictions,
-    Rollouts,
     Traces,
 )
 
@@ -158,7 +157,6 @@ class Proof:
             per coordinate.
         yardsticks: root mean square of what `nmse`, `acceleration_nmse` and `rollout_nmse` are
             relative to, by these names and joint [N m or N, rad/s^2 or m/s^2, rad or m].
-        motion: the roll-outs themselves; None where none were made.
     """
 
     nmse_before: Mapping[str, float]
@@ -175,7 +173,6 @@ class Proof:
     failed: int = 0
     distance: float = 0.0
     yardsticks: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    motion: Rollouts | None = None
 
     def errors(self) -> dict[str, Mapping[str, float]]:
         """Return the errors by joint under their names in diagnosis.json, before, then after."""

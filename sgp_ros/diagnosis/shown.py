@@ -94,26 +94,11 @@ class Predictions:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rollouts:
-    """Positions of m roll-outs of n steps of a recording, for pictures, each (m, n + 1, k).
-
-    Attributes:
-        time: (m, n + 1) [s].
-        measured, before, after: of the machine, the nominal and the final model [rad or m].
-    """
-
-    time: np.ndarray
-    measured: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Replay:
     """Motion of a model under what was recorded.
 
     Attributes:
-        position: (N, k), NaN where there is none [rad or m].
+        position: (N, k), NaN where there is none, and once it has left for good [rad or m].
         rms: (k,) root mean square errors, NaN of a replay that is not stable [rad or m].
     """
 
@@ -142,7 +127,7 @@ class Overlay:
     seconds: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class TriedFormula:
     """A formula of a force law that was fitted.
 
@@ -151,12 +136,15 @@ class TriedFormula:
         parameters: values with their units, by name.
         left: share of the mean squared effort of the joint that it leaves.
         words: the nearest known physics.
+        curve: (s,) over the factor of the search at `seen_x` of it; NaN where it is a function
+            of something else.
     """
 
     formula: str
     parameters: Mapping[str, tuple[float, str]]
     left: float
     words: str
+    curve: np.ndarray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -177,6 +165,8 @@ class LawSearch:
         formulas: best first; the first is asserted where `why_not` is empty.
         why_not: why none is asserted.
         words: the shape as a sentence.
+        seen_x: (s,) the variable in the recording, ascending.
+        seen: (s,) the data there: the shape, and what is left over the factor.
     """
 
     joint: str
@@ -192,3 +182,5 @@ class LawSearch:
     formulas: tuple[TriedFormula, ...]
     why_not: str
     words: str
+    seen_x: np.ndarray
+    seen: np.ndarray

@@ -74,6 +74,7 @@ class Chart:
         cells: a map instead of curves.
         limit: ends of the vertical axis; None fits it to the data.
         view: ends of x at first; None shows all.
+        option: label of the button that shows it, where one of several charts is seen at a time.
     """
 
     title: str
@@ -87,6 +88,7 @@ class Chart:
     cells: Cells | None = None
     limit: tuple[float, float] | None = None
     view: tuple[float, float] | None = None
+    option: str = ''
 
     def content(self) -> dict[str, Any]:
         """Return what the script reads; NaN becomes null."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,12 +9,12 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from sgp_ros.diagnosis.prove.held_out import HELD_OUT
 from sgp_ros.diagnosis.result import Diagnosis, Finding, ParameterError
 from sgp_ros.diagnosis.shown import Predictions
 from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.report.charts import Chart
+from sgp_ros.report.diagnosis_cards import cards, joint_shares, share_rows
 from sgp_ros.report.diagnosis_charts import diagnosis_charts
 from sgp_ros.report.diagnosis_figures import draw_diagnosis
 from sgp_ros.report.diagnosis_maps import band_sentences, important_joints
@@ -31,20 +30,21 @@ from sgp_ros.report.diagnosis_text import (
     differences_text,
     effect_name,
     equivalence_sentence,
-    explained,
+    is_calm,
     numbers,
     percent,
     place,
     quantity,
     visibility_sentences,
     why_it_lost,
-    worst_joint,
 )
 from sgp_ros.report.figures import png
 from sgp_ros.report.files import write_bytes, write_text
 from sgp_ros.report.html import MEANINGS
+from sgp_ros.report.law_search import search_rows
 from sgp_ros.report.metrics import versions
 from sgp_ros.report.next_steps import Steps
+from sgp_ros.report.overlay_charts import motion_columns, motion_rows
 from sgp_ros.report.page import render_page
 from sgp_ros.report.robot_picture import robot_picture
 from sgp_ros.report.verdict import held_out_sentence, verdict_sentence
@@ -53,7 +53,6 @@ from sgp_ros.rigid.tree import Tree
 _NAMED = ('kind', 'source_joint')
 """Parameters that are part of the name of an effect."""
 _SHOWN_RIVALS, _SHOWN_VARIABLES = 4, 5
-_WITHOUT_FORCES = ('parameters_only', 'unexplained')
 _VERDICTS = {
     'missing_physics': 'Physics is missing',
     'parameters_only': 'Only parameters are wrong',
@@ -101,17 +100,17 @@ def render(
         title=f'{_VERDICTS[found.verdict]}: diagnosis of {found.robot}',
         verdict=verdict_sentence(found),
         held_out='' if len(found.proofs) > 1 else held_out_sentence(found),
-        cards=_cards(found),
+        cards=cards(found),
         picture=Markup(picture),  # noqa: S704 - names in it are escaped
-        shares=_share_rows(found),
+        shares=share_rows(found),
         large=large,
         regions=band_sentences(found, large),
         has_bands=any(name.startswith('band ') for name in charts),
         bands=[name for name in charts if name.startswith('band ')],
         shapes=[name for name in charts if name.startswith('shape ')],
         dependences=_dependences(found, large) if found.findings else [],
-        is_calm=found.verdict == 'no_mismatch',
-        setup=[_finding(f) for f in found.setup],
+        is_calm=is_calm(found),
+        setup=[_finding(f) | {'share': ''} for f in found.setup],
         findings=[_finding(f, _chart_of(found, f, charts)) for f in found.findings],
         shared=[_finding(f) for f in found.shared],
         rivals=[_rival(f, best) for f in found.alternatives[:_SHOWN_RIVALS]],
@@ -121,19 +120,16 @@ def render(
         hidden=visibility_sentences(found),
         is_unexplained=found.verdict == 'unexplained',
         errors=[_error(e) for e in found.parameter_errors],
+        searches=search_rows(found),
         columns=columns(found),
         errors_in_units=errors_in_units(found),
+        motion_columns=motion_columns(found),
+        motion_rows=motion_rows(found),
         proofs=proof_rows(found),
         rollouts=rollouts_sentences(found),
         near_and_far=near_and_far(found),
         densities=densities(found),
-        settings=_settings(found),
-        refusals=[
-            {'reason': reason, 'count': count, 'meaning': MEANINGS.get(reason, '')}
-            for reason, count in found.refused.items()
-            if count
-        ],
-        remarks=list(found.remarks),
+        **_data_quality(found),
         next_steps=list(steps),
         versions=list(versions().items()),
     )  # fmt: skip
@@ -141,24 +137,8 @@ def render(
 
 def picture_of(found: Diagnosis, tree: Tree) -> str:
     """Return the robot as it stood in the middle of its motion; pale where nothing is wrong."""
-    shares = dict(joint_shares(found)) if found.verdict != 'no_mismatch' else {}
+    shares = dict(joint_shares(found)) if not is_calm(found) else {}
     return robot_picture(tree, np.median(found.traces.position, axis=0), shares)
-
-
-def joint_shares(found: Diagnosis) -> list[tuple[str, float]]:
-    """Return the share of each joint of all that the nominal robot leaves."""
-    left = found.proofs['train'].nmse_before
-    known = {name: x for name, x in left.items() if math.isfinite(x)}
-    total = sum(known.values())
-    return [(name, known.get(name, 0.0) / total if total else 0.0) for name in found.joints]
-
-
-def _share_rows(found: Diagnosis) -> list[dict[str, Any]]:
-    left = found.proofs['train'].nmse_before
-    return [
-        {'joint': name, 'share': share, 'percent': percent(share), 'own': percent(left[name])}
-        for name, share in joint_shares(found)
-    ]
 
 
 def _dependences(found: Diagnosis, joints: Sequence[str]) -> list[dict[str, Any]]:
@@ -178,33 +158,6 @@ def _chart_of(found: Diagnosis, finding: Finding, charts: Mapping[str, Chart]) -
     """Return the name of the chart of a finding's law; empty where there is none."""
     name = f'law {found.findings.index(finding)}'
     return name if name in charts else ''
-
-
-def _cards(found: Diagnosis) -> list[dict[str, str]]:
-    """Return the numbers that a reader asks for first."""
-    cards = [{'value': f'{found.certainty:.2f}', 'label': 'probability that the verdict is right'}]
-    is_calm = found.verdict == 'no_mismatch'
-    if found.traces.forces or found.verdict in _WITHOUT_FORCES:
-        by = (
-            'a learned correction, not by a law'
-            if found.verdict == 'unexplained'
-            else 'the finding'
-        )
-        label = f'of what the nominal robot leaves is explained by {by}'
-        cards.append({'value': percent(explained(found)), 'label': label})
-    for stem, proof in found.proofs.items():
-        if stem != 'train':
-            joint = worst_joint(proof)
-            before, after = percent(proof.nmse_before[joint]), percent(proof.nmse_after[joint])
-            value = before if is_calm else f'{before} -> {after}'
-            held = 'what was held out' if stem == HELD_OUT else f'{stem}, held out'
-            label = f'of the variance of the effort of {joint} is left on {held}'
-            cards.append({'value': value, 'label': label})
-    short = {'less than': '<', 'more than': '>'}
-    for card in cards:
-        for word, sign in short.items():
-            card['value'] = card['value'].replace(word, sign)
-    return cards
 
 
 def _finding(f: Finding, chart: str = '') -> dict[str, Any]:
@@ -259,6 +212,18 @@ def _error(e: ParameterError) -> dict[str, str]:
         'interval': f'{e.value - half:.4g} to {e.value + half:.4g}',
         'nominal': f'{e.nominal:.4g}',
         'unit': e.unit,
+    }
+
+
+def _data_quality(found: Diagnosis) -> dict[str, Any]:
+    return {
+        'settings': _settings(found),
+        'refusals': [
+            {'reason': reason, 'count': count, 'meaning': MEANINGS.get(reason, '')}
+            for reason, count in found.refused.items()
+            if count
+        ],
+        'remarks': list(found.remarks),
     }
 
 

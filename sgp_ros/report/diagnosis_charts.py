@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sgp_ros.diagnosis.result import Diagnosis, Finding
-from sgp_ros.diagnosis.shown import Band, Rollouts
+from sgp_ros.diagnosis.shown import Band
 from sgp_ros.report.charts import Cells, Chart, Series, kept, spoken, spread_rows
 from sgp_ros.report.diagnosis_curves import (
     abscissa,
@@ -26,26 +26,22 @@ from sgp_ros.report.diagnosis_maps import (
     reach_of,
     variable_units,
 )
-from sgp_ros.report.diagnosis_proof import recording_name
-from sgp_ros.report.diagnosis_text import UNKNOWN, effect_name
+from sgp_ros.report.diagnosis_text import UNKNOWN, effect_name, is_calm
+from sgp_ros.report.law_search import search_chart
+from sgp_ros.report.overlay_charts import FINAL, NOMINAL, motion_charts, overlaid
 
-NOMINAL, FINAL = 'nominal robot', 'diagnosed robot'
 _TONES = ('law1', 'law2', 'law3')
-_MOST_LAWS, _MOST_ROLLOUTS = 4, 8
-_ROLLOUT_STEP_S = 0.015
-"""Between two points of a roll-out on a page [s]."""
+_MOST_LAWS = 4
 
 
 def diagnosis_charts(found: Diagnosis) -> dict[str, Chart]:
     """Return the charts of a diagnosis by name, in the order of its page."""
     charts: dict[str, Chart] = {}
-    shown = shown_recording(found)
-    motion = found.proofs[shown].motion
     for j in important_joints(found):
         name = found.joints[j]
-        charts[f'effort {name}'] = _efforts(found, j)
-        if motion is not None:
-            charts[f'motion {name}'] = _motion(found, shown, motion, j)
+        charts |= (
+            motion_charts(found, j) if overlaid(found) else {f'effort {name}': _efforts(found, j)}
+        )
         charts[f'left {name}'] = _left(found, j)
         charts |= {f'map {when} {name}': chart for when, chart in _maps(found, j)}
         own = [b for b in found.bands if b.joint == name]
@@ -53,16 +49,12 @@ def diagnosis_charts(found: Diagnosis) -> dict[str, Chart]:
     laws = sorted(forces_of(found), key=lambda pair: -pair[0].share)[:_MOST_LAWS]
     for i, (finding, force) in enumerate(laws):
         charts[f'law {found.findings.index(finding)}'] = _law(found, i, finding, force)
+    charts |= {f'search {s.joint}': search_chart(s) for s in found.law_searches}
     for f in found.findings:
-        if f.effect == UNKNOWN and f.joint in found.joints:
+        is_searched = f'search {f.joint}' in charts
+        if f.effect == UNKNOWN and f.joint in found.joints and not is_searched:
             charts[f'shape {f.joint}'] = _shape(found, found.joints.index(f.joint))
     return charts
-
-
-def shown_recording(found: Diagnosis) -> str:
-    """Return the held-out recording that is furthest from what was learned; else that itself."""
-    held = [stem for stem in found.proofs if stem != 'train']
-    return max(held, key=lambda stem: found.proofs[stem].distance) if held else 'train'
 
 
 def _efforts(found: Diagnosis, j: int) -> Chart:
@@ -73,7 +65,7 @@ def _efforts(found: Diagnosis, j: int) -> Chart:
         for x in (traces.effort, traces.effort + traces.before, traces.effort + traces.after)
     )
     series = [('acted', acted, 'measured', 'thick'), (NOMINAL, before, 'nominal', 'dashed')]
-    if found.verdict != 'no_mismatch':
+    if not is_calm(found):
         series.append((FINAL, after, 'final', 'line'))
     rows = kept([y for _, y, *_ in series])
     low, high = np.nanmin(acted), np.nanmax(acted)
@@ -81,53 +73,21 @@ def _efforts(found: Diagnosis, j: int) -> Chart:
         f'Effort on {name}: what acted, and what each model needs for this motion',
         f'Effort on {name} over {spoken(float(np.ptp(traces.time)))} s: what acted lies between '
         f'{spoken(low)} and {spoken(high)} {unit}.'
-        + misses(found, 'train', 'nmse', j),
+        + _misses(found, j),
         'time [s]', f'effort [{unit}]', traces.time[rows],
         [Series(label, y[rows], tone, style) for label, y, tone, style in series],
         group='train', view=_busiest(found),
     )  # fmt: skip
 
 
-def misses(found: Diagnosis, stem: str, kind: str, j: int) -> str:
-    """Say by how much the models miss, in units, in a sentence after a blank; empty if unknown."""
-    unit = position_unit(found, j) if kind.startswith('rollout') else found.units[j]
-    proof, name = found.proofs[stem], found.joints[j]
-    before, after = (proof.rms(f'{kind}_{when}').get(name) for when in ('before', 'after'))
+def _misses(found: Diagnosis, j: int) -> str:
+    """Return the errors of the effort as a sentence after a blank; empty where unknown."""
+    proof, name, unit = found.proofs['train'], found.joints[j], found.units[j]
+    before, after = (proof.rms(f'nmse_{when}').get(name) for when in ('before', 'after'))
     if before is None or after is None:
         return ''
-    text = f' The {NOMINAL} misses it by {spoken(before)} {unit}'
-    if found.verdict != 'no_mismatch':
-        text += f', the {FINAL} by {spoken(after)} {unit}'
-    return f'{text} (root mean square).'
-
-
-def _motion(found: Diagnosis, stem: str, motion: Rollouts, j: int) -> Chart:
-    """Return the roll-outs of both models over the position that was measured."""
-    unit, name = position_unit(found, j), found.joints[j]
-    step = float(motion.time[0, 1] - motion.time[0, 0])
-    nodes = np.unique([*range(0, motion.time.shape[1], max(1, round(_ROLLOUT_STEP_S / step))),
-                       motion.time.shape[1] - 1])  # fmt: skip
-    time, curves = motion.time[:, nodes], []
-    for x in (motion.measured, motion.before, motion.after):
-        y = x[:, nodes, j]
-        curves.append(np.hstack([y, np.full((len(y), 1), np.nan)]).ravel())
-    gap = np.hstack([time, time[:, -1:] + 1e-4 * step]).ravel()  # each roll-out ends in a break
-    order = np.argsort(gap, kind='stable')
-    labels = (('measured', 'measured', 'thick'), (NOMINAL, 'nominal', 'dashed'),
-              (FINAL, 'final', 'line'))  # fmt: skip
-    series = [
-        Series(label, y[order], tone, style)
-        for (label, tone, style), y in zip(labels, curves, strict=True)
-    ]
-    if found.verdict == 'no_mismatch':
-        series.pop()
-    return Chart(
-        f'Position of {name} on {recording_name(stem)}: measured, and simulated from there on',
-        f'{len(time)} roll-outs, each from a measured state, under the recorded commands.'
-        + misses(found, stem, 'rollout_nmse', j),
-        'time [s]', f'position [{unit}]', gap[order], series, group='motion',
-        view=_worst_stretch(motion, j),
-    )  # fmt: skip
+    text = f' The {NOMINAL} is off by {spoken(before)} {unit} rms'
+    return text + ('.' if is_calm(found) else f', the {FINAL} by {spoken(after)} {unit}.')
 
 
 def _busiest(found: Diagnosis) -> tuple[float, float] | None:
@@ -136,27 +96,19 @@ def _busiest(found: Diagnosis) -> tuple[float, float] | None:
     return (float(rows[0]), float(rows[-1])) if rows[-1] > rows[0] else None
 
 
-def _worst_stretch(motion: Rollouts, j: int) -> tuple[float, float]:
-    """Return a stretch of a few roll-outs around that which the nominal robot misses most."""
-    off = ((motion.before - motion.measured)[:, :, j] ** 2).sum(axis=1)
-    middle = int(np.argmax(off))
-    start = float(motion.time[max(0, middle - _MOST_ROLLOUTS // 2), 0])
-    return start, start + _MOST_ROLLOUTS * float(np.ptp(motion.time[middle]))
-
-
 def _left(found: Diagnosis, j: int) -> Chart:
     """Return what the models leave of the effort, the laws that were found, and the noise."""
     traces, unit, name = found.traces, found.units[j], found.joints[j]
     curves = [(f'{NOMINAL} leaves', traces.before[:, j], 'measured', 'thick')]
     for i, (finding, force) in enumerate(acting(found, j)):
         curves.append((effect_name(finding), force[:, j], _TONES[i % len(_TONES)], 'line'))
-    if found.verdict != 'no_mismatch':
+    if not is_calm(found):
         curves.append((f'{FINAL} leaves', traces.after[:, j], 'final', 'line'))
     values = [broken(found, y) for _, y, *_ in curves]
     rows = kept(values)
     noise = 2.0 * float(traces.noise[j])
     shown = [(NOMINAL, traces.before[:, j]), (FINAL, traces.after[:, j])]
-    shown = shown[: 1 if found.verdict == 'no_mismatch' else 2]
+    shown = shown[: 1 if is_calm(found) else 2]
     return Chart(
         f'What is left of the effort on {name}',
         ', '.join(
@@ -178,7 +130,7 @@ def _maps(found: Diagnosis, j: int) -> Iterator[tuple[str, Chart]]:
     unit, name, reach = found.units[j], found.joints[j], reach_of(found, j)
     length = position_unit(found, j)
     shown = [('before', NOMINAL, found.traces.before), ('after', FINAL, found.traces.after)]
-    for when, model, values in shown[: 1 if found.verdict == 'no_mismatch' else 2]:
+    for when, model, values in shown[: 1 if is_calm(found) else 2]:
         x, y, mean = cells_of(found, j, values[:, j])
         a, b = np.unravel_index(np.nanargmax(np.abs(mean)), mean.shape)
         yield when, Chart(

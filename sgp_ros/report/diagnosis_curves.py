@@ -51,9 +51,14 @@ def law_curve(found: Diagnosis, finding: Finding, force: np.ndarray) -> LawCurve
 
 
 def broken(found: Diagnosis, values: np.ndarray) -> np.ndarray:
-    """Return values (N,) with NaN in the last row before a gap, where a line is to break."""
-    step = np.diff(found.traces.time, append=found.traces.time[-1])
-    return np.where(step > _GAP / found.rate_hz, np.nan, values)
+    """Return values (N,) of the traces with NaN where a line is to break."""
+    return with_gaps(found.traces.time, values, found.rate_hz)
+
+
+def with_gaps(time: np.ndarray, values: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Return values (N,) with NaN in the last row before a gap in time (N,)."""
+    step = np.diff(time, append=time[-1])
+    return np.where(step > _GAP / rate_hz, np.nan, values)
 
 
 def acting(found: Diagnosis, j: int) -> list[tuple[Finding, np.ndarray]]:

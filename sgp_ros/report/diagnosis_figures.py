@@ -29,8 +29,10 @@ from sgp_ros.report.diagnosis_maps import (
     reach_of,
 )
 from sgp_ros.report.diagnosis_proof import recording_name
-from sgp_ros.report.diagnosis_text import UNKNOWN, effect_name
+from sgp_ros.report.diagnosis_text import UNKNOWN, effect_name, is_calm
 from sgp_ros.report.figures import BAND, GREY, MEASURED, PREDICTED
+from sgp_ros.report.law_search import draw_searches
+from sgp_ros.report.overlay_charts import draw_motion, overlaid
 
 BEFORE, AFTER, BY_CHANCE = '#E69F00', PREDICTED, '#BBBBBB'
 _VARIABLES, _SEEN = 7, 0.005
@@ -127,8 +129,13 @@ def draw_diagnosis(found: Diagnosis) -> dict[str, Figure]:
     if found.findings:
         large = {found.joints[j] for j in important_joints(found)}
         figures['dependence'] = draw_dependence(found, large)
+    if overlaid(found):
+        figures['motion'] = draw_motion(found, important_joints(found))
+    if found.law_searches:
+        figures['search'] = draw_searches(found.law_searches)
+    searched = {s.joint for s in found.law_searches}
     for f in found.findings:
-        if f.effect == UNKNOWN and f.joint in found.joints:
+        if f.effect == UNKNOWN and f.joint in found.joints and f.joint not in searched:
             figures['shape'] = draw_shape(found, f)
     figures['proof'] = draw_proof(found)
     return figures
@@ -206,7 +213,7 @@ def _trace(axes: Axes, found: Diagnosis, j: int, shown: slice) -> dict[str, Arti
     for finding, force, colour in _coloured(found, j):
         axes.plot(time, broken(found, force[:, j])[shown], color=colour, lw=1.1,
                   label=effect_name(finding))  # fmt: skip
-    if found.verdict != 'no_mismatch':
+    if not is_calm(found):
         left = broken(found, traces.after[:, j])[shown]
         (alike['final model leaves'],) = axes.plot(time, left, color='#D55E00', lw=0.9)
     alike['noise (2 std)'] = axes.axhspan(-half, half, color=BAND, lw=0, zorder=0)

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from sgp_ros.diagnosis.criteria import LEAST_SHARE
 from sgp_ros.diagnosis.result import Diagnosis
 from sgp_ros.diagnosis.shown import Band, Dependence
-from sgp_ros.report.diagnosis_text import scored_joints, worst_joint
+from sgp_ros.report.diagnosis_text import is_calm, scored_joints, worst_joint
 from sgp_ros.report.figures import GREY, PREDICTED
 
 _FEWEST_CELLS, _MOST_CELLS = 8, 24
@@ -24,7 +24,7 @@ def important_joints(found: Diagnosis) -> list[int]:
     """Return the joints that deserve large pictures, at most three, in order of the robot."""
     proof = found.proofs['train']
     worst = worst_joint(proof)
-    if found.verdict == 'no_mismatch':
+    if is_calm(found):
         return [found.joints.index(worst)]
     named = {f.joint for f in found.findings}
     least = max(_IMPORTANT * proof.nmse_before[worst], _IMPORTANT * LEAST_SHARE)
@@ -41,7 +41,7 @@ def draw_location(found: Diagnosis) -> Figure:
     """Draw what nominal robot and final model leave over position and velocity, on one scale."""
     joints = important_joints(found)
     left = [('left by the nominal robot', found.traces.before)]
-    if found.verdict != 'no_mismatch':
+    if not is_calm(found):
         left.append(('left by the final model', found.traces.after))
     figure = Figure(figsize=(1.0 + 4.5 * len(left), 0.3 + 3.2 * len(joints)), layout='constrained')
     grid = figure.subplots(len(joints), len(left), squeeze=False, sharex='row', sharey='row')

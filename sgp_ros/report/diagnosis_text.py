@@ -30,6 +30,11 @@ _SIMILAR_NATS = 20.0
 _MOST_ERRORS = 3
 
 
+def is_calm(found: Diagnosis) -> bool:
+    """Return whether the nominal robot is right, once errors of the set-up are undone."""
+    return found.verdict in {'no_mismatch', 'setup_error'}
+
+
 def scored_joints(proof: Proof) -> list[str]:
     """Return the joints with a meaningful score: an effort that never changes gives none."""
     return [
@@ -188,10 +193,11 @@ def visibility_sentences(found: Diagnosis) -> list[str]:
     for effect in dict.fromkeys(effect for _, effect, _ in found.visibility):
         own = {joint: p for (joint, e, _), p in found.visibility.items() if e == effect}
         never = [joint for joint, p in own.items() if p.value == math.inf]
-        seen = [f'{joint} {quantity(p)}' for joint, p in own.items() if joint not in never]
-        parts = [f'below {", ".join(seen)}'] if seen else []
-        parts += [f'of any size on {", ".join(never)}'] if never else []
-        sentences.append(f'{plain_name(effect)}, {"; ".join(parts)}')
+        seen = [
+            f'below {quantity(p)} on {joint}' for joint, p in own.items() if joint not in never
+        ]
+        seen += [f'of any size on {", ".join(never)}'] if never else []
+        sentences.append(f'{plain_name(effect)}: {", ".join(seen)}')
     return sentences
 
 

@@ -49,9 +49,17 @@ def render_page(
     )
 
 
+_SIGNS = {
+    '+-': '±', ' -> ': ' → ', ' N m': '\u00a0N\u00a0m', '^2': '²', '^3': '³', '(rad)²': 'rad²',
+    '(rad)³': 'rad³', '(m)²': 'm²', '(m)³': 'm³',
+}  # fmt: skip
+
+
 def typeset(text: str) -> str:
     """Return text with the signs that a terminal may lack."""
-    return text.replace('+-', '±').replace(' -> ', ' → ')
+    for plain, sign in _SIGNS.items():
+        text = text.replace(plain, sign)
+    return text
 
 
 def robot_styles() -> str:

@@ -14,7 +14,15 @@ from sgp_ros.diagnosis.result import (
     ParameterError,
     Proof,
 )
-from sgp_ros.diagnosis.shown import Band, Dependence, Traces
+from sgp_ros.diagnosis.shown import (
+    Band,
+    Dependence,
+    LawSearch,
+    Overlay,
+    Replay,
+    Traces,
+    TriedFormula,
+)
 
 LEVEL, NOISE, N = 0.317, 0.004, 600
 COULOMB = Finding(
@@ -85,6 +93,10 @@ def diagnosis(
         Traces(time, position, velocity, np.ones((N, k)), before, before, after,
                np.full(k, NOISE), tuple(force for f in findings if f is not UNKNOWN)),
         10.0, 40.0, N, {'duplicate': 3}, bands=tuple(_bands(joints)),
+        overlays={
+            stem: _overlay(time, position, before, after)
+            for stem in ('train', *(['real_test'] if held else []))
+        },
     )  # fmt: skip
 
 
@@ -99,3 +111,36 @@ def _bands(joints):
             rows = 0.8 if regions else 0.0
             half = np.full((9, 2), 0.1)
             yield Band(joint, variable, np.linspace(-2.0, 2.0, 9), mean, half, regions, rows)
+
+
+OFF = 0.1
+"""Error of the nominal robot in every replay [rad]."""
+
+
+def _overlay(time, position, before, after):
+    """Return replays that are off by `OFF` with the nominal robot; it diverges after 2 s."""
+    k = position.shape[1]
+    far = np.where(time[:, None] % 2.0 < 1.0, position + OFF, np.nan)
+    right = Replay(position, np.full(k, 0.01 * OFF))
+    return Overlay(
+        time, position, np.ones_like(before), {'nominal': 1.0 + before, 'diagnosed': 1.0 + after},
+        {
+            'open_0.5': {'nominal': Replay(position + OFF, np.full(k, OFF)), 'diagnosed': right},
+            'open_2': {'nominal': Replay(far, np.full(k, np.nan)), 'diagnosed': right},
+        },
+        float(time[-1]),
+    )  # fmt: skip
+
+
+def search(why_not='the best formula follows the shape only nearly'):
+    """Return a search at `elbow` that ended with friction over a place."""
+    x = np.linspace(-1.0, 1.0, 41)
+    shape = 0.2 + 0.1 * x**2
+    formula = TriedFormula(
+        'tau_x[elbow] = (a*q[elbow]**2 + d)*sign(dq[elbow])',
+        {'a': (0.1, 'N m/rad^2'), 'd': (0.2, 'N m')}, 0.01, 'a law found from the data', shape,
+    )  # fmt: skip
+    return LawSearch(
+        'elbow', 'q[elbow]', 'sign(dq[elbow])', 'rad', 'N m', x, shape, np.full(41, 0.01), 0.008,
+        0.03, (formula,), why_not, 'follows the position of elbow: 0.3 N m at -1 rad', x, shape,
+    )  # fmt: skip

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -13,7 +17,7 @@ from sgp_ros.report.diagnosis import render
 from sgp_ros.report.diagnosis_charts import diagnosis_charts
 from sgp_ros.report.robot_picture import LEVELS, robot_picture
 from sgp_ros.rigid.tree import read_urdf
-from test.report.diagnoses import COULOMB, LEVEL, UNKNOWN, diagnosis
+from test.report.diagnoses import COULOMB, LEVEL, OFF, UNKNOWN, diagnosis, search
 from test.report.pages import charts_of, content_of
 
 ARM = """
@@ -52,7 +56,7 @@ def test_what_is_no_number_reaches_the_page_as_a_break():
 
 def test_the_page_of_a_diagnosis_draws_each_model_over_what_acted():
     """What the nominal robot lacks is the difference of two curves that lie over each other."""
-    found = diagnosis('missing_physics', [COULOMB])
+    found = replace(diagnosis('missing_physics', [COULOMB]), overlays={})
     charts = charts_of(render(found, {}))
     effort = {s['label']: np.array(s['y'], float) for s in charts['effort elbow']['series']}
     gap = np.abs(effort['nominal robot'] - effort['acted'])
@@ -61,6 +65,43 @@ def test_the_page_of_a_diagnosis_draws_each_model_over_what_acted():
     assert charts['effort elbow']['group'] == charts['left elbow']['group'] == 'train'
     before, after = (charts[f'map {when} elbow']['cells'] for when in ('before', 'after'))
     assert before['reach'] == after['reach']
+
+
+def test_motion_is_shown_beside_efforts_with_its_errors_in_degrees():
+    """A replay in which a model diverges is not the one that is seen first, and says so."""
+    page = render(diagnosis('missing_physics', [COULOMB]), {})
+    charts = charts_of(page)
+    names = [name for name in charts if name.startswith('motion elbow ')]
+    assert names == ['motion elbow open_0.5', 'motion elbow open_2', 'motion elbow error']
+    off = charts['motion elbow error']['series'][0]['y']
+    assert np.nanmedian(np.array(off, float)) == pytest.approx(OFF)
+    assert {charts[n]['group'] for n in (*names, 'effort elbow')} == {'motion'}
+    text = content_of(page)
+    assert f'off by {OFF} rad ({math.degrees(OFF):.2g}°) rms' in text
+    assert 'The nominal robot diverges' in text
+    assert text.count('<td>diverges</td>') == 4  # both joints of both recordings
+    assert re.search(
+        r'>5.7 → 0.057°</strong>rms error of the position of elbow on real_test', text
+    )
+    nominal = np.array(charts['motion elbow open_2']['series'][1]['y'], float)
+    assert 0.4 < np.isfinite(nominal).mean() < 0.6
+
+
+@pytest.mark.parametrize('why_not', ['', 'the best formula follows the shape only nearly'])
+def test_the_search_for_a_law_is_drawn_and_said(why_not):
+    """Data, shape with its band, formulas; asserted or not, and never both."""
+    found = diagnosis('unexplained', [UNKNOWN])
+    found = replace(found, law_searches=(search(why_not),))
+    page = render(found, {})
+    chart, text = charts_of(page)['search elbow'], content_of(page)
+    assert [s['label'] for s in chart['series']] == [
+        'measured', 'shape without a formula', 'formula 1'
+    ]  # fmt: skip
+    assert 'low' in chart['series'][1]
+    assert 'data-chart="search elbow"' in text
+    assert ('No formula is asserted' in text) == bool(why_not)
+    assert ('Formula 1 is asserted' in text) == (not why_not)
+    assert 'a = 0.1 N m/rad², d = 0.2 N m' in text.replace('\u00a0', ' ')
 
 
 @pytest.mark.parametrize('verdict', ['no_mismatch', 'parameters_only', 'unexplained'])

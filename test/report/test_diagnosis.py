@@ -37,6 +37,7 @@ from sgp_ros.report.diagnosis_text import (
     visibility_sentences,
     why_it_lost,
 )
+from sgp_ros.report.page import typeset
 from sgp_ros.report.verdict import held_out_sentence, verdict_sentence
 from test.report.diagnoses import (
     ASYMMETRIC,
@@ -70,7 +71,7 @@ def test_what_could_not_have_shown_is_said_in_words_and_numbers():
     }
     found = replace(diagnosis('no_mismatch'), visibility=seen)
     assert visibility_sentences(found) == [
-        'backlash, below shoulder 0.00213 rad; of any size on elbow'
+        'backlash: below 0.00213 rad on shoulder, of any size on elbow'
     ]
     assert 'What this recording could not have shown' in render(found, {})
     entries = diagnosis_mapping(found)['visibility']
@@ -186,14 +187,16 @@ def test_the_page_opens_with_the_sentence_and_needs_no_other_file(tmp_path):
     write_diagnosis(tmp_path, found)
     page = (tmp_path / 'report.html').read_text()
     order = (
-        verdict_sentence(found).replace('+-', '±'), '<h2>Where', '<h2>What', COULOMB.formula,
+        typeset(verdict_sentence(found)), '<h2>Where', '<h2>What', COULOMB.formula,
         'why they were rejected', '<h2>How much better', '<td>3</td><td class="text">duplicate',
     )  # fmt: skip
     at = [page.index(text) for text in order]
     assert at == sorted(at)
     content_of(page)
     stems = {path.stem for path in tmp_path.glob('*.png')}
-    assert stems == {'location', 'others', 'time', 'bands', 'law', 'dependence', 'proof'}
+    assert stems == {
+        'location', 'others', 'time', 'bands', 'law', 'dependence', 'proof', 'motion'
+    }  # fmt: skip
     assert page.count('src="data:image/png;base64,') == len(stems - {'dependence'})
     assert not list(tmp_path.glob('.sgp_growing_*'))
 
@@ -365,7 +368,7 @@ def test_a_joint_that_is_never_driven_hides_no_finding():
     assert explained(found) > 0.99
     assert important_joints(found) == [1]
     assert 'shoulder' not in held_out_sentence(found)
-    assert len(draw_diagnosis(found)) == 7
+    assert len(draw_diagnosis(found)) == 8
 
 
 def test_many_joints_stay_readable():
@@ -429,7 +432,7 @@ def test_the_part_that_was_held_out_is_called_so():
     )
     assert 'on the part held out (elbow)' in held_out_sentence(found)
     text = _text(render(found, {}))
-    assert 'is left on what was held out' in text
+    assert 'is left on elbow, the part held out' in text
     assert 'held_out' not in text
 
 

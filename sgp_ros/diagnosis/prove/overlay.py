@@ -112,19 +112,19 @@ def _modes(
 def _replayed(
     final: FinalModel, side: _Side, windows: RolloutWindows, rows: np.ndarray, gains: Gains | None
 ) -> Replay:
-    """Return the positions of a model at the rows (N, k), and their errors."""
+    """Return the positions of a model at the rows (N, k) until it leaves, and their errors."""
     motion = windows.motion
     rolled, ends = roll_out(windows, side.model, final.equations, side.remainders, gains)
     spread = np.ptp(motion.position, axis=0)
     low, high = motion.position.min(axis=0), motion.position.max(axis=0)
-    near = (rolled > low - _FAR * spread) & (rolled < high + _FAR * spread)
-    ends = ends & near.all(axis=(1, 2))
+    near = (rolled > low - _FAR * spread) & (rolled < high + _FAR * spread)  # not NaN either
     shown = np.full((len(rows), motion.position.shape[1]), np.nan)
-    if not ends.all():
-        return Replay(shown, np.full(shown.shape[1], math.nan))
+    seen = np.where(np.logical_and.accumulate(near, axis=1), rolled, np.nan)
     for w, nodes in enumerate(windows.nodes):
         inside = (rows >= nodes[0]) & (rows <= nodes[-1])
         for j in range(shown.shape[1]):
-            shown[inside, j] = np.interp(rows[inside], nodes, rolled[w, :, j])
+            shown[inside, j] = np.interp(rows[inside], nodes, seen[w, :, j])
+    if not (ends & near.all(axis=(1, 2))).all():
+        return Replay(shown, np.full(shown.shape[1], math.nan))
     steps = windows.squared(rolled).sum(axis=0) / (len(windows.first) * windows.steps)
     return Replay(shown, np.sqrt(steps))

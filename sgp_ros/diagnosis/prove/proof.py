@@ -29,7 +29,6 @@ from sgp_ros.diagnosis.compare.trajectory import (
 from sgp_ros.diagnosis.prove.prediction import FinalModel, accelerations
 from sgp_ros.diagnosis.prove.rollouts import cut, roll_out
 from sgp_ros.diagnosis.result import Proof
-from sgp_ros.diagnosis.shown import Rollouts
 from sgp_ros.errors import RecordingError
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -169,9 +168,7 @@ def prove(final: FinalModel, raw: RawTrajectory, tree: Tree, name: str) -> Proof
         )
     scores = _Scores(tree.moving_names)
     densities = _one_step(final, motion, low, resting(raw, motion, bandwidth), scores)
-    motions, counts = _rolled_out(
-        final, motion, ZeroPhase(rate, bandwidth.state_cutoff).trim, scores
-    )
+    counts = _rolled_out(final, motion, ZeroPhase(rate, bandwidth.state_cutoff).trim, scores)
     values = scores.values
     return Proof(
         values['nmse_before'], values['nmse_after'],
@@ -179,7 +176,7 @@ def prove(final: FinalModel, raw: RawTrajectory, tree: Tree, name: str) -> Proof
         float(densities[0].mean()), float(densities[1].mean()),
         values.get('rollout_nmse_before', {}), values.get('rollout_nmse_after', {}),
         scores.intervals, (mean_interval(densities[0]), mean_interval(densities[1])),
-        *counts, _distance(final.equations.motion, motion), scores.yardsticks, motions,
+        *counts, _distance(final.equations.motion, motion), scores.yardsticks,
     )  # fmt: skip
 
 
@@ -214,24 +211,23 @@ def _one_step(
 
 def _rolled_out(
     final: FinalModel, motion: ObservedMotion, trim: int, scores: _Scores
-) -> tuple[Rollouts | None, tuple[int, int]]:
-    """Score the roll-outs that both models finish; return these, all windows, and the others."""
+) -> tuple[int, int]:
+    """Score the roll-outs that both models finish; return the number of all and of the others."""
     if motion.is_static:
-        return None, (0, 0)
+        return 0, 0
     windows = cut(motion, trim)
     if not len(windows.first):
-        return None, (0, 0)
+        return 0, 0
     before, ends_before = roll_out(windows, final.nominal, final.equations)
     after, ends_after = roll_out(windows, final.model, final.equations, final.remainders)
     both = ends_before & ends_after
     counts = len(both), int((~both).sum())
     if not both.any():
-        return None, counts
+        return counts
     steps, held = windows.steps, windows.held[both]
     scores.add('rollout_nmse_before', windows.squared(before)[both] / steps, held / steps)
     scores.add('rollout_nmse_after', windows.squared(after)[both] / steps, held / steps)
-    rows = windows.nodes[both]
-    return Rollouts(motion.time[rows], motion.position[rows], before[both], after[both]), counts
+    return counts
 
 
 def _distance(learned: ObservedMotion, motion: ObservedMotion) -> float:

@@ -42,7 +42,7 @@ OF_VELOCITY = (
     'a*X + b*X**3', 'a*X + b*abs(X)*X', 'a*X + b*tanh(X/v0)', 'a*(abs(X)/r)**p*sign(X)',
 )  # fmt: skip
 """Shapes in a velocity X."""
-_WORDS = 'a law found from the data'
+NAMELESS = 'a law found from the data'
 NEAREST = {
     'a*X/(1 + (X/v0)**2)': 'an eddy-current brake',
     'a*abs(X)*X': 'quadratic drag',
@@ -120,7 +120,7 @@ def formulas(smooth: SmoothForce, motion: ObservedMotion) -> Iterator[FoundLaw]:
             for name in sorted(formula.parameters)
         ]
         size = formula.folded(lambda _node: 1.0, lambda _node, parts: 1.0 + sum(parts))
-        words = NEAREST.get(f'{shape} {smooth.gate}'.strip(), _WORDS)
+        words = NEAREST.get(f'{shape} {smooth.gate}'.strip(), NAMELESS)
         yield FoundLaw(smooth, formula, joint, parameters, words, PER_PIECE * size)
 
 

@@ -12,12 +12,15 @@ from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.shown import LawSearch, TriedFormula
 from sgp_ros.diagnosis.unlisted.assertion import Explained, with_laws
+from sgp_ros.diagnosis.unlisted.formulas import FoundLaw
 from sgp_ros.diagnosis.unlisted.search import Searched, law_of
 from sgp_ros.diagnosis.unlisted.shapes import SmoothForce, force_unit
 from sgp_ros.physics.effect_at import EffectAt
 
 POINTS = 41
 _FORMULAS = 3
+_MOST_SEEN, _WEAK = 600, 0.2
+"""Rows of the recording beside a shape; the least factor of them, relative to the greatest."""
 _CLEAR = 0.85
 """A curve rises or falls where it leaves this part of its greatest value."""
 
@@ -76,9 +79,59 @@ def _smooth(searched: Searched) -> tuple[EffectAt, SmoothForce]:
     return placed, placed.effect
 
 
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Some rows of a recording, in the order of the variable.
+
+    Attributes:
+        rows: (s,) of the motion.
+        x: (s,) the variable.
+        y: (s,) what other effects leave for the shape: itself plus the residual over the factor.
+    """
+
+    rows: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+
+
+def seen_by(searched: Searched) -> Seen:
+    """Return the data beside the shape of a joint, where its factor is not small."""
+    placed, smooth = _smooth(searched)
+    equations = searched.smooth.frame.equations
+    rows = equations.filter.rows
+    x = smooth.variable.values(equations.motion)[rows]
+    g = smooth.factors(equations.motion)[rows]
+    kept = np.flatnonzero(np.abs(g) > _WEAK * np.abs(g).max())
+    kept = kept[np.argsort(x[kept], kind='stable')]
+    kept = kept[np.linspace(0, len(kept) - 1, min(len(kept), _MOST_SEEN)).astype(int)]
+    left = searched.smooth.residual[kept, searched.joint]
+    y = smooth.basis(x[kept]) @ placed.coefficients + left / g[kept]
+    return Seen(rows[kept], x[kept], y)
+
+
+def _curve(law: EffectAt, searched: Searched, seen: Seen) -> np.ndarray:
+    """Return a formula over its factor at the rows that were seen (s,); NaN if of other kind."""
+    _, smooth = _smooth(searched)
+    assert isinstance(law.effect, FoundLaw)
+    own = law.effect.smooth
+    is_speed = smooth.variable.kind == 'dq' and smooth.variable.index == searched.joint
+    if own.variable != smooth.variable or not (is_speed or own.gate == smooth.gate):
+        return np.full(len(seen.x), np.nan)
+    motion = searched.smooth.frame.equations.motion
+    g = smooth.factors(motion)
+    width = law.report(motion).get('v1', 0.0)
+    if own.gate == 'sign' and smooth.gate == 'sign' and width:  # the smooth form of the factor
+        g = np.tanh(motion.velocity[:, searched.joint] / float(width))
+    force, g = law.force(motion)[seen.rows, searched.joint], g[seen.rows]
+    return np.divide(
+        force, g, out=np.full(len(g), np.nan), where=np.abs(g) > _WEAK * np.abs(g).max()
+    )
+
+
 def _search(found: Explained, searched: Searched) -> LawSearch:
     _, smooth = _smooth(searched)
     shape, motion = shape_of(searched), searched.smooth.frame.equations.motion
+    seen = seen_by(searched)
     tree = motion.tree
     prismatic = bool(tree.is_prismatic[searched.joint])
     length = 'm' if tree.is_prismatic[smooth.variable.index] else 'rad'
@@ -97,15 +150,24 @@ def _search(found: Explained, searched: Searched) -> LawSearch:
             continue
         units = {q.name: q.unit for q in law.effect.quantities}
         numbers = {n: (float(x), units[n]) for n, x in law.report(motion).items()}
-        tried.append(TriedFormula(law.effect.formula, numbers, left(model), law.effect.words))
+        curve = _curve(law, searched, seen)
+        tried.append(
+            TriedFormula(law.effect.formula, numbers, left(model), law.effect.words, curve)
+        )
     return LawSearch(
         joint=tree.joint_names[searched.joint],
         variable=smooth.variable.text, factor=smooth.factor, unit=unit, force_unit=per,
         x=shape.x, mean=shape.mean, half=INTERVAL * shape.std,
         left=left(searched.smooth), left_listed=left(searched.listed),
-        formulas=tuple(tried), why_not=found.why_not.get(searched.joint, ''),
-        words=sentence(smooth, shape, unit, per),
+        formulas=tuple(tried), why_not=_why_not(found, searched.joint),
+        words=sentence(smooth, shape, unit, per), seen_x=seen.x, seen=seen.y,
     )  # fmt: skip
+
+
+def _why_not(found: Explained, joint: int) -> str:
+    if law_of(found.decision.model, joint) is not None:
+        return ''
+    return found.why_not.get(joint, 'an effect of the list says the same with fewer numbers')
 
 
 def sentence(smooth: SmoothForce, shape: Shape, unit: str, per: str) -> str:

@@ -65,6 +65,8 @@
     ctx.restore();
   }
 
+  const tall = wide => Math.round(Math.max(230, Math.min(320, wide * 0.42)));
+
   function options(chart, at) {
     const series = [{ label: chart.x_label.replace(/ \[.*/, ''), value: (u, x) => number(x) }];
     const values = [chart.x], bands = [];
@@ -95,7 +97,7 @@
       series.push({ show: true, class: 'hidden' });
     }
     return [values, {
-      width: at.clientWidth, height: Math.round(Math.max(230, Math.min(320, at.clientWidth * 0.42))),
+      width: at.clientWidth || 600, height: tall(at.clientWidth || 600),
       scales, series, bands,
       axes: [axis(chart.x_label), { ...axis(chart.y_label), size: 58 }],
       cursor: {
@@ -147,6 +149,19 @@
     });
   }
 
+  document.querySelectorAll('.choice').forEach(choice => { // one of several charts is seen
+    const buttons = [...choice.querySelectorAll('button[data-option]')];
+    const show = wanted => {
+      choice.querySelectorAll('figure[data-chart]').forEach(f => {
+        f.hidden = f.dataset.chart !== wanted;
+        fit(f);
+      });
+      for (const b of buttons) b.setAttribute('aria-pressed', String(b.dataset.option === wanted));
+    };
+    for (const b of buttons) b.onclick = () => show(b.dataset.option);
+    show(buttons[0].dataset.option);
+  });
+
   const figures = [...document.querySelectorAll('figure[data-chart]')];
   function draw() {
     for (const u of drawn.values()) u.destroy();
@@ -155,14 +170,15 @@
     figures.forEach(build);
   }
   draw();
-  new ResizeObserver(() => {
-    for (const [figure, u] of drawn) {
-      const wide = figure.querySelector('.plot').clientWidth;
-      if (wide && wide !== u.width) u.setSize({ width: wide, height: u.height });
-    }
-  }).observe(document.body);
+  function fit(figure) { // to the width of the page; what is hidden has none
+    const u = drawn.get(figure), wide = figure.querySelector('.plot').clientWidth;
+    if (u && wide && wide !== u.width) u.setSize({ width: wide, height: tall(wide) });
+  }
+  new ResizeObserver(() => figures.forEach(fit)).observe(document.body);
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', draw);
-  document.addEventListener('toggle', e => { if (e.target.open) draw(); }, true);
+  document.addEventListener('toggle', e => {
+    if (e.target.open) e.target.querySelectorAll('figure[data-chart]').forEach(fit);
+  }, true);
 
   document.querySelectorAll('pre.command').forEach(block => {
     const button = document.createElement('button');

@@ -60,6 +60,11 @@ def test_the_shape_is_told_in_words_and_numbers(braked):
     true *= np.sign(search.x) if search.factor else 1.0
     outside = np.abs(search.mean - true) > search.half + 0.02 * np.abs(true).max()
     assert outside.mean() < 0.2
+    shown = np.interp(search.seen_x, search.x, search.mean)
+    assert np.abs(search.seen - shown).mean() < 0.05 * np.abs(true).max()
+    best = search.formulas[0].curve
+    assert np.abs(best - shown)[np.isfinite(best)].max() < 0.1 * np.abs(true).max()
+    assert (np.diff(search.seen_x) >= 0.0).all()
     assert search.words.startswith('resists the motion by a force that rises to 0.6')
     assert 'an eddy-current brake' in [t.words for t in search.formulas]
     written = diagnosis_mapping(braked)['law_search']

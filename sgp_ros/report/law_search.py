@@ -1,0 +1,114 @@
+"""What a search for a law that no list has found: its shape beside the data, formulas, words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from sgp_ros.diagnosis.result import Diagnosis
+from sgp_ros.diagnosis.shown import LawSearch
+from sgp_ros.diagnosis.unlisted.formulas import NAMELESS
+from sgp_ros.report.charts import Chart, Series, spoken
+from sgp_ros.report.diagnosis_text import percent
+from sgp_ros.report.figures import BAND, GREY, MEASURED, PREDICTED
+
+_TONES = ('law1', 'law2', 'law3')
+_COLOURS = ('#009E73', '#CC79A7', '#6A51A3')
+_SHAPE = 'shape without a formula'
+
+
+def search_chart(search: LawSearch) -> Chart:
+    """Return the shape with its 95 % band, the data, and the formulas of the same variable."""
+    x = search.seen_x
+    mean, half = (np.interp(x, search.x, y) for y in (search.mean, search.half))
+    series = [
+        Series('measured', search.seen, 'measured', 'points'),
+        Series(_SHAPE, mean, 'final', 'line', half),
+    ]
+    series += [
+        Series(f'formula {i + 1}', t.curve, tone, 'dashed')
+        for i, (t, tone) in enumerate(zip(search.formulas, _TONES, strict=False))
+        if np.isfinite(t.curve).any()
+    ]
+    return Chart(
+        f'Force on {search.joint} over {search.variable}',
+        f'The shape lies between {spoken(search.mean.min())} and {spoken(search.mean.max())} '
+        f'{search.force_unit}, its 95 % band is at most +- {spoken(search.half.max())} '
+        f'{search.force_unit} wide.',
+        f'{search.variable} [{search.unit}]', _label(search), x, series, limit=_limits(search),
+    )  # fmt: skip
+
+
+def _label(search: LawSearch) -> str:
+    over = f' / ({search.factor})' if search.factor else ''
+    return f'force{over} [{search.force_unit}]'
+
+
+def _limits(search: LawSearch) -> tuple[float, float]:
+    """Return ends of the vertical axis: the bulk of the data, and the shape."""
+    low, high = np.quantile(search.seen, (0.01, 0.99))
+    low, high = min(low, search.mean.min()), max(high, search.mean.max())
+    pad = 0.08 * max(high - low, 1e-12)
+    return float(low - pad), float(high + pad)
+
+
+def draw_searches(searches: Sequence[LawSearch]) -> Figure:
+    """Draw the same for print, one panel for each joint."""
+    figure = Figure(figsize=(6.5 if len(searches) == 1 else 10, 3.8), layout='constrained')
+    for i, search in enumerate(searches):
+        axes = figure.add_subplot(1, len(searches), i + 1)
+        axes.plot(search.seen_x, search.seen, '.', ms=4, color=MEASURED, label='measured',
+                  rasterized=True)  # fmt: skip
+        axes.fill_between(search.x, search.mean - search.half, search.mean + search.half,
+                          color=BAND, lw=0, alpha=0.7)  # fmt: skip
+        axes.plot(search.x, search.mean, color=PREDICTED, lw=1.6, label=_SHAPE)
+        for n, (t, colour) in enumerate(zip(search.formulas, _COLOURS, strict=False)):
+            if np.isfinite(t.curve).any():
+                axes.plot(search.seen_x, t.curve, '--', lw=1.2, color=colour,
+                          label=f'formula {n + 1}')  # fmt: skip
+        axes.axhline(0.0, color=GREY, lw=0.6)
+        axes.set(xlabel=f'{search.variable} [{search.unit}]', ylabel=_label(search),
+                 ylim=_limits(search))  # fmt: skip
+        axes.set_title(search.joint, fontsize='medium')
+        axes.legend(fontsize='x-small')
+    return figure
+
+
+def search_rows(found: Diagnosis) -> list[dict[str, Any]]:
+    """Return what a page says of each search."""
+    return [
+        {
+            'joint': s.joint,
+            'chart': f'search {s.joint}',
+            'words': f'What is missing on {s.joint} {s.words}.',
+            'left': f'This shape leaves {percent(s.left)} of the mean squared effort of '
+                    f'{s.joint}; the best effects of the list leave {percent(s.left_listed)}.',
+            'conclusion': _conclusion(s),
+            'is_asserted': not s.why_not,
+            'formulas': [
+                {
+                    'formula': t.formula, 'left': percent(t.left),
+                    'nearest': '' if t.words == NAMELESS else t.words,
+                    'parameters': _parameters(t.parameters),
+                }
+                for t in s.formulas
+            ],
+        }
+        for s in found.law_searches
+    ]  # fmt: skip
+
+
+def _conclusion(search: LawSearch) -> str:
+    if search.why_not:
+        return f'No formula is asserted: {search.why_not}.'
+    return 'Formula 1 is asserted: it is the finding above.'
+
+
+def _parameters(values: Mapping[str, tuple[float, str]]) -> str:
+    return ', '.join(
+        f'{name} = {x:.4g}{"" if unit in {"", "1"} else f" {unit}"}'
+        for name, (x, unit) in values.items()
+    )
