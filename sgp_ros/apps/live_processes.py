@@ -47,6 +47,7 @@ def graph_environment(logs: Path) -> Iterator[dict[str, str]]:
         profile = find_shipped('quick_discovery.xml')
         if profile is not None:
             environment['FASTRTPS_DEFAULT_PROFILES_FILE'] = str(profile)
+            environment['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'SUBNET'  # the profile narrows it
         yield environment
 
 

@@ -33,7 +33,7 @@ def domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
                 continue
             environment = {
                 'ROS_DOMAIN_ID': str(number),
-                'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+                'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET',  # the profile stays on this host
                 'FASTRTPS_DEFAULT_PROFILES_FILE': str(_ROOT / 'config/quick_discovery.xml'),
                 'ROS_LOG_DIR': str(tmp_path_factory.mktemp('log')),
                 'PYTHONPATH': str(_ROOT),

@@ -301,6 +301,13 @@ def _is_alive(pid: int) -> bool:
     return True
 
 
+def test_no_killed_node_leaves_shared_memory_that_another_opens(graph: Graph) -> None:
+    node = _start(graph)
+    Stream(graph).publish_until_read(5)
+    for pid in (os.getpid(), node.process.pid):
+        assert '/dev/shm/fastrtps' not in Path(f'/proc/{pid}/maps').read_text()
+
+
 def test_a_record_survives_a_killed_node(graph: Graph, tmp_path: Path) -> None:
     path = tmp_path / 'run.mcap'
     node = _start(graph, record__path=path)
