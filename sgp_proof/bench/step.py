@@ -12,10 +12,11 @@ import numpy as np
 from sgp_proof.bench.problem import Problem, draw_problem, median_seconds, move_seconds
 from sgp_proof.bench.rivals import Rivals, timed
 from sgp_ros.gp.factor import length_for
-from sgp_ros.gp.factor_loops import absorb_column, solve_lower
+from sgp_ros.gp.factor_loops import absorb_column
 from sgp_ros.gp.model import CoefficientPrior
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.regression import Memory
+from sgp_ros.gp.whitening_loops import solve_lower
 
 SIZES = (250, 500, 1000, 2000)
 SHAPES = ((1, 8), (1, 21), (7, 21))

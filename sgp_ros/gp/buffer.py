@@ -7,19 +7,66 @@ is the one the prediction made. Which sample leaves is a policy (`gp.retention`)
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 
-from sgp_ros.gp.factor import GrowingFactor, SlidingRows, Whitening, part_of
+from sgp_ros.gp.factor import GrowingFactor, Whitening, length_for, part_of
 from sgp_ros.gp.model import Model, Observations, OutputGroup, output_groups
 from sgp_ros.gp.retention import RETENTIONS
 
-_FULL = np.ones(())
+
+class SlidingRows:
+    """A growing list of rows in one block of memory.
+
+    Attributes:
+        start: first live row in the block.
+        size: rows held.
+
+    Args:
+        capacity: most rows held at once.
+        shape: of a row.
+    """
+
+    def __init__(self, capacity: int, shape: tuple[int, ...]) -> None:
+        self._block = np.zeros((length_for(capacity), *shape))
+        self.start = 0
+        self.size = 0
+
+    @property
+    def rows(self) -> np.ndarray:
+        """The rows in order, a view (size, ...)."""
+        return self._block[self.start : self.start + self.size]
+
+    def grown(self) -> np.ndarray:
+        """Return one more row at the end, to be filled."""
+        if self.start + self.size == len(self._block):
+            self.replace(self.rows)
+        self.size += 1
+        return np.asarray(self._block[self.start + self.size - 1])
+
+    def drop(self, m: int) -> None:
+        """Remove row m; those before it move up. O(m), nothing is copied for m = 0."""
+        self.size -= 1
+        if m == self.size:
+            return
+        if m:
+            live = slice(self.start, self.start + m)
+            self._block[self.start + 1 : self.start + 1 + m] = self._block[live]
+        self.start += 1
+
+    def replace(self, rows: np.ndarray) -> None:
+        """Hold these rows instead."""
+        self._block[: len(rows)] = rows
+        self.start, self.size = 0, len(rows)
 
 
 class SampleBuffer:
     """Copies of samples, with room for as many as are held at once.
+
+    Attributes:
+        shape: of the data of a sample, (k, p + 1).
 
     Args:
         U: (n, d) inputs.
@@ -32,9 +79,15 @@ class SampleBuffer:
         self, U: np.ndarray, data: np.ndarray, weights: np.ndarray, capacity: int
     ) -> None:
         self._capacity = capacity
-        self._U = _sliding(U, capacity)
-        self._data = _sliding(data, capacity)
-        self._weights = _sliding(weights, capacity)
+        self.shape: tuple[int, ...] = data.shape[1:]
+        self._hold(U, data, weights)
+
+    def _hold(self, U: np.ndarray, data: np.ndarray, weights: np.ndarray) -> None:
+        self._inputs = U.shape[1]
+        flat = data.reshape(len(U), math.prod(self.shape))
+        rows = np.concatenate([U, flat, weights[:, None]], axis=1)
+        self._rows = SlidingRows(self._capacity, rows.shape[1:])
+        self._rows.replace(rows)
 
     @classmethod
     def empty(cls, k: int, p: int) -> SampleBuffer:
@@ -48,22 +101,22 @@ class SampleBuffer:
     @property
     def size(self) -> int:
         """Samples held."""
-        return self._data.size
+        return self._rows.size
 
     @property
     def inputs(self) -> np.ndarray:
         """Inputs, a view (size, d)."""
-        return self._U.rows
+        return self._rows.rows[:, : self._inputs]
 
     @property
     def data(self) -> np.ndarray:
         """Regressors and, last, observations, a view (size, k, p + 1)."""
-        return self._data.rows
+        return self._rows.rows[:, self._inputs : -1].reshape(self.size, *self.shape)
 
     @property
     def weights(self) -> np.ndarray:
         """Weights of the equations, a view (size,)."""
-        return self._weights.rows
+        return self._rows.rows[:, -1]
 
     def observations(self) -> Observations:
         """Return a copy of the samples."""
@@ -73,27 +126,20 @@ class SampleBuffer:
 
     def append(self, u: np.ndarray, data: np.ndarray) -> None:
         """Add a sample of weight 1, input u (d,), data (k, p + 1); the first one tells d."""
-        if not self.size:
-            self._U = _sliding(np.zeros((0, len(u))), self._capacity)
-        self._U.append(u)
-        self._data.append(data)
-        self._weights.append(_FULL)
+        if len(u) != self._inputs:
+            self._hold(np.zeros((0, len(u))), np.zeros((0, *self.shape)), np.zeros(0))
+        row = self._rows.grown()
+        row[: len(u)] = u
+        row[len(u) : -1] = data.reshape(-1)
+        row[-1] = 1.0
 
     def drop(self, m: int) -> None:
         """Remove sample m."""
-        self._U.drop(m)
-        self._data.drop(m)
-        self._weights.drop(m)
+        self._rows.drop(m)
 
     def fade(self, factor: float) -> None:
         """Let all samples count `factor` times as much as before."""
-        self._weights.rows[:] *= factor
-
-
-def _sliding(rows: np.ndarray, capacity: int) -> SlidingRows:
-    held = SlidingRows(capacity, rows.shape[1:])
-    held.replace(rows)
-    return held
+        self.weights[:] *= factor
 
 
 class FactoredBuffer:
@@ -131,6 +177,7 @@ class FactoredBuffer:
         self.model = model
         self.samples = samples.with_room(room)
         self.groups = output_groups(model)
+        self._places = tuple(group.place for group in self.groups)
         self.room = room
         kept: dict[OutputGroup, GrowingFactor] = {}
         if before is not None and before.room == room:
@@ -173,12 +220,10 @@ class FactoredBuffer:
         Returns:
             Shapes (k, p), (k,) and (k,): Z is the second less the first times W.
         """
-        explained = np.empty(self.samples.data.shape[1:])
-        variance = np.empty(len(explained))
-        for group, whitening in zip(self.groups, whitenings, strict=True):
-            outputs = list(group.outputs)
-            explained[outputs] = whitening.explained
-            variance[outputs] = np.square(group.scales) * whitening.variance
+        explained, variance = np.empty(self.samples.shape), np.empty(self.samples.shape[0])
+        for factor, place, whitening in zip(self.factors, self._places, whitenings, strict=True):
+            explained[place] = whitening.explained
+            variance[place] = factor.squared_scales * whitening.variance
         return explained[:, :-1], explained[:, -1], variance
 
     def require_room(self, whitenings: tuple[Whitening, ...]) -> None:
@@ -204,8 +249,10 @@ class FactoredBuffer:
             `p(y | earlier samples, W)`: rows of unit noise and their values, per factor.
         """
         rows = [
-            factor.append(whitening, data[list(group.outputs)])
-            for group, factor, whitening in zip(self.groups, self.factors, whitenings, strict=True)
+            factor.append(whitening, data[place])
+            for place, factor, whitening in zip(
+                self._places, self.factors, whitenings, strict=True
+            )
         ]
         self.samples.append(u, data)
         self._retention.append(self.factors, u)

@@ -7,25 +7,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg
 
 from sgp_ros.errors import NumericalError
-from sgp_ros.gp.factor_loops import (
-    absorb_column,
-    close_gap,
-    combine_rows,
-    inverse_column,
-    move_to_front,
-    solve_lower,
-)
+from sgp_ros.gp.factor_loops import absorb_column, append_row, drop_row, substitute_back
+from sgp_ros.gp.kernels import COMPILED_FORMS
 from sgp_ros.gp.linear_algebra import covariance_factor
 from sgp_ros.gp.model import OutputGroup
+from sgp_ros.gp.whitening_loops import solve_lower, whiten_input, whiten_vector
 
 ROOM = 64
 """Least number of rows that a window may slide before everything moves to the front."""
+_NOTHING = np.zeros(0)
 
 
 def length_for(capacity: int) -> int:
@@ -37,58 +33,7 @@ def length_for(capacity: int) -> int:
     return capacity + max(ROOM, capacity // 4)
 
 
-class SlidingRows:
-    """A growing list of rows in one block of memory.
-
-    Attributes:
-        start: first live row in the block.
-        size: rows held.
-
-    Args:
-        capacity: most rows held at once.
-        shape: of a row.
-    """
-
-    def __init__(self, capacity: int, shape: tuple[int, ...]) -> None:
-        self._block = np.zeros((length_for(capacity), *shape))
-        self.start = 0
-        self.size = 0
-
-    @property
-    def rows(self) -> np.ndarray:
-        """The rows in order, a view (size, ...)."""
-        return self._block[self.start : self.start + self.size]
-
-    @property
-    def is_at_end(self) -> bool:
-        """Whether the next row would move everything to the front."""
-        return self.start + self.size == len(self._block)
-
-    def append(self, row: np.ndarray) -> None:
-        """Add a row at the end."""
-        if self.is_at_end:
-            self.replace(self.rows)
-        self._block[self.start + self.size] = row
-        self.size += 1
-
-    def drop(self, m: int) -> None:
-        """Remove row m; those before it move up. O(m), nothing is copied for m = 0."""
-        self.size -= 1
-        if m == self.size:
-            return
-        if m:
-            live = slice(self.start, self.start + m)
-            self._block[self.start + 1 : self.start + 1 + m] = self._block[live]
-        self.start += 1
-
-    def replace(self, rows: np.ndarray) -> None:
-        """Hold these rows instead."""
-        self._block[: len(rows)] = rows
-        self.start, self.size = 0, len(rows)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Whitening:
+class Whitening(NamedTuple):
     """An input against the buffered samples of one factor.
 
     Attributes:
@@ -114,6 +59,10 @@ class Whitening:
 class GrowingFactor:
     """Factor of `K + noise I` over the buffered inputs of one group of outputs.
 
+    Attributes:
+        size: samples held.
+        squared_scales: of the outputs, (k,).
+
     Args:
         group: the outputs, their kernel and noise.
         p: number of coefficients.
@@ -121,20 +70,23 @@ class GrowingFactor:
     """
 
     def __init__(self, group: OutputGroup, p: int, capacity: int) -> None:
-        self._kernel = group.kernel
+        self._kernel = kernel = group.kernel
         self._noise = group.noise
-        self._scales = np.array(group.scales)[:, None]  # (k, 1)
-        dense = length_for(capacity) if group.kernel is not None else 0
-        self._U = np.zeros((dense, dense))
-        self._S = SlidingRows(capacity, (0 if group.kernel is None else len(group.kernel.inputs),))
-        self._white = SlidingRows(capacity, (len(group.outputs) * (p + 1),))
+        self._scales = np.array(group.scales)  # (k,)
+        self.squared_scales = np.square(self._scales)
         self._shape = (len(group.outputs), p + 1)
-        self._carried = np.zeros(capacity)
-
-    @property
-    def size(self) -> int:
-        """Samples held."""
-        return self._white.size
+        self._width = len(group.outputs) * (p + 1)
+        length = length_for(capacity)
+        dense = length if kernel is not None else 0
+        self._U = np.zeros((dense, dense))
+        self._S = np.zeros((length, 0 if kernel is None else len(kernel.inputs)))
+        self._white = np.zeros((length, self._width))
+        self._start = self.size = 0
+        self._carried, self._extra = np.zeros(capacity), np.zeros(self._width)
+        self._form = COMPILED_FORMS.get(type(kernel), 0) if kernel is not None else 0
+        if kernel is not None:
+            self._columns, self._lengths = np.array(kernel.inputs), np.array(kernel.lengthscales)
+            self._variance = kernel.variance
 
     @property
     def outputs(self) -> int:
@@ -144,34 +96,51 @@ class GrowingFactor:
     @property
     def white(self) -> np.ndarray:
         """Whitened regressors and, last, observations `L^-1 [F y]`, (size, k, p + 1)."""
-        return self._white.rows.reshape(self.size, *self._shape)
+        return self._white[self._live].reshape(self.size, *self._shape)
 
     @property
     def lower(self) -> np.ndarray:
         """The lower factor, a view (size, size); (0, 0) where Z is zero."""
-        if self._kernel is None:
-            return self._U
-        live = slice(self._white.start, self._white.start + self.size)
-        return self._U[live, live].T
+        return self._U if self._kernel is None else self._U[self._live, self._live].T
+
+    @property
+    def _live(self) -> slice:
+        return slice(self._start, self._start + self.size)
 
     def inverse_column(self, m: int) -> np.ndarray:
-        """Return column m (n,) of `(K + noise I)^-1`; (0,) where Z is zero. O(n^2)."""
+        """Return column m (n,) of `(K + noise I)^-1`; (0,) where Z is zero.
+
+        Forward substitution from row m on, then back substitution. O(n^2), no n x n array.
+        """
         if self._kernel is None:
             return np.zeros(0)
-        return inverse_column(self._U, self._white.start, self.size, m)
+        x = np.zeros(self.size)
+        x[m] = 1.0
+        solve_lower(self._U, self._start + m, x[m:])
+        substitute_back(self._U, self._start, x)
+        return x
 
     def whiten(self, u: np.ndarray) -> Whitening:
         """Return an input u (d,) against the samples. O(n^2 / 2 + n k p)."""
-        explained = np.zeros(self._shape)
-        if self._kernel is None:
-            return Whitening(np.zeros(0), np.zeros(0), explained, 0.0, 0.0)
-        s = self._kernel.scale(u[None])[0]
-        v = self._kernel.vector(self._S.rows, s)
-        solve_lower(self._U, self._white.start, v)
-        combine_rows(v, self._white.rows, explained.reshape(-1))
-        explained *= self._scales
-        prior = float(self._kernel.diagonal(u[None])[0])
-        return Whitening(s, v, explained, prior, float(v @ v))
+        kernel = self._kernel
+        if kernel is None:
+            return Whitening(_NOTHING, _NOTHING, np.zeros(self._shape), 0.0, 0.0)
+        explained = np.empty(self._width)
+        if self._form:
+            s, v = np.empty(len(self._columns)), np.empty(self.size)
+            prior = self._variance
+            reduction = whiten_input(
+                self._form, prior, u, self._columns, self._lengths, self._U, self._S, self._white,
+                self._start, self._scales, s, v, explained,
+            )  # fmt: skip
+        else:
+            s = kernel.scale(u[None])[0]
+            v = kernel.vector(self._S[self._live], s)
+            prior = float(kernel.diagonal(u[None])[0])
+            reduction = whiten_vector(
+                self._U, self._white, self._start, self._scales, v, explained
+            )
+        return Whitening(s, v, explained.reshape(self._shape), prior, reduction)
 
     def pivot(self, whitening: Whitening) -> float:
         """Return the diagonal element that `append` would add.
@@ -202,36 +171,27 @@ class GrowingFactor:
             NumericalError: as `pivot`.
         """
         diagonal = self.pivot(whitening)
-        row: np.ndarray = (data - whitening.explained) / (diagonal * self._scales)
-        if self._kernel is not None and self._white.is_at_end:
-            move_to_front(self._U, self._white.start, self.size)
-        self._white.append(row.reshape(-1))
-        self._S.append(whitening.s)
-        if self._kernel is not None:
-            last = self._white.start + self.size - 1
-            self._U[self._white.start : last, last] = whitening.v
-            self._U[last, last] = diagonal
+        row: np.ndarray = (data - whitening.explained) / (diagonal * self._scales)[:, None]
+        self._start = append_row(
+            self._U, self._S, self._white, self._start, self.size,
+            whitening.s, whitening.v, diagonal, row.reshape(-1),
+        )  # fmt: skip
+        self.size += 1
         return row
 
     def drop(self, m: int) -> None:
         """Remove sample m. O(n^2)."""
-        n, start = self.size, self._white.start
-        row = self._white.rows[m].copy()
-        if self._kernel is not None:
-            carried = self._carried[: n - 1 - m]
-            carried[:] = self._U[start + m, start + m + 1 : start + n]
-            absorb_column(self._U, start + m + 1, carried, self._white.rows[m + 1 :], row)
-            if m < n - 1:
-                close_gap(self._U, start, n, m)
-        self._white.drop(m)
-        self._S.drop(m)
+        self._start = drop_row(
+            self._U, self._S, self._white, self._start, self.size, m, self._carried, self._extra
+        )
+        self.size -= 1
 
     def absorb(self, column: np.ndarray) -> None:
         """Factor `K + noise I + column column^T` instead, for a column (n,). O(n^2)."""
         carried = self._carried[: self.size]
         carried[:] = column
-        extra = np.zeros(self._shape).reshape(-1)
-        absorb_column(self._U, self._white.start, carried, self._white.rows, extra)
+        extra = np.zeros(self._width)
+        absorb_column(self._U, self._start, carried, self._white[self._live], extra)
 
     def fill(self, U: np.ndarray, data: np.ndarray) -> None:
         """Fill a new factor from inputs U (n, d), regressors and observations (n, k, p + 1).
@@ -244,17 +204,17 @@ class GrowingFactor:
         n = len(U)
         if not n:
             return
-        flat = (data / self._scales).reshape(n, -1)
+        self._start, self.size = 0, n
+        flat = (data / self._scales[:, None]).reshape(n, -1)
         if self._kernel is None:
-            self._white.replace(flat / math.sqrt(self._noise))
-            self._S.replace(np.zeros((n, 0)))
+            self._white[:n] = flat / math.sqrt(self._noise)
             return
         K = self._kernel.matrix(U)
         K[np.diag_indices(n)] += self._noise
         L = covariance_factor(K, may_overwrite=True)
         self._U[:n, :n] = L.T
-        self._S.replace(self._kernel.scale(U))
-        self._white.replace(linalg.solve_triangular(L, flat, lower=True))
+        self._S[:n] = self._kernel.scale(U)
+        self._white[:n] = linalg.solve_triangular(L, flat, lower=True)
 
     def distance(self, exact: GrowingFactor) -> float:
         """Return the relative distance from a factor of the same samples, in Frobenius norm.
@@ -271,14 +231,15 @@ class GrowingFactor:
 
     def state(self) -> dict[str, np.ndarray]:
         """Return what `restore` needs, as arrays."""
-        return {'L': self.lower, 'S': self._S.rows, 'white': self._white.rows}
+        return {'L': self.lower, 'S': self._S[self._live], 'white': self._white[self._live]}
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue exactly where `state` was taken."""
-        self._white.replace(state['white'])
-        self._S.replace(state['S'])
-        n = len(state['L'])
-        self._U[:n, :n] = state['L'].T
+        n = len(state['white'])
+        self._start, self.size = 0, n
+        self._white[:n], self._S[:n] = state['white'], state['S']
+        if self._kernel is not None:
+            self._U[:n, :n] = state['L'].T
 
 
 def part_of(state: Mapping[str, np.ndarray], prefix: str) -> dict[str, np.ndarray]:

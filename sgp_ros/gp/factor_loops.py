@@ -1,4 +1,4 @@
-"""Compiled loops of the growing factor: triangular solve and plane rotations, in place.
+"""Compiled loops that change the growing factor, in place: samples that come, go and rotate.
 
 The factor `K = L L^T` is stored column by column: row j of U is column j of L from its diagonal
 on, contiguous. A column is then all that one step of a solve or of a rotation needs, and every
@@ -20,69 +20,6 @@ from numba import njit
 from scipy import linalg
 
 _compiled: Callable[[Any], Any] = njit(cache=True, error_model='numpy')
-
-
-@_compiled
-def _take_four(
-    U: np.ndarray, r: int, first: int, stop: int, start: int,
-    x0: float, x1: float, x2: float, x3: float, x: np.ndarray,
-) -> None:  # fmt: skip
-    one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
-    for i in range(first, stop):
-        x[i - start] = (
-            x[i - start] - x0 * U[r, i] - x1 * U[r + one, i]
-            - x2 * U[r + two, i] - x3 * U[r + three, i]
-        )  # fmt: skip
-
-
-@_compiled
-def solve_lower(U: np.ndarray, start: int, x: np.ndarray) -> None:
-    """Replace x (n,) by L^-1 x for the n x n factor that begins at `start`. O(n^2 / 2).
-
-    Args:
-        U: (N, N), row j holds column j of L from its diagonal on.
-        start: first live row of U.
-        x: right side, then solution.
-    """
-    n = len(x)
-    stop = start + n
-    quads = n - n % 4
-    for j in range(0, quads, 4):
-        for a in range(j, j + 4):
-            x[a] /= U[start + a, start + a]
-            for c in range(a + 1, j + 4):
-                x[c] -= x[a] * U[start + a, start + c]
-        r = start + j
-        # Unsigned indices: a signed one might count from the end, and the loop would stay scalar.
-        _take_four(
-            U, np.uint64(r), np.uint64(r + 4), np.uint64(stop), np.uint64(start),
-            x[j], x[j + 1], x[j + 2], x[j + 3], x,
-        )  # fmt: skip
-    for j in range(quads, n):
-        for a in range(quads, j):
-            x[j] -= x[a] * U[start + a, start + j]
-        x[j] /= U[start + j, start + j]
-
-
-@_compiled
-def combine_rows(v: np.ndarray, rows: np.ndarray, total: np.ndarray) -> None:
-    """Set `total (m,) = v (n,) @ rows (n, m)`. O(n m).
-
-    Rows are added in order, each element in the same way: the bits depend on no library.
-    """
-    n = len(v)
-    quads = n - n % 4
-    total[:] = 0.0
-    for i in range(0, quads, 4):
-        v0, v1, v2, v3 = v[i], v[i + 1], v[i + 2], v[i + 3]
-        for c in range(len(total)):
-            total[c] = (
-                total[c] + v0 * rows[i, c] + v1 * rows[i + 1, c]
-                + v2 * rows[i + 2, c] + v3 * rows[i + 3, c]
-            )  # fmt: skip
-    for i in range(quads, n):
-        for c in range(len(total)):
-            total[c] += v[i] * rows[i, c]
 
 
 @_compiled
@@ -170,22 +107,83 @@ def move_to_front(U: np.ndarray, start: int, n: int) -> None:
             U[j, i] = U[start + j, start + i]
 
 
-def absorbed_column_numpy(
-    L: np.ndarray, carried: np.ndarray, white: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the factor (n, n) and whitened data (n, m) of `absorb_column`, from scratch."""
-    factor = linalg.cholesky(L @ L.T + np.outer(carried, carried), lower=True)
-    return factor, linalg.solve_triangular(factor, L @ white, lower=True)
+@_compiled
+def _copy_row(A: np.ndarray, i: int, j: int) -> None:
+    for c in range(A.shape[1]):
+        A[j, c] = A[i, c]
 
 
-def dropped_sample_numpy(
-    L: np.ndarray, white: np.ndarray, m: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the factor (n-1, n-1) and whitened data (n-1, c) without sample m, from scratch."""
-    rest = np.delete(np.arange(len(L)), m)
-    K, data = L @ L.T, L @ white
-    factor = np.linalg.cholesky(K[np.ix_(rest, rest)])
-    return factor, np.linalg.solve(factor, data[rest])
+@_compiled
+def append_row(
+    U: np.ndarray, S: np.ndarray, white: np.ndarray, start: int, n: int,
+    s: np.ndarray, v: np.ndarray, diagonal: float, row: np.ndarray,
+) -> int:  # fmt: skip
+    """Border the factor of n samples with one more, and return where it begins. O(n).
+
+    Where the memory ends, everything moves to its front first. Without a process U is empty.
+
+    Args:
+        U: (N, N) factor.
+        S: (N, d) scaled inputs.
+        white: (N, k w) whitened data.
+        start: first live row of each.
+        n: samples held.
+        s: (d,) scaled input.
+        v: (n,) its whitened covariances.
+        diagonal: element that the factor ends with.
+        row: (k w,) whitened data.
+    """
+    if start + n == len(white):
+        if len(U):
+            move_to_front(U, start, n)
+        for i in range(n):
+            _copy_row(white, start + i, i)
+            _copy_row(S, start + i, i)
+        start = 0
+    last = start + n
+    for c in range(len(row)):
+        white[last, c] = row[c]
+    for c in range(len(s)):
+        S[last, c] = s[c]
+    if len(U):
+        for i in range(n):
+            U[start + i, last] = v[i]
+        U[last, last] = diagonal
+    return start
+
+
+@_compiled
+def drop_row(
+    U: np.ndarray, S: np.ndarray, white: np.ndarray, start: int, n: int,
+    m: int, carried: np.ndarray, row: np.ndarray,
+) -> int:  # fmt: skip
+    """Remove sample m of n from factor, inputs and data; return where they begin. O(n^2).
+
+    Args:
+        U: (N, N) factor.
+        S: (N, d) scaled inputs.
+        white: (N, k w) whitened data.
+        start: first live row of each.
+        n: samples held.
+        m: which of them.
+        carried: (n,) at least, for the column that is carried through the rotations.
+        row: (k w,), for the data that are.
+    """
+    rest = n - 1 - m
+    if len(U):
+        for c in range(len(row)):
+            row[c] = white[start + m, c]
+        for i in range(rest):
+            carried[i] = U[start + m, start + m + 1 + i]
+        absorb_column(U, start + m + 1, carried[:rest], white[start + m + 1 : start + n], row)
+    if not rest:
+        return start
+    if m and len(U):
+        close_gap(U, start, n, m)
+    for j in range(start + m - 1, start - 1, -1):
+        _copy_row(white, j, j + 1)
+        _copy_row(S, j, j + 1)
+    return start + 1
 
 
 @_compiled
@@ -204,8 +202,11 @@ def _take_sums(U: np.ndarray, r: int, first: int, n: int, start: int, x: np.ndar
 
 
 @_compiled
-def _substitute_back(U: np.ndarray, start: int, x: np.ndarray) -> None:
-    """Replace x (n,) by L^-T x. Four sums at once, of which none waits for another."""
+def substitute_back(U: np.ndarray, start: int, x: np.ndarray) -> None:
+    """Replace x (n,) by L^-T x for the factor that begins at `start`. O(n^2 / 2).
+
+    Four sums at once, of which none waits for another.
+    """
     n = len(x)
     rest = n % 4
     for i in range(n - 4, rest - 1, -4):
@@ -220,26 +221,19 @@ def _substitute_back(U: np.ndarray, start: int, x: np.ndarray) -> None:
         x[a] /= U[start + a, start + a]
 
 
-@_compiled
-def inverse_column(U: np.ndarray, start: int, n: int, m: int) -> np.ndarray:
-    """Return column m (n,) of `(L L^T)^-1` for a lower factor L of n samples.
-
-    Forward substitution from row m on, then back substitution, by columns of L, as
-    they are stored. O(n^2 / 2 + (n - m)^2 / 2), no n x n array.
-
-    Args:
-        U: (N, N), row j holds column j of L from its diagonal on.
-        start: first live row of U.
-        n: samples held.
-        m: which of them.
-    """
-    x = np.zeros(n)
-    x[m] = 1.0
-    solve_lower(U, start + m, x[m:])
-    _substitute_back(U, start, x)
-    return x
+def absorbed_column_numpy(
+    L: np.ndarray, carried: np.ndarray, white: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the factor (n, n) and whitened data (n, m) of `absorb_column`, from scratch."""
+    factor = linalg.cholesky(L @ L.T + np.outer(carried, carried), lower=True)
+    return factor, linalg.solve_triangular(factor, L @ white, lower=True)
 
 
-def inverse_column_numpy(L: np.ndarray, m: int) -> np.ndarray:
-    """Return what `inverse_column` does, by the solver of the library."""
-    return np.asarray(linalg.cho_solve((L, True), np.eye(len(L))[m]))
+def dropped_sample_numpy(
+    L: np.ndarray, white: np.ndarray, m: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the factor (n-1, n-1) and whitened data (n-1, c) without sample m, from scratch."""
+    rest = np.delete(np.arange(len(L)), m)
+    K, data = L @ L.T, L @ white
+    factor = np.linalg.cholesky(K[np.ix_(rest, rest)])
+    return factor, np.linalg.solve(factor, data[rest])

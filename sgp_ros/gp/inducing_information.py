@@ -173,7 +173,7 @@ class InducingInformation:
         """
         is_resolved = True
         for points, found in zip(self.sets, features, strict=True):
-            self.total.absorb(points.absorb(u, found, data[list(points.group.outputs)], weight))
+            self.total.absorb(points.absorb(u, found, data[points.place], weight))
             is_resolved &= points.is_resolved
         self.unresolved += not is_resolved
 

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 from scipy import linalg
@@ -27,8 +26,8 @@ from sgp_ros.gp.factor import GrowingFactor, Whitening, part_of
 from sgp_ros.gp.information import Forgetting, Information
 from sgp_ros.gp.model import OutputGroup
 from sgp_ros.gp.rotations import (
-    absorb_each,
     absorb_equation,
+    absorb_sample,
     absorbed_equations_numpy,
     solve_transposed,
 )
@@ -48,7 +47,7 @@ class InducingPoints:
     """Square-root information on the weights of one group of outputs, coupled to W.
 
     Attributes:
-        group: the outputs, their kernel and noise.
+        group, place: the outputs, their kernel and noise; where the outputs stand.
         inputs: inducing inputs, (d,) each.
         is_resolved: whether the last sample left a remainder that is small beside the noise.
         tally: of the samples, as much as they count: their number, their variances over that of
@@ -61,14 +60,14 @@ class InducingPoints:
     """
 
     def __init__(self, group: OutputGroup, p: int, capacity: int) -> None:
-        self.group = group
+        self.group, self.place = group, group.place
         self.inputs: list[np.ndarray] = []
         self.is_resolved = True
         self.tally = np.zeros(3)
         k = len(group.outputs)
         self._shape = (k, p + 1)
         self._residual_R, self._residual_z = np.zeros((k, p, p)), np.zeros((k, p))
-        self._scales = np.array(group.scales)[:, None]  # (k, 1)
+        self._scales = np.array(group.scales)  # (k,)
         self._capacity = dense = capacity if group.kernel is not None else 0
         variance = 0.0 if group.kernel is None else group.kernel.variance
         own = OutputGroup(group.kernel, JITTER * variance, (0,), (1.0,))
@@ -76,6 +75,7 @@ class InducingPoints:
         self._least = max(REMAINDER * group.noise, LEAST * variance)
         self._R, self._S = np.zeros((dense, dense)), np.zeros((dense, k * (p + 1)))
         self._data_R, self._data_S = np.zeros_like(self._R), np.zeros_like(self._S)
+        self._phi, self._alone = np.zeros(dense), np.zeros(self._shape)
 
     @property
     def size(self) -> int:
@@ -132,8 +132,8 @@ class InducingPoints:
         Returns:
             Shapes (k, p), (k,) and (k,): Z is the second less the first times W.
         """
-        coupling = self._scales * (gain @ self._S[: len(gain)]).reshape(self._shape)
-        variance = np.square(self._scales[:, 0]) * (gain @ gain + remainder_of(features))
+        coupling = self._scales[:, None] * (gain @ self._S[: len(gain)]).reshape(self._shape)
+        variance = np.square(self._scales) * (gain @ gain + remainder_of(features))
         return coupling[:, :-1], coupling[:, -1], variance
 
     def join(self, u: np.ndarray, features: Whitening) -> Whitening:
@@ -152,7 +152,7 @@ class InducingPoints:
         self.inputs.append(u.copy())
         self._R[self.size - 1, self.size - 1] = 1.0
         v = np.append(features.v, own)
-        return replace(features, v=v, reduction=features.reduction + own * own)
+        return features._replace(v=v, reduction=features.reduction + own * own)
 
     def absorb(
         self, u: np.ndarray, features: Whitening, data: np.ndarray, weight: float = 1.0
@@ -170,20 +170,23 @@ class InducingPoints:
         """
         found = self.join(u, features)
         remainder, noise = remainder_of(found), self.group.noise
-        self.tally += weight**2 * np.array([1.0, 1.0 + remainder / noise, not self.is_resolved])
+        tally = self.tally
+        tally[0] += weight**2
+        tally[1] += weight**2 * (1.0 + remainder / noise)
         if not self.is_resolved:
-            remainder *= max(self.tally[2], 1.0)
-        scale = weight / math.sqrt(noise + remainder)
-        rest = (scale / self._scales * data).reshape(-1)
-        alone = rest.copy()
-        absorb_equation(self._R, self._S, scale * found.v, rest)
-        absorb_equation(self._data_R, self._data_S, scale * found.v, alone)
-        absorb_each(self._residual_R, self._residual_z, alone.reshape(self._shape))
-        return rest.reshape(self._shape)
+            tally[2] += weight**2
+            remainder *= max(float(tally[2]), 1.0)
+        rest = np.empty(self._shape)
+        absorb_sample(
+            self._R, self._S, self._data_R, self._data_S, self._residual_R, self._residual_z,
+            found.v, data, self._scales, weight / math.sqrt(noise + remainder),
+            self._phi, rest, self._alone,
+        )  # fmt: skip
+        return rest
 
     def learn_anew(self, U: np.ndarray, data: np.ndarray, weights: np.ndarray) -> None:
         """Learn all outputs (n, k, p + 1) at the inputs U (n, d), weighted by (n,), in order."""
-        own = data[:, list(self.group.outputs)]
+        own = data[:, self.place]
         for u, row, weight in zip(U, own, weights, strict=True):
             self.absorb(u, self.features(u), row, float(weight))
 

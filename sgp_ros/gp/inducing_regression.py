@@ -103,9 +103,9 @@ class InducingPointRegression(Regression):
     ) -> OnlinePrediction:
         rows, mean, variance = f.copy(), np.zeros(len(f)), np.zeros(len(f))
         for points, found, gain in zip(self._basis.sets, features, gains, strict=True):
-            outputs = list(points.group.outputs)
-            explained, mean[outputs], variance[outputs] = points.explain(found, gain)
-            rows[outputs] -= explained
+            place = points.place
+            explained, mean[place], variance[place] = points.explain(found, gain)
+            rows[place] -= explained
         mean, covariance = self._basis.total.predict(rows, mean, variance)
         return OnlinePrediction(mean, covariance, u, f, features, self._version, gains)
 

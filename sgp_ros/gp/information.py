@@ -20,6 +20,7 @@ from sgp_ros.gp.rotations import (
     absorb_rows,
     absorbed_rows_numpy,
     has_safe_diagonal,
+    predict_rows,
     solve_rows,
     solve_upper,
 )
@@ -145,12 +146,19 @@ class Information:
             Mean and covariance, the latter infinite on the diagonal where an undetermined
             direction of W enters.
         """
-        spread = self.spread(rows)  # (k, r)
+        solved = self._solution()
+        if solved.spread is None:
+            covariance = np.empty((len(rows), len(rows)))
+            mean = mean.copy()
+            predict_rows(self.R, solved.w, rows.copy(), mean, covariance)
+            covariance.reshape(-1)[:: len(rows) + 1] += variance
+            return mean, covariance
+        spread = rows @ solved.spread  # (k, r)
         covariance = spread @ spread.T
         diagonal = covariance.reshape(-1)[:: len(rows) + 1]
         diagonal += variance
         diagonal[~self.is_determined(rows)] = np.inf
-        return mean + rows @ self.coefficients, covariance
+        return mean + rows @ solved.w, covariance
 
     def _solution(self) -> _Solved:
         if self._solved is None:

@@ -16,6 +16,7 @@ from sgp_ros.gp.kernel import (
     distance_sums,
 )
 from sgp_ros.gp.linear_algebra import turn_into_exponents
+from sgp_ros.gp.whitening_loops import MATERN32, MATERN52, SQUARED_EXPONENTIAL
 
 _FAR = 1e6
 """Square of a distance at which a Matern kernel is zero in double precision. Without an end the
@@ -223,5 +224,10 @@ _BUILT_IN: tuple[type[Kernel], ...] = (
     AdditiveSquaredExponential,
     Linear,
 )
+COMPILED_FORMS: dict[type[Kernel], int] = {
+    SquaredExponential: SQUARED_EXPONENTIAL, Matern32: MATERN32, Matern52: MATERN52,
+}  # fmt: skip
+"""Numbers by which compiled loops know a kernel; the others are evaluated by `Kernel.vector`."""
+
 KERNELS: dict[str, type[Kernel]] = {kernel.name: kernel for kernel in _BUILT_IN}
 """Choices of `model.kernel`; each passes the contract suite."""

@@ -97,6 +97,14 @@ class OutputGroup:
     outputs: tuple[int, ...]
     scales: tuple[float, ...]
 
+    @property
+    def place(self) -> slice | list[int]:
+        """The outputs as an index; a slice, which copies nothing, where they follow each other."""
+        first, last = self.outputs[0], self.outputs[-1]
+        if last - first + 1 == len(self.outputs):
+            return slice(first, last + 1)
+        return list(self.outputs)
+
 
 def output_groups(model: Model) -> tuple[OutputGroup, ...]:
     """Return the groups of a model in the order of their first outputs."""

@@ -18,6 +18,24 @@ from numba import njit
 from scipy import linalg
 
 _compiled: Callable[[Any], Any] = njit(cache=True, error_model='numpy')
+_LEAST, _MOST = 1e-280, 1e280
+
+
+@_compiled
+def _rotation(a: float, b: float) -> tuple[float, float]:
+    """Return cosine and sine of the rotation that turns (a, b) into (radius, 0)."""
+    square = a * a + b * b
+    # Squares that leave the range of numbers are the exception, and the only slow case.
+    radius = np.sqrt(square) if _LEAST < square < _MOST else np.hypot(a, b)
+    return a / radius, b / radius
+
+
+@_compiled
+def _rotate(A: np.ndarray, i: int, first: int, x: np.ndarray, c: float, s: float) -> None:
+    for j in range(first, np.uint64(len(x))):
+        above = A[i, j]
+        A[i, j] = c * above + s * x[j]
+        x[j] = c * x[j] - s * above
 
 
 @_compiled
@@ -27,20 +45,15 @@ def absorb_row(R: np.ndarray, z: np.ndarray, row: np.ndarray, value: float) -> N
     R (p, p) upper triangular and z (p,) are updated in place by p rotations, `row` is used up.
     O(p^2).
     """
-    p = len(z)
-    for i in range(p):
+    for i in range(len(z)):
         if row[i] == 0.0:
             continue
-        radius = np.hypot(R[i, i], row[i])
-        cosine = R[i, i] / radius
-        sine = row[i] / radius
-        for j in range(i, p):
-            above = R[i, j]
-            R[i, j] = cosine * above + sine * row[j]
-            row[j] = cosine * row[j] - sine * above
+        c, s = _rotation(R[i, i], row[i])
+        # Unsigned indices: a signed one might count from the end, and the loop would stay scalar.
+        _rotate(R, np.uint64(i), np.uint64(i), row, c, s)
         above = z[i]
-        z[i] = cosine * above + sine * value
-        value = cosine * value - sine * above
+        z[i] = c * above + s * value
+        value = c * value - s * above
 
 
 @_compiled
@@ -112,6 +125,39 @@ def solve_rows(R: np.ndarray, rows: np.ndarray) -> None:
                 row[j] -= row[i] * R[i, j]
 
 
+@_compiled
+def predict_rows(
+    R: np.ndarray, w: np.ndarray, rows: np.ndarray, mean: np.ndarray, covariance: np.ndarray
+) -> None:
+    """Add `rows w` to mean (k,) and set covariance (k, k) to `rows (R^T R)^-1 rows^T`. O(k p^2).
+
+    Args:
+        R: (p, p) upper triangular, invertible.
+        w: (p,).
+        rows: (k, p), used up.
+        mean: of what is beside them.
+        covariance: any.
+    """
+    for i in range(len(mean)):
+        for j in range(len(w)):
+            mean[i] += rows[i, j] * w[j]
+    solve_rows(R, rows)
+    for i in range(len(mean)):
+        for j in range(i + 1):
+            total = 0.0
+            for c in range(len(w)):
+                total += rows[i, c] * rows[j, c]
+            covariance[i, j] = covariance[j, i] = total
+
+
+def predicted_rows_numpy(
+    R: np.ndarray, w: np.ndarray, rows: np.ndarray, mean: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return mean and covariance of `predict_rows`, by the solver of the library."""
+    spread = np.linalg.solve(R.T, rows.T)
+    return mean + rows @ w, spread.T @ spread
+
+
 def absorbed_rows_numpy(
     R: np.ndarray, z: np.ndarray, rows: np.ndarray, values: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -123,14 +169,6 @@ def absorbed_rows_numpy(
         upper = np.linalg.qr(stacked, mode='r')[:p]
         triangle[: len(upper)] = upper
     return np.ascontiguousarray(triangle[:, :-1]), triangle[:, -1].copy()
-
-
-@_compiled
-def _rotate(A: np.ndarray, i: int, first: int, x: np.ndarray, c: float, s: float) -> None:
-    for j in range(first, np.uint64(len(x))):
-        above = A[i, j]
-        A[i, j] = c * above + s * x[j]
-        x[j] = c * x[j] - s * above
 
 
 @_compiled
@@ -149,11 +187,46 @@ def absorb_equation(R: np.ndarray, S: np.ndarray, phi: np.ndarray, rest: np.ndar
     for i in range(len(phi)):
         if phi[i] == 0.0:
             continue
-        radius = np.hypot(R[i, i], phi[i])
-        c, s = R[i, i] / radius, phi[i] / radius
-        # Unsigned indices: a signed one might count from the end, and the loop would stay scalar.
+        c, s = _rotation(R[i, i], phi[i])
         _rotate(R, np.uint64(i), np.uint64(i), phi, c, s)
         _rotate(S, np.uint64(i), np.uint64(0), rest, c, s)
+
+
+@_compiled
+def absorb_sample(
+    R: np.ndarray, S: np.ndarray, data_R: np.ndarray, data_S: np.ndarray,
+    residual_R: np.ndarray, residual_z: np.ndarray,
+    v: np.ndarray, data: np.ndarray, scales: np.ndarray, weight: float,
+    phi: np.ndarray, rest: np.ndarray, alone: np.ndarray,
+) -> None:  # fmt: skip
+    """Add a sample to the systems of `InducingPoints` with the prior and without. O(m^2 + m k p).
+
+    Args:
+        R: (M, M) of the system with the prior of the weights, as of `absorb_equation`.
+        S: (M, k (p + 1)) of it.
+        data_R: (M, M) of the system of the data alone.
+        data_S: (M, k (p + 1)) of it.
+        residual_R: (k, p, p) what that leaves on W, by output.
+        residual_z: (k, p) of it.
+        v: (m,) features.
+        data: (k, p + 1) regressors and observations.
+        scales: (k,) of the outputs.
+        weight: of the equation, one over the deviation of its noise.
+        phi: (m,) at least, for rotations.
+        rest: (k, p + 1), becomes what the system with the prior leaves on W.
+        alone: (k, p + 1), as phi.
+    """
+    m, width = len(v), data.shape[1]
+    for j in range(len(scales)):
+        for c in range(width):
+            rest[j, c] = alone[j, c] = weight / scales[j] * data[j, c]
+    for i in range(m):
+        phi[i] = weight * v[i]
+    absorb_equation(R, S, phi[:m], rest.reshape(-1))
+    for i in range(m):
+        phi[i] = weight * v[i]
+    absorb_equation(data_R, data_S, phi[:m], alone.reshape(-1))
+    absorb_each(residual_R, residual_z, alone)
 
 
 @_compiled

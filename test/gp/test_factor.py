@@ -6,20 +6,28 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numba import njit
+from numba import njit, types
 
 from sgp_ros.gp.factor import ROOM, GrowingFactor
 from sgp_ros.gp.factor_loops import (
     absorb_column,
     absorbed_column_numpy,
+    append_row,
     close_gap,
-    combine_rows,
+    drop_row,
     dropped_sample_numpy,
     move_to_front,
-    solve_lower,
 )
-from sgp_ros.gp.kernels import SquaredExponential
+from sgp_ros.gp.kernels import COMPILED_FORMS, SquaredExponential
 from sgp_ros.gp.model import OutputGroup, output_groups
+from sgp_ros.gp.whitening_loops import (
+    combine_rows,
+    fill_covariances,
+    solve_lower,
+    whiten_input,
+    whiten_vector,
+    whitened_numpy,
+)
 from test.gp.worlds import random_problem
 
 GROUP = OutputGroup(SquaredExponential(1.0, (1.0,), (0,)), 0.1, (0, 1), (1.0, 2.0))
@@ -85,6 +93,47 @@ def test_compiled_combination_is_a_product(seed, n):
     v, rows, total = rng.normal(size=n), rng.normal(size=(n, 5)), np.full(5, np.nan)
     combine_rows(v, rows, total)
     np.testing.assert_allclose(total, v @ rows, atol=1e-12)
+
+
+@given(SEEDS, st.integers(0, 9), st.sampled_from(list(COMPILED_FORMS)))
+def test_compiled_covariances_are_those_of_the_kernel(seed, n, kind):
+    """Each formula that the loops know is that of its class, also where it vanishes."""
+    rng = np.random.default_rng(seed)
+    kernel = kind(1.7, (0.5, 2.0, 1.0), (0, 1, 2))
+    S, s, v = rng.normal(size=(n + 2, 3)), rng.normal(size=3), np.full(n, np.nan)
+    S[-1] *= 1e6
+    fill_covariances(COMPILED_FORMS[kind], kernel.variance, S, 2, s, v)
+    np.testing.assert_allclose(v, kernel.vector(S[2:], s), rtol=1e-12, atol=1e-300)
+
+
+@given(SEEDS, st.integers(0, 9), st.integers(0, 3))
+def test_compiled_whitening_equals_the_library(seed, n, start):
+    """Solve, products with the data and the norm, wherever the factor begins."""
+    rng = np.random.default_rng(seed)
+    L, v, scales = _lower(rng, n), rng.normal(size=n), np.array([1.0, 2.0])
+    white, explained = rng.normal(size=(start + n + 2, 6)), np.full(6, np.nan)
+    expected = whitened_numpy(L, v, white[start : start + n], scales)
+    reduction = whiten_vector(_placed(L, start), white, start, scales, v, explained)
+    for one, other in zip((v, explained, reduction), expected, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-9)
+
+
+def test_a_kernel_of_ones_own_whitens_alike():
+    """What the loops do not know is evaluated by the kernel itself, to the same end."""
+
+    class Own(SquaredExponential):
+        __slots__ = ()
+
+    rng = np.random.default_rng(3)
+    own = OutputGroup(Own(1.0, (1.0,), (0,)), GROUP.noise, GROUP.outputs, GROUP.scales)
+    U, data, u = rng.normal(size=(6, 1)), rng.normal(size=(6, 2, 3)), rng.normal(size=1)
+    found = []
+    for group in (GROUP, own):
+        factor = GrowingFactor(group, 2, 10)
+        factor.fill(U, data)
+        found.append(factor.whiten(u))
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-12)
 
 
 @given(SEEDS, st.integers(1, 12))
@@ -164,11 +213,21 @@ def _machine_code(function, signature):
 
 
 @pytest.mark.parametrize(
-    'loop', [solve_lower, combine_rows, absorb_column, close_gap, move_to_front]
-)
+    'loop',
+    [
+        solve_lower, combine_rows, absorb_column, close_gap, move_to_front, whiten_input,
+        append_row, drop_row,
+    ],
+)  # fmt: skip
 def test_compiled_loops_allocate_nothing(loop):
     """What the compiler made of each loop calls no allocator."""
     rng = np.random.default_rng(0)
+    U, x = np.eye(12), np.zeros(9)
+    solve_lower(U, 0, x)
+    combine_rows(x, U[:9], np.zeros(12))
+    close_gap(U, 0, 9, 3)
+    move_to_front(U, 1, 9)
+    absorb_column(U, 0, x, U[:9], np.zeros(12))
     for m in (0, 3, 9):
         factor, _, _ = _filled(rng, n=9)
         for _ in range(2 * ROOM):
@@ -176,7 +235,8 @@ def test_compiled_loops_allocate_nothing(loop):
             factor.drop(m)
     for signature in loop.signatures:
         assert 'NRT_MemInfo_alloc' not in _machine_code(loop.py_func, signature)
-    with_scratch = _machine_code(lambda x: np.zeros(len(x)), (loop.signatures[0][0],))
+    array = next(kind for kind in loop.signatures[0] if isinstance(kind, types.Array))
+    with_scratch = _machine_code(lambda x: np.zeros(len(x)), (array,))
     assert 'NRT_MemInfo_alloc' in with_scratch  # so this is how an allocation would look
 
 

@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sgp_ros.errors import NumericalError
-from sgp_ros.gp.factor_loops import inverse_column, inverse_column_numpy
-from sgp_ros.gp.model import CoefficientPrior, Model
+from sgp_ros.gp.factor import GrowingFactor
+from sgp_ros.gp.kernels import SquaredExponential
+from sgp_ros.gp.model import CoefficientPrior, Model, OutputGroup
 from sgp_ros.gp.online import OnlineRegression
 from sgp_ros.gp.regression import Memory
 from sgp_ros.gp.retention import RETENTIONS
@@ -40,12 +41,16 @@ def _covariance(model, data, j, rows):
 def test_a_column_of_the_inverse_is_that_of_the_library(seed, n, start, data):
     """Compiled substitution and LAPACK solve the same system, wherever the factor begins."""
     m = data.draw(st.integers(0, n - 1))
-    root = np.random.default_rng(seed).normal(size=(n, n))
-    L = np.linalg.cholesky(root @ root.T + np.eye(n))
-    U = np.zeros((start + n, start + n))
-    U[start:, start:] = L.T
-    found = inverse_column(U, start, n, m)
-    np.testing.assert_allclose(found, inverse_column_numpy(L, m), atol=1e-10)
+    rng = np.random.default_rng(seed)
+    kernel = SquaredExponential(1.0, (0.5,), (0,))
+    factor = GrowingFactor(OutputGroup(kernel, 0.1, (0,), (1.0,)), 0, n + 1)
+    U = rng.normal(size=(n + start, 1))
+    for u in U:
+        if factor.size == n:
+            factor.drop(0)
+        factor.append(factor.whiten(u), np.zeros((1, 1)))
+    inverse = np.linalg.inv(kernel.matrix(U[start:]) + 0.1 * np.eye(n))
+    np.testing.assert_allclose(factor.inverse_column(m), inverse[m], atol=1e-10)
 
 
 @given(st.integers(0, 1000))

@@ -11,6 +11,8 @@ from sgp_ros.gp.rotations import (
     absorb_each,
     absorbed_rows_numpy,
     has_safe_diagonal,
+    predict_rows,
+    predicted_rows_numpy,
     solve_rows,
     solve_upper,
 )
@@ -27,6 +29,19 @@ def test_compiled_solves_equal_the_library(seed, p):
     solve_rows(R, X)
     np.testing.assert_allclose(x, np.linalg.solve(R, z), atol=1e-10)
     np.testing.assert_allclose(X, rows @ np.linalg.inv(R), atol=1e-10)
+
+
+@given(st.integers(0, 10_000), st.integers(1, 4), st.integers(1, 8))
+def test_compiled_prediction_equals_the_library(seed, k, p):
+    """Mean and covariance of rows of W."""
+    rng = np.random.default_rng(seed)
+    R = np.triu(rng.normal(size=(p, p))) + 4.0 * np.eye(p)
+    w, rows, mean = rng.normal(size=p), rng.normal(size=(k, p)), rng.normal(size=k)
+    expected = predicted_rows_numpy(R, w, rows, mean)
+    covariance = np.full((k, k), np.nan)
+    predict_rows(R, w, rows, mean, covariance)
+    np.testing.assert_allclose(mean, expected[0], atol=1e-10)
+    np.testing.assert_allclose(covariance, expected[1], atol=1e-10)
 
 
 @given(st.integers(0, 10_000), st.integers(0, 4), st.integers(0, 5))
