@@ -10,6 +10,7 @@ keeps the direction of its friction until its velocity is zero.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -202,9 +203,14 @@ def _equations(
 def _solve(M: np.ndarray, drive: np.ndarray, sticks: np.ndarray) -> np.ndarray:
     """Accelerations of the joints that do not stick, zero for those that do, (m, k)."""
     k = drive.shape[1]
-    moves = ~sticks
-    A = np.where(moves[:, :, None] & moves[:, None, :], M, np.eye(k))
-    b = np.where(moves, drive, 0.0)
+    A, b = M, drive
+    if sticks.any():
+        moves = ~sticks
+        A = np.where(moves[:, :, None] & moves[:, None, :], M, np.eye(k))
+        b = np.where(moves, drive, 0.0)
+    if np.isfinite(A).all():
+        with suppress(np.linalg.LinAlgError):  # one of them is singular: which?
+            return np.asarray(np.linalg.solve(A, b[:, :, None])[:, :, 0])
     determinant = np.linalg.det(A)
     is_regular = np.isfinite(determinant) & (determinant != 0.0)
     A = np.where(is_regular[:, None, None], A, np.eye(k))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from sgp_ros.errors import NumericalError
+from sgp_ros.rigid.mass_loops import fill_mass
 from sgp_ros.rigid.rigid_geometry import full_motion, geometry
 from sgp_ros.rigid.rigid_loops import fill_regressor, fill_torque
 from sgp_ros.rigid.tree import Tree
@@ -56,16 +57,20 @@ def inverse_dynamics(
         v: velocities, (n, k) [rad/s or m/s].
         a: accelerations, (n, k) [rad/s^2 or m/s^2].
     """
-    return _inverse(tree, parameters, tree.gravity, q, v, a)
+    full = full_motion(tree, q, v, a)
+    tau = np.zeros((len(full[0]), geometry(tree).size))
+    fill_torque(geometry(tree), tree.gravity.copy(), *full, _table(tree, parameters), tau)
+    return tau
 
 
 def mass_matrix(tree: Tree, parameters: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Return the joint-space inertia, (n, k, k), a column per unit acceleration. O(k b)."""
-    n, k = np.shape(q)
-    units = np.tile(np.eye(k), (n, 1))
-    still = np.zeros((n * k, k))
-    columns = _inverse(tree, parameters, np.zeros(3), np.repeat(q, k, axis=0), still, units)
-    return columns.reshape(n, k, k).transpose(0, 2, 1)
+    """Return the joint-space inertia, (n, k, k). O(b depth) per sample."""
+    still = np.zeros_like(q)
+    full, _, _ = full_motion(tree, q, still, still)
+    g = geometry(tree)
+    M = np.zeros((len(full), g.size, g.size))
+    fill_mass(g, full, _table(tree, parameters), M)
+    return M
 
 
 def forward_dynamics(
@@ -96,16 +101,6 @@ def forward_dynamics(
     return np.linalg.solve(M, (np.asarray(tau) - bias)[:, :, None])[:, :, 0]
 
 
-def _inverse(
-    tree: Tree,
-    parameters: np.ndarray,
-    gravity: np.ndarray,
-    q: np.ndarray,
-    v: np.ndarray,
-    a: np.ndarray,
-) -> np.ndarray:
-    full = full_motion(tree, q, v, a)
-    tau = np.zeros((len(full[0]), geometry(tree).size))
-    table = np.array(parameters, dtype=np.float64).reshape(len(tree.parents), 10)
-    fill_torque(geometry(tree), gravity.copy(), *full, table, tau)
-    return tau
+def _table(tree: Tree, parameters: np.ndarray) -> np.ndarray:
+    """Return inertial parameters as the loops read them, (b, 10)."""
+    return np.array(parameters, dtype=np.float64).reshape(len(tree.parents), 10)

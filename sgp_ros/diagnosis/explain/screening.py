@@ -166,8 +166,8 @@ class _Products:
             x = (filtered.reshape(N, -1, m)[:, j if filtered.ndim == 3 else 0]) / sigma[j]
             Bx[j], xx[j], xr[j] = rest.B[:, j].T @ x, x.T @ x, x.T @ rest.r[:, j]
         u = Bx.sum(axis=0)  # (P, m)
-        shared = np.einsum('kpm,pl->kml', Bx, u)
-        own = xx - shared - shared.transpose(0, 2, 1) + np.einsum('pm,kpq,ql->kml', u, rest.BB, u)
+        shared = Bx.transpose(0, 2, 1) @ u  # (k, m, m)
+        own = xx - shared - shared.transpose(0, 2, 1) + u.T @ (rest.BB @ u)
         G = xx.sum(axis=0) - u.T @ u
         G[np.diag_indices(m)] = np.where(
             np.diag(G) > _UNSEEN * np.diag(xx.sum(axis=0)), np.diag(G), np.inf

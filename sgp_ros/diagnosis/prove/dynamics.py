@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -16,9 +17,13 @@ from sgp_ros.diagnosis.explain.fitted_model import Model, extra_force
 from sgp_ros.diagnosis.locate.remainder import Remainder
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.observed_motion import ObservedMotion
+
+_Forces = tuple[Model, tuple[EffectAt, ...]]
+"""Effects of a model, and effects that the nominal robot has."""
 
 _SMALL = 1e-6
 """Difference of positions and velocities [rad or m, per second]."""
@@ -50,8 +55,7 @@ class DiagnosedDynamics:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return M, (m, k, k), and the drive, (m, k) [N m or N].
 
-        The equation of motion is affine in the acceleration: its value without acceleration is
-        the drive, and what each unit adds a column of M.
+        The forces of effects are affine in the acceleration: what each unit adds is inertia.
 
         Args:
             q: (m, k) [rad or m].
@@ -59,19 +63,31 @@ class DiagnosedDynamics:
             loads: (m, 2 k + 2) [N m or N, s].
         """
         m, k = q.shape
-        a = np.repeat(np.vstack([np.zeros((1, k)), np.eye(k)]), m, axis=0)
-        stated = _chosen(self.stated, _sees_acceleration)
-        motion = self._motion(np.tile(q, (k + 1, 1)), np.tile(v, (k + 1, 1)), a, loads, stated)
-        needed = motion.effort_for(motion.position, motion.velocity, a)
-        inertial = extra_force(_part(self.model, _sees_acceleration), motion)
-        e = (needed - motion.effort - inertial).reshape(k + 1, m, k)
-        stated = _chosen(self.stated, _sees_no_acceleration)
-        here = self._motion(q, v, np.zeros_like(q), loads, stated)
-        others = extra_force(_part(self.model, _sees_no_acceleration), here)
-        drive = loads[:, k : 2 * k] - e[0] + others
+        still = np.zeros((m, k))
+        M = mass_matrix(self.tree, self.tree.parameters, q)
+        others, stated = self._beside_acceleration
+        here = self._motion(q, v, still, loads, stated)
+        drive = loads[:, k : 2 * k] + here.effort - here.effort_for(q, v, still)
+        drive += extra_force(others, here)
+        inertial, stated = self._with_acceleration
+        if inertial.effects or stated:
+            a = np.repeat(np.vstack([np.zeros((1, k)), np.eye(k)]), m, axis=0)
+            pushed = self._motion(np.tile(q, (k + 1, 1)), np.tile(v, (k + 1, 1)), a, loads, stated)
+            force = extra_force(inertial, pushed).reshape(k + 1, m, k)
+            drive += force[0]
+            M -= np.moveaxis(force[1:] - force[0], 0, 2)
         for remainder in self.remainders:
             drive[:, remainder.joint] += remainder.force(here)
-        return np.moveaxis(e[1:] - e[0], 0, 2), drive
+        return M, drive
+
+    @cached_property
+    def _with_acceleration(self) -> _Forces:
+        return _part(self.model, _sees_acceleration), _chosen(self.stated, _sees_acceleration)
+
+    @cached_property
+    def _beside_acceleration(self) -> _Forces:
+        no = _sees_no_acceleration
+        return _part(self.model, no), _chosen(self.stated, no)
 
     def level_of_dry_friction(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """Return half the jump of each joint's force as its velocity changes sign, (m, k)."""
