@@ -69,6 +69,13 @@ class Correction:
         same = np.arange(k)
         return cls(same, np.zeros(k), np.ones(k), same, np.ones(k), np.ones(k), np.ones(k))
 
+    @property
+    def moves(self) -> tuple[object, ...]:
+        """What of it changes motion and robot; the rest changes efforts alone."""
+        origins = b'' if self.origins is None else self.origins.tobytes()
+        columns = (self.order.tobytes(), self.offset.tobytes(), self.scale.tobytes())
+        return *columns, self.roll, self.pitch, origins
+
     def log_volume(self, driven: np.ndarray) -> float:
         """Return by how much the density of recorded accelerations exceeds that of true ones.
 

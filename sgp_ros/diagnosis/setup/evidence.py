@@ -9,7 +9,9 @@ error of the connection must explain what none of them does.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -21,6 +23,7 @@ from sgp_ros.diagnosis.setup.correction import Acting, Correction, delayed
 from sgp_ros.physics.drive import Servo
 from sgp_ros.rigid.rigid_body import mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 _MOST_ROWS = 1000
 _STRETCHES = 4
@@ -30,6 +33,8 @@ _PER_PERIOD = 8.0
 _ROUNDS = 4
 _KEPT = 50
 """Clock offsets of which the efforts are remembered."""
+_MOTIONS = 8
+"""Corrected motions of which the columns are remembered."""
 FRICTION = 0.3
 """Prior standard deviation of friction and offset, relative to the rms of the joint's effort."""
 
@@ -91,6 +96,8 @@ class Probe:
         M = mass_matrix(tree, tree.parameters, self.motion.position[self._pose])
         self.nominal_inertia = float(np.linalg.slogdet(M)[1].mean())
         self._known: dict[float, Acting] = {}
+        self._columns: dict[tuple[object, ...], _Unknowns] = {}
+        self._Y: np.ndarray | None = None  # fresh memory costs more than the computation
 
     def acting(self, clock: float) -> Acting:
         """Return the recorded efforts taken `clock` later."""
@@ -118,34 +125,28 @@ class Probe:
     def agreement(self, correction: Correction) -> Agreement:
         """Return how well the recording agrees with the robot once it is corrected."""
         motion = correction.motion(self.motion, self.acting(correction.clock))
-        tree = motion.tree
-        k = tree.size
-        Y = torque_regressor(tree, motion.position, motion.velocity, motion.acceleration)
-        nominal = Y @ tree.parameters.ravel() + tree.damping[:k] * motion.velocity
-        d = self.filter(nominal - motion.effort - motion.stated_force)
-        n = len(Y)
-        bodies = -self.filter((Y.reshape(n * k, -1) @ self.directions.T).reshape(n, -1))
-        bodies = bodies.reshape(len(d), k, -1)
+        unknowns = self._unknowns_of(correction.moves, motion)
+        d = unknowns.nominal - self.filter(motion.effort + motion.stated_force)
         power = self.power[correction.effort_order] / correction.effort_scale**2
         power = np.where(self.driven, power, self.power)
         rms = np.sqrt(power)
-        extra = np.zeros((len(d), k, 3 * k))
-        for j in range(k):
-            v = motion.velocity[:, j]
-            size = max(float(np.sqrt((v * v).mean())), 1e-12)
-            columns = np.column_stack([v / size, motion.direction[:, j], np.ones(n)])
-            extra[:, j, 3 * j : 3 * j + 3] = FRICTION * rms[j] * self.filter(columns)
-        poses = motion.position[self._pose]
-        sets = (bodies[:, :, :0], bodies, np.concatenate([bodies, extra], axis=2))
+        volume = correction.log_volume(self.driven)
         found = []
-        for X in sets:
-            value, left, b = self._with(d, X, power)
-            w = np.zeros(bodies.shape[2])
-            w[: len(b)] = b[: len(w)]
-            shift = self._log_inertia(tree, w, poses) + correction.log_volume(self.driven)
+        for value, left, w in self._with(d, unknowns, power):
+            shift = self._log_inertia(motion.tree, w, motion.position[self._pose]) + volume
             found.append((value + min(INDEPENDENT_ROWS, len(d)) * shift, left))
         best = max(range(3), key=lambda i: found[i][0])
         return Agreement(found[best][0], best, found[best][1], d / rms)
+
+    def _unknowns_of(self, key: tuple[object, ...], motion: ObservedMotion) -> _Unknowns:
+        """Return the columns of a motion; corrections of efforts alone leave them as they are."""
+        if key not in self._columns:
+            if len(self._columns) >= _MOTIONS:
+                self._columns.clear()
+            q, v, a = motion.position, motion.velocity, motion.acceleration
+            self._Y = torque_regressor(motion.tree, q, v, a, self._Y)
+            self._columns[key] = _Unknowns.of(motion, self._Y, self.filter, self.directions)
+        return self._columns[key]
 
     def _log_inertia(self, tree: Tree, w: np.ndarray, poses: np.ndarray) -> float:
         """Return the mean of log det M of changed bodies less that of the nominal robot."""
@@ -156,28 +157,111 @@ class Probe:
         return float(np.linalg.slogdet(M)[1].mean()) - self.nominal_inertia
 
     def _with(
-        self, d: np.ndarray, X: np.ndarray, power: np.ndarray
-    ) -> tuple[float, np.ndarray, np.ndarray]:
-        """Return the evidence of efforts with unknowns of unit prior, what is left, and these."""
-        N, _, p = X.shape
+        self, d: np.ndarray, unknowns: _Unknowns, power: np.ndarray
+    ) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
+        """Yield the evidence of efforts, what is left, and changes of bodies.
+
+        For each set of unknowns of unit prior: none, bodies, bodies and friction.
+        """
+        N, k = d.shape
         rows = min(INDEPENDENT_ROWS, N)
-        floor = (1e-5 + SHAPE_ERROR * np.minimum((d**2).mean(axis=0) / power, 1.0)) * power
-        variance = (d**2).mean(axis=0) + floor
-        occam, b = 0.0, np.zeros(p)
-        left = d
-        if p:
-            G = np.einsum('njp,njq->jpq', X, X, optimize=True)
-            g = np.einsum('njp,nj->jp', X, d, optimize=True)
-            for _ in range(_ROUNDS):
-                weight = rows / N / variance
-                A = np.tensordot(weight, G, 1) + np.eye(p)
-                b = np.linalg.solve(A, weight @ g)
-                left = d - X @ b
+        square = (d**2).mean(axis=0)
+        floor = (1e-5 + SHAPE_ERROR * np.minimum(square / power, 1.0)) * power
+        p = unknowns.bodies.shape[2]
+        size = FRICTION * np.sqrt(power)
+        products = unknowns.products(d, size)
+        for count in (0, p, p + 3 * k):
+            variance, left = square + floor, d
+            occam, b = 0.0, np.zeros(count)
+            for _ in range(_ROUNDS if count else 0):
+                A, g = (x[:count, ...] for x in products.weighted(rows / N / variance))
+                A = A[:, :count] + np.eye(count)
+                b = np.linalg.solve(A, g)
+                left = d - unknowns.force(b, size)
                 variance = (left**2).mean(axis=0) + floor
-            occam = 0.5 * float(np.linalg.slogdet(A)[1])
-        share = variance / power
-        value = -0.5 * rows * float(np.log(share).sum()) - 0.5 * float(b @ b) - occam
-        return value, (left**2).mean(axis=0) / power, b
+            if count:
+                occam = 0.5 * float(np.linalg.slogdet(A)[1])
+            share = variance / power
+            value = -0.5 * rows * float(np.log(share).sum()) - 0.5 * float(b @ b) - occam
+            yield value, (left**2).mean(axis=0) / power, b[:p] if count else np.zeros(p)
+
+
+@dataclass(frozen=True, eq=False)
+class _Products:
+    """Products of the columns of p bodies and three everyday forces, joint by joint.
+
+    Attributes:
+        G: (k, p + 3, p + 3) with themselves.
+        g: (k, p + 3) with the discrepancy.
+    """
+
+    G: np.ndarray
+    g: np.ndarray
+
+    def weighted(self, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the sums over joints with weights (k,), (P, P) and (P,) for P = p + 3 k."""
+        k, p = len(weight), self.G.shape[1] - 3
+        G, g = self.G * weight[:, None, None], self.g * weight[:, None]
+        A, b = np.zeros((p + 3 * k, p + 3 * k)), np.zeros(p + 3 * k)
+        A[:p, :p], b[:p] = G[:, :p, :p].sum(axis=0), g[:, :p].sum(axis=0)
+        for j in range(k):
+            own = slice(p + 3 * j, p + 3 * j + 3)
+            A[:p, own], A[own, :p], A[own, own] = G[j, :p, p:], G[j, p:, :p], G[j, p:, p:]
+            b[own] = g[j, p:]
+        return A, b
+
+
+@dataclass(frozen=True, eq=False)
+class _Unknowns:
+    """Filtered efforts of a motion, by everyday unknowns.
+
+    Attributes:
+        nominal: (N, k) of the nominal robot [N m or N].
+        bodies: (N, k, p) per standard deviation of each inertial parameter's change.
+        friction: (N, k, 3) of a unit of viscous and dry friction and of an offset at each joint.
+    """
+
+    nominal: np.ndarray
+    bodies: np.ndarray
+    friction: np.ndarray
+
+    @classmethod
+    def of(
+        cls, motion: ObservedMotion, regressor: np.ndarray, low: ParallelFilter,
+        directions: np.ndarray,
+    ) -> _Unknowns:  # fmt: skip
+        """Return those of a motion with its regressor (n, k, 10 b), behind a filter."""
+        tree, v = motion.tree, motion.velocity
+        k = tree.size
+        Y = low(regressor)
+        nominal = Y @ tree.parameters.ravel() + low(tree.damping[:k] * v)
+        bodies = -(Y.reshape(len(Y) * k, -1) @ directions.T).reshape(len(Y), k, -1)
+        size = np.maximum(np.sqrt((v * v).mean(axis=0)), 1e-12)
+        friction = np.stack([v / size, motion.direction, np.ones_like(v)], axis=2)
+        return cls(nominal, bodies, low(friction))
+
+    @cached_property
+    def _squares(self) -> np.ndarray:
+        X = np.concatenate([self.bodies, self.friction], axis=2).transpose(1, 0, 2)
+        return X.transpose(0, 2, 1) @ X
+
+    def products(self, d: np.ndarray, size: np.ndarray) -> _Products:
+        """Return the products for a discrepancy (N, k) and forces of these sizes (k,)."""
+        k, p = d.shape[1], self.bodies.shape[2]
+        scale = np.ones((k, p + 3))
+        scale[:, p:] = size[:, None]
+        g = np.empty((k, p + 3))
+        for j in range(k):
+            g[j, :p], g[j, p:] = self.bodies[:, j].T @ d[:, j], self.friction[:, j].T @ d[:, j]
+        return _Products(self._squares * scale[:, :, None] * scale[:, None, :], g * scale)
+
+    def force(self, b: np.ndarray, size: np.ndarray) -> np.ndarray:
+        """Return the efforts of unknowns b (p,) or (p + 3 k,), (N, k) [N m or N]."""
+        k, p = self.bodies.shape[1:]
+        found = self.bodies @ b[:p]
+        if len(b) > p:
+            found += (self.friction * (b[p:].reshape(k, 3) * size[:, None])).sum(axis=2)
+        return found
 
 
 def _spread(raw: RawTrajectory, every: int) -> list[np.ndarray]:

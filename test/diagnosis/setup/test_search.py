@@ -84,6 +84,20 @@ def test_every_hypothesis_proposes_a_change_that_its_neutral_numbers_do_not_make
             assert changed.distance(plain) > 0.0, h.key
 
 
+def test_a_correction_agrees_the_same_whatever_was_looked_at_before():
+    """Columns of a motion are remembered: a correction of efforts alone takes them as they are."""
+    raw, tree = _raw(CASES / 'case_02')
+    used = Probe(raw, tree, choose_bandwidth(raw, tree))
+    moved, driven = Correction.none(tree.size), Correction.none(tree.size)
+    moved.offset[1], driven.effort_scale[2] = 0.1, 0.7
+    for correction in (Correction.none(tree.size), moved, driven, moved):
+        fresh = Probe(raw, tree, choose_bandwidth(raw, tree)).agreement(correction)
+        again = used.agreement(correction)
+        assert again.evidence == fresh.evidence
+        assert (again.discrepancy == fresh.discrepancy).all()
+    assert used.agreement(moved).evidence != used.agreement(driven).evidence
+
+
 def test_a_corrected_motion_is_scaled_with_its_derivatives():
     raw, tree = _raw(CASES / 'case_02')
     probe = Probe(raw, tree, choose_bandwidth(raw, tree))
