@@ -82,9 +82,9 @@ class Complement:
         joints = list(equation.complement_joints)
         if not joints or not self._is_known:
             return Channel.unknown(measured)
-        slope = (equation.slopes @ model[0].information.coefficients).T  # (k, c)
+        slope = model[0].information.products(equation.slopes).T  # (k, c)
         if physics is not None and np.any(weight < 1.0):
-            alone = (equation.slopes @ physics[0].information.coefficients).T
+            alone = physics[0].information.products(equation.slopes).T
             slope = alone + weight[:, None] * (slope - alone)
         if not np.isfinite(target.variance).all():
             return Channel.unknown(measured)
@@ -101,7 +101,7 @@ class Complement:
         prior = self.signals.predict()
         if prior is None:
             noise = np.array(model[0].model.noise)
-            start = equation.state_rows @ model[0].information.coefficients
+            start = model[0].information.products(equation.state_rows)
             solved = solve_complement(target.measured, slope, noise, start, predict, iterations)
         else:
             solved = update_complement(prior, target.measured, slope, predict, iterations)

@@ -1,18 +1,20 @@
 """Square-root information on W: a triangular system `R w = z` of unit noise that grows by rows.
 
 The posterior is N(R^-1 z, (R^T R)^-1). A row of zeros in R is a direction nothing has determined
-yet; until there is none, an orthogonal decomposition with scaled columns takes the place of the
-triangular solve.
+yet; until there is none, echelon form (`gp.echelon`) takes the place of the triangular solve for
+what is determined beyond doubt, and an orthogonal decomposition with scaled columns elsewhere.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import cached_property
 
 import numpy as np
 from scipy import linalg
 
+from sgp_ros.gp.echelon import Echelon
 from sgp_ros.gp.linear_algebra import symmetric_eigen
 from sgp_ros.gp.model import CoefficientPrior
 from sgp_ros.gp.posterior import NULL_TOLERANCE, RANK_TOLERANCE, ZERO_COLUMN
@@ -117,8 +119,8 @@ class Information:
     def spread(self, rows: np.ndarray) -> np.ndarray:
         """Return S (k, r) such that `rows W` has covariance `S S^T`, for rows (k, p)."""
         solved = self._solution()
-        if solved.spread is not None:
-            return rows @ solved.spread
+        if not solved.is_triangular:
+            return rows @ solved.decomposition.spread
         solution = rows.copy()
         solve_rows(self.R, solution)
         return solution
@@ -126,7 +128,7 @@ class Information:
     def is_determined(self, rows: np.ndarray) -> np.ndarray:
         """Whether `rows W` leaves out every undetermined direction, (k,) for rows (k, p)."""
         solved = self._solution()
-        if not solved.null.shape[1]:
+        if solved.is_triangular:
             return np.ones(len(rows), dtype=bool)
         scaled = rows / solved.scale
         outside = np.linalg.norm(scaled @ solved.null, axis=1)
@@ -147,18 +149,28 @@ class Information:
             direction of W enters.
         """
         solved = self._solution()
-        if solved.spread is None:
-            covariance = np.empty((len(rows), len(rows)))
-            mean = mean.copy()
+        if solved.is_triangular:
+            covariance, mean = np.empty((len(rows), len(rows))), mean.copy()
             predict_rows(self.R, solved.w, rows.copy(), mean, covariance)
             covariance.reshape(-1)[:: len(rows) + 1] += variance
             return mean, covariance
-        spread = rows @ solved.spread  # (k, r)
+        determined = solved.echelon.products(rows)
+        values, spread = determined or (rows @ solved.w, self.spread(rows))  # (k,), (k, r)
         covariance = spread @ spread.T
         diagonal = covariance.reshape(-1)[:: len(rows) + 1]
         diagonal += variance
-        diagonal[~self.is_determined(rows)] = np.inf
-        return mean + rows @ solved.w, covariance
+        if determined is None:
+            diagonal[~self.is_determined(rows)] = np.inf
+        return mean + values, covariance
+
+    def products(self, rows: np.ndarray) -> np.ndarray:
+        """Return the posterior mean of `rows W`, (...,) for rows (..., p). O(p^2) each."""
+        solved = self._solution()
+        if not solved.is_triangular:
+            determined = solved.echelon.products(rows.reshape(-1, rows.shape[-1]))
+            if determined is not None:
+                return determined[0].reshape(rows.shape[:-1])
+        return np.asarray(rows @ solved.w)
 
     def _solution(self) -> _Solved:
         if self._solved is None:
@@ -167,30 +179,52 @@ class Information:
 
 
 class _Solved:
-    """Solution of one state of the system; `spread` is None where R itself is invertible."""
+    """Solution of one state of the system.
+
+    Attributes:
+        is_triangular: whether R itself is invertible, so that it takes the place of `spread`.
+    """
 
     def __init__(self, R: np.ndarray, z: np.ndarray) -> None:
-        p = len(z)
-        self.null = np.zeros((p, 0))
-        self.spread: np.ndarray | None = None
-        if not p:
-            self.spread, self.w = np.zeros((0, 0)), np.zeros(0)
-            return
-        if has_safe_diagonal(R, ZERO_COLUMN, RANK_TOLERANCE):
-            self.w = z.copy()
-            solve_upper(R, self.w)
+        self.is_triangular = bool(has_safe_diagonal(R, ZERO_COLUMN, RANK_TOLERANCE))
+        self._z = z.copy()
+        if self.is_triangular:
+            solve_upper(R, self._z)
             return
         self.scale = np.sqrt((R * R).sum(axis=0))
         is_zero = self.scale <= ZERO_COLUMN * self.scale.max(initial=0.0)
         self.scale[is_zero] = 1.0
-        self._decompose(np.where(is_zero, 0.0, R / self.scale), z)
+        self._A = np.where(is_zero, 0.0, R / self.scale)
 
-    def _decompose(self, A: np.ndarray, z: np.ndarray) -> None:
-        """Solve `A x = z` for A (p, p) with columns of norm one, or zero, with the shortest x.
+    @property
+    def w(self) -> np.ndarray:
+        """The shortest solution, (p,), of columns with norm one."""
+        return self._z if self.is_triangular else self.decomposition.w
 
-        Complete orthogonal decomposition `A P = Q [L^T; 0] Z^T`: a QR with column pivoting tells
-        the rank, one of what it leaves the null space (Golub and Van Loan, section 5.4.7).
-        """
+    @property
+    def null(self) -> np.ndarray:
+        """Basis of the undetermined directions, (p, r), of columns with norm one."""
+        return np.zeros((len(self._z), 0)) if self.is_triangular else self.decomposition.null
+
+    @cached_property
+    def echelon(self) -> Echelon:
+        """What tells determined rows apart where that is beyond doubt."""
+        return Echelon(self._A, self._z, self.scale)
+
+    @cached_property
+    def decomposition(self) -> _Decomposition:
+        """What tells them apart in every case."""
+        return _Decomposition(self._A, self._z, self.scale)
+
+
+class _Decomposition:
+    """Shortest solution of `A x = z` for A (p, p) with columns of norm one, or zero.
+
+    Complete orthogonal decomposition `A P = Q [L^T; 0] Z^T`: a QR with column pivoting tells
+    the rank, one of what it leaves the null space (Golub and Van Loan, section 5.4.7).
+    """
+
+    def __init__(self, A: np.ndarray, z: np.ndarray, scale: np.ndarray) -> None:
         p = len(z)
         factored, order, tau, _, _ = linalg.lapack.dgeqp3(A)
         diagonal = np.abs(factored.diagonal())
@@ -201,7 +235,7 @@ class _Solved:
         Z, L = np.linalg.qr(np.triu(factored[:rank]).T, mode='complete')  # (p, p), (p, rank)
         Z = Z[np.argsort(order)]
         roots = linalg.solve_triangular(L[:rank], Z[:, :rank].T, check_finite=False)
-        self.spread = roots.T / self.scale[:, None]
+        self.spread = roots.T / scale[:, None]
         self.null = Z[:, rank:]
         turned = linalg.lapack.dormqr('L', 'T', factored, tau, z[:, None], 64 * p)[0][:rank, 0]
         self.w = self.spread @ turned

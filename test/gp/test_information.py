@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sgp_ros.gp.echelon import Echelon, products_numpy
 from sgp_ros.gp.inducing_regression import InducingPointRegression
 from sgp_ros.gp.information import Information
 from sgp_ros.gp.kernels import SquaredExponential
@@ -176,3 +177,42 @@ def test_stop_save_restore_continue_equals_never_stopped(way):
             online.learn(online.predict(data.U[i], data.F[i]), data.y[i])
     for name, array in other.state().items():
         np.testing.assert_array_equal(array, one.state()[name])
+
+
+@given(st.integers(0, 10_000), st.integers(3, 9), st.integers(1, 2))
+def test_echelon_form_tells_what_the_decomposition_does(seed, p, missing):
+    """Products with W and their covariance, in any units, where some of W is never told."""
+    rng = np.random.default_rng(seed)
+    span = rng.normal(size=(p - missing, p)) * 10.0 ** rng.uniform(-3.0, 3.0, size=p)
+    told = rng.normal(size=(3 * p, p - missing)) @ span
+    held = Information.nothing(p).with_rows(told, rng.normal(size=3 * p))
+    rows = rng.normal(size=(2, p - missing)) @ span
+    A, z = held.R / np.linalg.norm(held.R, axis=0), held.z
+    echelon = Echelon(A, z, np.linalg.norm(held.R, axis=0))
+    if not echelon.is_clear:  # an element of a random world may be anything
+        return
+    values, spread = echelon.products(rows)
+    expected, covariance = products_numpy(A, z, np.linalg.norm(held.R, axis=0), rows)
+    size = np.sqrt(np.diag(covariance))
+    np.testing.assert_allclose(values, expected, atol=1e-6 * size.max())
+    np.testing.assert_allclose(
+        spread @ spread.T / np.outer(size, size), covariance / np.outer(size, size), atol=1e-6
+    )
+    mean, whole = held.predict(rows, np.zeros(2), np.zeros(2))
+    np.testing.assert_allclose(mean, values, rtol=1e-12)
+    np.testing.assert_allclose(whole, spread @ spread.T, rtol=1e-12)
+    np.testing.assert_array_equal(held.products(rows), values)
+
+
+def test_what_is_not_determined_beyond_doubt_is_left_to_the_decomposition():
+    """A row that leaves the span, and a direction between rounding and information."""
+    rng = np.random.default_rng(0)
+    told = rng.normal(size=(9, 3)) @ rng.normal(size=(3, 5))
+    held = Information.nothing(5).with_rows(told, rng.normal(size=9))
+    outside = rng.normal(size=(2, 5))
+    _, covariance = held.predict(outside, np.zeros(2), np.zeros(2))
+    assert np.isinf(np.diag(covariance)).all()
+    np.testing.assert_array_equal(held.products(outside), outside @ held.coefficients)
+    faint = held.with_rows(1e-9 * np.linalg.norm(held.R) * outside[:1], np.zeros(1))
+    scale = np.linalg.norm(faint.R, axis=0)
+    assert not Echelon(faint.R / scale, faint.z, scale).is_clear
