@@ -12,12 +12,13 @@ from sgp_ros.apps.diagnosed_robot import replayed, write_diagnosed
 from sgp_ros.apps.finding_file import write_viewed
 from sgp_ros.apps.recorded import checked, gains_of, read_events, refuse_moving_base
 from sgp_ros.apps.terminal import strong, warned
-from sgp_ros.batch.acceptance import require_joints
+from sgp_ros.batch.acceptance import USUAL, require_joints
 from sgp_ros.batch.recording_check import RecordingCheck
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.result import Diagnosis, Finding, Proof
+from sgp_ros.engine.clock import on_one_clock
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event, JointSample
 from sgp_ros.engine.setting import EFFORT_SOURCES
@@ -174,7 +175,8 @@ def examine(
     # a node meets one recording of a motion, as it is; settled points are none
     is_met = gains is None and not chosen.static and not found.setup
     first = next(iter(events.values())) if is_met else []
-    start_ns = min(e.stamp_ns for e in next(iter(events.values())) if isinstance(e, JointSample))
+    known, _, _ = on_one_clock(next(iter(events.values())), USUAL)
+    start_ns = min(e.stamp_ns for e in known if isinstance(e, JointSample))
     return Examined(nominal, found, first, bags[0], robot, source, gains, start_ns, checks)
 
 

@@ -1,7 +1,7 @@
 """The accepted states and held commands of a whole recording.
 
 The intake of the engine decides what is accepted. A whole recording can be sorted, so no sample is
-late.
+late; where its clock was set back, what follows is taken as another recording.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sgp_ros.batch.continuity import jumps, unwrapped
+from sgp_ros.engine.clock import on_one_clock
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.intake import Intake, State
 from sgp_ros.engine.ordering import in_order
@@ -86,6 +87,7 @@ class Accepted:
         is_measured: (m,) whether the measured effort counts.
         commands: None without.
         counts: what was read, used and refused.
+        start_ns: stamp of the first state that was read [ns].
     """
 
     stamps_ns: np.ndarray
@@ -95,6 +97,7 @@ class Accepted:
     is_measured: np.ndarray
     commands: HeldCommands | None
     counts: Counts
+    start_ns: int
 
     def stretches(self, max_gap: float) -> list[np.ndarray]:
         """Return the rows of stretches of one source each, without a pause or a jump of positions.
@@ -108,15 +111,22 @@ class Accepted:
         return np.split(np.arange(len(self.stamps_ns)), np.flatnonzero(ends) + 1)
 
     def jump_remarks(self, max_gap: float, start_ns: int) -> tuple[str, ...]:
-        """Say where the positions jump though the stamps go on, counted from `start_ns`."""
+        """Say that the clock was set back, and where positions jump, counted from `start_ns`."""
+        said: tuple[str, ...] = ()
+        times = self.counts.clock_jumps
+        if times:
+            said = (f'Stamps go back: taken as {times + 1} recordings.',)
         found = jumps(self.stamps_ns, self.position)
         found &= np.diff(self.stamps_ns) <= max_gap * 1e9
-        times = 1e-9 * (self.stamps_ns[1:][found] - start_ns)
-        if not len(times):
-            return ()
-        shown = ', '.join(f'{t:.6g}' for t in times[:_SHOWN_JUMPS])
-        more = f' and {len(times) - _SHOWN_JUMPS} more' if len(times) > _SHOWN_JUMPS else ''
-        return (f'Positions jump at t = {shown} s{more}: taken as {len(times) + 1} recordings.',)
+        places = 1e-9 * (self.stamps_ns[1:][found] - start_ns)
+        if not len(places):
+            return said
+        shown = ', '.join(f'{t:.6g}' for t in places[:_SHOWN_JUMPS])
+        more = f' and {len(places) - _SHOWN_JUMPS} more' if len(places) > _SHOWN_JUMPS else ''
+        return (
+            *said,
+            f'Positions jump at t = {shown} s{more}: taken as {len(places) + 1} recordings.',
+        )
 
     def unwrapped(self, robot: Robot) -> Accepted:
         """Return the states with the turns of the robot's joints without limits counted on."""
@@ -138,7 +148,7 @@ def accept(
     """Return what the intake of the engine accepts of a recording.
 
     Args:
-        events: in any order.
+        events: in the order in which they came; that of a few seconds does not matter.
         robot: whose joints are taken, in its order.
         config: settings of the intake.
         commands_are: what commands ask for, see `Intake`.
@@ -152,6 +162,9 @@ def accept(
     events = list(events)
     require_joints(events, robot)
     admitted = [event for event in events if intake.admit(event)]
+    admitted, wrong, counts.clock_jumps = on_one_clock(admitted, config)
+    for event in wrong:
+        intake.refuse(event, 'clock')
     for event in in_order(admitted):
         if isinstance(event, CommandSample):
             intake.take_command(event)
@@ -160,10 +173,12 @@ def accept(
             states += [] if state is None else [state]
     if not states:
         raise _none_accepted(robot, config, counts, commands_are)
-    return _table(states, intake, counts)
+    known = admitted if counts.clock_jumps else events
+    start_ns = min(event.stamp_ns for event in known if isinstance(event, JointSample))
+    return _table(states, intake, counts, start_ns)
 
 
-def _table(states: list[State], intake: Intake, counts: Counts) -> Accepted:
+def _table(states: list[State], intake: Intake, counts: Counts, start_ns: int) -> Accepted:
     missing = np.full(states[0].position.shape, np.nan)
     velocity = np.array([missing if s.velocity is None else s.velocity for s in states])
     has_velocity = np.mean([s.velocity is not None for s in states]) > _COMMON_SHARE
@@ -178,6 +193,7 @@ def _table(states: list[State], intake: Intake, counts: Counts) -> Accepted:
         if held.stamps_ns
         else None,
         counts,
+        start_ns,
     )
 
 

@@ -206,7 +206,7 @@ def _clock(found: RecordingCheck) -> list[str]:
     if found.backward or found.repeated:
         said.append(
             f'{found.backward} backward and {found.repeated} repeated stamps: such states are '
-            'refused or sorted.'
+            'refused, sorted, or begin another round.'
         )
     if found.jitter > _JITTER:
         said.append(f'Stamps are uneven: steps vary by {100.0 * found.jitter:.0f} %.')

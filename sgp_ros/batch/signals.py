@@ -68,7 +68,7 @@ def collect_signals(
     """Bring the states and commands of a recording to a uniform grid at their median rate.
 
     Args:
-        events: in any order.
+        events: in the order in which they came, see `accept`.
         robot: whose joints are taken, in its order.
         config: settings of the intake; `max_gap` ends a segment too.
 

@@ -5,14 +5,18 @@ recording, a simulator that was reset, a computer whose clock was set. Only what
 So such an event waits as a suspect. The next state near the present refuses it; a second state
 near it, nearer than to the present, makes it the beginning of a new segment. Commands never tell
 the time: their clock may be another computer's, and without states nothing is identified anyway.
+
+A whole recording has no present: its events are sorted, and only a clock that was set back splits
+it, see `on_one_clock`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from sgp_ros.engine.config import EngineConfig
-from sgp_ros.engine.samples import CommandSample, Event, JointSample
+from sgp_ros.engine.samples import Event, JointSample
 
 END_NS = 2**31 * 10**9
 """First stamp that a ROS message cannot hold [ns]."""
@@ -20,6 +24,8 @@ LEAST_JUMP_S = 1.0
 """Least difference of a stamp from the newest that is a jump. A wrong stamp below it is waited for
 as long: states in between are late."""
 MOST_SUSPECTS = 200
+SHORTEST_ROUND = 16
+"""Fewest states between two jumps of a clock on average; else messages only came late."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +81,6 @@ class StreamClock:
                 refused = tuple(self.suspects)
                 self.suspects = []
             return Verdict((event,), refused)
-        if not isinstance(event, (JointSample, CommandSample)):
-            return Verdict(refused=(event,))
         self.suspects.append(event)
         if isinstance(event, JointSample) and self._is_confirmed(event, newest_ns):
             near = [self._is_nearer(other, event, newest_ns) for other in self.suspects]
@@ -105,3 +109,56 @@ class StreamClock:
     def _is_nearer(other: Event, event: Event, newest_ns: int) -> bool:
         """Whether `other` is nearer to `event` than that to the present."""
         return abs(event.stamp_ns - other.stamp_ns) < abs(event.stamp_ns - newest_ns)
+
+
+def on_one_clock(
+    events: Sequence[Event], config: EngineConfig
+) -> tuple[list[Event], list[Event], int]:
+    """Put the rounds of a recording whose clock was set back one after the other.
+
+    A looped bag or a simulator that was reset repeats its stamps: sorted by these, its rounds
+    would be mixed. A round ends where an engine begins a new segment. The next one is moved to
+    follow it after a pause, in which no command goes on to hold.
+
+    Args:
+        events: of a recording, in the order in which they came.
+        config: settings of the intake.
+
+    Returns:
+        The events, those whose stamps are of no round, and how often the clock was set back.
+    """
+    states = [event for event in events if isinstance(event, JointSample)]
+    rounds, _ = _rounds(states, config)
+    if len(rounds) == 1 or len(states) < SHORTEST_ROUND * len(rounds):
+        return list(events), [], 0
+    rounds, wrong = _rounds(events, config)
+    pause_ns = round(1e9 * (LEAST_JUMP_S + max(config.max_gap, config.command_timeout)))
+    found, end_ns = list(rounds[0]), max(event.stamp_ns for event in rounds[0])
+    for each in rounds[1:]:
+        stamps = [event.stamp_ns for event in each]
+        shift_ns = end_ns + pause_ns - min(stamps)
+        found += [replace(event, stamp_ns=event.stamp_ns + shift_ns) for event in each]
+        end_ns = max(stamps) + shift_ns
+    return found, wrong, len(rounds) - 1
+
+
+def _rounds(
+    events: Sequence[Event], config: EngineConfig
+) -> tuple[list[list[Event]], list[Event]]:
+    """Split events where the clock was set back; return the rounds and what belongs to none."""
+    clock = StreamClock(config)
+    newest_ns: int | None = None
+    rounds: list[list[Event]] = [[]]
+    wrong: list[Event] = []
+    for event in (*events, None):
+        verdict = clock.finish(newest_ns) if event is None else clock.judge(event, newest_ns)
+        wrong += verdict.refused
+        if not verdict.events:
+            continue
+        if verdict.is_jump and newest_ns is not None and verdict.events[0].stamp_ns < newest_ns:
+            rounds.append([])
+            newest_ns = None
+        rounds[-1] += verdict.events
+        stamps = [e.stamp_ns for e in verdict.events]
+        newest_ns = max(stamps if newest_ns is None else [newest_ns, *stamps])
+    return rounds, wrong

@@ -256,7 +256,9 @@ def _are_numbers(values: np.ndarray) -> bool:
 
     A sum of squares tells it of all at once, in the usual case.
     """
-    return bool(values.dot(values) < GREATEST) or bool((np.abs(values) < GREATEST).all())
+    with np.errstate(over='ignore', invalid='ignore'):
+        square = values.dot(values)
+    return bool(square < GREATEST) or bool((np.abs(values) < GREATEST).all())
 
 
 def _may_count(values: np.ndarray) -> bool:

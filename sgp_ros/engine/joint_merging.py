@@ -30,6 +30,8 @@ _SLOWER = 1.5
 _RETURN = 4.0
 _LEAST_STEP = 1e-3
 _MOST_ORDERS = 1000
+_MOST_PARTS = 5000
+"""Messages of a source that wait for the others at most, whose clock may be another one."""
 
 
 Part = tuple[int, np.ndarray, np.ndarray, np.ndarray]
@@ -192,6 +194,8 @@ class JointMerger:
                 return []  # late or repeated
             self._restart()
         source.parts.append(_part(sample, places))
+        if len(source.parts) > _MOST_PARTS:
+            del source.parts[: _MOST_PARTS // 2]
         return [] if self.missing else self._complete(source, stamp_ns)
 
     def _find(self, names: tuple[str, ...]) -> tuple[Source, list[int]]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -36,12 +36,14 @@ _REST_S = 0.001
 _CHECKED_AT_ONCE = 2000
 """Up to so many states, the service itself looks whether the robot moved; else the process."""
 Names = tuple[str, ...]
-State = tuple[int, Names, np.ndarray, np.ndarray | None, np.ndarray | None]
-Command = tuple[int, np.ndarray, Names | None]
+State = tuple[int, Names, np.ndarray, np.ndarray | None, np.ndarray | None, int]
+Command = tuple[int, np.ndarray, Names | None, str, np.ndarray | None, int]
+"""Fields of samples, then the time that had passed in the stream [ns]."""
 
 MOST_EVENTS = 200_000
 """Remembered at most, whatever the window: a minute of states and commands at 1.6 kHz each."""
-_STATE_FIELDS = 5
+_LONGEST_NS = 10 * 10**9
+"""Most that passes between two stamps [ns]: beyond there is a pause, or one of them is wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,9 +165,13 @@ def _outcome(
 
 def _events(past: Iterable[State | Command]) -> tuple[JointSample | CommandSample, ...]:
     return tuple(
-        JointSample(*fields) if len(fields) == _STATE_FIELDS else CommandSample(*fields)
+        JointSample(*fields[:-1]) if _is_state(fields) else CommandSample(*fields[:-1])
         for fields in past
     )
+
+
+def _is_state(fields: State | Command) -> TypeGuard[State]:
+    return isinstance(fields[1], tuple)
 
 
 class Diagnosing:
@@ -190,15 +196,21 @@ class Diagnosing:
 
     def take(self, event: Event) -> None:
         """Remember a state or command, forget what is older than the window."""
-        stamp_ns = event.stamp_ns
+        stamp_ns, passed_ns = event.stamp_ns, 0
+        if self._past:  # a clock that is set back, or a wrong stamp, costs nothing of the past
+            last = self._past[-1]
+            passed_ns = last[-1] + min(max(stamp_ns - last[0], 0), _LONGEST_NS)
         if isinstance(event, JointSample):
-            state = (stamp_ns, event.names, event.position, event.velocity, event.effort)
-            self._past.append(state)
+            self._past.append((
+                stamp_ns, event.names, event.position, event.velocity, event.effort, passed_ns,
+            ))  # fmt: skip
         elif isinstance(event, CommandSample):
-            self._past.append((stamp_ns, event.effort, event.names))
+            self._past.append((
+                stamp_ns, event.effort, event.names, event.kind, event.velocity, passed_ns,
+            ))  # fmt: skip
         else:
             return
-        while stamp_ns - self._past[0][0] > self._window_ns:
+        while passed_ns - self._past[0][-1] > self._window_ns:
             self._past.popleft()
 
     @property
@@ -215,7 +227,7 @@ class Diagnosing:
         Returns:
             Whether it was started, and one sentence.
         """
-        states = sum(len(past) == _STATE_FIELDS for past in self._past)
+        states = sum(map(_is_state, self._past))
         if self._process is not None:
             return False, 'a diagnosis is already running; /diagnostics tells its outcome'
         try:

@@ -63,6 +63,21 @@ def test_effort_and_acceleration_of_a_mass_agree_at_every_sample():
     assert np.abs(force[inner]).max() > 1.0
 
 
+def test_rounds_of_a_looped_recording_are_not_mixed():
+    """Each is a segment of its own, with the signals of the first."""
+    events = sorted(
+        cart_events(np.arange(400) * 0.01, [0.0, 0.5], [1.0, -1.0]), key=lambda e: e.stamp_ns
+    )
+    once = collect_signals(events, CART, EngineConfig(max_gap=0.1))
+    looped = collect_signals([*events, *events], CART, EngineConfig(max_gap=0.1))
+    first, second = looped.segments
+    assert np.array_equal(looped.position[first], once.position)
+    assert second.stop - second.start == len(once.position) - 1  # the first one ends the pause
+    assert looped.position[second] == pytest.approx(once.position[1:], abs=1e-9)
+    assert looped.effort[second][1:] == pytest.approx(once.effort[2:], abs=1e-9)
+    assert 'Stamps go back: taken as 2 recordings.' in looped.remarks
+
+
 def test_arrival_order_is_irrelevant():
     """A whole recording can be sorted: nothing is late."""
     events = cart_events(np.arange(100) * 0.01, [0.0, 0.5], [1.0, -1.0])

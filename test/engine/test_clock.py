@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sgp_ros.engine.clock import on_one_clock
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.samples import CommandSample, JointSample
 from test.engine.worlds import PENDULUM, START_NS, config, pendulum_events
@@ -92,3 +93,27 @@ def test_a_stamp_that_no_message_holds_is_refused():
     engine, _ = _fed([*wrong, *events])
     assert engine.counts.refused['clock'] == 4
     assert engine.counts.used == 50
+
+
+def test_a_recording_of_one_time_is_left_as_it_is():
+    """Also where messages came late, and with a command of another clock."""
+    events = pendulum_events(300)
+    late = [*events[::2], *events[1:40:2]]
+    other = [replace(events[0], stamp_ns=START_NS - HOUR_NS), *events]
+    for given in (events, late, other, []):
+        assert on_one_clock(given, config()) == (given, [], 0)
+
+
+@pytest.mark.parametrize('by_ns', [-HOUR_NS, -3 * 10**9 + 7])
+def test_rounds_of_a_looped_recording_follow_each_other(by_ns):
+    """The later one as it was, after a pause; what agrees with neither is of none."""
+    events = pendulum_events(300)
+    moved = _moved(events, by_ns)
+    wrong = replace(events[-1], stamp_ns=START_NS + HOUR_NS)
+    found, refused, times = on_one_clock([*events, *moved[:200], wrong, *moved[200:]], config())
+    assert (times, refused) == (1, [wrong])
+    assert found[: len(events)] == events
+    later = found[len(events) :]
+    steps = {e.stamp_ns - m.stamp_ns for e, m in zip(later, moved, strict=True)}
+    assert len(steps) == 1
+    assert later[0].stamp_ns - events[-1].stamp_ns > 10**9 * config().command_timeout

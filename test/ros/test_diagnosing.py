@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
-from sgp_ros.engine.samples import CommandSample, JointSample, Reset, frozen_array
+from sgp_ros.engine.samples import POSITION, CommandSample, JointSample, Reset, frozen_array
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.ros.diagnosing import MOST_EVENTS, Diagnosing
 
@@ -39,13 +39,24 @@ def test_the_memory_of_events_is_bounded_where_stamps_stand_still() -> None:
     assert len(kept.events) == MOST_EVENTS
 
 
+def test_a_wrong_stamp_costs_no_more_than_a_pause() -> None:
+    """And a clock that is set back costs nothing of what was before."""
+    kept = _diagnosing(60.0)
+    for stamp_ns in (*range(0, 10**9, 10**7), 10**18, *range(10**9, 2 * 10**9, 10**7), 0, 10**7):
+        kept.take(_state(stamp_ns))
+    assert len(kept.events) == 203
+
+
 def test_what_is_remembered_comes_back() -> None:
     kept = _diagnosing(1.0)
     velocity, effort = frozen_array([1.0, 2.0]), frozen_array([3.0])
     state = JointSample(5, ('pole', 'wheel'), velocity, velocity, None)
-    for event in (CommandSample(5, effort, ('wheel',)), state, CommandSample(6, effort)):
+    target = CommandSample(7, effort, ('wheel',), POSITION, velocity)
+    for event in (CommandSample(5, effort, ('wheel',)), state, CommandSample(6, effort), target):
         kept.take(event)
-    first, second, third = kept.events
+    first, second, third, fourth = kept.events
+    assert isinstance(fourth, CommandSample)
+    assert (fourth.kind, fourth.velocity) == (POSITION, velocity)
     assert isinstance(first, CommandSample)
     assert isinstance(second, JointSample)
     assert isinstance(third, CommandSample)

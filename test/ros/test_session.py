@@ -21,11 +21,12 @@ import yaml
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitRequest, FitResult, fit
+from sgp_ros.engine.replay import replay
 from sgp_ros.engine.samples import CommandSample, Event, JointSample, SettingsChange
 from sgp_ros.engine.snapshots import take_snapshot
 from sgp_ros.errors import ConfigError
 from sgp_ros.recordings.model_files import load_model, save_model
-from sgp_ros.recordings.predictions import PredictionTopics
+from sgp_ros.recordings.predictions import PredictionTopics, outputs
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.ros.fit_process import FitProcess, WorkerLost
@@ -322,3 +323,43 @@ def test_what_is_no_model_is_refused_in_one_line(tmp_path: Path, content: bytes 
     with pytest.raises(ConfigError, match=r'model\.npz') as caught:
         load_model(path)
     assert '\n' not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ('by_ns', 'window_s'), [(-60 * 10**9, 0.1), (-(10**18), 0.0), (60 * 10**9, 0.1)]
+)
+def test_a_record_of_a_clock_that_jumped_replays_to_the_same_numbers(
+    tmp_path: Path, by_ns: int, window_s: float
+) -> None:
+    """With changes of settings before, at and behind the jump, and messages of the old time."""
+    robot = load_robot('reaction_wheel')
+    settings = {**SETTINGS, 'reorder_window': window_s}
+    engine = Engine(robot, EngineConfig.from_mapping(settings, robot))
+    record = Record(tmp_path / 'run.mcap', TOPICS, 'sensor_msgs/JointState')
+    session = Session(engine, record, 'sensor_msgs/JointState')
+    events = _events(360)
+    moved = [dataclasses.replace(e, stamp_ns=e.stamp_ns + by_ns) for e in events[240:480]]
+    again = events[480:]
+    live: list[bytes] = []
+    for i, event in enumerate([*events[:240], *moved, *again]):
+        live += [output.prediction.accelerations.tobytes() for output in session.take(event)]
+        if i % 20 == 1 or 238 <= i <= 246:
+            session.change({'hyper.pole.noise_variance': 1e-3 * (1 + i)})
+    session.close()
+    final = [p.value for p in session.engine.parameters()]
+    assert session.engine.counts.clock_jumps == 2
+    assert session.engine.counts.learned > 100
+
+    other = Engine(robot, EngineConfig.from_mapping(settings, robot))
+    found: list[bytes] = []
+    replay(
+        other, open_recording(record.path).events(),
+        lambda step: found.extend(
+            o.prediction.accelerations.tobytes() for o in map(outputs, step.estimates) if o
+        ),
+        obey_record=True,
+    )  # fmt: skip
+    assert found[: len(live)] == live
+    assert len(live) > 100
+    assert [p.value for p in other.parameters()] == final
+    assert sum(other.counts.changes_refused.values()) == 0

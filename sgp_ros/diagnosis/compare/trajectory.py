@@ -20,7 +20,7 @@ from sgp_ros.batch.zero_phase import ZeroPhase
 from sgp_ros.diagnosis.compare.grid import Stretch, noise_density
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.engine.config import EngineConfig
-from sgp_ros.engine.samples import EFFORT, POSITION, Event, JointSample
+from sgp_ros.engine.samples import EFFORT, POSITION, Event
 from sgp_ros.errors import RecordingError
 from sgp_ros.physics.drive import Drive, Servo
 from sgp_ros.physics.effect_at import EffectAt
@@ -108,11 +108,10 @@ def collect(
     Raises:
         RecordingError: too little is left.
     """
-    known_events = list(events)
-    accepted = accept(known_events, robot, config, EFFORT if gains is None else POSITION)
+    accepted = accept(events, robot, config, EFFORT if gains is None else POSITION)
     if gains is None:  # position targets wrap with the positions
         accepted = accepted.unwrapped(robot)
-    start_ns = min(e.stamp_ns for e in known_events if isinstance(e, JointSample))
+    start_ns = accepted.start_ns
     seconds = (accepted.stamps_ns - start_ns) * 1e-9
     measured = bool(accepted.is_measured.mean() > _COMMON_SHARE)
     stretches = [
