@@ -24,6 +24,7 @@ from sgp_ros.engine.samples import JointSample
 _PERIODS = 31
 PAUSE_NS = 1_000_000_000
 """A source that is silent for longer, by the stamps of the others, is waited for no more."""
+_LONGEST_STEP_NS = PAUSE_NS // 4
 _LONGEST_GAP_NS = 10_000_000_000
 """A longer gap is a pause of the source, and nothing of it is taken for lost."""
 _SLOWER = 1.5
@@ -50,6 +51,7 @@ class Source:
         returns: messages after which the joints were nearer to where they were two messages ago
             than to the last: two publishers that say different things of them look like this.
         last_ns, period_ns: newest stamp and median distance of stamps [ns]; None and 0 before any.
+        passed_ns: time that passed by its stamps, jumps of the clock left out [ns].
 
     Args:
         joints: indices of the robot's joints that it brings.
@@ -62,6 +64,9 @@ class Source:
         self.received = self.lost = self.pauses = self.returns = 0
         self.last_ns: int | None = None
         self.period_ns = 0.0
+        self.passed_ns = 0
+        self._is_steady = False
+        self._heard: dict[Source, tuple[int, int]] = {}
         self._spacings: list[int] = []
         self._before: tuple[np.ndarray, ...] = ()
 
@@ -71,6 +76,8 @@ class Source:
         spacing = 0 if self.last_ns is None else stamp_ns - self.last_ns
         if self.last_ns is None or spacing > 0 or spacing < -PAUSE_NS:
             self.last_ns = stamp_ns
+        self._is_steady = 0 < spacing <= PAUSE_NS
+        self.passed_ns += min(max(spacing, 0), _LONGEST_STEP_NS)
         self.pauses += spacing > _LONGEST_GAP_NS
         if not 0 < spacing <= _LONGEST_GAP_NS:
             return
@@ -81,6 +88,19 @@ class Source:
             self.period_ns = float(median(self._spacings))
         if len(self._spacings) == _PERIODS:
             self._spacings = []
+
+    def misses(self, other: Source) -> bool:
+        """Whether another source has been silent, by its last stamp or without asking for that.
+
+        One stamp alone, of either, may be wrong: then the time counts that passed for this source.
+        """
+        if self._is_steady and (self.last_ns or 0) - (other.last_ns or 0) > PAUSE_NS:
+            return True
+        received, since_ns = self._heard.get(other, (-1, 0))
+        if received != other.received:
+            self._heard[other] = other.received, self.passed_ns
+            return False
+        return self.passed_ns - since_ns > PAUSE_NS
 
     def note_return(self, position: np.ndarray) -> None:
         """Look whether the joints jumped back to where they were two messages ago."""
@@ -184,7 +204,7 @@ class JointMerger:
         if self.looks_for_returns:
             source.note_return(sample.position[places])
         if len(source.owned) < len(source.joints):
-            self._inherit(source, stamp_ns)
+            self._inherit(source)
         if len(source.owned) == len(self._joints):
             return [sample]
         if not source.owned:
@@ -212,10 +232,10 @@ class JointMerger:
         self._places[names] = source, places
         return source, places
 
-    def _inherit(self, source: Source, stamp_ns: int) -> None:
+    def _inherit(self, source: Source) -> None:
         """Give a source the joints of others that have been silent."""
         for other in self.sources.values():
-            if other is source or other.last_ns is None or stamp_ns - other.last_ns <= PAUSE_NS:
+            if other is source or not source.misses(other):
                 continue
             left = [joint for joint in other.owned if joint in source.joints]
             if left:

@@ -88,7 +88,7 @@ def test_a_source_that_fell_silent_leaves_its_joints_to_another():
     sent = [s for i in range(5) for s in (_sample(i * MS, a=i), _sample(i * MS, b=i, c=i))]
     sent += [_sample(10**10 + i * MS, a=7, b=7, c=7) for i in range(5)]
     _, states = _merged(sent)
-    assert len(states) == 10
+    assert len(states) == 9  # one message alone tells no time
     assert states[-1].position.tolist() == [7, 7, 7]
 
 
@@ -122,3 +122,22 @@ def test_lost_messages_are_counted_by_the_period(jitter):
     missing = int(kept[-1]) + 1 - 41 - len(kept)
     assert missing > 200
     assert abs(merger.lost - missing) <= (0 if jitter == 0.0 else 0.02 * missing)
+
+
+@pytest.mark.parametrize('stamp_ns', [0, 10**18, 5 * 10**8])
+def test_one_wrong_message_takes_no_joint_away_for_long(stamp_ns):
+    """Its name may be damaged, and its stamp of a far future."""
+    sent = [_sample(10 * MS * i, a=1, b=2, c=3) for i in range(300)]
+    wrong = _sample(stamp_ns, a=1, x=2, c=3)
+    _, states = _merged([wrong, *sent])
+    assert states[-150:] == sent[-150:]
+    _, states = _merged([*sent[:20], wrong, *sent[20:]])
+    assert states == sent
+
+
+def test_messages_of_a_source_with_another_clock_are_held_in_bounded_number():
+    merger = JointMerger(('a', 'b'))
+    for i in range(12_000):
+        merger.take(_sample(10**15 + MS * i, a=1))
+        merger.take(_sample(2 * MS * i, b=1))
+    assert sum(len(source.parts) for source in merger.sources.values()) < 11_000
