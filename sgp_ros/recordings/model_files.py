@@ -174,6 +174,7 @@ def _replace(path: Path, write: Callable[[BinaryIO], object]) -> None:
     try:
         write(stream)
         take_place(stream, growing, path)
-    finally:
+    except BaseException:
         stream.close()
         growing.unlink(missing_ok=True)
+        raise

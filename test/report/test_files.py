@@ -7,9 +7,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from sgp_ros.engine.samples import JointSample
 from sgp_ros.errors import ConfigError
+from sgp_ros.recordings.model_files import load_model, save_model
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.recordings.writer import RecordingWriter
 from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.strangers import create_beside
 
@@ -86,6 +91,22 @@ def test_results_appear_together_or_not_at_all(tmp_path):
         _fail(tmp_path, a='newer')
     assert (tmp_path / 'a').read_text() == 'new'
     assert not list(tmp_path.glob('.sgp_growing_*'))
+
+
+def test_every_writer_of_results_waits_for_the_others(tmp_path):
+    """Models and recordings too, and none is lost on the way."""
+    sample = JointSample(10**18, ('a',), np.zeros(1))
+    with replacing_results(tmp_path, 'replay'):
+        save_model(tmp_path / 'model.npz', {'a': np.ones(3)}, {'learning.enabled': True})
+        with RecordingWriter(tmp_path / 'x.mcap') as writer:
+            writer.write_event(sample)
+        write_text(tmp_path / 'x.json', '1')
+        assert not list(tmp_path.glob('[a-z]*'))
+    assert {path.name for path in tmp_path.glob('[a-z]*')} == {
+        'model.npz', 'model.yaml', 'x.mcap', 'x.json',
+    }  # fmt: skip
+    assert load_model(tmp_path / 'model.npz')['a'].tolist() == [1.0, 1.0, 1.0]
+    assert len(list(open_recording(tmp_path / 'x.mcap').events())) == 1
 
 
 def test_the_next_run_completes_what_was_cut_off_between_two_names(tmp_path, monkeypatch):
