@@ -9,8 +9,8 @@ from __future__ import annotations
 import os
 import stat
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -104,6 +104,29 @@ def take_place(stream: BinaryIO, growing: Path, path: Path) -> None:
     if path in waiting:
         waiting[path].unlink(missing_ok=True)
     waiting[path] = growing
+
+
+def discard(stream: BinaryIO, growing: Path) -> None:
+    """Remove a file that will not be completed, whatever the disk says to its last bytes."""
+    with suppress(OSError):
+        stream.close()
+    growing.unlink(missing_ok=True)
+
+
+def replace_file(path: Path, write: Callable[[BinaryIO], object]) -> None:
+    """Write a file under another name beside it, which it gives up once it is complete.
+
+    Args:
+        path: of the file in the end.
+        write: called with the stream.
+    """
+    stream, growing = create_beside(path)
+    try:
+        write(stream)
+        take_place(stream, growing, path)
+    except BaseException:
+        discard(stream, growing)
+        raise
 
 
 @contextmanager

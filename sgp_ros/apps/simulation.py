@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
@@ -15,7 +16,7 @@ from sgp_ros.engine.samples import CommandSample, JointSample
 from sgp_ros.recordings.command_types import FLOAT64_ARRAY
 from sgp_ros.recordings.messages import JOINT_STATE
 from sgp_ros.recordings.writer import RecordingWriter
-from sgp_ros.report.files import write_text
+from sgp_ros.report.files import write_bytes, write_text
 from sgp_ros.report.next_steps import after_simulation, next_lines
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.effect_text import parse_physical
@@ -123,13 +124,13 @@ def write_truth(recording: SimulatedRecording, folder: Path) -> tuple[Path, Path
     """
     text, motion = folder / 'truth.json', folder / 'truth.npz'
     write_text(text, json.dumps(recording.truth, indent=1, allow_nan=False) + '\n')
-    growing = folder / 'truth.part.npz'
+    stream = io.BytesIO()
     np.savez(
-        growing,
+        stream,
         stamps_ns=recording.stamps_ns,
         position=recording.shown_position,
         velocity=recording.shown_velocity,
         acceleration=recording.true_acceleration,
     )
-    growing.replace(motion)
+    write_bytes(motion, stream.getvalue())
     return text, motion

@@ -51,8 +51,14 @@ def require_own_folder(out: Path, command: str) -> None:
 
 
 def mark_folder(out: Path, command: str) -> None:
-    """Leave a sign in a folder that a command of ours wrote there, where it left none itself."""
+    """Leave a sign in a folder that a command of ours wrote there, where it left none itself.
+
+    What runs that were killed have left there is removed.
+    """
     if out.is_dir():
+        from sgp_ros.strangers import remove_growing  # noqa: PLC0415 - it takes time
+
+        remove_growing(out)
         listing = out / f'{_LISTING}{command}.json'
         if not listing.exists():
             listing.write_text('{}\n', encoding='utf-8')

@@ -19,6 +19,7 @@ from sgp_ros.recordings.table_guess import guess_map
 from sgp_ros.recordings.table_map import read_map
 from sgp_ros.recordings.tables import Table, read_table
 from sgp_ros.recordings.writer import RecordingWriter
+from sgp_ros.strangers import replace_file
 
 _GAP = 5.0
 """Steps without a row that count as a gap."""
@@ -137,5 +138,6 @@ def _gains(out_path: Path, stated: object) -> Path | None:
 
 def _written(out_path: Path, what: str, content: Mapping[str, Any]) -> Path:
     path = out_path.with_name(f'{out_path.stem}_{what}.yaml')
-    path.write_text(yaml.safe_dump(dict(content), sort_keys=False), encoding='utf-8')
+    text = yaml.safe_dump(dict(content), sort_keys=False)
+    replace_file(path, lambda stream: stream.write(text.encode()))
     return path

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import hashlib
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import yaml
@@ -17,12 +17,11 @@ import yaml
 from sgp_ros.engine.samples import SettingValue
 from sgp_ros.errors import ConfigError
 from sgp_ros.strangers import (
-    create_beside,
     load_yaml,
     readable,
+    replace_file,
     require_file,
     require_within,
-    take_place,
 )
 
 NODE_ONLY = frozenset({
@@ -55,9 +54,9 @@ def save_model(
     path.parent.mkdir(parents=True, exist_ok=True)
     if settings is not None:
         text = yaml.safe_dump(_parameter_file(settings), sort_keys=False)
-        _replace(path.with_suffix('.yaml'), lambda file: file.write(text.encode()))
+        replace_file(path.with_suffix('.yaml'), lambda file: file.write(text.encode()))
     arrays: dict[str, Any] = {**snapshot, _HASH: np.array(_hash(snapshot))}
-    _replace(path, lambda file: np.savez(file, **arrays))
+    replace_file(path, lambda file: np.savez(file, **arrays))
 
 
 def load_model(path: Path) -> dict[str, np.ndarray]:
@@ -167,14 +166,3 @@ def _parameter_file(settings: Mapping[str, SettingValue]) -> dict[str, object]:
             branch = child
         branch[last] = list(value) if isinstance(value, tuple) else value
     return {'/**': {'ros__parameters': tree}}
-
-
-def _replace(path: Path, write: Callable[[BinaryIO], object]) -> None:
-    stream, growing = create_beside(path)
-    try:
-        write(stream)
-        take_place(stream, growing, path)
-    except BaseException:
-        stream.close()
-        growing.unlink(missing_ok=True)
-        raise

@@ -8,6 +8,7 @@ survives a crash.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
@@ -34,7 +35,7 @@ from sgp_ros.recordings.messages import (
 )
 from sgp_ros.recordings.topics import CHANGES_TOPIC
 from sgp_ros.recordings.typestore import definition, full_type, new_message, serialize
-from sgp_ros.strangers import create_beside, take_place
+from sgp_ros.strangers import create_beside, discard, take_place
 
 
 class RecordingWriter:
@@ -134,7 +135,15 @@ class RecordingWriter:
             if self._growing != self.path:
                 take_place(self._file, self._growing, self.path)
         finally:
-            self._file.close()
+            self.give_up()
+
+    def give_up(self) -> None:
+        """Leave a file that cannot be completed, as on a full disk; only a live record is kept."""
+        if self._growing == self.path:
+            with contextlib.suppress(OSError):
+                self._file.close()
+        elif not self._file.closed:
+            discard(self._file, self._growing)
 
     def __enter__(self) -> Self:
         """Return the writer itself."""
@@ -150,8 +159,7 @@ class RecordingWriter:
         if kind is None or self._growing == self.path:
             self.close()
         else:
-            self._file.close()
-            self._growing.unlink(missing_ok=True)
+            self.give_up()
 
     def _write(
         self, topic: str, kind: str, stamp_ns: int, message: Message, log_ns: int | None = None

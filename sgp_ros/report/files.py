@@ -22,10 +22,9 @@ from typing import Any
 from sgp_ros.errors import ConfigError
 from sgp_ros.strangers import (
     Waiting,
-    create_beside,
     is_growing,
     remove_growing,
-    take_place,
+    replace_file,
     waiting_files,
 )
 
@@ -33,14 +32,7 @@ from sgp_ros.strangers import (
 def write_bytes(path: Path, content: bytes) -> None:
     """Write `content` to a temporary name beside `path`, then rename it."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    stream, growing = create_beside(path)
-    try:
-        stream.write(content)
-        take_place(stream, growing, path)
-    except BaseException:
-        stream.close()
-        growing.unlink(missing_ok=True)
-        raise
+    replace_file(path, lambda stream: stream.write(content))
 
 
 def write_text(path: Path, content: str) -> None:

@@ -42,8 +42,7 @@ Command = tuple[int, np.ndarray, Names | None, str, np.ndarray | None, int]
 
 MOST_EVENTS = 200_000
 """Remembered at most, whatever the window: a minute of states and commands at 1.6 kHz each."""
-_LONGEST_NS = 10 * 10**9
-"""Most that passes between two stamps [ns]: beyond there is a pause, or one of them is wrong."""
+_LONGEST_NS = 10 * 10**9  # beyond there is a pause, or a stamp is wrong
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,18 +195,14 @@ class Diagnosing:
 
     def take(self, event: Event) -> None:
         """Remember a state or command, forget what is older than the window."""
-        stamp_ns, passed_ns = event.stamp_ns, 0
+        t, passed_ns = event.stamp_ns, 0
         if self._past:  # a clock that is set back, or a wrong stamp, costs nothing of the past
             last = self._past[-1]
-            passed_ns = last[-1] + min(max(stamp_ns - last[0], 0), _LONGEST_NS)
-        if isinstance(event, JointSample):
-            self._past.append((
-                stamp_ns, event.names, event.position, event.velocity, event.effort, passed_ns,
-            ))  # fmt: skip
-        elif isinstance(event, CommandSample):
-            self._past.append((
-                stamp_ns, event.effort, event.names, event.kind, event.velocity, passed_ns,
-            ))  # fmt: skip
+            passed_ns = last[-1] + min(max(t - last[0], 0), _LONGEST_NS)
+        if isinstance(x := event, JointSample):
+            self._past.append((t, x.names, x.position, x.velocity, x.effort, passed_ns))
+        elif isinstance(x, CommandSample):
+            self._past.append((t, x.effort, x.names, x.kind, x.velocity, passed_ns))
         else:
             return
         while passed_ns - self._past[0][-1] > self._window_ns:

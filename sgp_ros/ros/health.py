@@ -34,7 +34,8 @@ class Health:
         without_effort: joints of the robot without a finite effort in the last state.
         last_fit: one sentence on the last fit of hyper-parameters.
         fit_since_s: when the fit that runs was handed out, on a steady clock [s]; None without.
-        record_problem: why the record stopped; empty while all is well.
+        record_problem, unrecorded: why the record stopped, empty while all is well, and how many
+            events are missing since.
         failures, first_failure: errors that only a bug can cause, and the first of them with its
             event, for the log.
     """
@@ -46,7 +47,7 @@ class Health:
         self.seen_joints: tuple[str, ...] = ()
         self.last_fit = 'none yet'
         self.fit_since_s: float | None = None
-        self.record_problem = ''
+        self.record_problem, self.unrecorded = '', 0
         self.failures, self.first_failure = 0, ''
         self._durations_s: deque[float] = deque(maxlen=_DURATIONS)
         self._delays_s: deque[float] = deque(maxlen=_DURATIONS)
@@ -124,7 +125,8 @@ class Health:
             text = f'{self.failures} internal errors, the first: {self.first_failure}'
             parts.append(('errors', ERROR, text, {'count': str(self.failures)}))
         if self.record_problem:
-            parts.append(('record', ERROR, self.record_problem, {}))
+            values = {'unrecorded': str(self.unrecorded)}
+            parts.append(('record', ERROR, self.record_problem, values))
         return [
             Status(f'{node}: {name}', level, message, engine.robot.name, values)
             for name, level, message, values in parts

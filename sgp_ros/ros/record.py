@@ -158,6 +158,10 @@ class Record:
         """Complete the file."""
         self._writer.close()
 
+    def give_up(self) -> None:
+        """Leave the file as it is, readable up to the last chunk that is whole."""
+        self._writer.give_up()
+
     def _begin(self) -> None:
         path = self.path
         if self._is_split:

@@ -185,6 +185,7 @@ class Session:
 
     def _write_event(self, event: Event) -> None:
         self._write(lambda record: record.write_event(event, self.engine))
+        self.health.unrecorded += bool(self.health.record_problem)
 
     def _write(self, action: Callable[[Record], None]) -> None:
         """Write to the record; a full disk ends the record, not the node."""
@@ -193,6 +194,7 @@ class Session:
                 action(self._record)
             except OSError as error:
                 self.health.record_problem = f'the record stopped: {error}'
+                self._record.give_up()
                 self._record = None
 
     def _hand_out_fit(self) -> None:

@@ -286,7 +286,6 @@ def test_a_fit_that_runs_is_told_until_it_ends(session: Session) -> None:
     assert running() == 'none'
 
 
-@pytest.mark.filterwarnings('ignore::pytest.PytestUnraisableExceptionWarning')
 def test_a_full_disk_ends_the_record_but_not_the_session() -> None:
     session = Session(_engine(), Record(Path('/dev/full'), TOPICS, 'sensor_msgs/JointState'))
     for event in _events(60):
@@ -294,6 +293,8 @@ def test_a_full_disk_ends_the_record_but_not_the_session() -> None:
     session.flush_record()
     assert 'No space left' in session.health.record_problem
     assert session.engine.is_ready
+    session.take(_events(61)[-1])
+    assert session.health.unrecorded >= 1
     session.close()
 
 
