@@ -42,7 +42,7 @@ from sgp_ros.simulation.effects import Moment
 
 LEAST = 1e-3
 """Improvement of the nMSE that must be possible, or there is nothing to score."""
-_WORDS = ('kind', 'source_joint')
+_WORDS = ('kind', 'source_joint', 'encoder')
 _ROUNDS = 6
 """Twice as many as the diagnosis takes; more gain less than a nat."""
 

@@ -8,7 +8,17 @@ too (`law`), but stand in no list.
 
 from __future__ import annotations
 
-from sgp_ros.physics import actuation, carried, confined, coupled, friction, loads, memory, sensing
+from sgp_ros.physics import (
+    actuation,
+    carried,
+    confined,
+    coupled,
+    elasticity,
+    friction,
+    loads,
+    memory,
+    sensing,
+)
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.law import NAME as LAW
 from sgp_ros.physics.law import law_variable
@@ -64,6 +74,7 @@ EFFECTS: dict[str, Effect] = {
         VELOCITY_FILTER_LAG,
         coupled.CoupledFriction(),
         actuation.MotorSpeedLimit(),
+        elasticity.JointElasticity(),
     )
 }
 

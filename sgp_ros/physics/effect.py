@@ -3,7 +3,6 @@
 The extra generalised force of a law is `tau_x = columns(shape) @ coefficients` in the convention
 `M a + h = tau + tau_x`. The shape holds what enters otherwise (a width, an onset, a time
 constant). What a motor or an encoder does is written as the force that would look the same.
-Everything that the rest of the package says of a law is an attribute of its value.
 """
 
 from __future__ import annotations
@@ -41,8 +40,7 @@ Numbers = Mapping[str, float]
 class Effect:
     """A law of physics that a robot may have beside its rigid bodies.
 
-    A subclass states attributes, and where it differs from the usual ones, methods. A law of one
-    joint's own motion needs `local` alone:
+    A subclass states attributes and methods. A law of one joint's own motion needs `local` alone:
 
     >>> class CubicDrag(Effect):
     ...     name = 'cubic_drag'
@@ -66,14 +64,11 @@ class Effect:
 
     Attributes:
         name: as in the schema of a diagnosis.
-        words: for people, as in "missing on elbow: Coulomb friction".
-        formula: for people.
-        source: where the equation comes from.
+        words, formula: for people, as in "missing on elbow: Coulomb friction"; `source` of them.
         appearance: what it looks like in data.
         quantities: the parameters that are stated and reported.
-        linear: names of those that are coefficients, in the order of the columns; without any the
-            coefficient is 1, and the shape alone says how large the effect is.
-        kinds: the variants it comes in.
+        linear: names of those that are coefficients, by column; without any the coefficient is 1.
+        kinds: the variants it comes in; `kind_word` is the parameter that says which.
         has_source: whether it comes from another joint.
         plain: laws of one joint that it becomes without coupling, drift or way (least shape).
         site: what it sits on.
@@ -106,6 +101,7 @@ class Effect:
     quantities: tuple[Quantity, ...] = ()
     linear: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ()
+    kind_word: str = 'kind'
     has_source: bool = False
     plain: tuple[str, ...] = ()
     site: Site = JOINT
@@ -174,7 +170,7 @@ class Effect:
         named |= dict(zip(self.shape_names(kind), at.shape, strict=False))
         values: dict[str, Value] = {q.name: float(named[q.name]) for q in known}
         if kind:
-            values['kind'] = kind
+            values[self.kind_word] = kind
         if at.place.source >= 0:
             values['source_joint'] = motion.tree.joint_names[at.place.source]
         return values
@@ -187,7 +183,7 @@ class Effect:
 
     def stated_words(self, place: Place, tree: Structure) -> dict[str, str]:
         """Return the words that `EffectAt.stated` takes beside joint and numbers."""
-        words = {'kind': place.kind} if place.kind else {}
+        words = {self.kind_word: place.kind} if place.kind else {}
         if place.source >= 0:
             words['source_joint'] = tree.joint_names[place.source]
         return words | ({'side': side_word(place.side)} if self.edge else {})
@@ -213,6 +209,10 @@ class Effect:
         Element by element, for arrays of any shape.
         """
         raise NotImplementedError
+
+    def whole(self, motion: SeenMotion, at: Placed) -> np.ndarray:
+        """Return the force, (n,) or (n, k), also above the bandwidth of the equations."""
+        return self.columns(motion, at.place, at.shape) @ at.coefficients
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         """Return the force per coefficient [N m or N per unit of the coefficient].

@@ -57,7 +57,8 @@ class EffectAt:
         Raises:
             ValueError: a joint that does not move on its own.
         """
-        words = {k: x for k, x in parameters.items() if isinstance(x, str)}
+        words = {'kind' if k == effect.kind_word else k: x
+                 for k, x in parameters.items() if isinstance(x, str)}  # fmt: skip
         numbers = {k: x for k, x in parameters.items() if not isinstance(x, str)}
         place = Place.of(effect.edge, joint, words, numbers, tree)
         if not effect.is_force:

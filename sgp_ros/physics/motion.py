@@ -120,6 +120,14 @@ class SeenMotion(Protocol):
         """Step of the grid [s]."""
 
     @property
+    def starts(self) -> tuple[int, ...]:
+        """Rows at which the grid begins anew after a pause."""
+
+    @property
+    def bandwidth(self) -> float:
+        """Frequency up to which equations are formed of it [Hz]."""
+
+    @property
     def position(self) -> np.ndarray:
         """Positions, (n, k) [rad or m]."""
 

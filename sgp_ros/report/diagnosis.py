@@ -50,7 +50,7 @@ from sgp_ros.report.robot_picture import robot_picture
 from sgp_ros.report.verdict import held_out_sentence, verdict_sentence
 from sgp_ros.rigid.tree import Tree
 
-_NAMED = ('kind', 'source_joint')
+_NAMED = ('kind', 'source_joint', 'encoder')
 """Parameters that are part of the name of an effect."""
 _SHOWN_RIVALS, _SHOWN_VARIABLES = 4, 5
 _VERDICTS = {

@@ -77,6 +77,8 @@ def effect_name(finding: Finding | Difference) -> str:
     kind = str(words.get('kind', ''))
     if 'source_joint' in words:
         return f'{name} ({f"{kind} from" if kind else "with"} {words["source_joint"]})'
+    if 'encoder' in words:
+        return f'{name} (encoder on the {words["encoder"]})'
     return f'{"Coulomb" if kind == "coulomb" else kind} {name}'.strip()
 
 

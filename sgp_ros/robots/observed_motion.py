@@ -41,6 +41,7 @@ class ObservedMotion:
             learns from; None for any other motion.
         sign: from velocities to what stands for their sign; None takes its mean over the cells
             of the grid.
+        bandwidth: frequency up to which equations are formed of it [Hz].
         is_static: settled points, each of which stands for itself, not a motion.
     """
 
@@ -57,6 +58,7 @@ class ObservedMotion:
     recording: np.ndarray | None = None
     sign: Callable[[np.ndarray], np.ndarray] | None = None
     is_static: bool = False
+    bandwidth: float = np.inf
 
     @cached_property
     def direction(self) -> np.ndarray:

@@ -70,9 +70,9 @@ def _read(item: object, where: str, tree: Tree, problems: list[str]) -> EffectAt
     _check_joint(effect, joint, where, tree, problems)
     choices = _choices(effect, joint, tree)
     words = _words(choices, given, where, problems)
-    if effect.kinds and 'kind' not in words:
+    if effect.kinds and effect.kind_word not in words:
         return None
-    quantities = _quantities(effect, words.get('kind', ''), joint, tree)
+    quantities = _quantities(effect, words.get(effect.kind_word, ''), joint, tree)
     problems.extend(
         f'{where}: unknown parameter {key!r}, not one of {[*quantities, *choices]}'
         for key in given if key not in quantities and key not in choices
@@ -106,7 +106,7 @@ def _check_joint(effect: Effect, joint: str, where: str, tree: Tree, problems: l
 
 def _choices(effect: Effect, joint: str, tree: Tree) -> dict[str, tuple[str, ...]]:
     """Return the parameters that are words, with the words they may be."""
-    choices: dict[str, tuple[str, ...]] = {'kind': effect.kinds} if effect.kinds else {}
+    choices: dict[str, tuple[str, ...]] = {effect.kind_word: effect.kinds} if effect.kinds else {}
     if effect.has_source:
         choices['source_joint'] = tuple(j for j in tree.moving_names if j != joint)
     if effect.edge:

@@ -124,6 +124,44 @@ def backlash(
     )
 
 
+def elasticity(
+    _joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
+) -> tuple[Action, ...]:
+    """Return a spring and a damper between motor and link, both with their own motion.
+
+    `motor_inertia` is part of the robot's own inertia, so the link keeps the rest. What else acts
+    on the joint acts on the link.
+    """
+    stiffness, damping = float(values['stiffness']), float(values['damping'])
+    inertia = float(values['motor_inertia'])
+
+    def spring(moment: Moment) -> float:
+        twist = float(moment.state[0]) - float(moment.position[joint])
+        return stiffness * twist + damping * (
+            float(moment.state[1]) - float(moment.velocity[joint])
+        )
+
+    def motor(moment: Moment) -> tuple[float, float]:
+        force = float(moment.drive[joint]) - spring(moment)
+        return float(moment.state[1]), force / inertia
+
+    def shown(moment: Moment) -> tuple[float, float]:
+        return float(moment.state[0]), float(moment.state[1])
+
+    rate = max(math.sqrt(stiffness / inertia), damping / inertia)
+    return (
+        Action(
+            joint,
+            drive=spring,
+            inertia=-inertia,
+            sense=shown if values['encoder'] == 'motor' else None,
+            start=lambda q, v: (q, v),
+            state_rate=motor,
+            substep_s=0.3 / rate,
+        ),
+    )
+
+
 def eccentricity(
     joints: tuple[SimulatedJoint, ...], joint: int, values: Mapping[str, Value]
 ) -> tuple[Action, ...]:

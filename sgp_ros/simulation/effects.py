@@ -171,7 +171,7 @@ class Law:
     def parameters(self, effect: Effect) -> tuple[EffectParameter, ...]:
         """Return the parameters of an effect and those of its law; without default, required."""
         words = [EffectParameter('source_joint', is_joint=True)] if effect.has_source else []
-        words += [EffectParameter('kind', choices=effect.kinds)] if effect.kinds else []
+        words += [EffectParameter(effect.kind_word, choices=effect.kinds)] if effect.kinds else []
         ends = (NEARER, *SIDES)
         side = [EffectParameter('side', choices=ends, default=NEARER)] if effect.edge else []
         own = {p.name for p in self.own}

@@ -52,5 +52,6 @@ LAWS: dict[str, Law] = {
     'velocity_filter_lag': Law(actuation.velocity_lag),
     'coupled_friction': Law(friction.coupled),
     'motor_speed_limit': Law(actuation.speed_limit),
+    'joint_elasticity': Law(actuation.elasticity),
 }
 """Several effects in a motor act in this order, from the command to the joint."""

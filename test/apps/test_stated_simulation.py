@@ -76,6 +76,7 @@ EFFECT_VALUES = {
     'tip_force': {'fx': 0.5, 'fy': -0.3, 'fz': 1.0},
     'load_friction': {'level': 0.05, 'mu': 0.1},
     'motor_speed_limit': {'stall_torque': 0.6, 'no_load_speed': 3.0},
+    'joint_elasticity': {'stiffness': 2000.0, 'damping': 0.5, 'encoder': 'link'},
     'end_stop': {'position': 0.1, 'stiffness': 30.0, 'damping': 0.0, 'side': 'lower'},
 }  # fmt: skip
 """For an arm with forces of a newton metre. The model of a stop is linear: a damped one would pull
@@ -85,7 +86,7 @@ FORCE = {'reaction_wheel': 0.01, 'reaction_wheel_6': 0.01, 'linear_axis': 100.0}
 MOTOR_SHARE = 0.3
 """Of what a joint with backlash moves while the others are free, the part of the motor."""
 OF_MOTORS = {'torque_gain', 'dead_zone', 'saturation', 'actuator_lag', 'command_delay', 'backlash',
-             'load_friction', 'motor_speed_limit'}  # fmt: skip
+             'load_friction', 'motor_speed_limit', 'joint_elasticity'}  # fmt: skip
 
 
 def written(folder, name):
@@ -122,7 +123,7 @@ def stated(folder, name, effect):
     joints = [j for i, j in enumerate(tree.moving_names)
               if effect not in OF_MOTORS or tree.is_actuated[i]]  # fmt: skip
     values = sized(effect, FORCE.get(name, 1.0))
-    if effect == 'backlash' and joints:
+    if effect in {'backlash', 'joint_elasticity'} and joints:
         (M,) = mass_matrix(tree, tree.parameters, np.zeros((1, tree.size)))
         index = tree.moving_names.index(joints[-1])
         values['motor_inertia'] = MOTOR_SHARE / float(np.linalg.inv(M)[index, index])
@@ -186,9 +187,9 @@ class Simulated:
         )
 
 
-APPLICABLE = {'arm': 29, 'turned': 29, 'underactuated': 29, 'forearm': 27, 'reaction_wheel': 27,
-              'reaction_wheel_6': 27, 'toy_pendulum': 17, 'linear_axis': 25, 'simple_pendulum': 25,
-              'double_pendulum': 27}  # fmt: skip
+APPLICABLE = {'arm': 30, 'turned': 30, 'underactuated': 30, 'forearm': 28, 'reaction_wheel': 28,
+              'reaction_wheel_6': 28, 'toy_pendulum': 17, 'linear_axis': 26, 'simple_pendulum': 26,
+              'double_pendulum': 28}  # fmt: skip
 """Robot to how many effects it can have."""
 
 

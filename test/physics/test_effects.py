@@ -99,7 +99,8 @@ def _starts(effect, place, motion=MOTION):
     starts = effect.starts(motion, place)
     if effect.small is not None:
         c = 0.03 / starts[:, :1] * np.array([0.6, 0.8])
-        return np.array([effect.small.shape(*pair) for pair in zip(starts, c, strict=True)])
+        found = [effect.small.shape(*pair) for pair in zip(starts, c, strict=True)]
+        return np.clip(found, *effect.bounds(motion, place))
     if len(starts):
         return starts
     low, high = effect.bounds(motion, place)
@@ -127,7 +128,7 @@ def test_the_report_has_the_names_of_its_quantities_and_finite_numbers(effect, p
     units = {q.name: q.unit for q in effect.quantities}
     for name, value in values.items():
         if isinstance(value, str):
-            assert name in {'kind', 'source_joint'}
+            assert name in {effect.kind_word, 'source_joint'}
             assert value
         else:
             assert np.isfinite(value)
@@ -161,7 +162,7 @@ def test_no_place_on_a_joint_that_does_not_move(effect):
 
 @pytest.mark.parametrize('name', [
     'torque_gain', 'dead_zone', 'saturation', 'actuator_lag', 'command_delay', 'load_friction',
-    'backlash', 'motor_speed_limit',
+    'backlash', 'motor_speed_limit', 'joint_elasticity',
 ])  # fmt: skip
 def test_what_a_motor_does_has_no_place_on_a_passive_joint(name):
     """And every motor has one."""

@@ -53,7 +53,7 @@ def _entry(name, kind, std=0.01):
     if name == 'tip_force':
         numbers['fz'] = -2.0
     numbers |= {'position_friction': {'hi': 2.5}, 'torque_gain': {'gain': 0.6}}.get(name, {})
-    words = {'kind': kind} if kind else {}
+    words = {EFFECTS[name].kind_word: kind} if kind else {}
     words |= {'source_joint': 'shoulder'} if EFFECTS[name].has_source else {}
     parameters = {k: {'value': v, 'std': std} for k, v in numbers.items()}
     parameters |= {k: {'value': v} for k, v in words.items()}
@@ -159,7 +159,7 @@ def test_every_effect_of_one_time_is_in_the_model(tmp_path):
     'name', [n for n, e in EFFECTS.items() if not e.is_online and n != 'friction_drift']
 )
 def test_effects_with_memory_are_named_but_not_modelled(tmp_path, name):
-    robot = _robot(tmp_path, [_entry(name, '')[0]])
+    robot = _robot(tmp_path, [_entry(name, next(iter(EFFECTS[name].kinds), ''))[0]])
     assert f'not modelled online: {name} of elbow' in robot.description
     assert robot.effort_map is None
     assert len(robot.coefficients) == TREE.size

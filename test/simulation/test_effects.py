@@ -35,7 +35,8 @@ def step_response(effects, seconds=0.5):
 
 def example(name, joint, other=None):
     known = LAWS[name].parameters(EFFECTS[name])
-    values = {p.name: EXAMPLE_VALUE.get(p.name, 0.05) for p in known if not p.default}
+    values = {p.name: EXAMPLE_VALUE.get(p.name, (*p.choices, 0.05)[0]) for p in known
+              if not p.default}  # fmt: skip
     if name == 'joint_coupling':
         values = {'kind': 'spring', 'stiffness': 0.05, 'ratio': 2.0}
     if EFFECTS[name].has_source:

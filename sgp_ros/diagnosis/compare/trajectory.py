@@ -225,6 +225,7 @@ def observe(raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth) -> ObservedMot
     motion = ObservedMotion(
         tree, raw.time, raw.step, position, velocity, acceleration, np.zeros_like(position), None,
         tuple(s.start for s in raw.segments), raw.stated, raw.recording,
+        bandwidth=bandwidth.cutoff,
     )  # fmt: skip
     drive = raw.drive
     if raw.drive is not None and raw.gains is not None:

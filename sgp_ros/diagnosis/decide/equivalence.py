@@ -208,6 +208,7 @@ def moved(motion: ObservedMotion, width: float, speed: float, shift: float) -> O
     time = (motion.time[rows] - motion.time[rows][0]) / speed
     changed = replace(
         motion, time=time, step=motion.step / speed, starts=(0,), drive=None,
+        bandwidth=speed * motion.bandwidth,
         position=middle + shift * q.std(axis=0) + wide * (q - q.mean(axis=0)),
         velocity=wide * speed * motion.velocity[rows],
         acceleration=wide * speed**2 * motion.acceleration[rows],

@@ -1,0 +1,147 @@
+"""A spring between motor and link, on motions that were simulated with all of its states."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from sgp_ros.batch.zero_phase import ZeroPhase
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
+from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.diagnosis.explain.screening import screen
+from sgp_ros.physics.catalogue import ARMATURE, EFFECTS, VISCOUS_FRICTION
+from sgp_ros.physics.drive import Drive
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.elasticity import _behind, _resonator
+from sgp_ros.physics.parts import Place
+from sgp_ros.rigid.tree import read_urdf
+from sgp_ros.robots.observed_motion import ObservedMotion
+from sgp_ros.simulation.assembly import make_simulation
+from sgp_ros.simulation.recording import simulate
+from sgp_ros.simulation.sensors import Sensors
+from sgp_ros.simulation.tree_simulator import tree_simulator
+from test.simulation.trees import arm
+
+URDF, ELBOW = arm(limit=1.5), 1
+RATE, SECONDS, CUTOFF = 400.0, 6.0, 25.0
+J = 0.003
+STIFFNESS = J * (2.0 * np.pi * 15.0) ** 2
+LAW = EFFECTS['joint_elasticity']
+SPRING = {'stiffness': STIFFNESS, 'damping': 0.02, 'motor_inertia': J}
+FRICTION = 0.05
+
+
+@cache
+def recorded(encoder, *, has_friction=False):
+    """A motion of the arm whose elbow motor would swing at 15 Hz on its spring."""
+    text = ','.join(f'{name}={x}' for name, x in SPRING.items())
+    effects = [f'joint_elasticity:joint=elbow,{text},encoder={encoder}']
+    effects += [f'viscous_friction:joint=elbow,b={FRICTION}'] * has_friction
+    return simulate(
+        make_simulation(
+            tree_simulator(URDF), effects=effects, seed=5, rate_hz=RATE,
+            sensors=Sensors(measures_velocity=True, measures_effort=True),
+        ), SECONDS,
+    )  # fmt: skip
+
+
+def equations(encoder, *, has_friction=False):
+    """The equations of that motion, as a diagnosis forms them, without bodies."""
+    recording = recorded(encoder, has_friction=has_friction)
+    t = 1e-9 * (recording.stamps_ns - recording.stamps_ns[0])
+    n = len(t)
+    states = ZeroPhase(RATE, 2.5 * CUTOFF).states(recording.shown_position)
+    drive = Drive(t, recording.command, ((0.0, n),), 1.0 / RATE)
+    effort = np.column_stack([drive.effort(j) for j in range(2)])
+    motion = ObservedMotion(read_urdf(URDF), t, 1.0 / RATE, *states, effort, drive,
+                            bandwidth=CUTOFF)  # fmt: skip
+    low = ParallelFilter(RATE, CUTOFF, (slice(0, n),))
+    d = low(motion.nominal_effort - effort)
+    return Equations(
+        motion, low, t[low.rows], d, np.zeros((*d.shape, 0)), np.zeros((0, 20)),
+        (effort**2).mean(axis=0), np.full(2, 1e-9), np.ones((n, 2)), np.zeros((n, 2), dtype=bool),
+        np.zeros(2),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize('encoder', ['motor', 'link'])
+def test_its_force_is_what_the_nominal_robot_lacks(encoder):
+    """Below the bandwidth, with a resonance below it too; the wrong side explains none of it."""
+    found = equations(encoder)
+    left = {}
+    for kind in LAW.kinds:
+        truth = EffectAt.stated(LAW, 'elbow', SPRING | {'encoder': kind}, found.motion.tree)
+        force = Columns(found).of(truth, found)[:, :, 0]
+        left[kind] = ((found.d - force) ** 2).sum() / (found.d**2).sum()
+    assert left.pop(encoder) < 1e-3
+    assert min(left.values()) > 0.9
+
+
+@pytest.mark.parametrize('encoder', ['motor', 'link'])
+def test_no_friction_or_rotor_is_taken_for_a_resonance(encoder):
+    """With the spring beside them both have their right size, without it they have not."""
+    found = equations(encoder, has_friction=True)
+    columns, plain = Columns(found), (EffectAt(VISCOUS_FRICTION, Place(ELBOW)),
+                                      EffectAt(ARMATURE, Place(ELBOW)))  # fmt: skip
+    start = np.sqrt((found.d**2).mean(axis=0)) + 1e-9
+    alone = fit(columns, plain, start, is_free=False)
+    (_, spring), *_ = screen(columns, alone, [LAW])
+    assert spring.place == Place(ELBOW, encoder)
+    both = fit(columns, (*plain, spring), start, is_free=False)
+    friction, rotor = (float(s.coefficients[0]) for s in both.effects[:2])
+    assert friction == pytest.approx(FRICTION, rel=0.05)  # it is on the link
+    assert abs(rotor) < 0.05 * J
+    assert abs(alone.effects[1].coefficients[0]) > 2.0 * abs(rotor)
+    numbers = both.effects[2].report(found.motion)
+    assert numbers['encoder'] == encoder
+    assert numbers['stiffness'] == pytest.approx(STIFFNESS, rel=0.1)
+    assert both.mean_square.sum() < 0.02 * alone.mean_square.sum()
+
+
+def test_a_motor_on_a_spring_has_its_own_equation():
+    """`J theta'' = u - K (theta - q) - D (dtheta - dq)`, theta being what the encoder shows."""
+    recording = recorded('motor')
+    twist = recording.shown_position - recording.true_position
+    spin = recording.shown_velocity - recording.true_velocity
+    torque = STIFFNESS * twist[:, ELBOW] + SPRING['damping'] * spin[:, ELBOW]
+    expected = (recording.command[:, ELBOW] - torque) / J
+    np.testing.assert_allclose(recording.true_acceleration[:, ELBOW], expected, atol=1e-4)
+    assert np.abs(twist[:, ELBOW]).max() > 1e-3
+    assert not twist[:, 0].any()
+
+
+def test_hidden_states_follow_their_filters():
+    """Where the input is straight between the rows, against a solver of linear systems."""
+    u = np.random.default_rng(0).normal(size=500)
+    u[0] = 0.0
+    t, a, b = 0.002 * np.arange(500), 1.0 / (2.0 * np.pi * 30.0) ** 2, 1e-4
+    for numerator, denominator, found in (
+        ([1.0], [0.01, 1.0], _behind(u, 0.01, 0.002)),
+        ([b, 1.0], [a, b, 1.0], _resonator(u, a, b, 0.002)),
+        ([0.1, 1.0], [a, 0.1, 1.0], _resonator(u, a, 0.1, 0.002)),
+    ):
+        np.testing.assert_allclose(found, signal.lsim((numerator, denominator), u, t)[1],
+                                   atol=1e-9)  # fmt: skip
+
+
+@pytest.mark.parametrize('encoder', ['motor', 'link'])
+def test_its_share_counts_what_lies_above_the_bandwidth(encoder):
+    """The force with its resonance is that of the simulated motion at the full rate.
+
+    But for a factor, as the inertia with which the joint swings changes with the pose.
+    """
+    recording, found = recorded(encoder), equations(encoder)
+    motion = found.motion
+    truth = EffectAt.stated(LAW, 'elbow', SPRING | {'encoder': encoder}, motion.tree)
+    seen = ObservedMotion(
+        motion.tree, motion.time, motion.step, recording.shown_position,
+        recording.shown_velocity, recording.true_acceleration, motion.effort, motion.drive,
+    )  # fmt: skip
+    true = (seen.nominal_effort - recording.command)[:, ELBOW]
+    share = (LAW.whole(motion, EffectAt(LAW, truth.place, truth.shape, np.ones(1))) ** 2).mean()
+    assert 0.25 < share / (true**2).mean() < 4.0
