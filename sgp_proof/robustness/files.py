@@ -17,7 +17,10 @@ import time
 from collections import Counter
 from pathlib import Path
 
+import h5py
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.typesys import Stores, get_typestore
 from scipy.io import savemat
@@ -42,7 +45,8 @@ MAP = {
     'time': {'column': 't', 'unit': 's'},
     'joints': {'hinge': {'position': {'column': 'q', 'unit': 'rad'}}},
 }
-WEIGHTS = {'mat': 0.1}
+APART = ('mat', 'h5', 'parquet')
+WEIGHTS = dict.fromkeys(APART, 0.1)
 """Share of seeds of a format that takes a process of its own."""
 
 
@@ -55,6 +59,11 @@ def make_samples(folder: Path) -> dict[str, Path]:
     )
     np.savez(folder / 'x.npz', t=t, q=q)
     savemat(folder / 'x.mat', {'t': t, 'q': q, 'log': {'a': q}})
+    with h5py.File(folder / 'x.h5', 'w') as file:
+        file['log/t'], file['log/q'] = t, q
+    pq.write_table(pa.table({'t': t, 'q': q, 'v': [[a, b] for a, b in zip(t, q, strict=True)]}),
+                   folder / 'x.parquet')  # fmt: skip
+    (folder / 'x.json').write_text(json.dumps({'t': t.tolist(), 'q': q.tolist()}))
     robot = load_robot('toy_pendulum')
     with RecordingWriter(folder / 'x.mcap') as writer:
         for a, b in zip(t, q, strict=True):
@@ -68,7 +77,8 @@ def make_samples(folder: Path) -> dict[str, Path]:
     (folder / 'map.yaml').write_text(json.dumps(MAP))
     engine = Engine(robot, EngineConfig.from_mapping({}, robot))
     save_model(folder / 'model.npz', take_snapshot(engine))
-    names = ('x.csv', 'x.npz', 'x.mat', 'x.mcap', 'x.db3', 'x.bag', 'x.urdf', 'x.yaml')
+    names = ('x.csv', 'x.npz', 'x.mat', 'x.mcap', 'x.db3', 'x.bag', 'x.urdf', 'x.yaml', 'x.h5',
+             'x.parquet', 'x.json')  # fmt: skip
     found = {name[2:]: folder / name for name in names}
     found |= {'params': folder / 'params.yaml', 'map': folder / 'map.yaml'}
     return found | {'model': folder / 'model.npz'}
@@ -144,7 +154,7 @@ def damaged(content: bytes, rng: np.random.Generator) -> bytes:
 
 def read(kind: str, path: Path) -> None:
     """Read a file as the commands do."""
-    if kind in ('csv', 'npz', 'mat'):
+    if kind in ('csv', 'npz', 'json', *APART):
         remarks: list[str] = []
         load_columns(path, remarks)
         if kind == 'csv':

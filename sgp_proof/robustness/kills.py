@@ -214,8 +214,11 @@ class CommandKills:
         return Timed(time.monotonic() - began, time.monotonic() - writing)
 
 
-def run(seeds: range, faults: Faults, what: tuple[str, ...]) -> list[dict[str, object]]:
-    """Kill once a seed; return what came of each."""
+def run(
+    seeds: range, faults: Faults, what: tuple[str, ...], minutes: float
+) -> list[dict[str, object]]:
+    """Kill once a seed, as long as there is time; return what came of each."""
+    end = time.monotonic() + 60.0 * minutes
     rows: list[dict[str, object]] = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -223,6 +226,8 @@ def run(seeds: range, faults: Faults, what: tuple[str, ...]) -> list[dict[str, o
         kinds: dict[str, Any] = {}
         try:
             for seed in seeds:
+                if time.monotonic() > end:
+                    break
                 rng = np.random.default_rng((seed, 5))
                 kind = what[seed % len(what)]
                 if kind not in kinds and kind == 'node':
@@ -249,11 +254,13 @@ def main() -> None:
     """Run the seeds and add what came of them to the result."""
     parser = make_parser(__doc__, 'robust_kills', ('node', *COMMANDS))
     parser.add_argument('--seeds', type=seed_range, default=range(20), metavar='FIRST:LAST+1')
+    parser.add_argument('--minutes', type=float, default=1e9, help='after which no seed begins')
     arguments = parser.parse_args()
     before = read_result(arguments.out)
     faults = Faults()
     rows = {row['seed']: row for row in before.get('kills', [])}
-    rows |= {row['seed']: row for row in run(arguments.seeds, faults, tuple(arguments.names))}
+    new = run(arguments.seeds, faults, tuple(arguments.names), arguments.minutes)
+    rows |= {row['seed']: row for row in new}
     kills = [rows[seed] for seed in sorted(rows)]
     table = Counter(f'{row["what"]} {row["signal"]}' for row in kills)
     lost = [row['lost_s'] for row in kills if row.get('lost_s') is not None]

@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
-import io
 import re
-import resource
-import subprocess
-import sys
 import zipfile
-import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from scipy.io import loadmat
-from scipy.io.matlab import MatReadError
 
-from sgp_ros.errors import RecordingError, SgpError
+from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.model_files import require_unpacked
-from sgp_ros.recordings.table_formats import load_hdf5, load_json, load_parquet, refuse
-from sgp_ros.strangers import TooMuchError, bound, readable, require_file, require_within
+from sgp_ros.recordings.table_apart import READERS, load_apart
+from sgp_ros.recordings.table_formats import load_json, refuse
+from sgp_ros.strangers import readable, require_file, require_within
 
 Columns = dict[str, np.ndarray]
 ENDINGS = (
@@ -33,7 +25,6 @@ _DELIMITERS = (';', '\t', ',', ' ')
 _COMMENTS = '#%'
 _IN_BRACKETS = re.compile(r'\[[^\]]*\]')
 _APART = re.compile(r'\[[^\]]*\]|\S+')
-_SAID, _BYTES_PER_S = 1, 20e6
 _TIME = re.compile(r'\d{4}-\d\d-\d\d[T ]\d')
 
 
@@ -60,12 +51,8 @@ def load_columns(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]
 def _load(path: Path, suffix: str, remarks: list[str]) -> tuple[Columns, Sequence[int]]:
     if suffix == '.npz':
         return _load_npz(path), ()
-    if suffix == '.mat':
-        return _load_apart(path), ()
-    if suffix in {'.h5', '.hdf5', '.hdf'}:
-        return load_hdf5(path), ()
-    if suffix in {'.parquet', '.pq'}:
-        return load_parquet(path), ()
+    if suffix in READERS:
+        return load_apart(path), ()
     if suffix in {'.json', '.jsonl', '.ndjson'}:
         return load_json(path), ()
     if suffix in {'.csv', '.tsv', '.txt', '.dat'}:
@@ -200,76 +187,3 @@ def _plain_arrays(content: np.lib.npyio.NpzFile) -> Iterator[tuple[str, np.ndarr
         except ValueError:
             continue
         yield name, np.atleast_1d(array)
-
-
-def _load_apart(path: Path) -> Columns:
-    """Read a MAT file in a process of its own: some files end the interpreter inside SciPy."""
-    program = f'from {__name__} import send_mat; import sys; send_mat(sys.argv[1])'
-    seconds = bound('SECONDS') + path.stat().st_size / _BYTES_PER_S
-    try:
-        done = subprocess.run(  # noqa: S603  # this interpreter, this package
-            [sys.executable, '-c', program, str(path)], capture_output=True, timeout=seconds,
-            check=False,
-        )  # fmt: skip
-    except subprocess.TimeoutExpired as error:
-        raise TooMuchError(
-            f'{path} is not read within {seconds:.0f} s', 'an intact MAT file',
-            'raise SGP_MOST_SECONDS if it is meant',
-        ) from error  # fmt: skip
-    if done.returncode == 0:
-        with np.load(io.BytesIO(done.stdout), allow_pickle=False) as arrays:
-            return {name: arrays[name] for name in arrays.files}
-    said = done.stderr.decode(errors='replace').strip().splitlines()
-    if done.returncode == _SAID and said:
-        raise RecordingError(said[-1])
-    raise RecordingError(
-        f'{path} cannot be read: its reader ended with status {done.returncode}',
-        'a MATLAB .mat file', 'save it again, or as CSV',
-    )  # fmt: skip
-
-
-def send_mat(path: str) -> None:
-    """Write the arrays of a MAT file to stdout as NPZ, within the bound of what it unpacks to."""
-    most = 2 * bound('UNPACKED_MB') * (1 << 20)
-    with contextlib.suppress(ValueError, OSError):
-        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
-    try:
-        with readable(path, RecordingError, 'a MATLAB .mat file'):
-            columns = _load_mat(Path(path))
-    except SgpError as error:
-        sys.exit(str(error))
-    arrays: dict[str, Any] = dict(columns)
-    with open(1, 'wb', closefd=False) as stream:
-        np.savez(stream, **arrays)
-
-
-def _load_mat(path: Path) -> Columns:
-    try:
-        content = loadmat(path, simplify_cells=True)
-    except NotImplementedError:  # version 7.3
-        return load_hdf5(path, is_matlab=True)
-    except (MatReadError, ValueError, TypeError, KeyError, IndexError, zlib.error) as error:
-        raise RecordingError(f'{path} cannot be read ({error})', 'a MATLAB .mat file') from error
-    return dict(_flattened('', content))
-
-
-def _flattened(prefix: str, content: Mapping[str, object]) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the arrays of nested structures and cells under dotted names.
-
-    A cell array of vectors of one length is a matrix, one row a cell; each cell also has its own
-    name, `data.0` and so on, and so have the elements of an array of structures.
-    """
-    for name, value in content.items():
-        place = prefix + name
-        if isinstance(value, dict):
-            yield from _flattened(f'{place}.', value)
-        elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
-            cells = list(np.asarray(value, dtype=object).ravel()) if len(value) else []
-            yield from _flattened(f'{place}.', {str(i): cell for i, cell in enumerate(cells)})
-            arrays = [np.atleast_1d(np.asarray(c)) for c in cells if not isinstance(c, dict)]
-            if len(arrays) == len(cells) > 0 and len({a.shape for a in arrays}) == 1:
-                stacked = np.array(arrays)
-                if stacked.ndim == 2 and stacked.dtype.kind in 'fiub':
-                    yield place, stacked
-        elif isinstance(value, np.ndarray) and value.ndim and value.dtype.kind in 'fiub':
-            yield place, value

@@ -34,7 +34,7 @@ def test_intact_files_are_read(samples):
 def test_damaged_files_are_read_or_refused_in_one_line(samples, tmp_path):
     """Seeds of the formats that are read in this process."""
     faults = Faults()
-    others = {kind: path for kind, path in samples.items() if kind != 'mat'}
+    others = {kind: path for kind, path in samples.items() if kind not in files.APART}
     outcomes = [files.run(seed, others, tmp_path, faults)[1] for seed in range(120)]
     assert dict(faults) == {}
     assert {'read', 'refused'} == set(outcomes)
@@ -109,11 +109,12 @@ def test_a_bound_may_be_raised(tmp_path, monkeypatch):
     assert len(load_parameters(tmp_path / 'x.yaml')['b']) == 200
 
 
-def test_a_mat_file_that_ends_its_reader_ends_nothing_else(samples, tmp_path, monkeypatch):
+@pytest.mark.parametrize('kind', files.APART)
+def test_a_file_that_ends_its_reader_ends_nothing_else(samples, monkeypatch, kind):
     """It is read in a process of its own, here by one that is killed at once."""
     monkeypatch.setattr(sys, 'executable', '/bin/false')
     with pytest.raises(SgpError, match='its reader ended with status'):
-        load_columns(samples['mat'], [])
+        load_columns(samples[kind], [])
 
 
 def test_quoted_numbers_are_read(tmp_path):
