@@ -133,8 +133,7 @@ class Fold:
                 continue
             if isinstance(event, CommandSample):
                 self.intake.take_command(event)
-                if len(self.intake.commands.stamps_ns) > MOST_COMMANDS:
-                    self.intake.commands.thin()
+                self._bound_commands()
             elif isinstance(event, Reset):
                 self._forget()
             elif not self._obey(event):
@@ -142,6 +141,12 @@ class Fold:
             released.append(event)
         self._taking = None
         return Step(tuple(released), tuple(estimates))
+
+    def _bound_commands(self) -> None:
+        """Drop some where no state comes that lets them be forgotten."""
+        for history in (self.intake.commands, self.intake.targets):
+            if len(history.stamps_ns) > MOST_COMMANDS:
+                history.thin()
 
     def _obey(self, change: SettingsChange) -> bool:
         """Return whether a change of settings in the stream took effect."""

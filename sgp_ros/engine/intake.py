@@ -23,6 +23,7 @@ from sgp_ros.engine.samples import (
     Event,
     JointSample,
 )
+from sgp_ros.robots.gains import Gains, stated_gains
 from sgp_ros.robots.robot import Robot
 
 GREATEST = 1e30
@@ -54,6 +55,9 @@ class Intake:
     the order of their stamps. With `effort.source: auto` commands count until the first state
     that carries a measured effort; from there on a state without one is refused as unpaired.
 
+    Targets of position or velocity become the efforts that drives with stated gains make of them
+    at the time of each state, which needs measured velocities where the gains damp.
+
     Args:
         robot: whose joints are taken, in its order.
         config: settings of the intake.
@@ -63,6 +67,7 @@ class Intake:
 
     Attributes:
         commands: those taken.
+        targets: taken of a robot with stated gains, (2 k,) each.
         last_state_ns: stamp of the last state that was not a duplicate [ns]; None before.
         is_measured: whether a state with a measured effort has been accepted.
         limits: what the joints cannot do.
@@ -80,6 +85,9 @@ class Intake:
         self._gains = np.array([joint.effort_gain for joint in robot.joints])
         self._last_order: tuple[tuple[str, ...], np.ndarray | None] = ((), None)
         self.commands = CommandHistory(robot.effort_map.memory_s if robot.effort_map else 0.0)
+        self.targets = CommandHistory()
+        driven = [joint.name for joint in robot.joints if joint.is_actuated]
+        self._drives = stated_gains(robot.source, self._joints, driven)
         self.last_state_ns: int | None = None
         self.is_measured = False
         self.limits = Limits(robot)
@@ -128,8 +136,10 @@ class Intake:
     def take_command(self, command: CommandSample) -> None:
         """Let a command hold from its stamp on; joints it leaves out keep theirs."""
         names = command.names or self._command_joints
-        held, k = self.commands.efforts, len(self._joints)
-        is_target = self._commands_are == POSITION
+        is_converted = self._commands_are == EFFORT and command.kind != EFFORT
+        history = self.targets if is_converted else self.commands
+        is_target = is_converted or self._commands_are == POSITION
+        held, k = history.efforts, len(self._joints)
         effort = held[-1].copy() if held else np.zeros(2 * k if is_target else k)
         for i, name in enumerate(names):
             if name not in self._joints:
@@ -141,7 +151,7 @@ class Intake:
                 effort[[joint, k + joint]] = (0.0, asked) if command.kind == VELOCITY else both
             else:
                 effort[joint] = command.effort[i] * self._gains[joint]
-        self.commands.add(command.stamp_ns, effort)
+        history.add(command.stamp_ns, effort)
         self._counts.commands_used += 1
 
     def take_state(self, sample: JointSample) -> State | None:
@@ -184,12 +194,30 @@ class Intake:
             return True, np.where(self._actuated, effort * self._gains, 0.0)
         if source == 'state' or (source == 'auto' and self.is_measured):
             return False, None
+        timeout_ns = self._config.command_timeout * 1e9
+        if self._drives is not None and self.targets.stamps_ns:
+            held = self._held_effort(self._drives, sample, order, timeout_ns)
+            return held is not None, held
         age = self.commands.age_ns(sample.stamp_ns)
-        return age is not None and age <= self._config.command_timeout * 1e9, None
+        return age is not None and age <= timeout_ns, None
+
+    def _held_effort(
+        self, drives: Gains, sample: JointSample, order: np.ndarray | None, timeout_ns: float
+    ) -> np.ndarray | None:
+        """Return what the drives make of the target at the time of a state, (k,)."""
+        age = self.targets.age_ns(sample.stamp_ns)
+        if age is None or age > timeout_ns:
+            return None
+        self.targets.forget_before(sample.stamp_ns)
+        measured = _chosen(sample.velocity, order)
+        velocity = np.where(drives.kd > 0.0, np.nan if measured is None else measured, 0.0)
+        effort = drives.effort(self.targets.efforts[0], sample.position[order], velocity)
+        return effort if np.isfinite(effort).all() else None
 
     def begin_segment(self) -> None:
         """Forget stamps and commands: what follows has another time."""
         self.commands.clear()
+        self.targets.clear()
         self.last_state_ns = None
 
     def _state_problem(self, sample: JointSample) -> str | None:
@@ -231,8 +259,13 @@ class Intake:
             self._last_order = names, order
         return self._last_order[1]
 
+    def _takes(self, kind: str) -> bool:
+        if self._commands_are == POSITION:
+            return kind != EFFORT
+        return kind == EFFORT or self._drives is not None
+
     def _command_problem(self, command: CommandSample) -> str | None:
-        if command.names and (command.kind != EFFORT) != (self._commands_are == POSITION):
+        if command.names and not self._takes(command.kind):
             return 'wrong_kind'
         size = (len(command.names or self._command_joints),)
         if command.effort.shape != size or (

@@ -17,10 +17,12 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.estimator import Estimator
 from sgp_ros.engine.gate import Before, Gate
+from sgp_ros.engine.held_commands import CommandHistory
 from sgp_ros.engine.hyperparameters import kernel_named
 from sgp_ros.engine.intake import State
 from sgp_ros.engine.prior_knowledge import empty_baseline, empty_regression
 from sgp_ros.engine.samples import (
+    EFFORT,
     CommandSample,
     Event,
     JointSample,
@@ -78,12 +80,8 @@ def _plain(engine: Engine) -> dict[str, Any]:
         'pending': [_encode(event) for event in order.pending],
         'suspects': [_encode(event) for event in engine.clock.suspects],
         'began_ns': engine.began_ns,
-        'commands': [
-            [stamp, effort.tolist()]
-            for stamp, effort in zip(
-                intake.commands.stamps_ns, intake.commands.efforts, strict=True
-            )
-        ],
+        'commands': _held(intake.commands),
+        'targets': _held(intake.targets),
         'states': [_encode_state(state) for state in engine.filter.windows.states],
         'next_ns': engine.filter.windows.next_ns,
         'trial': None
@@ -135,6 +133,13 @@ def restored(robot: Robot, snapshot: Mapping[str, np.ndarray]) -> Engine:
     return engine
 
 
+def _held(history: CommandHistory) -> list[Any]:
+    return [
+        [stamp, values.tolist()]
+        for stamp, values in zip(history.stamps_ns, history.efforts, strict=True)
+    ]
+
+
 def _fill(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
     """Bring a fresh engine, built with the settings of `snapshot`, to its state."""
     text = _text(snapshot)
@@ -144,8 +149,9 @@ def _fill(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
     engine.stale_fits = text['stale_fits']
     engine.delay_s = text['delay_s']
     intake = engine.intake
-    for stamp, effort in text['commands']:
-        intake.commands.add(stamp, np.array(effort))
+    for history, name in ((intake.commands, 'commands'), (intake.targets, 'targets')):
+        for stamp, values in text.get(name, ()):
+            history.add(stamp, np.array(values))
     engine.filter.windows.states = [_decode_state(state) for state in text['states']]
     engine.filter.windows.next_ns = text['next_ns']
     if engine.filter.trial is not None:
@@ -237,7 +243,8 @@ def _encode(event: Event) -> dict[str, Any]:
     if isinstance(event, CommandSample):
         return {
             'kind': 'command', 'stamp_ns': event.stamp_ns, 'names': event.names,
-            'effort': _listed(event.effort),
+            'effort': _listed(event.effort), 'asks': event.kind,
+            'velocity': _listed(event.velocity),
         }  # fmt: skip
     if isinstance(event, SettingsChange):
         return {'kind': 'change', 'stamp_ns': event.stamp_ns, 'settings': dict(event.settings)}
@@ -255,7 +262,11 @@ def _decode(entry: dict[str, Any]) -> Event:
         return JointSample(stamp, names, frozen_array(entry['position']), velocity, effort)
     if entry['kind'] == 'command':
         known = None if entry['names'] is None else tuple(entry['names'])
-        return CommandSample(stamp, frozen_array(entry['effort']), known)
+        rates = entry.get('velocity')
+        return CommandSample(
+            stamp, frozen_array(entry['effort']), known, entry.get('asks', EFFORT),
+            None if rates is None else frozen_array(rates),
+        )  # fmt: skip
     if entry['kind'] == 'change':
         return SettingsChange(stamp, entry['settings'])
     return Reset(stamp)

@@ -187,7 +187,14 @@ class Servo:
         k = len(self.kp)
         error = self.targets.effort(joint, delay=delay) - self.position[:, joint]
         rate = self.targets.effort(k + joint, delay=delay) - self.velocity[:, joint]
-        return self.kp[joint] * error, self.kd[joint] * rate
+        return servo_parts(self.kp[joint], self.kd[joint], error, rate)
+
+
+def servo_parts(
+    kp: np.ndarray, kd: np.ndarray, error: np.ndarray, rate: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what the gains of a drive make of an error and of its rate [N m or N]."""
+    return kp * error, kd * rate
 
 
 def _averaged(

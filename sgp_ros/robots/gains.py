@@ -19,6 +19,7 @@ import numpy as np
 import yaml
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.physics.drive import servo_parts
 from sgp_ros.strangers import load_yaml
 
 _KEYS = ('kp', 'kd', 'feedforward')
@@ -38,6 +39,18 @@ class Gains:
     kp: np.ndarray
     kd: np.ndarray
     holds_gravity: bool = False
+
+    def effort(self, target: np.ndarray, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Return what the drives make of targets, without feed-forward, (k,) [N m or N].
+
+        Args:
+            target: positions, then velocities, that are asked for, (2 k,).
+            position: (k,) [rad or m].
+            velocity: (k,) [rad/s or m/s].
+        """
+        k = len(self.kp)
+        parts = servo_parts(self.kp, self.kd, target[:k] - position, target[k:] - velocity)
+        return sum(parts, np.zeros(k))
 
     def scaled(self, kp: np.ndarray, kd: np.ndarray) -> Gains:
         """Return the gains times factors, (k,) each."""
@@ -73,6 +86,25 @@ def read_gains(path: Path, joints: Sequence[str], actuated: Sequence[str]) -> Ga
             f'{path.name}: {reason}', 'a YAML file with kp and kd by joint'
         ) from None
     return checked_gains(content, path.name, joints, actuated)
+
+
+def stated_gains(
+    source: Mapping[str, Any], joints: Sequence[str], actuated: Sequence[str]
+) -> Gains | None:
+    """Return the gains that the file of a robot states, if they tell all of the efforts.
+
+    None without gains, with wrong ones, and where drives hold more, such as gravity.
+
+    Args:
+        source: content of its file.
+        joints: names of all joints.
+        actuated: joints that have a drive.
+    """
+    try:
+        found = checked_gains(source.get('gains'), 'gains of the robot', joints, actuated)
+    except ConfigError:
+        return None
+    return None if found.holds_gravity else found
 
 
 def checked_gains(

@@ -176,8 +176,9 @@ def _effort_remedy(arrivals: Arrivals) -> str:
 def _command_remedy(reason: str, arrivals: Arrivals) -> str:
     return {
         'wrong_kind': (
-            'wrong_kind: efforts are wanted, the commands are position targets; set command.type '
-            'to none and let the joint states carry the effort'
+            'wrong_kind: efforts are wanted, the commands are position targets; state the gains '
+            'of the drives in the file of the robot, or set command.type to none and let the '
+            'joint states carry the effort'
         ),
         'wrong_length': 'wrong_length: one number per joint of command.joints is wanted',
         'unknown_joint': f'unknown_joint: the robot has {list(arrivals.robot_joints)}',
