@@ -91,6 +91,10 @@ class Listener:
         )  # fmt: skip
         self._node.create_subscription(DiagnosticArray, '/diagnostics', self._report, 10)
 
+    def client(self, kind, name):
+        """Return a client of a service of the node."""
+        return self._node.create_client(kind, name)
+
     def turn(self):
         """Hear what has come."""
         self._executor.spin_once(timeout_sec=0.0)
