@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -21,6 +22,7 @@ from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import JointTrajectory
 
+from sgp_ros.engine.samples import JointSample
 from sgp_ros.recordings.reader import open_recording
 from test.ros.graph import Graph, NodeProcess
 from test.ros.replayed import recorded_predictions, replayed_predictions
@@ -319,6 +321,24 @@ def test_a_record_survives_a_killed_node(graph: Graph, tmp_path: Path) -> None:
     recording = open_recording(path)
     assert len(list(recording.events())) > 50
     assert 'recovered' in ' '.join(recording.remarks)
+
+
+def test_a_full_disk_ends_the_record_and_not_the_node(graph: Graph, tmp_path: Path) -> None:
+    """As a bound on the size of files does here; /diagnostics says it, and counts what is lost."""
+    path = tmp_path / 'run.mcap'
+    node = _start(graph, record__path=path)
+    stream = Stream(graph)
+    stream.publish_until_read(60)
+    graph.wait_until(lambda: path.stat().st_size > 2000, 'a record')
+    limit = (path.stat().st_size + 100,) * 2
+    resource.prlimit(node.process.pid, resource.RLIMIT_FSIZE, limit)
+    stream.publish_until_read(30)
+    graph.wait_until(lambda: 'too large' in graph.message('record'), 'the end of the record')
+    stream.publish_until_read(10)
+    graph.wait_until(lambda: graph.count('unrecorded', 'record') >= 10, 'what is not recorded')
+    assert node.stop() == 0
+    assert 'Traceback' not in node.stderr
+    assert sum(isinstance(e, JointSample) for e in open_recording(path).events()) > 20
 
 
 @pytest.mark.parametrize(
