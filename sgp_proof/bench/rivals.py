@@ -8,7 +8,7 @@ from typing import Any, Protocol, TypeAlias
 import numpy as np
 from scipy import optimize
 
-from sgp_proof.bench.problem import Problem, median_seconds
+from sgp_proof.bench.problem import Problem, least_seconds
 
 try:
     import gpytorch
@@ -124,7 +124,7 @@ def timed(
     """Return the time of a rival's work [ms] and how many times faster ours [s] is."""
     if theirs is None:
         return {f'{name}_ms': None, f'times_faster_{name}': None}
-    seconds = median_seconds(theirs, repeats)
+    seconds = least_seconds(theirs, repeats)
     return {f'{name}_ms': 1e3 * seconds, f'times_faster_{name}': seconds / ours}
 
 

@@ -19,7 +19,7 @@ for _name in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
 import numpy as np
 import pinocchio
 
-from sgp_proof.bench.problem import median_seconds
+from sgp_proof.bench.problem import least_seconds
 from sgp_proof.result_files import make_parser, write_result
 from sgp_ros.rigid.inertial import revolute_chain
 from sgp_ros.rigid.rigid_body import forward_dynamics, inverse_dynamics, torque_regressor
@@ -65,7 +65,7 @@ def batch_row(tree, size, rng, repeats):
     }
     row = {'samples': size}
     for name, work in works.items():
-        row[name] = 1e6 * median_seconds(work, repeats, loops) / size
+        row[name] = 1e6 * least_seconds(work, repeats, loops) / size
     row['samples_per_s'] = 1e6 / row['regressor_us']
     row['times_floor'] = row['regressor_us'] / row['floor_us']
     return row
@@ -79,7 +79,7 @@ def main() -> None:
     rng = np.random.default_rng(SEED)
     tree, model = chain(rng)
     q, v, a = rng.normal(size=(3, LOOPED, JOINTS))
-    looped = median_seconds(lambda: pinocchio_loop(model, q, v, a), arguments.repeats)
+    looped = least_seconds(lambda: pinocchio_loop(model, q, v, a), arguments.repeats)
     theirs = 1e6 * looped / LOOPED
     expected = pinocchio.computeJointTorqueRegressor(model, model.createData(), q[0], v[0], a[0])
     error = np.abs(torque_regressor(tree, q[:1], v[:1], a[:1])[0] - expected).max()

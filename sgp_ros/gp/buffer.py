@@ -220,6 +220,10 @@ class FactoredBuffer:
         Returns:
             Shapes (k, p), (k,) and (k,): Z is the second less the first times W.
         """
+        if len(self.factors) == 1:  # of all outputs, in order
+            (whole,) = whitenings
+            variance = self.factors[0].squared_scales * whole.variance
+            return whole.explained[:, :-1], whole.explained[:, -1], variance
         explained, variance = np.empty(self.samples.shape), np.empty(self.samples.shape[0])
         for factor, place, whitening in zip(self.factors, self._places, whitenings, strict=True):
             explained[place] = whitening.explained

@@ -89,6 +89,20 @@ def combine_rows(v: np.ndarray, rows: np.ndarray, total: np.ndarray) -> None:
 
 
 @_compiled
+def _take_squares(S: np.ndarray, r: int, s: np.ndarray, v: np.ndarray, i: int) -> None:
+    # Unsigned indices, as a signed one might count from the end.
+    one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    for j in range(np.uint64(len(s))):
+        at = s[j]
+        a += (S[r, j] - at) * (S[r, j] - at)
+        b += (S[r + one, j] - at) * (S[r + one, j] - at)
+        c += (S[r + two, j] - at) * (S[r + two, j] - at)
+        d += (S[r + three, j] - at) * (S[r + three, j] - at)
+    v[i], v[i + one], v[i + two], v[i + three] = a, b, c, d
+
+
+@_compiled
 def fill_covariances(
     form: int, variance: float, S: np.ndarray, start: int, s: np.ndarray, v: np.ndarray
 ) -> None:
@@ -99,18 +113,11 @@ def fill_covariances(
     n = len(v)
     quads = n - n % 4
     for i in range(0, quads, 4):
-        r = start + i
-        a, b, c, d = 0.0, 0.0, 0.0, 0.0
-        for j in range(len(s)):
-            a += (S[r, j] - s[j]) ** 2
-            b += (S[r + 1, j] - s[j]) ** 2
-            c += (S[r + 2, j] - s[j]) ** 2
-            d += (S[r + 3, j] - s[j]) ** 2
-        v[i], v[i + 1], v[i + 2], v[i + 3] = a, b, c, d
+        _take_squares(S, np.uint64(start + i), s, v, np.uint64(i))
     for i in range(quads, n):
         v[i] = 0.0
         for j in range(len(s)):
-            v[i] += (S[start + i, j] - s[j]) ** 2
+            v[i] += (S[start + i, j] - s[j]) * (S[start + i, j] - s[j])
     if form == SQUARED_EXPONENTIAL:
         for i in range(n):
             v[i] = variance * np.exp(-0.5 * v[i])
