@@ -80,6 +80,7 @@ $(VENV)/.made:
 
 $(VENV)/.package: setup.py | $(VENV)/.made
 	$(BIN)/python -m pip install --quiet --editable '.[wheels]'
+	$(BIN)/sgp compile --quiet
 	@touch $@
 
 $(VENV)/.test: setup.py | $(VENV)/.made

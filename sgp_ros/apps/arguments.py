@@ -253,12 +253,14 @@ def _add_export(add: AddCommand) -> None:
                         help='write value +- 2 std of the numbers too')  # fmt: skip
 
 
-def _add_robots(add: AddCommand) -> None:
+def _add_without_arguments(add: AddCommand) -> None:
     add(
         'robots', 'sgp_ros.apps.robots:run_robots',
         'List the built-in robots: names, joints, what they are.',
         'sgp robots',
     )  # fmt: skip
+    add('compile', 'sgp_ros.apps.compiling:run_compile',
+        'Compile now what the first commands would compile.', 'sgp compile')  # fmt: skip
 
 
 def _add_watch(add: AddCommand) -> None:
@@ -277,7 +279,7 @@ def _add_watch(add: AddCommand) -> None:
 
 
 GROUPS = (
-    ('Look around', ('demo', 'robots', 'effects')),
+    ('Look around', ('demo', 'robots', 'effects', 'compile')),
     ('From your recording', ('import', 'check', 'diagnose', 'identify', 'replay')),
     ('From many recordings', ('campaign',)),
     ('With a model', ('simulate', 'export')),
@@ -290,6 +292,6 @@ EXAMPLE = """example, which needs nothing but this package:
 
 COMMANDS = (
     _add_demo, _add_simulate, _add_replay, _add_identify, _add_diagnose, _add_effects,
-    _add_robots, _add_import, _add_export, _add_watch, _add_check, _add_campaign,
+    _add_without_arguments, _add_import, _add_export, _add_watch, _add_check, _add_campaign,
 )  # fmt: skip
 """What adds each command of the package, in the order of its help."""
