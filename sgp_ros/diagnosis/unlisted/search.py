@@ -31,6 +31,8 @@ from sgp_ros.physics.parts import JOINT, MOTOR
 SMOOTH, SHAPES, FITTED = 3, 4, 6
 """Smooth forces fitted beside each choice of kept effects; of all of these, those for which
 formulas are screened; formulas fitted for each but the best, of which all are."""
+EARNED = 3
+"""Best models with a formula in which every listed effect must earn its price again."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +100,8 @@ def search(equations: Equations, scale: Scale, listed: Model, joint: int) -> Sea
             if key not in laws or scale.worth(law) > scale.worth(laws[key]):
                 laws[key] = law
     ranked = sorted(laws.values(), key=lambda m: -scale.worth(m))
+    again = [earned(look.columns, scale, m, joint) for m in ranked[:EARNED]]
+    ranked = sorted([*again, *ranked[EARNED:]], key=lambda m: -scale.worth(m))
     fine = look.fine(ranked[0]) if ranked else None
     return Searched(joint, listed, smooth[0], tuple(ranked), fine)
 
@@ -174,6 +178,34 @@ class _Look:
     def _without(self, kept: tuple[EffectAt, ...], *, is_free: bool) -> Model:
         return fit(self.columns, kept, self.listed.sigma, is_free=is_free, rounds=2, steps=4,
                    still=len(kept))  # fmt: skip
+
+
+def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
+    """Return a model without the listed effects that are not worth their price beside its formula.
+
+    They were chosen before the formula was known, and may have stood for a part of it. One after
+    the other goes, and the formula and all others are fitted again, as long as that is worth more.
+
+    Args:
+        columns: of the recording.
+        scale: of mean squares.
+        model: with a formula at the joint.
+        joint: index.
+    """
+    law = law_of(model, joint)
+    trials = []
+    for out in model.effects:
+        left = tuple(s for s in model.effects if s is not out)
+        if out is not law:
+            trials += [
+                fit(columns, left, model.sigma, is_free=is_free, rounds=2, steps=10)
+                for is_free in dict.fromkeys((False, model.is_free))
+            ]
+    possible = [t for t in trials if t.is_possible() and np.isfinite(t.score)]
+    best = max(possible, key=scale.worth, default=model)
+    if scale.worth(best) <= scale.worth(model):
+        return model
+    return earned(columns, scale, best, joint)
 
 
 def own_effects(model: Model, joint: int) -> tuple[EffectAt, ...]:

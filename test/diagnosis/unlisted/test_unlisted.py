@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.decide.decision import Scale, decide
+from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import compare_models
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.unlisted.assertion import with_laws
 from sgp_ros.diagnosis.unlisted.formulas import formulas
-from sgp_ros.diagnosis.unlisted.search import law_of, search
+from sgp_ros.diagnosis.unlisted.search import earned, law_of, search
 from sgp_ros.diagnosis.unlisted.shapes import GATES, smooth_forces
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.formula import read_formula
+from sgp_ros.physics.parts import Place
 from sgp_ros.physics.units import read_unit, unit_of
 from test.diagnosis.worlds import CHAINS, events_of, simulate
 
@@ -90,6 +96,30 @@ def test_what_is_no_function_of_the_motion_has_no_law(equations_for, name):
     found = with_laws(equations, comparison, decision)
     assert law_of(found.decision.model, 0) is None
     assert found.decision.verdict == decision.verdict
+
+
+@pytest.mark.parametrize('friction', [0.0, 0.3])
+def test_a_listed_effect_beside_a_formula_earns_its_price_again(equations_for, friction):
+    """One that only stood for a part of the formula goes, one that is there stays."""
+
+    def force(t, q, v):
+        return (_brake(t, q, v)[0] - friction * math.tanh(v[0] / 0.01),)
+
+    _, equations = equations_for(simulate(CHAINS[1], 11, 10.0, force=force))
+    motion, columns = equations.motion, Columns(equations)
+    smooth = next(s for s in smooth_forces(motion, 0) if (s.variable.kind, s.gate) == ('dq', ''))
+    law = next(f for f in formulas(smooth, motion) if '/v0)**2)' in f.formula)
+    place = Place(0)
+    effects = [EffectAt(law, place, np.array([1.5]))]
+    effects += [EffectAt(EFFECTS[n], place) for n in ('torque_gain', 'coulomb_friction')]
+    start = np.sqrt((equations.d**2).mean(axis=0))
+    model = fit(columns, tuple(effects), start, is_free=False)
+    scale = Scale.of(equations, compare_models(equations, lambda _share: None))
+    scale = replace(scale, nominal=np.zeros_like(scale.nominal))
+    left = earned(columns, scale, model, 0)
+    names = [s.name for s in left.effects]
+    assert names == ['law', 'coulomb_friction'][: 1 + (friction > 0.0)]
+    assert scale.worth(left) > scale.worth(model)
 
 
 def test_a_listed_effect_keeps_its_name(equations_for, viscous):
