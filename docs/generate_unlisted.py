@@ -66,6 +66,8 @@ The recordings are made as [its page](real_machines/tflex.md) says.
   they leave, these are not asserted.
 - **Formulas.** The shapes of `diagnosis/unlisted/formulas.py` in that variable, times that factor, are fitted as every
   model is. Each piece of a formula has a price.
+- **Listed effects beside a formula** were chosen before it was known: in the best models each of them has to earn its
+  price again, or goes.
 - **Asserted** is a formula that is worth more than the spline and all listed effects, leaves no more than a
   finer spline does (F test), predicts parts left out, has no number at the end of its range, is finite over the range
   of the joints, and holds at least {least:.0f} % of the odds against formulas that would say something else in a motion
@@ -80,7 +82,8 @@ one that you know, write its formula into the robot YAML: [effects.md](effects.m
 ## What it does not do
 - Only one factor and one variable: a force of three variables, or one that remembers (a lag, play), has no formula here.
 - Several recordings at once, and settled points, are not searched.
-- It does not look for resonances: an elastic joint or mount has no name yet.
+- Of resonances only that of an elastic joint has a name, [effects.md](effects.md#joint_elasticity); a robot on a soft
+  mount has none yet.
 - A law with a listed effect of the same variable at the same joint (dry friction with an eddy-current brake) is one
   smooth force to the search, and has a formula only if one of the shapes has both.
 """
