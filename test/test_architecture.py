@@ -73,6 +73,7 @@ PROOF_ROOMS = {
     'concealed': {'result_files', 'paper'},
     'connection': {'result_files', 'concealed'},
     'robustness': {'result_files'},
+    'campaign': {'result_files'},
 }
 """Room of the proof to the other ones that it may import, beside every layer of the product."""
 

@@ -5,38 +5,30 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from sgp_ros import __version__
-from sgp_ros.apps.diagnose import examine
-from sgp_ros.apps.identify import identify_recording
+from sgp_ros.apps.campaign_task import examine_recording
 from sgp_ros.apps.terminal import strong, warned
+from sgp_ros.campaign.changes import FALSE_ALARMS
 from sgp_ros.campaign.cluster import cluster, run_tasks
 from sgp_ros.campaign.recordings import Told, find_recordings, read_covariates
 from sgp_ros.campaign.table import (
     COLUMNS,
     RUN_COLUMNS,
-    Row,
-    diagnosis_rows,
-    identification_rows,
     parquet_bytes,
     require_parquet,
     result_rows,
     run_rows,
 )
-from sgp_ros.diagnosis.mapping import diagnosis_mapping
-from sgp_ros.engine.samples import JointSample
-from sgp_ros.errors import ConfigError, RecordingError, SgpError
-from sgp_ros.recordings.reader import open_recording
+from sgp_ros.campaign.trends import find_trends
+from sgp_ros.errors import ConfigError
+from sgp_ros.report.campaign import render_campaign, trend_sentences
 from sgp_ros.report.files import replacing_results, write_bytes, write_text
-from sgp_ros.report.metrics import versions
 from sgp_ros.robots.models.door import is_model
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import urdf_text
@@ -147,74 +139,6 @@ def _state(path: Path) -> Any:
     return [[file.name, s.st_size, s.st_mtime_ns] for file, s in zip(files, stats, strict=True)]
 
 
-def examine_recording(job: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is kept of one recording: rows or a failure by task, and what they cost.
-
-    It runs in a worker. What the recording can cause is a result too, in one line.
-    """
-    tasks: dict[str, Any] = {}
-    result = {key: job[key] for key in ('recording', 'fingerprint')}
-    result['versions'] = ', '.join(f'{name} {x}' for name, x in versions().items())
-    result |= {'robot': Path(job['robot']).stem, 'covariates': {}}
-    try:
-        result |= _span(job)
-        result['covariates'] = {topic: mean_of_topic(job['path'], topic)
-                                for topic in job['topics']}  # fmt: skip
-    except (SgpError, OSError) as error:
-        failure = {'failure': ' '.join(str(error).split())}
-        return result | {'tasks': dict.fromkeys(job['arguments'], failure)}
-    for task, options in job['arguments'].items():
-        wall, processor = time.perf_counter(), time.process_time()
-        try:
-            tasks[task] = {'rows': _rows(task, job, options)}
-        except (SgpError, OSError) as error:
-            tasks[task] = {'failure': ' '.join(str(error).split())}
-        tasks[task]['cost'] = {
-            'processor_s': time.process_time() - processor,
-            'wall_s': time.perf_counter() - wall,
-            'worker': f'{os.uname().nodename} {os.getpid()}',
-        }
-    return result | {'tasks': tasks}
-
-
-def _rows(task: str, job: Mapping[str, Any], options: Mapping[str, Any]) -> list[Row]:
-    if task == 'identify':
-        found = identify_recording(job['path'], job['robot'], **options)
-        return list(identification_rows(found.findings))
-    examined = examine(job['path'], job['robot'], **options)
-    return list(diagnosis_rows(diagnosis_mapping(examined.found)))
-
-
-def _span(job: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the first stamp [ns] and the length [s] of a recording."""
-    topics = {k: next(iter(job['arguments'].values()))[k] for k in ('joint_states', 'command')}
-    events = open_recording(job['path']).events(**topics)
-    stamps = [event.stamp_ns for event in events if isinstance(event, JointSample)]
-    if not stamps:
-        raise RecordingError(f'{job["path"]} holds no state', 'joint states')
-    return {'start_ns': min(stamps), 'duration_s': 1e-9 * (max(stamps) - min(stamps))}
-
-
-def mean_of_topic(path: str, topic: str) -> float:
-    """Return the mean of the numbers of a topic: `data`, `temperature` or another single field.
-
-    Raises:
-        RecordingError: no such topic, or no number in its messages.
-    """
-    values = []
-    for _, message in open_recording(path).messages(topic):
-        for name in ('data', 'temperature', 'relative_humidity', 'fluid_pressure', 'voltage'):
-            with suppress(TypeError, ValueError, AttributeError):
-                values.append(float(getattr(message, name)))
-                break
-    if not values or not np.isfinite(values).any():
-        raise RecordingError(
-            f'{topic} of {path} holds no number', 'messages with data or temperature',
-            'give its values with --covariates',
-        )  # fmt: skip
-    return float(np.nanmean(np.where(np.isfinite(values), values, np.nan)))
-
-
 def _compute(
     out: Path, jobs: Sequence[Mapping[str, Any]], scheduler: str | None, workers: int | None,
     progress: Callable[[float], None],
@@ -280,11 +204,14 @@ def write_campaign(
     for row in rows:
         if row['kind'] == 'verdict':
             verdicts[row['verdict']] = verdicts.get(row['verdict'], 0) + 1
+    trends = find_trends(results)
     content = {
         'schema': _SCHEMA, 'recordings': len(results), 'verdicts': verdicts,
         'failures': failures, 'remarks': list(remarks), 'rows': len(rows),
+        'false_alarms': FALSE_ALARMS, 'trends': [trend.content() for trend in trends],
     }  # fmt: skip
     write_text(out / 'campaign.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
+    write_text(out / 'report.html', render_campaign(content, results, rows, trends))
     return content
 
 
@@ -293,8 +220,11 @@ def _print_summary(content: Mapping[str, Any], out: Path) -> None:
     failed = {f['recording'] for f in content['failures']}
     print(strong(f'{content["recordings"]} recordings: {said or "no verdict"}; '
                  f'{len(failed)} failed'))  # fmt: skip
+    for sentence in trend_sentences(content['trends']):
+        print(f'  trend     {sentence}')
     for f in content['failures']:
         print(warned(f'  failed    {f["recording"]}, {f["task"]}: {f["failure"]}'))
     for remark in content['remarks']:
         print(warned(f'  remark    {remark}'))
-    print(f'results: {out / "results.parquet"}')
+    print(f'table: {out / "results.parquet"}')
+    print(f'report: {out / "report.html"}')

@@ -180,6 +180,32 @@
     if (e.target.open) e.target.querySelectorAll('figure[data-chart]').forEach(fit);
   }, true);
 
+  const rank = cell => cell.dataset.value ?? cell.textContent.trim();
+  function sorted(table, column, sign) { // empty cells last, numbers before words
+    const rows = [...table.tBodies[0].rows], keys = new Map();
+    for (const row of rows) keys.set(row, rank(row.cells[column]));
+    const order = (a, b) => {
+      if (a === '' || b === '') return (a === '') - (b === '');
+      const [x, y] = [Number(a), Number(b)];
+      if (Number.isNaN(x) || Number.isNaN(y)) return sign * a.localeCompare(b, undefined, { numeric: true });
+      return sign * (x - y);
+    };
+    table.tBodies[0].append(...rows.sort((a, b) => order(keys.get(a), keys.get(b))));
+  }
+  document.querySelectorAll('table.sortable').forEach(table => {
+    const heads = [...table.tHead.rows[0].cells];
+    heads.forEach((head, column) => {
+      head.tabIndex = 0;
+      head.onclick = () => {
+        const falls = head.getAttribute('aria-sort') === 'ascending';
+        heads.forEach(other => other.removeAttribute('aria-sort'));
+        head.setAttribute('aria-sort', falls ? 'descending' : 'ascending');
+        sorted(table, column, falls ? -1 : 1);
+      };
+      head.onkeydown = e => { if (e.key === 'Enter') head.onclick(); };
+    });
+  });
+
   document.querySelectorAll('pre.command').forEach(block => {
     const button = document.createElement('button');
     button.textContent = 'copy';
