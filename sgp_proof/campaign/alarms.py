@@ -11,7 +11,8 @@ import numba
 import numpy as np
 from scipy import special
 
-from sgp_proof.result_files import make_parser, read_result, write_result
+from sgp_proof.campaign.wear import measured
+from sgp_proof.result_files import make_parser, write_result
 from sgp_ros.campaign.changes import HORIZON, LEAST_SIDE
 
 SERIES = 100_000
@@ -52,9 +53,7 @@ def main():
     parser.add_argument('--series', type=int, default=SERIES)
     arguments = parser.parse_args()
     found = equivalent_tests(arguments.series)
-    kept = {
-        k: v for k, v in read_result(arguments.out).items() if k not in {'schema', 'environment'}
-    }
+    kept = measured(arguments.out)
     kept['alarms'] = {
         'series': arguments.series, 'horizon': HORIZON, 'least_side': LEAST_SIDE, 'levels': found,
     }  # fmt: skip

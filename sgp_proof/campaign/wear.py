@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sgp_proof.result_files import read_result
+
 QUANTITIES = (('shoulder', 'viscous'), ('shoulder', 'coulomb'), ('elbow', 'viscous'),
               ('elbow', 'coulomb'))  # fmt: skip
 WORN = ('elbow', 'coulomb')
@@ -44,6 +46,11 @@ class World:
     growth: float = 0.1
     ramp: int = 0
     per_day: tuple[int, int] = (4, 12)
+
+
+def measured(path):
+    """Return what other measurements of a campaign have left in a result file."""
+    return {k: v for k, v in read_result(path).items() if k not in {'schema', 'environment'}}
 
 
 def draw_results(world, seed, begin=None):
