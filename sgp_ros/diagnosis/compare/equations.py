@@ -18,6 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.factors import Factor
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
@@ -60,6 +61,7 @@ class Equations:
         rests: (n, k) whether a joint rests.
         model_error: (k,) mean square by which d changes with the smoothing of the states: what
             filters leave of a perfect model where the motion is fast.
+        free: the same equations where dry friction holds fewer joints; None where there are none.
     """
 
     motion: ObservedMotion
@@ -73,6 +75,17 @@ class Equations:
     moving: np.ndarray
     rests: np.ndarray
     model_error: np.ndarray
+    free: Equations | None = None
+
+    @cached_property
+    def factors(self) -> tuple[Factor, ...]:
+        """Base of each joint; those that dry friction does not change are shared."""
+        found = []
+        for j in range(self.base.shape[1]):
+            base = self.base[:, j]
+            is_same = self.free is not None and np.array_equal(base, self.free.base[:, j])
+            found.append(self.free.factors[j] if is_same and self.free else Factor.of(base))
+        return tuple(found)
 
     def compact(self, columns: np.ndarray, joint: int, *, is_inertial: bool) -> np.ndarray:
         """Return columns (n, m) of one joint as its rows (N, m), or (n, k, m) as (N, k, m).
@@ -109,7 +122,7 @@ class Equations:
             Y[rows] = torque_regressor(tree, q, v, a)[:, j] @ self.directions.T
             base[:, j] += self.filter(Y)
             moving[rows, j] = 0.0
-        return replace(self, d=d, base=base, moving=moving)
+        return replace(self, d=d, base=base, moving=moving, free=self)
 
     @cached_property
     def poses(self) -> tuple[ObservedMotion, ...]:
@@ -255,4 +268,4 @@ def make_equations(
         np.ones(motion.position.shape), resting(raw, motion, bandwidth),
         _smoothing_error(raw, motion, low, bandwidth),
     )  # fmt: skip
-    return equations.with_dry_friction(motion.dry_joints)
+    return replace(equations.with_dry_friction(motion.dry_joints), free=None)

@@ -23,7 +23,8 @@ from sgp_ros.diagnosis.decide.decision import Decision, Scale
 from sgp_ros.diagnosis.explain.candidates import split
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.regression import Columns, Frame, on_all_joints
+from sgp_ros.diagnosis.explain.frame import Frame
+from sgp_ros.diagnosis.explain.regression import Columns, on_all_joints
 from sgp_ros.diagnosis.result import Parameter
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect

@@ -9,9 +9,9 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors, price_of
+from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.regression import (
     Columns,
-    Frame,
     dry_joints,
     shape_bounds,
     shape_scales,

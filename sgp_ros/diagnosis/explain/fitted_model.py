@@ -9,7 +9,8 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import FLOOR_SHARE
-from sgp_ros.diagnosis.explain.regression import Frame, dry_joints
+from sgp_ros.diagnosis.explain.frame import Frame
+from sgp_ros.diagnosis.explain.regression import dry_joints
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import EMPTY
 from sgp_ros.physics.effect_at import EffectAt

@@ -1,19 +1,17 @@
-"""Columns of candidate effects, and least squares with the inertial parameters projected out.
-
-Rows are scaled by the standard deviation of their joint. The change w of the inertial parameters
-has the prior N(0, I); with the prior as p more rows, `Q` spans what it can explain, and columns
-are compared by what is left of them. Source: Golub and Pereyra 1973 for the projection of linear
-coefficients while the shapes are searched.
-"""
+"""Filtered columns of candidate effects, remembered, and their shapes as one vector."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 MOST_HELD = 30_000_000
@@ -25,7 +23,8 @@ class Columns:
 
     def __init__(self, equations: Equations) -> None:
         self._equations = {frozenset[int](): equations}
-        self._known: dict[tuple[object, ...], np.ndarray] = {}
+        self._known: dict[tuple[object, ...], Seen] = {}
+        self._edges: dict[tuple[object, ...], np.ndarray | None] = {}
         self._motions: dict[bytes, ObservedMotion] = {}
         self._held = 0
 
@@ -62,21 +61,84 @@ class Columns:
         self, candidate: EffectAt, equations: Equations, motion: ObservedMotion
     ) -> np.ndarray:
         """Return the filtered columns of the place, (N, m), or (N, k, m), in a motion."""
-        joint = candidate.place.joint
+        return self.seen(candidate, equations, motion).x
+
+    def seen(self, candidate: EffectAt, equations: Equations, motion: ObservedMotion) -> Seen:
+        """Return the filtered columns of the place in a motion, with their products."""
+        is_inertial, joint = candidate.effect.is_inertial, candidate.place.joint
         key = (*candidate.key, candidate.shape.tobytes(), motion)
+        return self._kept(
+            key, equations, joint, lambda: candidate.columns(motion), is_inertial=is_inertial
+        )
+
+    def bins(
+        self, effect: Effect, place: Place, equations: Equations
+    ) -> tuple[Seen, np.ndarray] | None:
+        """Return the filtered columns of narrow bins of the range, and their edges, if any."""
+        key, motion = (effect.key, place, 'bins'), equations.motion
+        if key not in self._edges:
+            made = effect.bins(motion, place)
+            self._edges[key] = None if made is None else made[1]
+        edges = self._edges[key]
+        if edges is None:
+            return None
+
+        def columns() -> np.ndarray:
+            made = effect.bins(motion, place)
+            assert made is not None
+            return made[0]
+
+        return self._kept(key, equations, place.joint, columns), edges
+
+    def _kept(
+        self, key: tuple[object, ...], equations: Equations, joint: int,
+        make: Callable[[], np.ndarray], *, is_inertial: bool = False,
+    ) -> Seen:  # fmt: skip
         # what acts on one joint depends on whether that one is held, on no other
         keys = (*key, bool(equations.moving[:, max(joint, 0)].all())), (*key, equations)
         for known in keys:
             if known in self._known:
                 return self._known[known]
-        raw = candidate.columns(motion)
-        x = equations.compact(raw, joint, is_inertial=candidate.effect.is_inertial)
+        raw = make()
+        found = Seen(equations, equations.compact(raw, joint, is_inertial=is_inertial), joint)
         if self._held > MOST_HELD:
             self._known.clear()
             self._held = 0
-        self._known[keys[raw.ndim == 3]] = x
-        self._held += x.size
-        return x
+        self._known[keys[raw.ndim == 3]] = found
+        self._held += found.x.size
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Filtered columns with their products, which no scale of the rows changes.
+
+    Attributes:
+        x: (N, m) of one joint, or (N, k, m).
+        joint: whose rows they are, where they are of one.
+    """
+
+    equations: Equations
+    x: np.ndarray
+    joint: int
+
+    @cached_property
+    def rows(self) -> dict[int, np.ndarray]:
+        """Columns by joint, (N, m) each."""
+        if self.x.ndim == 2:
+            return {self.joint: self.x}
+        return {j: self.x[:, j] for j in range(self.x.shape[1])}
+
+    @cached_property
+    def squares(self) -> dict[int, np.ndarray]:
+        """Products of the columns with themselves by joint, (m, m) each."""
+        return {j: x.T @ x for j, x in self.rows.items()}
+
+    @cached_property
+    def explained(self) -> dict[int, np.ndarray]:
+        """Products of the bases of bodies with the columns by joint, (r_j, m) each."""
+        factors = self.equations.factors
+        return {j: factors[j].Q.T @ x for j, x in self.rows.items()}
 
 
 def on_all_joints(x: np.ndarray, joint: int, k: int) -> np.ndarray:
@@ -124,81 +186,3 @@ def with_shapes(candidates: tuple[EffectAt, ...], x: np.ndarray) -> tuple[Effect
         result.append(s.with_shape(x[at : at + m].copy()) if m else s)
         at += m
     return tuple(result)
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """Scaled equations and what inertial parameters explain of them.
-
-    Attributes:
-        sigma: (k,) scale of the rows [N m or N].
-        Q: (N k + p, p) orthonormal.
-        R: (p, p) upper triangular, `Q R = [B / sigma; I]`.
-        y: (N k + p,) what is left of the target.
-        is_free: whether inertial parameters may differ; else p is 0 here.
-    """
-
-    equations: Equations
-    sigma: np.ndarray
-    Q: np.ndarray
-    R: np.ndarray
-    y: np.ndarray
-    is_free: bool
-
-    @classmethod
-    def of(cls, equations: Equations, sigma: np.ndarray, *, is_free: bool) -> Frame:
-        """Return the frame for rows of these standard deviations."""
-        N, k, _ = equations.base.shape
-        base = equations.base if is_free else equations.base[:, :, :0]
-        p = base.shape[2]
-        scaled = (base / sigma[:, None]).reshape(N * k, p)
-        Q, R = np.linalg.qr(np.concatenate([scaled, np.eye(p)]))
-        target = np.concatenate([(equations.d / sigma).ravel(), np.zeros(p)])
-        return cls(equations, sigma, Q, R, target - Q @ (Q.T @ target), is_free)
-
-    def projected(self, columns: np.ndarray) -> np.ndarray:
-        """Return what inertial parameters leave of filtered columns (N, k, m), (N k + p, m)."""
-        N, k, m = columns.shape
-        x = np.zeros((len(self.Q), m))
-        x[: N * k] = (columns / self.sigma[:, None]).reshape(N * k, m)
-        return x - self.Q @ (self.Q.T @ x)
-
-    def beyond(self, y: np.ndarray, A: np.ndarray) -> Frame:
-        """Return the frame that also projects out columns A (N k + p, m), which this one did.
-
-        For searches beside effects that keep their shapes; `R` stays that of the bodies.
-
-        Args:
-            y: (N k + p,) target, less forces that are given.
-            A: columns.
-        """
-        if not A.shape[1]:
-            return replace(self, y=y)
-        own = np.linalg.qr(A / np.sqrt((A * A).sum(axis=0) + 1e-300))[0]
-        return replace(self, Q=np.concatenate([self.Q, own], axis=1), y=y - own @ (own.T @ y))
-
-    def by_joint(self, residual: np.ndarray) -> np.ndarray:
-        """Return the mean squares of a residual (N k + p,) per joint, unscaled, (k,)."""
-        N, k = self.equations.d.shape
-        return (residual[: N * k].reshape(N, k) ** 2).mean(axis=0) * self.sigma**2
-
-    def parameters(self, unexplained: np.ndarray) -> np.ndarray:
-        """Return w (p,) that explains best what effects (N, k) leave of the target."""
-        N, k = self.equations.d.shape
-        if not self.is_free:
-            return np.zeros(self.equations.base.shape[2])
-        x = (unexplained / self.sigma).ravel()
-        return np.linalg.solve(self.R, self.Q[: N * k].T @ x)
-
-    @property
-    def occam(self) -> float:
-        """What free inertial parameters cost in evidence, `log det R` [nats]."""
-        return float(np.log(np.abs(np.diag(self.R))).sum())
-
-    @property
-    def determined(self) -> int:
-        """Number of combinations of inertial parameters that the data tell more of than the prior.
-
-        Their singular values of `[B / sigma; I]` are above the square root of two.
-        """
-        return int((np.linalg.svd(self.R, compute_uv=False) > np.sqrt(2.0)).sum())

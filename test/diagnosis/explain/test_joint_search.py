@@ -11,8 +11,9 @@ from sgp_ros.diagnosis.criteria import COUNTED_SHARE
 from sgp_ros.diagnosis.explain.candidates import fit, residual_of
 from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import floors
+from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.joint_search import by_joint, coupled, gain, uncoupled, usual
-from sgp_ros.diagnosis.explain.regression import Columns, Frame
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt

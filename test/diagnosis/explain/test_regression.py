@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
-from sgp_ros.diagnosis.explain.regression import Columns, Frame
+from sgp_ros.diagnosis.explain.frame import Frame
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
@@ -46,6 +49,22 @@ def test_projection_equals_dense_ridge_regression(equations_for, heavy, k):
     np.testing.assert_allclose(
         np.linalg.slogdet(X[:, 1:].T @ X[:, 1:] + np.eye(p))[1], 2.0 * frame.occam, rtol=1e-9
     )
+
+
+def test_frames_of_any_scale_share_the_factors_of_the_joints(equations_for, heavy):
+    """Basis and triangle are those of all rows; dry friction factors only what it changes."""
+    _, equations = equations_for(heavy[2])
+    N, k, p = equations.base.shape
+    for sigma in (_start(equations), np.array([1e-3, 10.0])):
+        frame = Frame.of(equations, sigma, is_free=True)
+        rows = np.concatenate([(equations.base / sigma[:, None]).reshape(N * k, p), np.eye(p)])
+        np.testing.assert_allclose(frame.Q.T @ frame.Q, np.eye(p), atol=1e-12)
+        np.testing.assert_allclose(frame.Q @ frame.R, rows, atol=1e-11 * np.abs(rows).max())
+    base = equations.base.copy()
+    base[:, 1] *= 2.0
+    held = replace(equations, base=base, free=equations)
+    assert held.factors[0] is equations.factors[0]
+    np.testing.assert_allclose(held.factors[1].Q @ held.factors[1].R, base[:, 1], atol=1e-11)
 
 
 def test_what_remains_is_told_apart_by_joint(equations_for, heavy):

@@ -1,0 +1,126 @@
+"""Least squares with the inertial parameters projected out.
+
+Rows are scaled by the standard deviation of their joint. The change w of the inertial parameters
+has the prior N(0, I); with the prior as p more rows, `Q` spans what it can explain, and columns
+are compared by what is left of them. Source: Golub and Pereyra 1973 for the projection of linear
+coefficients while the shapes are searched.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from sgp_ros.diagnosis.compare.equations import Equations
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Scaled equations and what inertial parameters explain of them.
+
+    Attributes:
+        sigma: (k,) scale of the rows [N m or N].
+        S: orthonormal coefficients of the bases of the joints, (r_j, p) each, and of the prior,
+            (p, p): `Q = diag(Q_1, ..., Q_k, I) S`, see `compare.factors`.
+        R: (p, p) upper triangular, `Q R = [B / sigma; I]`.
+        is_free: whether inertial parameters may differ; else p is 0 here.
+        own: (N k + p, m) more orthonormal columns that are projected out.
+        given: (N k + p,) what is left of the target, where it is known.
+    """
+
+    equations: Equations
+    sigma: np.ndarray
+    S: tuple[np.ndarray, ...]
+    R: np.ndarray
+    is_free: bool
+    own: np.ndarray | None = None
+    given: np.ndarray | None = None
+
+    @classmethod
+    def of(cls, equations: Equations, sigma: np.ndarray, *, is_free: bool) -> Frame:
+        """Return the frame for rows of these standard deviations."""
+        factors = equations.factors
+        p = equations.base.shape[2] if is_free else 0
+        parts = [f.R[:, :p] / s for f, s in zip(factors, sigma, strict=True)]
+        S, R = np.linalg.qr(np.concatenate([*parts, np.eye(p)]))
+        ends = np.cumsum([len(part) for part in parts])
+        return cls(equations, sigma, tuple(np.split(S, ends)), R, is_free)
+
+    @property
+    def Q(self) -> np.ndarray:  # noqa: N802  # as in the equations
+        """Orthonormal basis of what is projected out, (N k + p, p) or with `own` more columns."""
+        N, k = self.equations.d.shape
+        rows = np.empty((N, k, self.R.shape[1]))
+        for j, factor in enumerate(self.equations.factors):
+            rows[:, j] = factor.Q @ self.S[j]
+        Q = np.concatenate([rows.reshape(N * k, -1), self.S[-1]])
+        return Q if self.own is None else np.concatenate([Q, self.own], axis=1)
+
+    @cached_property
+    def y(self) -> np.ndarray:
+        """What is left of the target, (N k + p,)."""
+        if self.given is not None:
+            return self.given
+        return self.projected(self.equations.d[:, :, None])[:, 0]
+
+    def projected(self, columns: np.ndarray) -> np.ndarray:
+        """Return what inertial parameters leave of filtered columns (N, k, m), (N k + p, m)."""
+        N, k, m = columns.shape
+        x = np.zeros((N * k + len(self.S[-1]), m))
+        scaled = columns / self.sigma[:, None]
+        if self.is_free:
+            u = self._explained(scaled)
+            for j, factor in enumerate(self.equations.factors):
+                scaled[:, j] -= factor.Q @ (self.S[j] @ u)
+            x[N * k :] = -self.S[-1] @ u
+        x[: N * k] = scaled.reshape(N * k, m)
+        return x if self.own is None else x - self.own @ (self.own.T @ x)
+
+    def _explained(self, scaled: np.ndarray) -> np.ndarray:
+        """Return the products of the basis with scaled columns (N, k, m), (p, m)."""
+        u = np.zeros((self.R.shape[1], scaled.shape[2]))
+        for j, factor in enumerate(self.equations.factors):
+            if scaled[:, j].any():
+                u += self.S[j].T @ (factor.Q.T @ scaled[:, j])
+        return u
+
+    def beyond(self, y: np.ndarray, A: np.ndarray) -> Frame:
+        """Return the frame that also projects out columns A (N k + p, m), which this one did.
+
+        For searches beside effects that keep their shapes; `R` stays that of the bodies.
+
+        Args:
+            y: (N k + p,) target, less forces that are given.
+            A: columns.
+        """
+        if not A.shape[1]:
+            return replace(self, given=y)
+        own = np.linalg.qr(A / np.sqrt((A * A).sum(axis=0) + 1e-300))[0]
+        return replace(self, own=own, given=y - own @ (own.T @ y))
+
+    def by_joint(self, residual: np.ndarray) -> np.ndarray:
+        """Return the mean squares of a residual (N k + p,) per joint, unscaled, (k,)."""
+        N, k = self.equations.d.shape
+        return (residual[: N * k].reshape(N, k) ** 2).mean(axis=0) * self.sigma**2
+
+    def parameters(self, unexplained: np.ndarray) -> np.ndarray:
+        """Return w (p,) that explains best what effects (N, k) leave of the target."""
+        if not self.is_free:
+            return np.zeros(self.equations.base.shape[2])
+        u = self._explained((unexplained / self.sigma)[:, :, None])
+        return np.linalg.solve(self.R, u[:, 0])
+
+    @property
+    def occam(self) -> float:
+        """What free inertial parameters cost in evidence, `log det R` [nats]."""
+        return float(np.log(np.abs(np.diag(self.R))).sum())
+
+    @property
+    def determined(self) -> int:
+        """Number of combinations of inertial parameters that the data tell more of than the prior.
+
+        Their singular values of `[B / sigma; I]` are above the square root of two.
+        """
+        return int((np.linalg.svd(self.R, compute_uv=False) > np.sqrt(2.0)).sum())

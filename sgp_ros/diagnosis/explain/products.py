@@ -1,0 +1,130 @@
+"""Products that tell what a trial adds to a model, without a fit.
+
+With B an orthonormal basis of what bodies and effects explain, r what they leave, and x the
+columns of a trial, of which only the rows of one joint differ from zero,
+`|r - (x - B B^T x) c|^2` follows for each joint from `x^T x`, `B^T x`, `x^T r` and the products of
+B with itself and with r, joint by joint. The part of B that is due to bodies follows from small
+products that no scale changes, so that N rows are gone through once for each column.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.explain.candidates import split
+from sgp_ros.diagnosis.explain.fitted_model import Model, floors
+from sgp_ros.diagnosis.explain.frame import Frame
+from sgp_ros.diagnosis.explain.regression import Columns, Seen
+
+_UNSEEN = 1e-13
+"""Part of a column's square below which it counts as explained."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """What a model leaves, in one frame, with products of the basis B of what it explains.
+
+    B has the P columns `[Q, own]`, Q that of the bodies.
+
+    Attributes:
+        frame: scaled equations.
+        r: (N, k) residual.
+        own: (N, k, m) orthonormal beside Q together with the rows of the prior: what effects add.
+        BB: (k, P, P) products of the basis with itself, joint by joint.
+        Br: (k, P) products of the basis and the residual, joint by joint.
+    """
+
+    frame: Frame
+    r: np.ndarray
+    own: np.ndarray
+    BB: np.ndarray
+    Br: np.ndarray
+
+    @classmethod
+    def of(cls, columns: Columns, model: Model, dry: frozenset[int]) -> Rest:
+        """Return what a model leaves where dry friction may hold some joints."""
+        frame = Frame.of(columns.equations(dry), model.sigma, is_free=model.is_free)
+        y, A, _ = split(frame, columns, model.effects, model.w)
+        own = np.zeros((len(y), 0))
+        if A.shape[1]:
+            own = np.linalg.qr(A / np.sqrt((A * A).sum(axis=0) + 1e-300))[0]
+            y = y - own @ (own.T @ y)
+        N, k = frame.equations.d.shape
+        r, F = y[: N * k].reshape(N, k), own[: N * k].reshape(N, k, -1)
+        p = frame.R.shape[1]
+        P = p + F.shape[2]
+        BB, Br = np.empty((k, P, P)), np.empty((k, P))
+        for j, factor in enumerate(frame.equations.factors):
+            S, f = frame.S[j], F[:, j]
+            BB[j, :p, :p], BB[j, p:, p:] = S.T @ S, f.T @ f
+            BB[j, :p, p:] = S.T @ (factor.Q.T @ f)
+            BB[j, p:, :p] = BB[j, :p, p:].T
+            Br[j, :p], Br[j, p:] = S.T @ (factor.Q.T @ r[:, j]), f.T @ r[:, j]
+        return cls(frame, r, F, BB, Br)
+
+    @property
+    def equations(self) -> Equations:
+        """The equations of the frame."""
+        return self.frame.equations
+
+    @cached_property
+    def left(self) -> np.ndarray:
+        """Mean squares of the residual, (k,) [N^2 m^2 or N^2]."""
+        return np.asarray((self.r**2).mean(axis=0) * self.frame.sigma**2)
+
+    @cached_property
+    def floor(self) -> np.ndarray:
+        """Least mean squares that count, (k,) [N^2 m^2 or N^2]."""
+        return floors(self.equations)
+
+
+@dataclass(frozen=True, eq=False)
+class Products:
+    """Products of columns, less what the model explains of them, with themselves and the residual.
+
+    Attributes:
+        own: (k, m, m), joint by joint.
+        cross: (k, m) with the residual, joint by joint.
+        G: (m, m) over all rows.
+        b: (m,) with the residual over all rows.
+    """
+
+    own: np.ndarray
+    cross: np.ndarray
+    G: np.ndarray
+    b: np.ndarray
+
+    @classmethod
+    def of(cls, rest: Rest, seen: Seen) -> Products:
+        """Return those of filtered columns."""
+        frame, m = rest.frame, seen.x.shape[-1]
+        k, P = rest.Br.shape
+        p = frame.R.shape[1]
+        Bx, xx, xr = np.zeros((k, P, m)), np.zeros((k, m, m)), np.zeros((k, m))
+        for j, x in seen.rows.items():
+            s = frame.sigma[j]
+            if p:
+                Bx[j, :p] = frame.S[j].T @ seen.explained[j] / s
+            Bx[j, p:], xr[j] = rest.own[:, j].T @ x / s, x.T @ rest.r[:, j] / s
+            xx[j] = seen.squares[j] / s**2
+        u = Bx.sum(axis=0)  # (P, m)
+        shared = Bx.transpose(0, 2, 1) @ u  # (k, m, m)
+        own = xx - shared - shared.transpose(0, 2, 1) + u.T @ (rest.BB @ u)
+        G = xx.sum(axis=0) - u.T @ u
+        G[np.diag_indices(m)] = np.where(
+            np.diag(G) > _UNSEEN * np.diag(xx.sum(axis=0)), np.diag(G), np.inf
+        )
+        return cls(own, xr - rest.Br @ u, G, xr.sum(axis=0))
+
+    def coefficients(self) -> np.ndarray:
+        """Return the least squares (m,); zero for columns that are explained already."""
+        if len(self.b) == 1:
+            return self.b / self.G[0]
+        size = np.sqrt(np.diag(self.G))
+        G = np.where(np.isfinite(self.G), self.G, 0.0) / np.outer(size, size)
+        G[np.diag_indices(len(size))] = np.isfinite(size)
+        return np.asarray(np.linalg.lstsq(G, self.b / size, rcond=_UNSEEN)[0] / size)
