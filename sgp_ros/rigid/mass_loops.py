@@ -1,10 +1,11 @@
 """Compiled mass matrix of a kinematic tree by composite bodies.
 
-All bodies beyond a joint move with it as one. In the axes of the root, about its origin, their
-inertias simply add up: mass m, first moment h and moment of inertia I. A unit motion of the joint,
-turning w and sliding s there, takes the force `m s + w x h` and the moment `h x s + I w`; every
-joint between it and the root feels its component along the motion that this one permits. No
-function of another module is called, because the cache of compiled code watches this one alone.
+All bodies beyond a joint move with it as one: mass m, first moment h and moment of inertia I about
+the origin of the joint, in its axes, to which those of the bodies beyond are added. A unit motion
+of the joint, turning w or sliding s, takes the force `m s + w x h` and the moment `h x s + I w`;
+handed down to the root, it is felt by every joint on the way along the motion that this one
+permits. A joint that nothing resists has an inertia of zero, without rounding. No function of
+another module is called, because the cache of compiled code watches this one alone.
 
 Source: Featherstone 2008, Rigid Body Dynamics Algorithms, section 6.2.
 """
@@ -26,86 +27,77 @@ _compiled: Callable[[Any], Any] = njit(cache=True, error_model='numpy')
 def fill_mass(g: Geometry, q: np.ndarray, parameters: np.ndarray, M: np.ndarray) -> None:
     """Add the mass matrices (n, k, k) of positions (n, b) to `M`."""
     b = len(g.order)
-    world, origin = np.zeros((b + 1, 3, 3)), np.zeros((b + 1, 3))
-    for r in range(3):
-        world[b, r, r] = 1.0
-    motion, composite, wrench = np.zeros((b, 6)), np.zeros((b + 1, 10)), np.zeros(6)
+    turn, place = np.zeros((b, 3, 3)), np.zeros((b, 3))
+    composite, wrench = np.zeros((b + 1, 10)), np.zeros(6)
     for sample in range(len(q)):
-        composite[:] = 0.0
-        for i in g.order:
-            _place(g, q[sample, i], i, world, origin, motion[i])
+        composite[:b], composite[b] = parameters, 0.0
         for i in g.order[::-1]:
-            _add_body(parameters[i], world[i], origin[i], composite[i])
-            for t in range(10):
-                composite[g.parents[i], t] += composite[i, t]
-            _unit_wrench(composite[i], motion[i], wrench)
+            _place(g, q[sample, i], i, turn[i], place[i])
+            _add_body(composite[i], turn[i], place[i], composite[g.parents[i]])
+        for i in g.order:
+            _unit_wrench(g, i, composite[i], wrench)
             row, j = g.rows[i], i
             while j < b:
                 felt = 0.0
-                for t in range(6):
-                    felt += motion[j, t] * wrench[t]
+                first = 0 if g.slidings[j] else 3
+                for t in range(3):
+                    felt += g.axes[j, t] * wrench[first + t]
+                felt *= g.gains[i] * g.gains[j]
                 M[sample, g.rows[j], row] += felt
                 if j != i:
                     M[sample, row, g.rows[j]] += felt
+                _hand_down(turn[j], place[j], wrench)
                 j = g.parents[j]
 
 
 @_compiled
-def _place(
-    g: Geometry, q: float, i: int, world: np.ndarray, origin: np.ndarray, motion: np.ndarray
-) -> None:
-    """Set rotation and origin of body i in the root, and the motion (6,) of its joint there.
-
-    Turning and sliding of the point at the root's origin, per position of the joint it follows.
-    """
-    j = g.parents[i]
-    slides = g.slidings[i]
-    s, c = (0.0, 0.0) if slides else (np.sin(q), 1.0 - np.cos(q))
-    world[i] = 0.0
+def _place(g: Geometry, q: float, i: int, turn: np.ndarray, place: np.ndarray) -> None:
+    """Set rotation and origin of body i in the frame of the body it hangs on."""
+    s, c = (0.0, 0.0) if g.slidings[i] else (np.sin(q), 1.0 - np.cos(q))
     for t in range(3):
-        place = g.starts[i, t] + q * g.slides[i, t]
-        for r in range(3):
-            origin[i, r] = (origin[j, r] if t == 0 else origin[i, r]) + world[j, r, t] * place
+        place[t] = g.starts[i, t] + q * g.slides[i, t]
         for u in range(3):
-            turn = g.turns[i, 0, t, u] + s * g.turns[i, 1, t, u] + c * g.turns[i, 2, t, u]
-            for r in range(3):
-                world[i, r, u] += world[j, r, t] * turn
-    motion[:] = 0.0
-    first = 3 if slides else 0
-    for r in range(3):
-        for t in range(3):
-            motion[first + r] += g.gains[i] * world[i, r, t] * g.axes[i, t]
-    if not slides:
-        x, y, z = origin[i]
-        motion[3] = y * motion[2] - z * motion[1]
-        motion[4] = z * motion[0] - x * motion[2]
-        motion[5] = x * motion[1] - y * motion[0]
+            turn[t, u] = g.turns[i, 0, t, u] + s * g.turns[i, 1, t, u] + c * g.turns[i, 2, t, u]
+
+
+@_compiled
+def _hand_down(turn: np.ndarray, place: np.ndarray, wrench: np.ndarray) -> None:
+    """Turn force and moment (6,) of a body into those of the body it hangs on, in its frame."""
+    a, b, c, d, e, f = wrench
+    fx = turn[0, 0] * a + turn[0, 1] * b + turn[0, 2] * c
+    fy = turn[1, 0] * a + turn[1, 1] * b + turn[1, 2] * c
+    fz = turn[2, 0] * a + turn[2, 1] * b + turn[2, 2] * c
+    x, y, z = place
+    wrench[0], wrench[1], wrench[2] = fx, fy, fz
+    wrench[3] = turn[0, 0] * d + turn[0, 1] * e + turn[0, 2] * f + y * fz - z * fy
+    wrench[4] = turn[1, 0] * d + turn[1, 1] * e + turn[1, 2] * f + z * fx - x * fz
+    wrench[5] = turn[2, 0] * d + turn[2, 1] * e + turn[2, 2] * f + x * fy - y * fx
 
 
 @_compiled
 def _add_body(
-    parameters: np.ndarray, world: np.ndarray, origin: np.ndarray, total: np.ndarray
+    parameters: np.ndarray, turn: np.ndarray, place: np.ndarray, total: np.ndarray
 ) -> None:
-    """Add the inertial parameters of a body, about the origin of the root in its axes."""
+    """Add the inertial parameters of a body to those of the body it hangs on, in its frame."""
     mass = parameters[0]
-    fx, fy, fz = 0.0, 0.0, 0.0  # first moment about the body's origin
+    fx, fy, fz = 0.0, 0.0, 0.0  # first moment about its origin
     for t in range(3):
-        fx += world[0, t] * parameters[1 + t]
-        fy += world[1, t] * parameters[1 + t]
-        fz += world[2, t] * parameters[1 + t]
-    px, py, pz = origin
+        fx += turn[0, t] * parameters[1 + t]
+        fy += turn[1, t] * parameters[1 + t]
+        fz += turn[2, t] * parameters[1 + t]
+    px, py, pz = place
     total[0] += mass
     total[1] += fx + mass * px
     total[2] += fy + mass * py
     total[3] += fz + mass * pz
     xx, yy, zz = 2.0 * fx * px + mass * px * px, 2.0 * fy * py + mass * py * py, 2.0 * fz * pz
     zz += mass * pz * pz
-    total[4] += _turned(parameters, world[0], world[0]) + yy + zz
-    total[5] += _turned(parameters, world[0], world[1]) - fx * py - px * fy - mass * px * py
-    total[6] += _turned(parameters, world[1], world[1]) + xx + zz
-    total[7] += _turned(parameters, world[0], world[2]) - fx * pz - px * fz - mass * px * pz
-    total[8] += _turned(parameters, world[1], world[2]) - fy * pz - py * fz - mass * py * pz
-    total[9] += _turned(parameters, world[2], world[2]) + xx + yy
+    total[4] += _turned(parameters, turn[0], turn[0]) + yy + zz
+    total[5] += _turned(parameters, turn[0], turn[1]) - fx * py - px * fy - mass * px * py
+    total[6] += _turned(parameters, turn[1], turn[1]) + xx + zz
+    total[7] += _turned(parameters, turn[0], turn[2]) - fx * pz - px * fz - mass * px * pz
+    total[8] += _turned(parameters, turn[1], turn[2]) - fy * pz - py * fz - mass * py * pz
+    total[9] += _turned(parameters, turn[2], turn[2]) + xx + yy
 
 
 @_compiled
@@ -120,13 +112,15 @@ def _turned(parameters: np.ndarray, u: np.ndarray, v: np.ndarray) -> float:
 
 
 @_compiled
-def _unit_wrench(total: np.ndarray, motion: np.ndarray, wrench: np.ndarray) -> None:
-    """Set moment and force (6,) that a motion (6,) takes, about the origin of the root."""
+def _unit_wrench(g: Geometry, i: int, total: np.ndarray, wrench: np.ndarray) -> None:
+    """Set force and moment (6,) that a unit motion of joint i takes."""
     mass, hx, hy, hz, xx, xy, yy, xz, yz, zz = total
-    x, y, z, u, v, w = motion
-    wrench[0] = xx * x + xy * y + xz * z + hy * w - hz * v
-    wrench[1] = xy * x + yy * y + yz * z + hz * u - hx * w
-    wrench[2] = xz * x + yz * y + zz * z + hx * v - hy * u
-    wrench[3] = mass * u + y * hz - z * hy
-    wrench[4] = mass * v + z * hx - x * hz
-    wrench[5] = mass * w + x * hy - y * hx
+    x, y, z = g.axes[i]
+    if g.slidings[i]:
+        wrench[0], wrench[1], wrench[2] = mass * x, mass * y, mass * z
+        wrench[3], wrench[4], wrench[5] = hy * z - hz * y, hz * x - hx * z, hx * y - hy * x
+        return
+    wrench[0], wrench[1], wrench[2] = y * hz - z * hy, z * hx - x * hz, x * hy - y * hx
+    wrench[3] = xx * x + xy * y + xz * z
+    wrench[4] = xy * x + yy * y + yz * z
+    wrench[5] = xz * x + yz * y + zz * z

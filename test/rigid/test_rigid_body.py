@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pinocchio
@@ -156,3 +157,16 @@ def test_motions_of_another_shape_are_refused():
         torque_regressor(tree, q[:, :2], v[:, :2], a[:, :2])
     with pytest.raises(ValueError, match='3 joints'):
         torque_regressor(tree, q, v[1:], a)
+
+
+def test_a_joint_that_nothing_resists_has_no_inertia():
+    """A point mass on the axis of the last joint: zero without rounding, as its file states it."""
+    tree, _, q, _, _ = _world(3, 6, 0)
+    tree, parameters = replace(tree, is_prismatic=np.zeros(6, bool)), tree.parameters.copy()
+    last = int(np.flatnonzero(~np.isin(np.arange(6), tree.parents))[0])
+    on_axis = 0.3 * tree.axes[last]
+    moments = 2.0 * (np.eye(3) * (on_axis @ on_axis) - np.outer(on_axis, on_axis))
+    parameters[last] = [2.0, *(2.0 * on_axis), *moments[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]]
+    M = mass_matrix(tree, parameters, q)
+    assert np.abs(M[:, last, last]).max() <= 1e-15
+    assert np.abs(M[:, last]).max() <= 1e-15

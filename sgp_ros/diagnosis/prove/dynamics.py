@@ -109,10 +109,12 @@ class DiagnosedDynamics:
         """Return the fastest rate at which a small deviation changes in these states [1/s].
 
         The largest eigenvalue of the linearised equations, by differences; infinite where these
-        have no finite solution.
+        have no finite solution, such as of a body without inertia.
         """
         m, k = q.shape
         M, drive = self.equations(q, v, loads)
+        if not (np.isfinite(M).all() and np.linalg.det(M).all()):
+            return np.inf
         away = np.where(v < 0.0, -1.0, 1.0)  # a difference never crosses a reversal
         A = np.zeros((m, 2 * k, 2 * k))
         A[:, :k, k:] = np.eye(k)
