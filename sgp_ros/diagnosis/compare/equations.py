@@ -18,7 +18,6 @@ from functools import cached_property
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.factors import Factor
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
@@ -41,6 +40,32 @@ _OTHER_PLACES = {index: name for name, index in PLACES.items()}
 
 POSES = 32
 """Positions over which the inertia of a robot is averaged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Factor:
+    """Base of one joint (N, p) as `Q @ R`, which no scale of its rows changes.
+
+    A frame scales the rows of each joint by another number. Only the small triangles are factored
+    again then: `[R_1 / s_1; ...; R_k / s_k; I] = S R` gives the basis `diag(Q_1, ..., Q_k, I) S`
+    of all rows, orthonormal to rounding. O(k p^3) a frame instead of O(N k p^2).
+
+    Attributes:
+        Q: (N, r) orthonormal, of the columns that are not zero.
+        R: (r, p).
+    """
+
+    Q: np.ndarray
+    R: np.ndarray
+
+    @classmethod
+    def of(cls, base: np.ndarray) -> Factor:
+        """Return the factor of a base (N, p)."""
+        seen = np.flatnonzero(base.any(axis=0))
+        Q, own = np.linalg.qr(base[:, seen])
+        R = np.zeros((len(own), base.shape[1]))
+        R[:, seen] = own
+        return cls(Q, R)
 
 
 @dataclass(frozen=True, eq=False)

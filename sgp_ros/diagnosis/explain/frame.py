@@ -23,7 +23,7 @@ class Frame:
     Attributes:
         sigma: (k,) scale of the rows [N m or N].
         S: orthonormal coefficients of the bases of the joints, (r_j, p) each, and of the prior,
-            (p, p): `Q = diag(Q_1, ..., Q_k, I) S`, see `compare.factors`.
+            (p, p): `Q = diag(Q_1, ..., Q_k, I) S`, see `Factor`.
         R: (p, p) upper triangular, `Q R = [B / sigma; I]`.
         is_free: whether inertial parameters may differ; else p is 0 here.
         own: (N k + p, m) more orthonormal columns that are projected out.
