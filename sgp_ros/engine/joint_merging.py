@@ -30,7 +30,7 @@ _LONGEST_GAP_NS = 10_000_000_000
 _SLOWER = 1.5
 _RETURN = 4.0
 _LEAST_STEP = 1e-3
-_MOST_ORDERS = 1000
+_MOST_ORDERS = 100
 _MOST_PARTS = 5000
 """Messages of a source that wait for the others at most, whose clock may be another one."""
 

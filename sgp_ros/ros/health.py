@@ -19,6 +19,8 @@ from sgp_ros.recordings.messages import Status
 from sgp_ros.ros.verdict import ERROR, OK, Arrivals, judge
 
 _DURATIONS = 2000
+_MOST_NAMES, _MOST_TEXT = 200, 400
+"""Joints and characters of a message that are remembered: it may hold any number of them."""
 _LONGEST_DELAY_S = 60.0
 
 
@@ -57,12 +59,12 @@ class Health:
 
     def note_joints(self, sample: JointSample) -> None:
         """Note what a message named, and which of its joints had no effort."""
-        self.seen_joints = sample.names
+        self.seen_joints = sample.names[:_MOST_NAMES]
         if sample.effort is None:
-            self.without_effort = sample.names
+            self.without_effort = self.seen_joints
         elif np.isnan(sample.effort).any():
             is_unknown = np.isnan(sample.effort)
-            self.without_effort = tuple(np.array(sample.names)[is_unknown].tolist())
+            self.without_effort = tuple(np.array(sample.names)[is_unknown][:_MOST_NAMES].tolist())
         else:
             self.without_effort = ()
 
@@ -99,7 +101,7 @@ class Health:
     def note_unreadable(self, error: MessageError) -> None:
         """Note a message that is no sample."""
         self._unreadable += 1
-        self._unreadable_reason = str(error)
+        self._unreadable_reason = str(error)[:_MOST_TEXT]
 
     def statuses(
         self,
