@@ -78,10 +78,12 @@ def _locked(path: Path) -> Iterator[None]:
                 f'{path.parent} is being written to by another run ({who})',
                 'a folder of its own for each', 'choose another one with --out, or wait',
             ) from error  # fmt: skip
-        os.ftruncate(handle, 0)
-        os.pwrite(handle, f'process {os.getpid()}\n'.encode(), 0)
-        yield
-        path.unlink(missing_ok=True)
+        try:
+            os.ftruncate(handle, 0)
+            os.pwrite(handle, f'process {os.getpid()}\n'.encode(), 0)
+            yield
+        finally:
+            path.unlink(missing_ok=True)
     finally:
         os.close(handle)
 

@@ -90,7 +90,7 @@ def test_results_appear_together_or_not_at_all(tmp_path):
     with pytest.raises(ZeroDivisionError):
         _fail(tmp_path, a='newer')
     assert (tmp_path / 'a').read_text() == 'new'
-    assert not list(tmp_path.glob('.sgp_growing_*'))
+    assert [path.name for path in tmp_path.glob('.*')] == ['.sgp_replay.json']
 
 
 def test_every_writer_of_results_waits_for_the_others(tmp_path):
