@@ -6,6 +6,7 @@ accepted states is not decided here: online they fill windows, offline whole str
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -287,11 +288,9 @@ def _chosen(values: np.ndarray | None, order: np.ndarray | None) -> np.ndarray |
 def _are_numbers(values: np.ndarray) -> bool:
     """Return whether all numbers (m,) are smaller than `GREATEST`.
 
-    A sum of squares tells it of all at once, in the usual case.
+    Their norm tells it of all at once, in the usual case.
     """
-    with np.errstate(over='ignore', invalid='ignore'):
-        square = values.dot(values)
-    return bool(square < GREATEST) or bool((np.abs(values) < GREATEST).all())
+    return math.hypot(*values.tolist()) < GREATEST or bool((np.abs(values) < GREATEST).all())
 
 
 def _may_count(values: np.ndarray) -> bool:

@@ -44,6 +44,7 @@ class Autoregression:
         self.products = np.zeros((k, size, size + 1))
         self.error_covariance = np.zeros((k, k))
         self.past = np.zeros((0, k))
+        self._coefficients: np.ndarray | None = None
 
     @property
     def coefficients(self) -> np.ndarray:
@@ -52,6 +53,11 @@ class Autoregression:
         The ridge is relative to each column, so no unit enters; a signal that rests at zero has
         coefficients of zero.
         """
+        if self._coefficients is None:
+            self._coefficients = self._solved()
+        return self._coefficients
+
+    def _solved(self) -> np.ndarray:
         size = np.sqrt(np.diagonal(self.products[:, :, :-1], axis1=1, axis2=2))
         size = np.where(size > 0.0, size, 1.0)
         A = self.products[:, :, :-1] / (size[:, :, None] * size[:, None, :])
@@ -82,6 +88,7 @@ class Autoregression:
                 change = np.outer(error, error) - self.error_covariance
                 self.error_covariance = self.error_covariance + share * change
             self.products = self.products + rows[:, :, None] * np.column_stack([rows, x])[:, None]
+            self._coefficients = None
         self.n += 1
         step = x - self.mean
         self.mean = self.mean + step / self.n
@@ -98,6 +105,7 @@ class Autoregression:
         """Continue exactly where `state` was taken."""
         for name in _ARRAYS:
             setattr(self, name, np.array(state[name]))
+        self._coefficients = None
         self.n, self.errors = (int(count) for count in state['counts'])
 
     def _rows(self) -> np.ndarray:
