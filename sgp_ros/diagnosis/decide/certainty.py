@@ -28,7 +28,7 @@ from sgp_ros.diagnosis.decide.cross_validation import without
 from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision, Scale
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
 from sgp_ros.diagnosis.explain.comparison import Comparison
-from sgp_ros.diagnosis.explain.credibility import is_credible
+from sgp_ros.diagnosis.explain.credibility import is_credible, is_sound
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.result import Difference, Finding
 from sgp_ros.physics.parts import JOINT, MOTOR
@@ -64,7 +64,7 @@ class Probabilities:
         scale, asserted = self.scale, self.asserted
         if min(model.shares) <= COUNTED_SHARE:
             return 'one of its effects is too small to count as physics'
-        if not scale.is_sound(model):
+        if not is_sound(model):
             return 'its effects cancel each other or the bodies'
         losses = {
             'bodies that differ more than is likely': 0.5

@@ -27,7 +27,6 @@ from sgp_ros.diagnosis.criteria import (
     FLOOR_SHARE,
     INDEPENDENT_ROWS,
     LEAST_SHARE,
-    MOST_OPPOSED,
     NOTHING_EXPLAINED,
     PER_EFFECT,
     PER_PARAMETER,
@@ -37,7 +36,7 @@ from sgp_ros.diagnosis.criteria import (
 )
 from sgp_ros.diagnosis.decide.cross_validation import repeatable, structure, supported, without
 from sgp_ros.diagnosis.explain.comparison import Comparison
-from sgp_ros.diagnosis.explain.credibility import is_credible
+from sgp_ros.diagnosis.explain.credibility import is_credible, is_sound
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.physics.parts import JOINT, MOTOR
 
@@ -150,13 +149,7 @@ class Scale:
 
     def counts(self, model: Model) -> bool:
         """Return whether effects are large enough, credible, and do not cancel each other."""
-        is_large = self.is_sound(model) and min(model.shares) > COUNTED_SHARE
-        return is_large and is_credible(model)
-
-    def is_sound(self, model: Model) -> bool:
-        """Return whether effects do not merely cancel each other, or the bodies."""
-        there = max(min(model.net_share, float(self.nominal.sum())), 1e-12)
-        return sum(model.filtered_shares) < MOST_OPPOSED * there
+        return min(model.shares) > COUNTED_SHARE and is_credible(model)
 
     def fit(self, model: Model) -> float:
         """Return the tempered log likelihood, with the prior of the bodies' change [nats].
@@ -187,7 +180,7 @@ def _ranked(comparison: Comparison, scale: Scale) -> list[Model]:
     """
     models = (*comparison.singles, *comparison.pairs, *comparison.more)
     least = comparison.base.score + EVIDENCE
-    sound = [m for m in models if m.score > least and scale.is_sound(m)]
+    sound = [m for m in models if m.score > least and is_sound(m)]
     ranked = sorted(sound, key=scale.worth, reverse=True)
     if ranked and max(ranked[0].shares) < COUNTED_SHARE:
         return []

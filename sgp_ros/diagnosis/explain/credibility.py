@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sgp_ros.diagnosis.criteria import SLIGHT_REST
+from sgp_ros.diagnosis.criteria import MOST_OPPOSED, SLIGHT_REST
 from sgp_ros.diagnosis.explain.fitted_model import Model, beyond_plain
 from sgp_ros.diagnosis.explain.screening import WIDEST, are_apart
 from sgp_ros.physics.effect_at import EffectAt
@@ -12,14 +12,22 @@ from sgp_ros.robots.observed_motion import ObservedMotion
 
 
 def is_credible(model: Model) -> bool:
-    """Return whether all effects have signs, sizes and regions that they can have."""
+    """Return whether all effects have signs, sizes and regions that they can have together."""
     motion = model.frame.equations.motion
     is_finite = model.is_possible() and bool(np.isfinite(model.score))
-    is_finite = is_finite and are_apart(model.effects, motion)
+    is_finite = is_finite and are_apart(model.effects, motion) and is_sound(model)
     power = model.frame.equations.power
     return is_finite and all(
         _is_confined(s, motion) and _is_needed(s, motion, power) for s in model.effects
     )
+
+
+def is_sound(model: Model) -> bool:
+    """Return whether effects do not merely cancel each other, or the bodies."""
+    equations = model.frame.equations
+    nominal = float(((equations.d**2).mean(axis=0) / equations.power).sum())
+    there = max(min(model.net_share, nominal), 1e-12)
+    return sum(model.filtered_shares) < MOST_OPPOSED * there
 
 
 def _is_needed(s: EffectAt, motion: ObservedMotion, power: np.ndarray) -> bool:
