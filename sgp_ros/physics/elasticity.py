@@ -32,6 +32,8 @@ _MOST_OF_LINK = 0.95
 _LEAST_OF_LINK = 0.005
 _SOFTEST_HZ = 1.0
 """Frequency of the link on its spring below which no joint is a joint."""
+_SOFT = 0.9
+"""Part of that softness from which on a fit has run into its bound."""
 _SETTLING = 0.2
 """Longest ratio of damping to stiffness, relative to the period of the softest spring."""
 _WIDER = 2.0
@@ -159,7 +161,11 @@ class JointElasticity(Effect):
         }  # fmt: skip
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
-        return bool(at.shape[0] > 0.0 and at.shape[1] > 0.0 and at.shape[2] >= 0.0)
+        """Return whether it is a spring; a fit that ends at the softest one is something else."""
+        softest = self.bounds(motion, at.place)[1][1]
+        return bool(
+            at.shape[0] > 0.0 and 0.0 < at.shape[1] < _SOFT * softest and at.shape[2] >= 0.0
+        )
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         return np.asarray(shape[1] * _of_softness(motion, place, shape))
