@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.equations import Equations, make_equations
+from sgp_ros.diagnosis.compare.equations import Equations, joint_name, make_equations
 from sgp_ros.diagnosis.compare.sufficiency import require_rows
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth
 from sgp_ros.diagnosis.criteria import (
@@ -32,6 +32,7 @@ from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.evidence import Probe
 from sgp_ros.diagnosis.setup.search import Connection, search
 from sgp_ros.diagnosis.shown import Predictions
+from sgp_ros.physics.catalogue import TORQUE_GAIN
 from sgp_ros.physics.parts import MOTOR
 from sgp_ros.rigid.tree import Tree
 
@@ -80,7 +81,8 @@ class Connected:
         """Return the worth of what is decided, as the density of the recorded motion [nats].
 
         Errors are relative to what the motors deliver, be their gain a law of the motor or an
-        error of the connection.
+        error of the connection. Of position targets nothing that is delivered is known, and errors
+        are absolute.
 
         Args:
             nominal: (k,) shares of the discrepancy whose shape is only nearly right; the same
@@ -95,9 +97,11 @@ class Connected:
         driven = equations.motion.tree.is_actuated[: delivered.shape[1]]
         power = np.maximum((delivered**2).mean(axis=0), 1e-12 * equations.power)
         power = np.where(driven, power, equations.power)
+        order = range(len(power)) if self.correction is None else self.correction.effort_order
+        if self.recordings.learned.gains is not None:
+            power = recorded[list(order)]
         scale = Scale.of(equations, self.several.comparison)
         worth = replace(scale, nominal=nominal, power=power).worth(model)
-        order = range(len(power)) if self.correction is None else self.correction.effort_order
         volume = 0.5 * float(np.log(recorded[list(order)] / power)[driven].sum())
         if self.correction is not None:
             volume -= float(np.log(np.abs(self.correction.scale)).sum())
@@ -129,10 +133,23 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
     if is_open or plain.several.decision.verdict == 'no_mismatch':
         return plain
     bandwidth = choose_bandwidth(recordings.learned, tree)
-    found = search(Probe(recordings.learned, tree, bandwidth))
+    tried = plain
+    # gains can be told from bodies that are known alone
+    for knows_bodies in (True, False) if recordings.learned.gains is not None else (False,):
+        probe = Probe(recordings.learned, tree, bandwidth, knows_bodies=knows_bodies)
+        tried = _connected(plain, search(probe), tree, progress)
+        if tried.findings:
+            break
+    return tried
+
+
+def _connected(
+    plain: Connected, found: Connection, tree: Tree, progress: Callable[[float], None]
+) -> Connected:
+    """Return the recordings with errors of the connection undone where that is worth it."""
     if not found.errors:
         return plain
-    correction = found.errors[-1].correction
+    recordings, correction = plain.recordings, found.errors[-1].correction
     corrected = replace(
         compared(recordings.corrected(correction), correction.tree(tree), progress),
         correction=correction,
@@ -147,7 +164,8 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
         # on the same band: what is slower has less noise
         cutoff = corrected.equations.filter.cutoff
         gain = _gain(compared(recordings, tree, progress, cutoff), corrected) - price
-    if gain < PER_EFFECT:
+    least = -ALIKE if _stands_for_gains(plain, found) else PER_EFFECT
+    if gain < least:
         return plain if gain < -ALIKE else _beside(plain, found, gain)
     return replace(
         corrected,
@@ -155,6 +173,18 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
         equivalents=_equal(found),
         remarks=(*(e.remedy for e in found.errors), *recordings.remarks),
     )
+
+
+def _stands_for_gains(plain: Connected, found: Connection) -> bool:
+    """Return whether the gain of a motor stands for the gains of its drive, which are both scaled.
+
+    Where commands are position targets, the motor that multiplies them is the drive.
+    """
+    named = {e.hypothesis.joint for e in found.errors if 'kp' in e.hypothesis.names}
+    motion = plain.equations.motion
+    scaled = {joint_name(motion, s.place.joint) for s in plain.several.decision.model.effects
+              if s.name == TORQUE_GAIN.name}  # fmt: skip
+    return plain.recordings.learned.gains is not None and bool(named & scaled)
 
 
 def _gain(plain: Connected, corrected: Connected) -> float:

@@ -30,6 +30,11 @@ class Acting:
     damping: np.ndarray
     other: np.ndarray
 
+    def size(self, kp: np.ndarray | float, kd: np.ndarray | float) -> np.ndarray:
+        """Return the mean squares of the parts behind factors of the gains, summed, (k,)."""
+        parts = (kp * self.proportional) ** 2 + (kd * self.damping) ** 2 + self.other**2
+        return np.asarray(np.maximum(parts.mean(axis=0), 1e-300))
+
     def rows(self, rows: np.ndarray) -> Acting:
         """Return some of the rows."""
         return Acting(self.proportional[rows], self.damping[rows], self.other[rows])
@@ -75,14 +80,6 @@ class Correction:
         origins = b'' if self.origins is None else self.origins.tobytes()
         columns = (self.order.tobytes(), self.offset.tobytes(), self.scale.tobytes())
         return *columns, self.roll, self.pitch, origins
-
-    def log_volume(self, driven: np.ndarray) -> float:
-        """Return by how much the density of recorded accelerations exceeds that of true ones.
-
-        At the same relative error of the recorded efforts of the driven joints (k,) [nats].
-        """
-        effort = np.log(np.abs(self.effort_scale[driven])).sum()
-        return float(effort - np.log(np.abs(self.scale)).sum())
 
     def tree(self, tree: Tree) -> Tree:
         """Return the robot as it stands."""

@@ -14,6 +14,7 @@ from itertools import combinations, product
 import numpy as np
 
 from sgp_ros.diagnosis.setup.correction import Correction
+from sgp_ros.physics.catalogue import COMMAND_DELAY
 from sgp_ros.physics.drive import Servo
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -29,6 +30,7 @@ _UNITS = (1e-3, 1.0 / 9.80665, 100.0 / 9.80665, 1e3)
 """Recorded per SI unit of force: k, kgf, kgf cm, m."""
 _ANGLES = (-2.4, -1.6, -0.8, -0.2, -0.03, 0.03, 0.2, 0.8, 1.6, 2.4)
 _CLOCKS = (-0.3, -0.1, -0.03, -0.008, 0.008, 0.03, 0.1, 0.3)
+_DELAYS = np.geomspace(0.002, 0.12, 24)
 _TURNS = (-0.1, 0.1, 0.5 * math.pi, -0.5 * math.pi, math.pi)
 
 _REMEDIES = {
@@ -55,11 +57,12 @@ class Hypothesis:
         names: of its numbers.
         units: of its numbers.
         starts: (s, m) numbers to start from; m = 0 where there is nothing to estimate.
-        steps: (m,) first steps of a search [units].
+        steps: (m,) first steps of a search [units]; of scales and delays relative to these.
         applied: returns a correction with the error of these numbers (m,) undone too.
         words: parameters that are no numbers.
         is_possible: whether it can have these numbers (m,).
         canonical: returns the one of several equal sets of numbers (m,) that is reported.
+        is_physics: whether it is none, but hides errors of the connection as long as it is there.
     """
 
     effect: str
@@ -72,6 +75,7 @@ class Hypothesis:
     words: Mapping[str, str] = field(default_factory=dict)
     is_possible: Callable[[np.ndarray], bool] = lambda _: True
     canonical: Callable[[np.ndarray], np.ndarray] = lambda x: x
+    is_physics: bool = False
 
     def remedy(self, values: Mapping[str, float]) -> str:
         """Return what to do about the error of these numbers, a sentence."""
@@ -102,6 +106,8 @@ def hypotheses(motion: ObservedMotion) -> list[Hypothesis]:
         found.append(_effort_scale(driven, ALL))
     if driven:
         found.append(_clock(has_commands=motion.drive is not None))
+    if isinstance(motion.drive, Servo):
+        found.append(_late_targets())
     turning = [j for j in joints if not tree.is_prismatic[j]]
     if len(turning) > 1:
         found.append(_position_scale(turning, ALL, (DEGREES, 1.0 / DEGREES)))
@@ -195,6 +201,15 @@ def _clock(*, has_commands: bool) -> Hypothesis:
         'clock_offset', ALL, ('offset',), ('s',), _column(starts), np.array([0.004]),
         lambda c, x: replace(c, clock=c.clock + float(x[0])),
         is_possible=lambda x: bool(x[0] > 0.0) or not has_commands,
+    )  # fmt: skip
+
+
+def _late_targets() -> Hypothesis:
+    """Return the delay of targets, beside which gains are another law than without."""
+    return Hypothesis(
+        COMMAND_DELAY.name, ALL, ('delay',), ('s',), _column(_DELAYS), np.array([0.05]),
+        lambda c, x: replace(c, clock=c.clock - float(x[0])),
+        is_possible=lambda x: bool(x[0] > 0.0), is_physics=True,
     )  # fmt: skip
 
 

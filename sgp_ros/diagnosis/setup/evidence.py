@@ -5,13 +5,16 @@ parameters and, per joint, viscous and dry friction and an offset, each with a w
 The evidence is that of the recorded motion and efforts, with b integrated out (Laplace), for the
 nominal robot alone, with bodies, and with friction too; the best of the three counts, so that an
 error of the connection must explain what none of them does.
+
+Beside open bodies the size of all efforts is open too, and so are the gains of drives, where no
+effort is measured: these are looked for with known bodies, beside rotors and dry friction in the
+place of bodies and friction. Viscous friction is left out there: with `kd` it is one law.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -20,6 +23,7 @@ from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, observe
 from sgp_ros.diagnosis.criteria import INDEPENDENT_ROWS, SHAPE_ERROR
 from sgp_ros.diagnosis.setup.correction import Acting, Correction, delayed
+from sgp_ros.diagnosis.setup.unknowns import Unknowns
 from sgp_ros.physics.drive import Servo
 from sgp_ros.rigid.rigid_body import mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
@@ -45,7 +49,7 @@ class Agreement:
 
     Attributes:
         evidence: logarithm, best of the sets of unknowns [nats].
-        unknowns: number of the set that is best: 0 none, 1 bodies, 2 bodies and friction.
+        unknowns: number of the set that is best: 0 none, 1 bodies or rotors, 2 friction too.
         left: (k,) share of the mean squared effort that is left with them.
         discrepancy: (N, k) from the nominal robot, relative to the rms effort of each joint.
     """
@@ -63,12 +67,20 @@ class Agreement:
 class Probe:
     """A recording on which corrections are tried.
 
+    Args:
+        raw: the recording.
+        tree: nominal robot.
+        bandwidth: of the filters.
+        knows_bodies: whether the bodies are those of the robot.
+
     Attributes:
         full: its motion at the full rate.
         motion: the same, thinned.
     """
 
-    def __init__(self, raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth) -> None:
+    def __init__(
+        self, raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth, *, knows_bodies: bool = False
+    ) -> None:
         motion = observe(raw, tree, bandwidth)
         every = max(1, int(1.0 / (raw.step * _PER_PERIOD * bandwidth.cutoff)))
         self._raw, self.every = raw, every
@@ -95,8 +107,10 @@ class Probe:
         self._pose = np.linspace(0, len(pick) - 1, 24).astype(int)
         M = mass_matrix(tree, tree.parameters, self.motion.position[self._pose])
         self.nominal_inertia = float(np.linalg.slogdet(M)[1].mean())
+        inertia = self.motion.mass_diagonal.mean(axis=0)
+        self._rotors = np.diag(inertia) if knows_bodies else None
         self._known: dict[float, Acting] = {}
-        self._columns: dict[tuple[object, ...], _Unknowns] = {}
+        self._columns: dict[tuple[object, ...], Unknowns] = {}
         self._Y: np.ndarray | None = None  # fresh memory costs more than the computation
 
     def acting(self, clock: float) -> Acting:
@@ -127,10 +141,11 @@ class Probe:
         motion = correction.motion(self.motion, self.acting(correction.clock))
         unknowns = self._unknowns_of(correction.moves, motion)
         d = unknowns.nominal - self.filter(motion.effort + motion.stated_force)
-        power = self.power[correction.effort_order] / correction.effort_scale**2
-        power = np.where(self.driven, power, self.power)
+        power = self._delivered(motion, correction)
         rms = np.sqrt(power)
-        volume = correction.log_volume(self.driven)
+        # by how much the density of recorded accelerations exceeds that of relative errors
+        volume = -0.5 * float(np.log(power / self.power)[self.driven].sum())
+        volume -= float(np.log(np.abs(correction.scale)).sum())
         found = []
         for value, left, w in self._with(d, unknowns, power):
             shift = self._log_inertia(motion.tree, w, motion.position[self._pose]) + volume
@@ -138,26 +153,50 @@ class Probe:
         best = max(range(3), key=lambda i: found[i][0])
         return Agreement(found[best][0], best, found[best][1], d / rms)
 
-    def _unknowns_of(self, key: tuple[object, ...], motion: ObservedMotion) -> _Unknowns:
+    def _delivered(self, motion: ObservedMotion, correction: Correction) -> np.ndarray:
+        """Return the size of the efforts to which errors are relative, (k,) mean squares.
+
+        What gains make of errors of position and velocity cancels for the most part, and what is
+        wrong with them does not: neither a delay nor a filter makes less of it. With known bodies
+        the size of efforts is known too.
+        """
+        if not isinstance(self.full.drive, Servo):
+            power = (motion.effort**2).mean(axis=0)
+        elif self._rotors is not None:
+            power = self.power
+        else:
+            acting = self.acting(correction.clock)
+            stated = acting.size(1.0, 1.0)
+            power = self.power * acting.size(correction.kp, correction.kd) / stated
+            power = power[correction.effort_order] / correction.effort_scale**2
+        return np.where(self.driven & (power > 0.0), power, self.power)
+
+    def _unknowns_of(self, key: tuple[object, ...], motion: ObservedMotion) -> Unknowns:
         """Return the columns of a motion; corrections of efforts alone leave them as they are."""
         if key not in self._columns:
             if len(self._columns) >= _MOTIONS:
                 self._columns.clear()
             q, v, a = motion.position, motion.velocity, motion.acceleration
             self._Y = torque_regressor(motion.tree, q, v, a, self._Y)
-            self._columns[key] = _Unknowns.of(motion, self._Y, self.filter, self.directions)
+            found = Unknowns.of(motion, self._Y, self.filter, self.directions)
+            if self._rotors is not None:
+                found = found.of_known_bodies(self.filter(a), self._rotors)
+            self._columns[key] = found
         return self._columns[key]
 
     def _log_inertia(self, tree: Tree, w: np.ndarray, poses: np.ndarray) -> float:
-        """Return the mean of log det M of changed bodies less that of the nominal robot."""
-        changed = tree.parameters + (w @ self.directions).reshape(tree.parameters.shape)
-        M = mass_matrix(tree, changed, poses)
+        """Return the mean of log det M of changed bodies or rotors less the nominal one."""
+        if self._rotors is None:
+            changed = tree.parameters + (w @ self.directions).reshape(tree.parameters.shape)
+            M = mass_matrix(tree, changed, poses)
+        else:
+            M = mass_matrix(tree, tree.parameters, poses) + self._rotors * w
         if not np.isfinite(M).all() or np.linalg.eigvalsh(M)[:, 0].min() <= 0.0:
             return -np.inf
         return float(np.linalg.slogdet(M)[1].mean()) - self.nominal_inertia
 
     def _with(
-        self, d: np.ndarray, unknowns: _Unknowns, power: np.ndarray
+        self, d: np.ndarray, unknowns: Unknowns, power: np.ndarray
     ) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
         """Yield the evidence of efforts, what is left, and changes of bodies.
 
@@ -184,84 +223,6 @@ class Probe:
             share = variance / power
             value = -0.5 * rows * float(np.log(share).sum()) - 0.5 * float(b @ b) - occam
             yield value, (left**2).mean(axis=0) / power, b[:p] if count else np.zeros(p)
-
-
-@dataclass(frozen=True, eq=False)
-class _Products:
-    """Products of the columns of p bodies and three everyday forces, joint by joint.
-
-    Attributes:
-        G: (k, p + 3, p + 3) with themselves.
-        g: (k, p + 3) with the discrepancy.
-    """
-
-    G: np.ndarray
-    g: np.ndarray
-
-    def weighted(self, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the sums over joints with weights (k,), (P, P) and (P,) for P = p + 3 k."""
-        k, p = len(weight), self.G.shape[1] - 3
-        G, g = self.G * weight[:, None, None], self.g * weight[:, None]
-        A, b = np.zeros((p + 3 * k, p + 3 * k)), np.zeros(p + 3 * k)
-        A[:p, :p], b[:p] = G[:, :p, :p].sum(axis=0), g[:, :p].sum(axis=0)
-        for j in range(k):
-            own = slice(p + 3 * j, p + 3 * j + 3)
-            A[:p, own], A[own, :p], A[own, own] = G[j, :p, p:], G[j, p:, :p], G[j, p:, p:]
-            b[own] = g[j, p:]
-        return A, b
-
-
-@dataclass(frozen=True, eq=False)
-class _Unknowns:
-    """Filtered efforts of a motion, by everyday unknowns.
-
-    Attributes:
-        nominal: (N, k) of the nominal robot [N m or N].
-        bodies: (N, k, p) per standard deviation of each inertial parameter's change.
-        friction: (N, k, 3) of a unit of viscous and dry friction and of an offset at each joint.
-    """
-
-    nominal: np.ndarray
-    bodies: np.ndarray
-    friction: np.ndarray
-
-    @classmethod
-    def of(
-        cls, motion: ObservedMotion, regressor: np.ndarray, low: ParallelFilter,
-        directions: np.ndarray,
-    ) -> _Unknowns:  # fmt: skip
-        """Return those of a motion with its regressor (n, k, 10 b), behind a filter."""
-        tree, v = motion.tree, motion.velocity
-        k = tree.size
-        Y = low(regressor)
-        nominal = Y @ tree.parameters.ravel() + low(tree.damping[:k] * v)
-        bodies = -(Y.reshape(len(Y) * k, -1) @ directions.T).reshape(len(Y), k, -1)
-        size = np.maximum(np.sqrt((v * v).mean(axis=0)), 1e-12)
-        friction = np.stack([v / size, motion.direction, np.ones_like(v)], axis=2)
-        return cls(nominal, bodies, low(friction))
-
-    @cached_property
-    def _squares(self) -> np.ndarray:
-        X = np.concatenate([self.bodies, self.friction], axis=2).transpose(1, 0, 2)
-        return X.transpose(0, 2, 1) @ X
-
-    def products(self, d: np.ndarray, size: np.ndarray) -> _Products:
-        """Return the products for a discrepancy (N, k) and forces of these sizes (k,)."""
-        k, p = d.shape[1], self.bodies.shape[2]
-        scale = np.ones((k, p + 3))
-        scale[:, p:] = size[:, None]
-        g = np.empty((k, p + 3))
-        for j in range(k):
-            g[j, :p], g[j, p:] = self.bodies[:, j].T @ d[:, j], self.friction[:, j].T @ d[:, j]
-        return _Products(self._squares * scale[:, :, None] * scale[:, None, :], g * scale)
-
-    def force(self, b: np.ndarray, size: np.ndarray) -> np.ndarray:
-        """Return the efforts of unknowns b (p,) or (p + 3 k,), (N, k) [N m or N]."""
-        k, p = self.bodies.shape[1:]
-        found = self.bodies @ b[:p]
-        if len(b) > p:
-            found += (self.friction * (b[p:].reshape(k, 3) * size[:, None])).sum(axis=2)
-        return found
 
 
 def _spread(raw: RawTrajectory, every: int) -> list[np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,25 +68,70 @@ class Connection:
 
 
 def search(probe: Probe) -> Connection:
-    """Return the errors that explain what bodies and everyday friction do not."""
+    """Return the errors that explain what bodies and everyday friction do not.
+
+    A delay of targets looks like other gains of every drive, so that a search one by one would
+    not come back to it: where it is worth its price, a second search begins with it.
+    """
     none = Correction.none(probe.motion.tree.size)
-    start = now = probe.agreement(none)
-    errors: list[Tried] = []
+    start = probe.agreement(none)
     rivals: dict[tuple[str, str, tuple[str, ...]], tuple[Tried, ...]] = {}
-    correction = none
-    for _ in range(_MOST):
+    chains = [_grown(probe, [], start, rivals)]
+    for h in hypotheses(probe.full):
+        first = _physics(probe, h) if h.is_physics else None
+        if first is not None and first.worth > start.evidence + PER_EFFECT:
+            rivals[h.key] = ()
+            chains.append(_grown(probe, [first], first.agreement, rivals))
+    errors = _of_the_connection(probe, max(chains, key=lambda c: _worth(c, start)))
+    return Connection(tuple(errors), tuple(rivals[e.hypothesis.key] for e in errors), start)
+
+
+def _physics(probe: Probe, h: Hypothesis) -> Tried:
+    """Return physics of one number, searched from where it leaves least of each joint.
+
+    With wrong gains at another joint the evidence of all has its best elsewhere.
+    """
+    none = Correction.none(probe.motion.tree.size)
+    left = np.array([probe.agreement(h.applied(none, x)).left for x in h.starts])  # (s, k)
+    starts = h.starts[np.unique(left.argmin(axis=0))]
+    return max((_refined(probe, none, h, x) for x in starts), key=lambda t: t.worth)
+
+
+def _worth(errors: Sequence[Tried], start: Agreement) -> float:
+    """Return the evidence with all errors undone less their prices [nats]."""
+    price = sum(PER_EFFECT + PER_PARAMETER * len(e.numbers) for e in errors)
+    return (errors[-1].agreement if errors else start).evidence - price
+
+
+def _grown(
+    probe: Probe, errors: list[Tried], now: Agreement,
+    rivals: dict[tuple[str, str, tuple[str, ...]], tuple[Tried, ...]],
+) -> list[Tried]:  # fmt: skip
+    """Return errors with those that are worth their price beside them, one after the other."""
+    for _ in range(_MOST - len(errors)):
         known = [e.hypothesis.key for e in errors]
+        correction = errors[-1].correction if errors else Correction.none(probe.motion.tree.size)
         ranked = _ranked(probe, correction, now, known)
         if not ranked or ranked[0].worth < now.evidence + PER_EFFECT:
             break
-        errors.append(ranked[0])
+        errors = [*errors, ranked[0]]
         rivals[ranked[0].hypothesis.key] = tuple(ranked[1:])
         if len(errors) > 1:
             errors = _together(probe, errors)
         if errors[-1].agreement.evidence <= now.evidence:
             break
-        correction, now = errors[-1].correction, errors[-1].agreement
-    return Connection(tuple(errors), tuple(rivals[e.hypothesis.key] for e in errors), start)
+        now = errors[-1].agreement
+    return errors
+
+
+def _of_the_connection(probe: Probe, errors: Sequence[Tried]) -> list[Tried]:
+    """Return errors without the physics beside them, which stays to be found."""
+    correction, kept = Correction.none(probe.motion.tree.size), []
+    for e in errors:
+        if not e.hypothesis.is_physics:
+            correction = e.hypothesis.applied(correction, e.numbers)
+            kept.append(replace(e, correction=correction))
+    return kept
 
 
 def _together(probe: Probe, errors: list[Tried]) -> list[Tried]:
@@ -164,8 +210,8 @@ def _parabola(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> n
 
 
 def _steps(h: Hypothesis, x: np.ndarray) -> np.ndarray:
-    """Return steps of a search; a factor is searched in steps relative to itself."""
-    return h.steps * np.abs(x) if 'scale' in h.names else h.steps
+    """Return steps of a search; factors and delays are searched in steps relative to these."""
+    return h.steps * np.abs(x) if 'scale' in h.names or h.is_physics else h.steps
 
 
 def _refined(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> Tried:

@@ -1,5 +1,6 @@
 """Errors of how a robot was connected are found, with their numbers, before any physics."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -30,8 +31,9 @@ def _raw(case):
     return collect(events, nominal.robot, nominal.stated, gains=gains), tree
 
 
-def _found(raw, tree):
-    return search(Probe(raw, tree, choose_bandwidth(raw, tree))).errors
+def _found(raw, tree, *, knows_bodies=False):
+    probe = Probe(raw, tree, choose_bandwidth(raw, tree), knows_bodies=knows_bodies)
+    return search(probe).errors
 
 
 @pytest.mark.parametrize(
@@ -57,6 +59,16 @@ def test_friction_is_no_error_of_the_connection(folder):
 
 def test_a_delay_of_targets_is_physics_and_not_a_clock():
     assert not _found(*_raw(CASES / 'case_09'))
+
+
+def test_gains_are_found_beside_a_delay_of_the_targets():
+    """The delay stays: it is physics, but every gain looks wrong as long as it is there."""
+    raw, tree = _raw(CASES / 'case_08')
+    late = replace(raw, drive=raw.drive.changed(lambda targets: targets, -0.02))
+    (error,) = _found(late, tree, knows_bodies=True)
+    assert error.hypothesis.key == ('gain_scale', 'shoulder', ())
+    assert error.numbers == pytest.approx([0.8, 1.0], abs=0.02)
+    assert error.correction.clock == 0.0
 
 
 def test_what_corrects_an_error_makes_the_recording_agree():

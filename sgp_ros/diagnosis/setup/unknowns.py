@@ -1,0 +1,100 @@
+"""Columns of the everyday unknowns beside which errors of a connection are looked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
+from sgp_ros.robots.observed_motion import ObservedMotion
+
+
+@dataclass(frozen=True, eq=False)
+class Products:
+    """Products of the columns of p bodies and three everyday forces, joint by joint.
+
+    Attributes:
+        G: (k, p + 3, p + 3) with themselves.
+        g: (k, p + 3) with the discrepancy.
+    """
+
+    G: np.ndarray
+    g: np.ndarray
+
+    def weighted(self, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the sums over joints with weights (k,), (P, P) and (P,) for P = p + 3 k."""
+        k, p = len(weight), self.G.shape[1] - 3
+        G, g = self.G * weight[:, None, None], self.g * weight[:, None]
+        A, b = np.zeros((p + 3 * k, p + 3 * k)), np.zeros(p + 3 * k)
+        A[:p, :p], b[:p] = G[:, :p, :p].sum(axis=0), g[:, :p].sum(axis=0)
+        for j in range(k):
+            own = slice(p + 3 * j, p + 3 * j + 3)
+            A[:p, own], A[own, :p], A[own, own] = G[j, :p, p:], G[j, p:, :p], G[j, p:, p:]
+            b[own] = g[j, p:]
+        return A, b
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """Filtered efforts of a motion, by everyday unknowns.
+
+    Attributes:
+        nominal: (N, k) of the nominal robot [N m or N].
+        bodies: (N, k, p) per standard deviation of each inertial parameter's change.
+        friction: (N, k, 3) of a unit of viscous and dry friction and of an offset at each joint.
+    """
+
+    nominal: np.ndarray
+    bodies: np.ndarray
+    friction: np.ndarray
+
+    @classmethod
+    def of(
+        cls, motion: ObservedMotion, regressor: np.ndarray, low: ParallelFilter,
+        directions: np.ndarray,
+    ) -> Unknowns:  # fmt: skip
+        """Return those of a motion with its regressor (n, k, 10 b), behind a filter."""
+        tree, v = motion.tree, motion.velocity
+        k = tree.size
+        Y = low(regressor)
+        nominal = Y @ tree.parameters.ravel() + low(tree.damping[:k] * v)
+        bodies = -(Y.reshape(len(Y) * k, -1) @ directions.T).reshape(len(Y), k, -1)
+        size = np.maximum(np.sqrt((v * v).mean(axis=0)), 1e-12)
+        friction = np.stack([v / size, motion.direction, np.ones_like(v)], axis=2)
+        return cls(nominal, bodies, low(friction))
+
+    def of_known_bodies(self, acceleration: np.ndarray, rotors: np.ndarray) -> Unknowns:
+        """Return those with rotors for bodies, and without viscous friction.
+
+        Args:
+            acceleration: filtered (N, k).
+            rotors: typical inertias of the joints, (k, k) diagonal.
+        """
+        friction = self.friction.copy()
+        friction[:, :, 0] = 0.0
+        return replace(self, bodies=-acceleration[:, :, None] * rotors, friction=friction)
+
+    @cached_property
+    def _squares(self) -> np.ndarray:
+        X = np.concatenate([self.bodies, self.friction], axis=2).transpose(1, 0, 2)
+        return X.transpose(0, 2, 1) @ X
+
+    def products(self, d: np.ndarray, size: np.ndarray) -> Products:
+        """Return the products for a discrepancy (N, k) and forces of these sizes (k,)."""
+        k, p = d.shape[1], self.bodies.shape[2]
+        scale = np.ones((k, p + 3))
+        scale[:, p:] = size[:, None]
+        g = np.empty((k, p + 3))
+        for j in range(k):
+            g[j, :p], g[j, p:] = self.bodies[:, j].T @ d[:, j], self.friction[:, j].T @ d[:, j]
+        return Products(self._squares * scale[:, :, None] * scale[:, None, :], g * scale)
+
+    def force(self, b: np.ndarray, size: np.ndarray) -> np.ndarray:
+        """Return the efforts of unknowns b (p,) or (p + 3 k,), (N, k) [N m or N]."""
+        k, p = self.bodies.shape[1:]
+        found = self.bodies @ b[:p]
+        if len(b) > p:
+            found += (self.friction * (b[p:].reshape(k, 3) * size[:, None])).sum(axis=2)
+        return found
