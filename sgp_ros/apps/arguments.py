@@ -157,6 +157,7 @@ def _add_identify(add: AddCommand) -> None:
                         help='of the low-pass (default: chosen from the data)')  # fmt: skip
     parser.add_argument('--inputs', nargs='+', metavar='NAME',
                         help='what Z sees, such as own:velocity or every:velocity')  # fmt: skip
+    _add_gains(parser, has_sim=False)
 
 
 def _add_diagnose(add: AddCommand) -> None:

@@ -12,14 +12,15 @@ import numpy as np
 
 from sgp_ros.apps.held_rollouts import best_coefficients, roll_out_held
 from sgp_ros.apps.identified_robot import nominal_coefficients, write_identified
+from sgp_ros.apps.recorded import checked, gains_of, read_events, refuse_moving_base
 from sgp_ros.apps.terminal import strong, warned
 from sgp_ros.batch.identification import HELD_OUT, Identification, IdentificationOptions, identify
 from sgp_ros.batch.signals import Signals, collect_signals
+from sgp_ros.diagnosis.gathered import Knowledge, driven, suspected
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.gp.scores import INTERVAL_95
-from sgp_ros.recordings.reader import open_recording
 from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.report.findings import collect_findings
 from sgp_ros.report.identification import write_identification
@@ -32,6 +33,7 @@ from sgp_ros.report.identification_text import (
     verdict,
 )
 from sgp_ros.report.next_steps import Steps, after_identification, ending
+from sgp_ros.robots.nominal import Nominal, nominal_model
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
 
@@ -50,6 +52,7 @@ class IdentifyOptions:
         share: how much of it.
         stretch: length of alternate stretches [s].
         cutoff: of the low-pass [Hz]; None chooses from the data.
+        gains: YAML file of the gains of drives whose commands are positions; None for efforts.
     """
 
     tests: Sequence[str] = ()
@@ -61,6 +64,7 @@ class IdentifyOptions:
     share: float = 0.4
     stretch: float = 6.0
     cutoff: float | None = None
+    gains: str | None = None
 
     @property
     def identification(self) -> IdentificationOptions:
@@ -126,9 +130,10 @@ def identify_recording(
     chosen = IdentifyOptions(**options)
     model = load_robot(robot)
     remarks: list[str] = []
-    signals = read_signals(bag, model, chosen, remarks)
+    nominal = _nominal(model)
+    signals = read_signals(bag, model, chosen, remarks, nominal)
     tests = {
-        name: read_signals(path, model, chosen, remarks)
+        name: read_signals(path, model, chosen, remarks, nominal)
         for name, path in names_of_tests(chosen.tests).items()
     }
     progress(0.1)
@@ -191,23 +196,47 @@ def names_of_tests(tests: Sequence[str]) -> dict[str, str]:
     return named
 
 
-def read_signals(bag: str, robot: Robot, options: IdentifyOptions, remarks: list[str]) -> Signals:
-    """Return the signals of a recording; what is odd about it is appended to `remarks`."""
-    recording = open_recording(bag)
-    events = recording.events(options.joint_states, options.command)
+def read_signals(
+    bag: str, robot: Robot, options: IdentifyOptions, remarks: list[str],
+    nominal: Nominal | None = None,
+) -> Signals:  # fmt: skip
+    """Return the signals of a recording, checked; what is odd about it is appended to `remarks`.
+
+    Args:
+        bag: the recording.
+        robot: that it shows.
+        options: how it is read.
+        remarks: of the user.
+        nominal: the robot with known bodies, against which the connection is checked, and for
+            which gains make efforts of targets; None without.
+
+    Raises:
+        RecordingError: nothing can be used, or the recording contradicts itself.
+    """
+    refuse_moving_base(bag)
+    said: list[str] = []
+    events = read_events(bag, options.joint_states, options.command, said)
+    config = EngineConfig(effort_source=EFFORT_SOURCES[options.effort])
     try:
-        signals = collect_signals(
-            events, robot, EngineConfig(effort_source=EFFORT_SOURCES[options.effort])
-        )
+        gains = None if nominal is None else gains_of(options.gains, nominal, events, said)
+        checked({Path(bag).stem: events}, robot, gains, said)
+        if nominal is not None:
+            known = Knowledge(nominal.robot, nominal.stated, config, gains)
+            said += suspected(events, nominal.tree, known)
+            events = events if gains is None else driven(events, nominal.tree, known)
+        signals = collect_signals(events, robot, config)
     except RecordingError as error:
         raise RecordingError(f'{bag}: {error.found}', error.expected, error.remedy) from error
-    remarks += recording.remarks
-    remarks += [
-        f'{bag}: {count} messages could not be read: {why}'
-        for why, count in recording.unreadable.items()
-    ]
-    remarks += [f'{bag}: {remark}' for remark in signals.remarks]
+    remarks += [f'{bag}: {remark}' for remark in (*said, *signals.remarks)]
     return signals
+
+
+def _nominal(robot: Robot) -> Nominal | None:
+    """Return the robot with known bodies; None where it has none."""
+    try:
+        return nominal_model(robot)
+    except ConfigError:
+        return None
 
 
 def print_findings(findings: Mapping[str, Any]) -> None:

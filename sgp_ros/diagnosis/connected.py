@@ -36,6 +36,8 @@ from sgp_ros.physics.catalogue import TORQUE_GAIN
 from sgp_ros.physics.parts import MOTOR
 from sgp_ros.rigid.tree import Tree
 
+_CORRECTED = 'All that follows is said of the recording corrected so.'
+
 
 @dataclass(frozen=True, eq=False)
 class Connected:
@@ -171,7 +173,7 @@ def _connected(
         corrected,
         findings=tuple(_finding(found, i, gain) for i in range(len(found.errors))),
         equivalents=_equal(found),
-        remarks=(*(e.remedy for e in found.errors), *recordings.remarks),
+        remarks=(*(f'{e.remedy} {_CORRECTED}' for e in found.errors), *recordings.remarks),
     )
 
 

@@ -10,11 +10,21 @@ import numpy as np
 from sgp_ros.diagnosis.compare.settled import collect_settled
 from sgp_ros.diagnosis.compare.several import join
 from sgp_ros.diagnosis.compare.sufficiency import at_rest, require_motion
-from sgp_ros.diagnosis.compare.trajectory import RawTrajectory, collect
+from sgp_ros.diagnosis.compare.trajectory import (
+    Bandwidth,
+    RawTrajectory,
+    choose_bandwidth,
+    collect,
+    observe,
+)
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE
 from sgp_ros.diagnosis.prove.held_out import HELD_OUT, keep_back
 from sgp_ros.diagnosis.setup.correction import Correction
+from sgp_ros.diagnosis.setup.evidence import Probe
+from sgp_ros.diagnosis.setup.search import search
 from sgp_ros.engine.config import EngineConfig
-from sgp_ros.engine.samples import Event
+from sgp_ros.engine.samples import Event, JointSample, frozen_array
+from sgp_ros.errors import RecordingError
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.gains import Gains
@@ -138,3 +148,44 @@ def _kept_back(
     said = dict.fromkeys(remark for _, _, remarks in parts for remark in remarks)
     learned = join([part for part, _, _ in parts])
     return learned, {HELD_OUT: join(kept)} if kept else {}, tuple(said)
+
+
+def driven(events: Iterable[Event], tree: Tree, known: Knowledge) -> list[Event]:
+    """Return a recording of position control as one of efforts: those that its gains make.
+
+    Args:
+        events: with targets.
+        tree: nominal robot.
+        known: with the gains.
+    """
+    raw = known.collected(events)
+    if raw.gains is None:
+        return list(events)
+    rate = 1.0 / raw.step
+    motion = observe(raw, tree, Bandwidth(0.4 * rate, 0.4 * rate))
+    return [
+        JointSample(raw.start_ns + round(t * 1e9), tree.moving_names, *map(frozen_array, rows))
+        for t, *rows in zip(raw.time, raw.position, motion.velocity, motion.effort, strict=True)
+    ]
+
+
+def suspected(events: Iterable[Event], tree: Tree, known: Knowledge) -> tuple[str, ...]:
+    """Return what to check of how a robot is connected before its bodies are estimated.
+
+    Looked for only where bodies and everyday friction leave what counts as physics. What cannot
+    be looked at is refused by those who need it.
+
+    Args:
+        events: of a recording.
+        tree: nominal robot.
+        known: what is known beside it.
+    """
+    try:
+        raw = known.collected(events)
+    except RecordingError:
+        return ()
+    probe = Probe(raw, tree, choose_bandwidth(raw, tree))
+    left = probe.agreement(Correction.none(tree.size)).left.max()
+    if left < COUNTED_SHARE or not probe.full.effort.any():
+        return ()
+    return tuple(f'Check how the robot is connected. {e.remedy}' for e in search(probe).errors)

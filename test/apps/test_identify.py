@@ -12,8 +12,11 @@ from sgp_ros.apps.held_rollouts import stretches_of
 from sgp_ros.apps.identify import IdentifyOptions, names_of_tests, read_signals
 from sgp_ros.batch.identification import HELD_OUT, IdentificationOptions, identify
 from sgp_ros.cli import main
-from sgp_ros.engine.samples import frozen_array
+from sgp_ros.engine.samples import POSITION, CommandSample, JointSample, frozen_array
 from sgp_ros.physics.term import Motion
+from sgp_ros.recordings.messages import JOINT_STATE
+from sgp_ros.recordings.reader import open_recording
+from sgp_ros.recordings.writer import RecordingWriter
 from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import nominal_robot
@@ -28,6 +31,7 @@ from test.batch.arm_world import (
 from test.report.pages import content_of
 
 SAMPLES = arm_samples(rate=50.0)
+KP, KD, STEP_NS = 40.0, 3.0, 5_000_000
 STILL = frozen_array([0.2, 0.3])
 FILES = {
     'identification.json', 'robot_identified.yaml', 'robot_identified.urdf', 'report.html',
@@ -298,3 +302,53 @@ def _refused(command, capsys):
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 1, lines
     return lines[0]
+
+
+SWING = """<mujoco model="swing"><worldbody><body pos="0 0 1">
+<joint name="hinge" axis="0 1 0" damping="0.2"/>
+<geom type="capsule" fromto="0 0 0 0 0 -.4" size=".03" mass="1.5"/></body></worldbody>
+<actuator><motor joint="hinge"/></actuator></mujoco>"""
+
+
+@pytest.fixture(scope='module')
+def swing(tmp_path_factory):
+    """Return a folder with a recording of efforts, and the same motion as one of targets."""
+    folder = tmp_path_factory.mktemp('swing')
+    (folder / 'swing.xml').write_text(SWING)
+    words = ['simulate', folder / 'swing.xml', '--duration', 8, '--rate', 200, '--out', folder]
+    assert main([str(x) for x in words]) == 0
+    events = list(open_recording(folder / 'swing.mcap').events())
+    states = {e.stamp_ns: e for e in events if isinstance(e, JointSample)}
+    with RecordingWriter(folder / 'targets.mcap', command_type=JOINT_STATE) as writer:
+        for e in events:
+            if isinstance(e, CommandSample) and e.stamp_ns in states:
+                now, then = states[e.stamp_ns], states.get(e.stamp_ns + STEP_NS)
+                then = now if then is None else then
+                q, v = now.position + then.position, now.velocity + then.velocity
+                target = q / 2.0 + (e.effort + KD * v / 2.0) / KP
+                writer.write_event(CommandSample(e.stamp_ns, target, ('hinge',), POSITION))
+                writer.write_event(replace(now, effort=None))
+    (folder / 'gains.yaml').write_text(f'kp: {{hinge: {KP}}}\nkd: {{hinge: {KD}}}\n')
+    return folder
+
+
+def test_targets_become_efforts_by_their_gains(swing, tmp_path):
+    """Damping and the moment of gravity follow from targets as from efforts."""
+    out = tmp_path / 'out'
+    words = _command(swing / 'targets.mcap', swing / 'swing.xml', out)
+    assert main([*words, '--gains', str(swing / 'gains.yaml')]) == 0
+    content = json.loads((out / 'identification.json').read_text())
+    found = {p['name']: p['value'] for p in content['parameters'] if p['std']}
+    assert found['hinge.viscous'] == pytest.approx(0.2, abs=0.01)
+    assert found['body_1.mz'] == pytest.approx(-1.5 * 0.2, abs=0.003)
+
+
+def test_a_wrong_connection_is_said_before_bodies_are_estimated(swing, tmp_path, capsys):
+    """A recording that contradicts the robot is checked as it is before a diagnosis."""
+    with RecordingWriter(tmp_path / 'turned.mcap') as writer:
+        for e in open_recording(swing / 'swing.mcap').events():
+            is_state = isinstance(e, JointSample)
+            writer.write_event(replace(e, position=-e.position + 0.9) if is_state else e)
+    out = tmp_path / 'out'
+    assert main(_command(tmp_path / 'turned.mcap', swing / 'swing.xml', out)) == 0
+    assert 'Check how the robot is connected.' in (out / 'report.html').read_text()

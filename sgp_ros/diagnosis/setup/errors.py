@@ -44,7 +44,6 @@ _REMEDIES = {
     'joint_origin': 'Move the origin of {joint} by ({x:.4g}, {y:.4g}, {z:.4g}) m.',
     'gain_scale': 'The drive of {joint} has {kp:.3g} times the stated kp, {kd:.3g} times kd.',
 }
-_CORRECTED = ' All that follows is said of the recording corrected so.'
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +78,7 @@ class Hypothesis:
 
     def remedy(self, values: Mapping[str, float]) -> str:
         """Return what to do about the error of these numbers, a sentence."""
-        return _REMEDIES[self.effect].format(joint=self.joint, **values, **self.words) + _CORRECTED
+        return _REMEDIES[self.effect].format(joint=self.joint, **values, **self.words)
 
     @property
     def neutral(self) -> np.ndarray:
