@@ -71,17 +71,20 @@ def search(probe: Probe) -> Connection:
     """Return the errors that explain what bodies and everyday friction do not.
 
     A delay of targets looks like other gains of every drive, so that a search one by one would
-    not come back to it: where it is worth its price, a second search begins with it.
+    not come back to it: where it is worth its price, a search begins with it. Another one that
+    begins with nothing follows where that leaves what counts as physics.
     """
     none = Correction.none(probe.motion.tree.size)
     start = probe.agreement(none)
     rivals: dict[tuple[str, str, tuple[str, ...]], tuple[Tried, ...]] = {}
-    chains = [_grown(probe, [], start, rivals)]
+    chains: list[list[Tried]] = []
     for h in hypotheses(probe.full):
         first = _physics(probe, h) if h.is_physics else None
         if first is not None and first.worth > start.evidence + PER_EFFECT:
             rivals[h.key] = ()
             chains.append(_grown(probe, [first], first.agreement, rivals))
+    if all(c[-1].agreement.left.max() > COUNTED_SHARE for c in chains):
+        chains.append(_grown(probe, [], start, rivals))
     errors = _of_the_connection(probe, max(chains, key=lambda c: _worth(c, start)))
     return Connection(tuple(errors), tuple(rivals[e.hypothesis.key] for e in errors), start)
 
