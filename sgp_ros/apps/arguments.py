@@ -120,6 +120,12 @@ def _add_simulate(add: AddCommand) -> None:
         '--sensor', dest='sensors', action='append', default=[], metavar='NAME=VALUE',
         help='such as bits=14, velocity=no, jitter=0.001, drop=0.005; may be repeated',
     )  # fmt: skip
+    parser.add_argument(
+        '--commands', metavar='BAG',
+        help='replay its commands through ROBOT instead and compare with its motion',
+    )  # fmt: skip
+    parser.add_argument('--nominal', metavar='ROBOT', help='replayed beside ROBOT')
+    _add_gains(parser)
 
 
 def _add_replay(add: AddCommand) -> None:

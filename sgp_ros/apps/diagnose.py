@@ -228,7 +228,7 @@ def write_examined(out: Path, examined: Examined) -> tuple[dict[str, Any], Diagn
         if online is not None:
             content['online'] = online.content()
         write_text(out / 'diagnosis.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
-        write_overlay(out, found)
+        write_overlay(out, found.joints, found.units, found.overlays)
         steps = after_diagnosis(found, examined.bag, examined.robot, out)
         write_diagnosis(out, found, nominal.tree, steps)
     return content, found

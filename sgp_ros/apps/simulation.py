@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from sgp_ros.apps.commanded import run_commanded
 from sgp_ros.apps.simulated_robot import find_robot
 from sgp_ros.engine.samples import CommandSample, JointSample
 from sgp_ros.recordings.command_types import FLOAT64_ARRAY
@@ -40,6 +41,9 @@ def run_simulation(
     effects: Sequence[str] = (),
     physical: Sequence[str] = (),
     sensors: Sequence[str] = (),
+    commands: str | None = None,
+    nominal: str | None = None,
+    gains: str | None = None,
 ) -> dict[str, Any]:
     """Simulate a robot and write `<robot>.mcap`, `truth.json` and `truth.npz` into `out`.
 
@@ -54,10 +58,15 @@ def run_simulation(
         effects: texts such as `coulomb_friction:joint=pole,level=0.01`.
         physical: texts such as `pole_viscosity=0.01`.
         sensors: texts such as `bits=14`.
+        commands: recording whose commands are replayed, see `run_commanded`; None to simulate.
+        nominal: robot that is replayed beside it.
+        gains: of drives in a replay whose commands are targets.
 
     Raises:
         ConfigError: a robot, controller, effect or value that does not exist.
     """
+    if commands is not None:
+        return run_commanded(robot, out, progress, commands=commands, nominal=nominal, gains=gains)
     found = find_robot(robot)
     simulator, name = found.simulator, found.name
     chosen, transport = parse_sensors(sensors, simulator.sensors, simulator.joints)

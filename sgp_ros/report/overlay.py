@@ -4,32 +4,42 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sgp_ros.diagnosis.result import Diagnosis
 from sgp_ros.diagnosis.shown import Overlay
 from sgp_ros.report.files import write_bytes, write_text
 
 
-def write_overlay(folder: Path, found: Diagnosis) -> None:
-    """Write both files; nothing where no recording was replayed."""
-    if not found.overlays:
+def write_overlay(
+    folder: Path, joints: Sequence[str], units: Sequence[str], found: Mapping[str, Overlay]
+) -> None:
+    """Write both files; nothing where no recording was replayed.
+
+    Args:
+        folder: of the results.
+        joints: names, in the order of the arrays.
+        units: of their efforts.
+        found: motions by the name of the recording.
+    """
+    if not found:
         return
-    arrays: dict[str, Any] = _series(found.overlays)
+    arrays: dict[str, Any] = _series(found)
     stream = io.BytesIO()
     np.savez(stream, **arrays)
     write_bytes(folder / 'overlay.npz', stream.getvalue())
-    text = json.dumps(overlay_content(found), indent=1, allow_nan=False)
+    text = json.dumps(overlay_content(joints, units, found), indent=1, allow_nan=False)
     write_text(folder / 'overlay.json', text + '\n')
 
 
-def overlay_content(found: Diagnosis) -> dict[str, Any]:
-    """Return the errors of overlays by recording."""
-    joints, units = found.joints, found.units
+def overlay_content(
+    joints: Sequence[str], units: Sequence[str], found: Mapping[str, Overlay]
+) -> dict[str, Any]:
+    """Return the errors of overlays by recording; arguments as those of `write_overlay`."""
 
     def by_joint(x: np.ndarray) -> dict[str, float] | None:
         return dict(zip(joints, map(float, x), strict=True)) if np.isfinite(x).all() else None
@@ -54,7 +64,7 @@ def overlay_content(found: Diagnosis) -> dict[str, Any]:
                     for mode, sides in o.replays.items()
                 },
             }
-            for stem, o in found.overlays.items()
+            for stem, o in found.items()
         },
     }
 
@@ -73,3 +83,15 @@ def _series(found: Mapping[str, Overlay]) -> dict[str, np.ndarray]:
             if np.isfinite(r.rms).all()
         }
     return series
+
+
+def write_series(path: Path, joints: Sequence[str], found: Overlay) -> None:
+    """Write measured and replayed positions as a table, a row a time; nothing where none is."""
+    columns = {'t': found.time}
+    for j, joint in enumerate(joints):
+        columns[f'{joint}_measured'] = found.position[:, j]
+        for mode, sides in found.replays.items():
+            columns |= {f'{joint}_{mode}_{n}': r.position[:, j] for n, r in sides.items()}
+    rows = zip(*columns.values(), strict=True)
+    lines = [','.join('' if math.isnan(x) else f'{x:.9g}' for x in row) for row in rows]
+    write_text(path, '\n'.join([','.join(columns), *lines]) + '\n')

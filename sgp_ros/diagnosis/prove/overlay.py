@@ -10,7 +10,7 @@ kd (dq - dq')`. That is what users of position control see.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,13 +56,17 @@ def overlays(
     return {stem: x for stem, x in found.items() if x is not None}
 
 
-def overlay(final: FinalModel, raw: RawTrajectory, tree: Tree) -> Overlay | None:
+def overlay(
+    final: FinalModel, raw: RawTrajectory, tree: Tree,
+    names: Sequence[str] = ('nominal', 'diagnosed'),
+) -> Overlay | None:  # fmt: skip
     """Return the motions of both models over that of a recording; None of settled points.
 
     Args:
         final: nominal and final model.
         raw: any recording of the robot.
         tree: nominal robot.
+        names: of both models; of one name, that of the nominal one alone.
     """
     if raw.approach is not None:
         return None
@@ -74,9 +78,8 @@ def overlay(final: FinalModel, raw: RawTrajectory, tree: Tree) -> Overlay | None
         return None
     rests = resting(raw, motion, bandwidth)
     trim = ZeroPhase(rate, bandwidth.state_cutoff).trim
-    sides = {
-        'nominal': _Side(final.nominal, ()), 'diagnosed': _Side(final.model, final.remainders)
-    }  # fmt: skip
+    both = _Side(final.nominal, ()), _Side(final.model, final.remainders)
+    sides = dict(zip(names, both, strict=False))
     effort = low(motion.effort)[: len(rows)]
     efforts = {
         name: effort + low(final.imbalance(s.model, motion, rests, s.remainders))[: len(rows)]
