@@ -120,12 +120,9 @@ def _add_simulate(add: AddCommand) -> None:
         '--sensor', dest='sensors', action='append', default=[], metavar='NAME=VALUE',
         help='such as bits=14, velocity=no, jitter=0.001, drop=0.005; may be repeated',
     )  # fmt: skip
-    parser.add_argument(
-        '--commands', metavar='BAG',
-        help='replay its commands through ROBOT instead and compare with its motion',
-    )  # fmt: skip
+    parser.add_argument('--commands', metavar='BAG', help='replay its commands instead, compare')
     parser.add_argument('--nominal', metavar='ROBOT', help='replayed beside ROBOT')
-    _add_gains(parser)
+    _add_gains(parser, has_sim=False)
 
 
 def _add_replay(add: AddCommand) -> None:
@@ -135,9 +132,7 @@ def _add_replay(add: AddCommand) -> None:
         'sgp replay robot.mcap --robot linear_axis --out out/replay',
     )  # fmt: skip
     _add_recording(parser)
-    parser.add_argument(
-        '--params', metavar='YAML', help="ROS 2 parameter file (default: the robot's own)"
-    )
+    parser.add_argument('--params', metavar='YAML', help="ROS 2 parameters (default: the robot's)")
     parser.add_argument('--model', metavar='NPZ', help='continue from a saved model')
     parser.add_argument('--frozen', dest='is_learning', action='store_false',
                         help='predict and score, do not learn')  # fmt: skip
@@ -276,8 +271,7 @@ def _add_watch(add: AddCommand) -> None:
         'Show what a running node says: joints, parameters, warnings, verdict.',
         'sgp watch --node /left/sgp_node',
     )  # fmt: skip
-    parser.add_argument('--node', default='/sgp_node', metavar='NAME',
-                        help='full name of the node (default: %(default)s)')  # fmt: skip
+    parser.add_argument('--node', default='/sgp_node', metavar='NAME', help='default: %(default)s')
     parser.add_argument('--wait', type=_above(0.0), default=10.0, metavar='S',
                         help='for its first word [s] (default: %(default)s)')  # fmt: skip
     parser.add_argument('--once', action='store_true', help='print one picture and end')

@@ -40,8 +40,8 @@ def run_commanded(
 ) -> dict[str, Any]:  # fmt: skip
     """Replay recorded commands and write what the robot does, beside what was measured.
 
-    Writes `<robot>_replayed.mcap` (the motion of the longest stable replay), `replay.csv`, `overlay.json`,
-    `overlay.npz` and a page.
+    Writes `<robot>_replayed.mcap` (the motion of the longest stable replay), `replay.csv`,
+    `overlay.json`, `overlay.npz` and a page.
 
     Args:
         robot: built-in name, robot YAML (such as robot_diagnosed.yaml) or model file.

@@ -72,7 +72,7 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis, gains: Gains | No
         **_physics(robot),
         **robot.source,
         'urdf': URDF_NAME,
-        **({} if gains is None else {'gains': _gains(robot, found, gains)}),
+        **({} if gains is None or gains.is_recorded else {'gains': _gains(robot, found, gains)}),
         'effects': [*known, *stated_findings((*found.findings, *found.shared))],
         'parameters': stated,
     }

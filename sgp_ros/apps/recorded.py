@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from sgp_ros.batch.command_kinds import hold_targets, require_gains_of_velocity
+from sgp_ros.batch.command_kinds import has_gains, hold_targets, require_gains_of_velocity
 from sgp_ros.batch.contradictions import require_sense, require_shared_motion
 from sgp_ros.batch.recording_check import RecordingCheck, check_recording
-from sgp_ros.engine.samples import Event
+from sgp_ros.engine.samples import CommandSample, Event
 from sgp_ros.errors import RecordingError
-from sgp_ros.recordings.reader import open_recording
+from sgp_ros.recordings.messages import joint_sample
+from sgp_ros.recordings.reader import Recording, open_recording
+from sgp_ros.recordings.topics import GAINS_TOPIC
 from sgp_ros.robots.gains import Gains, checked_gains, read_gains
 from sgp_ros.robots.nominal import Nominal
 from sgp_ros.robots.robot import Robot
@@ -28,13 +32,38 @@ def read_events(
 ) -> list[Event]:
     """Return the events of a recording; what is wrong with it is appended to `remarks`."""
     recording = open_recording(bag)
-    events = list(recording.events(joint_states, command))
+    events = _with_gains(recording, list(recording.events(joint_states, command)))
     remarks += recording.remarks
     remarks += [
         f'{count} messages of {recording.path.name} could not be read: {why}'
         for why, count in recording.unreadable.items()
     ]
     return events
+
+
+def _with_gains(recording: Recording, events: list[Event]) -> list[Event]:
+    """Return events whose targets have the gains that are recorded beside them."""
+    if GAINS_TOPIC not in [topic.name for topic in recording.topics]:
+        return events
+    rows = [joint_sample(message, log_ns) for log_ns, message in recording.messages(GAINS_TOPIC)]
+    rows.sort(key=lambda x: x.stamp_ns)
+    stamps = [x.stamp_ns for x in rows]
+    found: list[Event] = []
+    for e in events:
+        at = bisect_right(stamps, e.stamp_ns) - 1
+        if isinstance(e, CommandSample) and at >= 0:
+            kp, kd = rows[at].position, rows[at].velocity
+            if kd is None:
+                raise RecordingError(
+                    f'{recording.path.name}: no kd in {GAINS_TOPIC}',
+                    'kp as position and kd as velocity of each joint',
+                )  # fmt: skip
+            pairs = zip(map(float, kp), map(float, kd), strict=True)
+            gains = dict(zip(rows[at].names, pairs, strict=True))
+            found.append(replace(e, gains=gains))
+        else:
+            found.append(e)
+    return found
 
 
 def checked(
@@ -67,9 +96,9 @@ def checked(
 def gains_of(
     path: str | None, nominal: Nominal, events: Iterable[Event], remarks: list[str]
 ) -> Gains | None:
-    """Return the gains of drives that hold targets: those given, or those of the robot's file.
+    """Return the gains of drives that hold targets: given, recorded, or those of the robot's file.
 
-    The latter count where the commands are targets: by the type of their messages, or, where that
+    The last count where the commands are targets: by the type of their messages, or, where that
     says nothing, because positions follow them.
 
     Args:
@@ -88,6 +117,10 @@ def gains_of(
     known = list(events)
     if path is not None:
         found = read_gains(Path(path), names, driven)
+        if has_gains(known):
+            remarks.append('The gains are those given, not those recorded beside the targets.')
+    elif has_gains(known):
+        found = Gains(np.ones(len(names)), np.ones(len(names)), is_recorded=True)
     elif stated is None or not hold_targets(known, nominal.robot):
         return None
     else:

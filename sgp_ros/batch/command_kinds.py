@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from sgp_ros.batch.acceptance import USUAL, Accepted, accept
+from sgp_ros.batch.acceptance import USUAL, Accepted, HeldCommands, accept
 from sgp_ros.engine.samples import EFFORT, POSITION, VELOCITY, CommandSample, Event
 from sgp_ros.errors import RecordingError
 from sgp_ros.robots.gains import Gains
@@ -46,12 +46,52 @@ def require_gains_of_velocity(events: Iterable[Event], gains: Gains) -> None:
     Raises:
         RecordingError: with what to write.
     """
+    if gains.is_recorded:
+        return
     kinds = {e.kind for e in events if isinstance(e, CommandSample) and e.names is not None}
     if VELOCITY in kinds and gains.kp.any():
         raise RecordingError(
             'commands that are targets of velocity', 'kp of 0 and the gain of the velocity as kd',
             'write both into the file of --gains',
         )  # fmt: skip
+
+
+def has_gains(events: Iterable[Event]) -> bool:
+    """Return whether targets come with gains."""
+    return any(isinstance(e, CommandSample) and e.gains is not None for e in events)
+
+
+def with_recorded_gains(
+    targets: HeldCommands, events: Iterable[Event], robot: Robot
+) -> HeldCommands:
+    """Return targets (c, 2 k) with the recorded gains behind them, (c', 4 k).
+
+    Args:
+        targets: of position and velocity.
+        events: of the recording.
+        robot: whose driven joints must have both gains.
+
+    Raises:
+        RecordingError: a recording without gains, or gains of other joints.
+    """
+    given = [e for e in events if isinstance(e, CommandSample) and e.gains is not None]
+    driven = {j.name for j in robot.joints if j.is_actuated}
+    names = {name for e in given for name in e.gains or ()}
+    if not given or not driven <= names or any(set(e.gains or ()) != names for e in given):
+        raise RecordingError(
+            f'gains of {sorted(names) or "no joint"} beside the targets',
+            f'kp and kd of each of {sorted(driven)} beside each target',
+            'give those of the drives with --gains gains.yaml',
+        )  # fmt: skip
+    given.sort(key=lambda e: e.stamp_ns)
+    none = (0.0, 0.0)
+    rows = np.array([[(e.gains or {}).get(j.name, none) for j in robot.joints] for e in given])
+    stamps = np.array([e.stamp_ns for e in given], dtype=np.int64)
+    stamps, last = np.unique(stamps[::-1], return_index=True)  # of equal stamps the last
+    values = rows.transpose(0, 2, 1).reshape(len(given), -1)[len(given) - 1 - last]
+    gains = HeldCommands(stamps, values)
+    both = np.union1d(targets.stamps_ns, stamps)
+    return HeldCommands(both, np.column_stack([targets.at(both), gains.at(both)]))
 
 
 def are_efforts(accepted: Accepted, robot: Robot) -> bool:

@@ -214,12 +214,13 @@ def _unit_of_target(joint: Joint, target: np.ndarray, q: np.ndarray) -> str:
 
 def _why(joint: Joint, away: np.ndarray, gains: Gains | None, j: int) -> str:
     """Say why a target is not reached, as far as the gains of the drive tell."""
-    if gains is None or not math.isfinite(joint.effort_limit) or not joint.effort_limit > 0.0:
+    limit = joint.effort_limit
+    if gains is None or gains.is_recorded or not (math.isfinite(limit) and limit > 0.0):
         return ': a load that its gains do not hold, saturation, or a wrong zero'
-    asked = float(np.median(np.abs(np.mean(gains.kp[..., j]) * away)))
+    asked = float(np.median(np.abs(gains.kp[j] * away)))
     unit = joint.unit('effort')
-    if asked > joint.effort_limit:
-        return (f': its gains ask for {asked:.3g} {unit}, its limit is {joint.effort_limit:.3g} '
+    if asked > limit:
+        return (f': its gains ask for {asked:.3g} {unit}, its limit is {limit:.3g} '
                 f'{unit}: the drive is in saturation, or drives another joint')  # fmt: skip
     return f': a load of {asked:.3g} {unit} that its gains give way to, or a wrong zero'
 

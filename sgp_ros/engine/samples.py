@@ -56,6 +56,7 @@ class CommandSample:
         kind: what the numbers are, `EFFORT`, `POSITION` or `VELOCITY`; numbers without names may
             be any.
         velocity: (m,) target of the velocity beside one of the position; None without.
+        gains: recorded kp and kd of drives that follow it, by joint; None where they are constant.
     """
 
     stamp_ns: int
@@ -63,6 +64,7 @@ class CommandSample:
     names: tuple[str, ...] | None = None
     kind: str = EFFORT
     velocity: np.ndarray | None = None
+    gains: Mapping[str, tuple[float, float]] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -141,12 +141,14 @@ class Servo:
     It is computed in the drive on its own fresh measurements, so a delay is one of the targets.
 
     Attributes:
-        targets: positions, then velocities, of all joints, (c, 2 k) [rad or m].
+        targets: positions, then velocities, of all joints, (c, 2 k) [rad or m]; with recorded
+            gains these behind them, (c, 4 k) [N m/rad, N m s/rad].
         step: of the grids [s].
         starts: rows at which the grids begin.
-        kp, kd: (k,) gains [N m/rad, N m s/rad].
+        kp, kd: (k,) gains [N m/rad, N m s/rad], or factors of recorded ones [1].
         position, velocity: (n, k) on the grids.
         feedforward: (n, k) [N m or N].
+        is_recorded: whether the gains come with the targets.
     """
 
     targets: RecordedCommands
@@ -157,6 +159,7 @@ class Servo:
     position: np.ndarray
     velocity: np.ndarray
     feedforward: np.ndarray
+    is_recorded: bool = False
 
     @property
     def values(self) -> np.ndarray:
@@ -187,7 +190,11 @@ class Servo:
         k = len(self.kp)
         error = self.targets.effort(joint, delay=delay) - self.position[:, joint]
         rate = self.targets.effort(k + joint, delay=delay) - self.velocity[:, joint]
-        return servo_parts(self.kp[joint], self.kd[joint], error, rate)
+        kp, kd = self.kp[joint], self.kd[joint]
+        if self.is_recorded:
+            kp = kp * self.targets.effort(2 * k + joint, delay=delay)
+            kd = kd * self.targets.effort(3 * k + joint, delay=delay)
+        return servo_parts(kp, kd, error, rate)
 
 
 def servo_parts(

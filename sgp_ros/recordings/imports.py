@@ -15,6 +15,7 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.recordings.table_entries import JointHint
 from sgp_ros.recordings.table_files import load_columns
 from sgp_ros.recordings.table_formats import feature_names
+from sgp_ros.recordings.table_gains import is_recorded
 from sgp_ros.recordings.table_guess import guess_map
 from sgp_ros.recordings.table_map import read_map
 from sgp_ros.recordings.tables import Table, read_table
@@ -129,7 +130,7 @@ def quality(table: Table) -> dict[str, Any]:
 
 def _gains(out_path: Path, stated: object) -> Path | None:
     """Write the gains of a map as the file that `--gains` takes."""
-    if stated is None:
+    if stated is None or is_recorded(stated):  # those of each row are in the recording
         return None
     if not isinstance(stated, dict) or not {'kp', 'kd'} <= set(stated):
         raise ConfigError(f'gains of the map are {stated!r}', 'kp and kd by joint')

@@ -18,8 +18,6 @@ from sgp_ros.recordings.column_names import (
     COMMAND,
     CURRENT,
     EFFORT,
-    KD,
-    KP,
     POSITION,
     TIME,
     VELOCITY,
@@ -34,11 +32,11 @@ from sgp_ros.recordings.table_entries import (
     entries_of,
     joint_names,
 )
+from sgp_ros.recordings.table_gains import add_gains
 from sgp_ros.recordings.table_map import UNITS
 from sgp_ros.recordings.table_units import (
     as_numbers,
     follows,
-    is_constant,
     position_unit,
     time_unit,
     velocity_unit,
@@ -84,7 +82,7 @@ def guess_map(
     _add_efforts(found, entries, joints, hinted, guess)
     guess.content['joints'] = found
     _add_commands(entries, joints, positions, units, guess)
-    _add_gains(columns, entries, joints, rows, guess)
+    add_gains(columns, entries, joints, rows, guess)
     return guess
 
 
@@ -264,34 +262,3 @@ def _add_commands(
             joints[x]: e.place(e.said.unit if e.said.unit in _EFFORTS else 'N m')
             for x, e in named[EFFORT].items()
         }
-
-
-def _add_gains(
-    columns: Columns, entries: Sequence[Entry], joints: Mapping[str, str], rows: int, guess: Guess
-) -> None:
-    """Enter gains that the table states, as one number or one for each joint, or in each row."""
-    found: dict[str, dict[str, float]] = {}
-    for role in (KP, KD):
-        values = {
-            joints[x]: e.numbers for x, e in chosen(entries, role, guess).items()
-            if x in joints
-        }  # fmt: skip
-        for name, array in columns.items():
-            numbers = as_numbers(array.ravel())
-            if meaning(name).role != role or len(array) == rows or numbers is None:
-                continue
-            if numbers.size in {1, len(joints)}:
-                each = np.broadcast_to(numbers, len(joints))
-                values = {j: each[i : i + 1] for i, j in enumerate(joints.values())}
-            else:
-                guess.unsure.append(
-                    f'{name} holds {numbers.size} gains for {len(joints)} joints: left out.'
-                )
-        if any(not is_constant(x) for x in values.values()):
-            guess.unsure.append(f'{role} changes in the log: left out, only fixed gains count.')
-        elif values:
-            found[role] = {joint: float(x[0]) for joint, x in values.items()}
-    if set(found) == {KP, KD} and set(found[KP]) == set(found[KD]):
-        guess.content['gains'] = found
-    elif found:
-        guess.unsure.append(f'Only {" and ".join(found)} of the gains is there: left out.')

@@ -17,7 +17,7 @@ anew: they follow each other. A joint has a `position`, and may have `velocity` 
 `targets` lists what drives are told to reach, and `gains` what they do about it:
 
     targets: {axis: {position: {column: q_des, unit: m}, velocity: {column: dq_des, unit: m/s}}}
-    gains: {kp: {axis: 300.0}, kd: {axis: 10.0}}
+    gains: {kp: {axis: 300.0}, kd: {axis: 10.0}}    # or {axis: {column: kp}}
 
 Keys of a quantity: `column`, `unit`, `index` (which column of a matrix in NPZ or MAT, from 0),
 `scale` and `offset`:

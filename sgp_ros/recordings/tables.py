@@ -27,6 +27,7 @@ from sgp_ros.engine.samples import (
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.recordings.command_types import COMMAND_TYPES
 from sgp_ros.recordings.table_files import Columns, load_columns
+from sgp_ros.recordings.table_gains import row_gains
 from sgp_ros.recordings.table_map import Quantity, TableMap, TimeBase, check_map
 
 _ISO = re.compile(r'(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:\d\d)?')
@@ -55,6 +56,7 @@ class Table:
         remarks: what was left out of the file.
         command_kind: what the commands are, see `CommandSample`.
         command_rates: (n, c) target velocities beside commanded positions, None without.
+        command_gains: (n, 2, c) gains of the drives, kp before kd; None where they are constant.
     """
 
     stamps_ns: tuple[int, ...]
@@ -66,6 +68,7 @@ class Table:
     remarks: tuple[str, ...] = ()
     command_kind: str = EFFORT
     command_rates: np.ndarray | None = None
+    command_gains: np.ndarray | None = None
 
     def events(self) -> Iterator[JointSample | CommandSample]:
         """Yield the rows in order, the command of a row before its state."""
@@ -76,10 +79,16 @@ class Table:
                 rates = None if self.command_rates is None else self.command_rates[row]
                 yield CommandSample(
                     stamp_ns, frozen_array(self.commands[row]), names, self.command_kind,
-                    None if rates is None else frozen_array(rates),
+                    None if rates is None else frozen_array(rates), self._gains(row),
                 )  # fmt: skip
             values = {name: frozen_array(array[row]) for name, array in self.channels.items()}
             yield JointSample(stamp_ns, self.joints, **values)
+
+    def _gains(self, row: int) -> dict[str, tuple[float, float]] | None:
+        if self.command_gains is None:
+            return None
+        kp, kd = self.command_gains[row].tolist()
+        return {j: (p, d) for j, p, d in zip(self.command_joints, kp, kd, strict=True)}
 
 
 def read_table(
@@ -120,6 +129,8 @@ def read_table(
     if set(lengths.values()) != {n}:
         raise ConfigError(f'{path}: columns of different length {lengths}', 'one length')
     table = _assemble(table_map, values, stamps_ns)
+    gains = row_gains(content.get('gains'), columns, table.command_joints, n)
+    table = replace(table, command_gains=gains)
     return _without_impossible(path, table, lines, remarks)
 
 
@@ -181,6 +192,7 @@ def _without_impossible(
         channels={name: array[kept] for name, array in table.channels.items()},
         commands=None if table.commands is None else table.commands[kept],
         command_rates=None if table.command_rates is None else table.command_rates[kept],
+        command_gains=None if table.command_gains is None else table.command_gains[kept],
         remarks=(*remarks, f'{said}: a position is missing, or a number is not below 1e150'),
     )
 

@@ -13,8 +13,12 @@ from sgp_ros.recordings.messages import JOINT_STATE
 CHANGES_TOPIC = '/sgp/changes'
 """Where a record keeps the changes of settings."""
 
+GAINS_TOPIC = '/gains'
+"""Where gains that change with time are: JointState with kp as position and kd as velocity."""
+
 _OWN_OUTPUTS = (
     'predicted_joint_states', 'prediction', 'prediction_variance', 'prediction_raw_variance',
+    'gains',
 )  # fmt: skip
 _COMMAND_NAMES = ('command', 'commands')
 

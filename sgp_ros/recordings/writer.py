@@ -33,7 +33,7 @@ from sgp_ros.recordings.messages import (
     joint_state_message,
     trajectory_message,
 )
-from sgp_ros.recordings.topics import CHANGES_TOPIC
+from sgp_ros.recordings.topics import CHANGES_TOPIC, GAINS_TOPIC
 from sgp_ros.recordings.typestore import definition, full_type, new_message, serialize
 from sgp_ros.strangers import create_beside, discard, take_place
 
@@ -96,6 +96,10 @@ class RecordingWriter:
         elif isinstance(event, CommandSample):
             message = COMMAND_TYPES[self._command_type].message(new_message, event)
             self._write(self._command_topic, self._command_type, event.stamp_ns, message, log_ns)
+            if event.gains is not None:
+                kp, kd = (np.array(x) for x in zip(*event.gains.values(), strict=True))
+                gains = JointSample(event.stamp_ns, tuple(event.gains), kp, kd)
+                self.write_joint_state(GAINS_TOPIC, gains)
         else:
             message = new_message(TEXT, data=change_to_text(event))
             self._write(self._changes_topic, TEXT, event.stamp_ns, message, log_ns)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,11 +34,14 @@ class Gains:
         kp: (k,) [N m/rad or N/m].
         kd: (k,) [N m s/rad or N s/m].
         holds_gravity: whether the drives add what the nominal robot takes against gravity.
+        is_recorded: whether the gains stand in the recording, beside each target; `kp` and `kd`
+            are then factors of these [1].
     """
 
     kp: np.ndarray
     kd: np.ndarray
     holds_gravity: bool = False
+    is_recorded: bool = False
 
     def effort(self, target: np.ndarray, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return what the drives make of targets, without feed-forward, (k,) [N m or N].
@@ -54,7 +57,7 @@ class Gains:
 
     def scaled(self, kp: np.ndarray, kd: np.ndarray) -> Gains:
         """Return the gains times factors, (k,) each."""
-        return Gains(self.kp * kp, self.kd * kd, self.holds_gravity)
+        return replace(self, kp=self.kp * kp, kd=self.kd * kd)
 
     def content(self, joints: Sequence[str]) -> dict[str, Any]:
         """Return the gains as a file states them."""

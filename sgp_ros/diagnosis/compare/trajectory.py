@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sgp_ros.batch.acceptance import USUAL, Accepted, HeldCommands, accept
-from sgp_ros.batch.command_kinds import are_efforts, are_positions
+from sgp_ros.batch.command_kinds import are_efforts, are_positions, with_recorded_gains
 from sgp_ros.batch.zero_phase import ZeroPhase
 from sgp_ros.diagnosis.compare.grid import Stretch, noise_density
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
@@ -108,6 +108,8 @@ def collect(
     Raises:
         RecordingError: too little is left.
     """
+    has_recorded_gains = gains is not None and gains.is_recorded
+    events = list(events) if has_recorded_gains else events  # these are passed twice
     accepted = accept(events, robot, config, EFFORT if gains is None else POSITION)
     if gains is None:  # position targets wrap with the positions
         accepted = accepted.unwrapped(robot)
@@ -132,6 +134,8 @@ def collect(
         slice(int(end) - len(part.time), int(end)) for end, part in zip(ends, parts, strict=True)
     )
     drive, remarks = _drive(accepted, robot, config, gains, measured=measured)
+    if drive is not None and has_recorded_gains:
+        drive = with_recorded_gains(drive, events, robot)
     remarks += accepted.jump_remarks(config.max_gap, start_ns)
     position = np.concatenate([part.position for part in parts])
     return RawTrajectory(
@@ -245,7 +249,7 @@ def _servo(targets: RecordedCommands, gains: Gains, motion: ObservedMotion) -> S
     held = motion.effort_for(motion.position, still, still) if gains.holds_gravity else still
     return Servo(
         targets, motion.step, motion.starts, gains.kp, gains.kd, motion.position,
-        motion.velocity, held,
+        motion.velocity, held, gains.is_recorded,
     )  # fmt: skip
 
 

@@ -85,9 +85,10 @@ def overlay(
         name: effort + low(final.imbalance(s.model, motion, rests, s.remainders))[: len(rows)]
         for name, s in sides.items()
     }
+    known = None if raw.gains is None or raw.gains.is_recorded else raw.gains
     replays = {
         mode: {name: _replayed(final, s, windows, rows, gains) for name, s in sides.items()}
-        for mode, windows, gains in _modes(motion, trim, raw.gains)
+        for mode, windows, gains in _modes(motion, trim, known)
     }
     return Overlay(
         motion.time[rows], motion.position[rows], effort, efforts, replays,

@@ -13,7 +13,6 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.rigid.tree import Tree
-from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 
@@ -123,7 +122,7 @@ class Correction:
             drive = drive.changed(change, -self.clock)
         if gains is not None:
             size = self.scale / self.effort_scale
-            gains = Gains(gains.kp[self.order], gains.kd[self.order], gains.holds_gravity)
+            gains = replace(gains, kp=gains.kp[self.order], kd=gains.kd[self.order])
             gains = gains.scaled(self.kp * size, self.kd * size)
         if effort is not None:
             effort = effort[:, self.effort_order] / self.effort_scale
@@ -142,9 +141,10 @@ class Correction:
         return np.asarray(values[:, self.effort_order] / self.effort_scale)
 
     def _targets(self, values: np.ndarray) -> np.ndarray:
-        position, velocity = np.split(values, 2, axis=1)
-        position = (position[:, self.order] - self.offset) / self.scale
-        return np.column_stack([position, velocity[:, self.order] / self.scale])
+        blocks = np.split(values, values.shape[1] // len(self.order), axis=1)
+        position, velocity, *gains = (x[:, self.order] for x in blocks)
+        position = (position - self.offset) / self.scale
+        return np.column_stack([position, velocity / self.scale, *gains])
 
 
 def delayed(effort: np.ndarray, raw: RawTrajectory, clock: float) -> np.ndarray:
