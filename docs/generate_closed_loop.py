@@ -8,6 +8,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from scipy import stats
+
 ROOT = Path(__file__).parents[1]
 TARGET = ROOT / 'docs' / 'closed_loop.md'
 _HEAD = """# Logs of position control without efforts
@@ -17,12 +19,15 @@ python -m sgp_proof.connection.closed --seeds {seeds}
 ```
 Driven robots follow smooth targets under proportional and derivative gains, at 50 to 500 Hz; the log holds positions,
 mostly velocities, and targets, and no effort. Each world conceals one or two of: gains other than stated, a delay of the target,
-rotor inertia, dry friction; or nothing. The truth moves in MuJoCo. A component is named where effect and joint are right
-and every number is to 15 % or within three standard deviations.
+rotor inertia, dry friction; or nothing. What makes less than 0.4 % of an effort counts as no physics and is drawn again. The
+truth moves in MuJoCo, whose own drives act within the stages of the Runge-Kutta method. A component is named where effect and
+joint are right and every number is to 15 % or within three standard deviations.
 
 Of {count} components in {with_hidden} worlds, **{named} are named**; everything is right in {all_named} of these worlds;
 {spurious} of {worlds} worlds have something asserted that is not there. The number of worlds is small: the page says what was
-measured, and no more. The aim, nine of ten components, is missed.
+measured, and no more. The aim, nine of ten components, is {aim}; an interval of 95 % (Clopper and Pearson) reaches from {low} %
+to {high} %. Worlds 0 to 11 are those on which misses of an earlier state were looked at and mended, so what is said of them
+flatters.
 
 | component | named |
 |---|---|
@@ -34,12 +39,15 @@ _TAIL = """
 |---|---|---|---|---|
 {rows}
 
-## What goes wrong
-* **Gains and something else at one joint.** Where the log has no target of the velocity, `kd` other than stated is viscous
-  friction: the two are one law, and the tool answers with the second. Gains other than stated beside a delay end
-  unexplained: the search for errors of the connection sees the recording as it is, with the delay in it.
-* **Rotors.** One is found too small by more than its interval says, and one is missed beside a delay.
-* **Nothing concealed** gives `parameters_only` with hardly any wrong parameter; no effect is asserted.
+## What to know
+* **Gains and a delay.** As long as a delay of the targets is there, the gains of every drive look wrong. So a search for errors
+  of the connection begins with the delay where that is worth its price; the delay stays and is named as physics.
+* **Gains and bodies.** Where no effort is measured, gains and bodies of twice the size move alike. Gains are therefore looked for
+  with the bodies of the robot's file first, beside rotors and dry friction.
+* **kd and viscous friction** are one law where the log has no target of the velocity. Where `kp` is as stated, the answer is viscous
+  friction; where it is not, the drive. A motor that multiplies all it is asked for is named as gains.
+* **Drives with a slow clock.** A drive that computes once a step of h, and not continuously, acts h/2 late: viscous friction comes
+  out too small by about kp h/2 and a rotor by kd h. With stiff gains and h of 0.25 ms, that was a sixth of a rotor in earlier worlds.
 """
 
 
@@ -49,8 +57,11 @@ def text() -> str:
     found = json.loads(path.read_text(encoding='utf-8'))
     s = found['summary']
     named, count = s['components_named']
+    low = stats.beta.ppf(0.025, named, count - named + 1) if named else 0.0
+    high = stats.beta.ppf(0.975, named + 1, count - named) if named < count else 1.0
     head = _HEAD.format(
-        seeds=found['seeds'], count=count, named=named, with_hidden=s['with_hidden'],
+        aim='met' if named >= 0.9 * count else 'missed', low=round(100 * low),
+        high=round(100 * high), seeds=found['seeds'], count=count, named=named, with_hidden=s['with_hidden'],
         all_named=s['all_named'], spurious=s['worlds_with_spurious'], worlds=s['worlds'],
     )  # fmt: skip
     effects = [f'| {effect} | {n} of {m} |' for effect, (n, m) in s['by_effect'].items()]
