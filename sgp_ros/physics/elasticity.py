@@ -98,17 +98,23 @@ def _some(motion: SeenMotion) -> slice:
     return slice(None, None, max(1, len(motion.time) // _POSES))
 
 
+def twist_of(
+    motion: SeenMotion, place: Place, shape: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return by how much the motor leads the link per 1/K, and two derivatives, (n,) each."""
+    j, (J, _, settling) = place.joint, shape
+    given = motion.effort[:, j] if place.kind == 'motor' else motion.nominal_effort[:, j]
+    torque = smooth(motion, given - J * motion.acceleration[:, j])
+    parts = [_behind(x, settling, motion.step) for x in np.split(torque, motion.starts[1:])]
+    twist = np.concatenate(parts)
+    return twist, *derivatives(motion, twist)
+
+
 def _of_softness(motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
     """Return the force per 1/K of a motor and a settling time, (n, 1) or (n, k, 1)."""
-    j, (J, _, settling) = place.joint, shape
-    on_motor = place.kind == 'motor'
-    given = motion.effort[:, j] if on_motor else motion.nominal_effort[:, j]
-    torque = smooth(motion, given - J * motion.acceleration[:, j])
-    twist = np.concatenate(
-        [_behind(x, settling, motion.step) for x in np.split(torque, motion.starts[1:])]
-    )
-    speed, change = derivatives(motion, twist)
-    if not on_motor:
+    j, J = place.joint, shape[0]
+    twist, speed, change = twist_of(motion, place, shape)
+    if place.kind == 'link':
         return np.asarray(-J * change[:, None])
     by_q, by_v, by_a = motion.effort_slopes(j)
     force = by_q * twist[:, None] + by_v * speed[:, None] + by_a * change[:, None]

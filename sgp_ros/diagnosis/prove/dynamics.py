@@ -17,6 +17,7 @@ from sgp_ros.diagnosis.explain.fitted_model import Model, extra_force
 from sgp_ros.diagnosis.locate.remainder import Remainder
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.elasticity import JointElasticity
 from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.gains import Gains
@@ -88,6 +89,14 @@ class DiagnosedDynamics:
     def _beside_acceleration(self) -> _Forces:
         no = _sees_no_acceleration
         return _part(self.model, no), _chosen(self.stated, no)
+
+    def started(self, motion: ObservedMotion, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return positions and velocities at rows of a recording (m,), (m, k) each."""
+        return motion.position[rows], motion.velocity[rows]
+
+    def shown(self, x: np.ndarray) -> np.ndarray:
+        """Return what the encoders show of positions or velocities (..., k)."""
+        return x
 
     def level_of_dry_friction(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """Return half the jump of each joint's force as its velocity changes sign, (m, k)."""
@@ -202,7 +211,7 @@ def remembered_force(model: Model, motion: ObservedMotion, tree: Tree) -> np.nda
 
 
 def _has_memory(effect: Effect) -> bool:
-    return effect.has_memory
+    return effect.has_memory and not isinstance(effect, JointElasticity)  # that has states
 
 
 def _is_local(effect: Effect) -> bool:

@@ -27,6 +27,7 @@ from sgp_ros.diagnosis.prove.dynamics import (
     dynamics_of,
     remembered_force,
 )
+from sgp_ros.diagnosis.prove.elastic import ElasticDynamics, springs_of
 from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -131,6 +132,10 @@ def roll_out(
     effort = motion.effort
     if gains is not None:
         effort = effort + gains.kp * motion.position + gains.kd * motion.velocity
+    springs = springs_of(model, motion)
+    if springs:
+        dynamics = ElasticDynamics.of(dynamics, springs, gains)
+    elif gains is not None:
         dynamics = ServoedDynamics.of(dynamics, gains)
     force = remembered_force(model, motion, dynamics.tree)
     ways = np.sqrt(windows.held.mean(axis=0) / windows.steps) + 1e-300
@@ -161,15 +166,16 @@ def _rolled(
     )  # (m, n, 2 k + 2)  # fmt: skip
     h = windows.stride * motion.step
     substeps = _substeps(dynamics, windows, loads, h)
-    q, v = (np.full((*nodes.shape, motion.position.shape[1]), np.nan) for _ in range(2))
-    q[:, 0], v[:, 0] = motion.position[nodes[:, 0]], motion.velocity[nodes[:, 0]]
+    start = dynamics.started(motion, nodes[:, 0])
+    q, v = (np.full((*nodes.shape, start[0].shape[1]), np.nan) for _ in range(2))
+    q[:, 0], v[:, 0] = start
     with np.errstate(all='ignore'):  # a roll-out that diverges overflows, and is counted
         for i in range(windows.steps):
             state = q[:, i], v[:, i]
             for _ in range(substeps):
                 state = advance(dynamics, *state, loads[:, i], h / substeps)
             q[:, i + 1], v[:, i + 1] = state
-    return q, v
+    return dynamics.shown(q), dynamics.shown(v)
 
 
 def _substeps(
@@ -179,7 +185,7 @@ def _substeps(
     rows = windows.nodes[:, :-1:4].ravel()
     motion = windows.motion
     some = loads[:, ::4].reshape(-1, loads.shape[2])
-    rate = dynamics.fastest_rate(motion.position[rows], motion.velocity[rows], some)
+    rate = dynamics.fastest_rate(*dynamics.started(motion, rows), some)
     if not math.isfinite(rate):
         return 1
     return int(np.clip(math.ceil(rate * h / _STABLE), 1, _MOST_SUBSTEPS))
