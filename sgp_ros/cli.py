@@ -16,6 +16,7 @@ import json
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext, redirect_stdout, suppress
 from importlib import import_module
@@ -71,6 +72,7 @@ def _run(arguments: dict[str, Any]) -> int:
         arguments.pop(f'_{k}') for k in ('name', 'function', 'json', 'quiet', 'force')
     )
     signal.signal(signal.SIGTERM, _interrupt)
+    warnings.filterwarnings('ignore', category=RuntimeWarning, module=r'scipy\.')
     try:
         out = arguments['out']
         if not is_forced:
