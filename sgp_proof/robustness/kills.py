@@ -19,6 +19,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -215,11 +216,10 @@ class CommandKills:
 
 
 def run(
-    seeds: range, faults: Faults, what: tuple[str, ...], minutes: float
-) -> list[dict[str, object]]:
-    """Kill once a seed, as long as there is time; return what came of each."""
+    seeds: Iterable[int], faults: Faults, what: tuple[str, ...], minutes: float
+) -> Iterator[dict[str, Any]]:
+    """Kill once a seed, as long as there is time; yield what came of each."""
     end = time.monotonic() + 60.0 * minutes
-    rows: list[dict[str, object]] = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         bags = make_recordings(folder) if set(what) & set(COMMANDS) else []
@@ -241,36 +241,36 @@ def run(
                 number = SIGNALS[int(rng.choice(3, p=[0.6, 0.2, 0.2]))]
                 row = {'seed': seed, 'signal': number.name, **kinds[kind].kill(rng, number)}
                 print(row, flush=True)
-                rows.append(row)
                 for fault in row['faults']:
                     faults.note(f'{kind}: {fault}', seed)
+                yield row
         finally:
             if 'node' in kinds:
                 kinds['node'].close()
-    return rows
 
 
 def main() -> None:
-    """Run the seeds and add what came of them to the result."""
+    """Run the seeds that are not in the result yet, or had faults, and add what came of them."""
     parser = make_parser(__doc__, 'robust_kills', ('node', *COMMANDS))
     parser.add_argument('--seeds', type=seed_range, default=range(20), metavar='FIRST:LAST+1')
     parser.add_argument('--minutes', type=float, default=1e9, help='after which no seed begins')
     arguments = parser.parse_args()
-    before = read_result(arguments.out)
-    faults = Faults()
-    rows = {row['seed']: row for row in before.get('kills', [])}
-    new = run(arguments.seeds, faults, tuple(arguments.names), arguments.minutes)
-    rows |= {row['seed']: row for row in new}
-    kills = [rows[seed] for seed in sorted(rows)]
+    rows = {row['seed']: row for row in read_result(arguments.out).get('kills', [])}
+    seeds = [seed for seed in arguments.seeds if seed not in rows or rows[seed]['faults']]
+    for row in run(seeds, Faults(), tuple(arguments.names), arguments.minutes):
+        rows[row['seed']] = row
+        _write(arguments.out, [rows[seed] for seed in sorted(rows)])
+
+
+def _write(path: Path, kills: list[dict[str, Any]]) -> None:
     table = Counter(f'{row["what"]} {row["signal"]}' for row in kills)
     lost = [row['lost_s'] for row in kills if row.get('lost_s') is not None]
     found = Counter(f'{row["what"]}: {fault}' for row in kills for fault in row['faults'])
-    write_result(arguments.out, {
+    write_result(path, {
         'number': len(kills), 'by_signal': dict(sorted(table.items())),
         'kept': dict(Counter(row['kept'] for row in kills if 'kept' in row)),
         'most_lost_s': max(lost, default=None), 'faults': dict(found), 'kills': kills,
     }, 'mcap')  # fmt: skip
-    print(dict(table), dict(found))
 
 
 if __name__ == '__main__':
