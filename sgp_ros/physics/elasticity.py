@@ -195,7 +195,12 @@ class JointElasticity(Effect):
         return c / a * np.concatenate(parts)
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
-        """Return motors and dampers of several sizes; the softness follows from the residual."""
+        """Return motors and dampers of several sizes; the softness follows from the residual.
+
+        None where nothing is known of the inertia.
+        """
+        if motion.free_inertia(place.joint, _some(motion)) <= 0.0:
+            return np.zeros((0, 3))
         (least, stiff, _), (most, _, slowest) = self.bounds(motion, place)
         return np.array([[J, stiff, T] for J in np.geomspace(least, most, 5)[1:]
                          for T in (0.0, 0.05 * slowest)])  # fmt: skip

@@ -203,12 +203,17 @@ class ObservedMotion:
     def free_inertia(self, joint: int, rows: slice) -> float:
         """Return the least inertia of a joint while all others are free [kg m^2 or kg].
 
+        It is 0 where the robot states none.
+
         Args:
             joint: index.
             rows: those that are looked at.
         """
         M = mass_matrix(self.tree, self.tree.parameters, self.position[rows])
-        return 1.0 / float(np.linalg.inv(M)[:, joint, joint].max())
+        try:
+            return 1.0 / float(np.linalg.inv(M)[:, joint, joint].max())
+        except np.linalg.LinAlgError:
+            return 0.0
 
     def effort_for(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the efforts of the nominal robot for a motion, (n, k) [N m or N]."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,6 +28,8 @@ from sgp_ros.recordings.typestore import new_message
 from sgp_ros.recordings.writer import RecordingWriter
 from sgp_ros.robots.registry import load_robot
 from test.report.pages import content_of
+
+ROOT = Path(__file__).parents[2]
 
 MJCF = """<mujoco model="swing"><compiler angle="radian"/><worldbody><body pos="0 0 1">
 <joint name="hinge" axis="0 1 0" damping="0.2" range="-3 3" limited="true"/>
@@ -156,3 +159,12 @@ def test_gains_of_the_model_are_used_where_positions_are_commanded(tmp_path, cap
     said = capsys.readouterr().err
     assert 'commands that are targets of velocity; expected kp of 0' in said
     assert said.count('\n') == 1
+
+
+def test_a_robot_without_any_inertia_is_checked(tmp_path):
+    """Laws that need one are left out; nothing else is known of an axis on a bench."""
+    robot = str(ROOT / 'config' / 'robots' / 'revolute_axis.urdf')
+    out = str(tmp_path)
+    assert main(['simulate', robot, '--duration', '4', '--out', out, '--quiet']) == 0
+    bag = str(tmp_path / 'revolute_axis.mcap')
+    assert main(['check', bag, '--robot', robot, '--out', out, '--quiet']) == 0
