@@ -19,6 +19,8 @@ from sgp_ros.physics.motion import Commands
 from sgp_ros.rigid.rigid_body import inverse_dynamics, mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
 
+_BLOCK = 8000
+"""Rows whose regressor is held at a time: that of a long recording would not fit in memory."""
 STILL = 1e-9
 """Range of the position within which a joint does not move [rad or m]."""
 
@@ -192,9 +194,13 @@ class ObservedMotion:
     @cached_property
     def last_body_columns(self) -> np.ndarray:
         """Efforts per inertial parameter of the last link, (n, k, 10)."""
-        Y = torque_regressor(self.tree, self.position, self.velocity, self.acceleration)
         last = self.tree.size - 1
-        return Y[:, :, 10 * last : 10 * last + 10].copy()
+        found = np.empty((*self.position.shape, 10))
+        for first in range(0, len(found), _BLOCK):
+            rows = slice(first, first + _BLOCK)
+            states = self.position[rows], self.velocity[rows], self.acceleration[rows]
+            found[rows] = torque_regressor(self.tree, *states)[:, :, 10 * last : 10 * last + 10]
+        return found
 
     def sliding(self, direction: float) -> ObservedMotion:
         """Return the same motion with every joint about to slide in one direction."""

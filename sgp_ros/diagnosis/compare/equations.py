@@ -38,6 +38,8 @@ OPEN_SPREAD = 1.0
 
 _OTHER_PLACES = {index: name for name, index in PLACES.items()}
 
+_BLOCK = 2000
+"""Rows whose regressor is held at a time: that of a long recording would not fit in memory."""
 POSES = 32
 """Positions over which the inertia of a robot is averaged."""
 
@@ -277,9 +279,11 @@ def make_equations(
     d = low(motion.nominal_effort - motion.effort - motion.stated_force) * motion.moves
     directions = body_directions(tree, unstated)
     base = np.empty((len(d), k, len(directions)))
-    Y = torque_regressor(tree, motion.position, motion.velocity, motion.acceleration)
-    for j in range(k):
-        base[:, j] = -low(Y[:, j] @ directions.T) * motion.moves[j]
+    for rows, out in low.blocks(_BLOCK):
+        states = motion.position[rows], motion.velocity[rows], motion.acceleration[rows]
+        Y = torque_regressor(tree, *states)
+        for j in range(k):
+            base[out, j] = -low.piece(Y[:, j] @ directions.T, out) * motion.moves[j]
     power = np.where(
         tree.is_actuated[:k],
         (motion.effort**2).mean(axis=0),

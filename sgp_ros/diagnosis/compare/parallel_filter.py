@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -61,15 +62,23 @@ class ParallelFilter:
     def __call__(self, x: np.ndarray) -> np.ndarray:
         """Return x (n, ...) filtered and thinned out, (N, ...)."""
         flat = x.reshape(len(x), -1)
-        half = len(self.taps) // 2
-        parts = []
+        found = np.empty((sum(map(len, self.kept)), flat.shape[1]))
+        for inside, out in self.blocks(len(found) or 1):
+            found[out] = self.piece(flat[inside], out)
+        return found.reshape(len(found), *x.shape[1:])
+
+    def blocks(self, most: int) -> Iterator[tuple[slice, slice]]:
+        """Yield rows in, and the rows out that follow from them, `most` of these at a time."""
+        half, at = len(self.taps) // 2, 0
         for kept in self.kept:
-            if not len(kept):
-                continue
-            piece = flat[kept[0] - half : kept[-1] + half + 1]
-            parts.append(_decimated(self.taps, piece, self.decimation, len(kept)))
-        joined = np.concatenate(parts) if parts else np.zeros((0, flat.shape[1]))
-        return joined.reshape(len(joined), *x.shape[1:])
+            for first in range(0, len(kept), most):
+                part = kept[first : first + most]
+                yield slice(part[0] - half, part[-1] + half + 1), slice(at, at + len(part))
+                at += len(part)
+
+    def piece(self, x: np.ndarray, out: slice) -> np.ndarray:
+        """Return the rows out of one of the blocks with the rows in x (m, c)."""
+        return _decimated(self.taps, x, self.decimation, out.stop - out.start)
 
 
 def _decimated(taps: np.ndarray, x: np.ndarray, step: int, count: int) -> np.ndarray:

@@ -76,3 +76,16 @@ def test_the_correlations_of_filtered_white_noise_are_what_it_says():
     measured = [float(rows[i:] @ rows[: len(rows) - i]) / float(rows @ rows) for i in range(5)]
     assert low.correlations(4) == pytest.approx(measured, abs=0.01)
     assert low.correlations(400)[-1] == 0.0
+
+
+def test_blocks_of_rows_are_filtered_as_the_whole_is():
+    """Each from the rows that it needs and no others, across pauses too."""
+    x = np.random.default_rng(1).normal(size=(600, 2))
+    low = _filter(segments=(slice(0, 250), slice(250, 300), slice(300, 600)))
+    found = np.full((len(low.rows), 2), np.nan)
+    sizes = []
+    for rows, out in low.blocks(7):
+        found[out] = low.piece(x[rows], out)
+        sizes.append(out.stop - out.start)
+    np.testing.assert_allclose(found, low(x), rtol=0, atol=1e-15)
+    assert max(sizes) == 7
