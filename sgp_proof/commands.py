@@ -23,6 +23,7 @@ def add_commands(add: AddCommand) -> None:
         "Measure speed and memory beside rivals and the machine's limit.",
         'sgp bench step --out out/bench',
     )  # fmt: skip
-    parser.add_argument('names', metavar='NAME', nargs='*', help='step or evidence (default: all)')
+    words = 'step, evidence, replay, diagnose or identify (default: all)'
+    parser.add_argument('names', metavar='NAME', nargs='*', help=words)
     parser.add_argument('--quick', dest='is_quick', action='store_true',
                         help='small sizes, under a minute')  # fmt: skip

@@ -65,7 +65,7 @@ PROOF_ROOMS = {
     'columns': set(),
     'commands': set(),
     'unchanged': {'result_files'},
-    'bench': {'result_files'},
+    'bench': {'result_files', 'concealed'},
     'paper': {'columns'},
     'real': {'result_files', 'columns'},
     'streams': {'result_files', 'paper', 'real'},

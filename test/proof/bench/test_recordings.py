@@ -1,0 +1,49 @@
+"""The benchmark of whole commands: what it draws, and what it says of growth."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from sgp_proof.bench import recordings
+from sgp_proof.bench.recordings import draw_recording, measured
+from sgp_ros.recordings.reader import open_recording
+
+COST = {'processor_s': 2.0, 'wall_s': 3.0, 'peak_megabytes': 100.0}
+
+
+def test_a_drawn_recording_is_that_of_its_robot(tmp_path):
+    """As many joints and seconds as asked for; the same numbers each time."""
+    robot, recording = draw_recording(tmp_path, 3, 2.0)
+    events = list(open_recording(str(recording)).events(None, None))
+    states = [e for e in events if hasattr(e, 'position')]
+    assert len(states[0].position) == 3
+    assert len(states) == pytest.approx(2.0 * recordings.RATE_HZ, abs=1)
+    assert all(name in robot.read_text(encoding='utf-8') for name in states[0].names)
+
+
+def test_a_command_is_measured_in_a_process_of_its_own():
+    """Seconds and memory are those of the command; one that fails is no result."""
+    found = measured(['--version'])
+    assert found['processor_s'] > 0.0
+    assert found['peak_megabytes'] > 5.0
+    with pytest.raises(RuntimeError, match='no_such_command'):
+        measured(['no_such_command'])
+
+
+def test_growth_is_told_between_rows_that_differ_in_one_size(monkeypatch):
+    """Costs as the square of the joints and linear in the length."""
+
+    def cost(words):
+        joints, seconds = map(float, words[1].rsplit('_')[-2:])
+        return COST | {'processor_s': joints**2 * seconds}
+
+    monkeypatch.setattr(recordings, 'measured', cost)
+    monkeypatch.setattr(recordings, 'draw_recording', lambda _, k, s: ('arm', f'arm_{k}_{s:g}'))
+    rows = recordings.bench_diagnose({}, lambda share: None, is_quick=False)
+    told = {'seconds': 1.0, 'joints': 2.0}
+    for name, wanted in told.items():
+        found = [row[f'exponent_{name}'] for row in rows if row[f'exponent_{name}'] != '']
+        assert found
+        assert all(math.isclose(x, wanted) for x in found)
