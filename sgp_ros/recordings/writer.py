@@ -71,6 +71,7 @@ class RecordingWriter:
         self._changes_topic = changes_topic
         self._schemas: dict[str, int] = {}
         self._channels: dict[tuple[str, str], int] = {}
+        _prepare(command_type)  # takes time: an interruption in it leaves no file
         self._file: BinaryIO
         if is_live:
             self._file, self._growing = self.path.open('wb'), self.path
@@ -78,7 +79,6 @@ class RecordingWriter:
             self._file, self._growing = create_beside(self.path)
         self._writer = Writer(self._file)
         self._writer.start(profile='ros2', library='sgp_ros')
-        _prepare(command_type)
 
     def write_event(self, event: Event, log_ns: int | None = None) -> None:
         """Write one event.
