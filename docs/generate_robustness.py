@@ -30,10 +30,11 @@ def _faults(result):
 def _garbage(summary):
     rows = {name: found for name, found in summary.items() if isinstance(found, dict)}
     lines = [
-        '| garbage | streams | within 10 % | median ratio | worst ratio |', '|---|---|---|---|---|',
+        '| garbage | streams | within 10 % | median ratio | worst ratio | worst where lost |',
+        '|---|---|---|---|---|---|',
         *(
             f'| {name} | {x["streams"]} | {x["within_10_percent"]} | {x["median"]:.3g} | '
-            f'{x["worst"]:.3g} |'
+            f'{x["worst"]:.3g} | {x["worst_lost"]:.3g} |'
             for name, x in rows.items()
         ),
     ]  # fmt: skip
@@ -44,9 +45,25 @@ def _garbage(summary):
     )
 
 
+def _kills(result):
+    kinds = dict.fromkeys(name.split()[0] for name in result['by_signal'])
+    signals = ('SIGKILL', 'SIGTERM', 'SIGINT')
+    lines = ['| what | ' + ' | '.join(signals) + ' |', '|---|---|---|---|']
+    for kind in kinds:
+        numbers = [str(result['by_signal'].get(f'{kind} {name}', 0)) for name in signals]
+        lines.append(f'| {kind} | {" | ".join(numbers)} |')
+    return '\n'.join(lines)
+
+
+def _disk(result):
+    names = ', '.join(f'`{name}`' for name in result['commands'])
+    return f'{names}: faults: {"; ".join(result["faults"]) or "none"}.'
+
+
 def text() -> str:
     """Return the page."""
     events, files, gates = (_load(f'robust_{n}') for n in ('events', 'files', 'gates'))
+    messages, kills, disk = (_load(f'robust_{n}') for n in ('messages', 'kills', 'disk'))
     summary = gates['summary']
     rate = summary['falsely_refused'] / summary['equations']
     machine = events['environment']
@@ -57,7 +74,11 @@ def text() -> str:
         FILE_COUNTS=_table('format and outcome', files['outcomes']),
         EQUATIONS=summary['equations'], REFUSED=summary['falsely_refused'], RATE=f'{1e2 * rate:.2g}',
         LARGEST=f'{LARGEST:g}', BOUND=f'{1e2 / LARGEST**2:.2g}', STREAMS=len(gates['clean']),
-        GARBAGE=_garbage(summary),
+        GARBAGE=_garbage(summary), MESSAGES=messages['messages'],
+        MESSAGE_FAULTS=_faults(messages), MESSAGE_MB=messages['peak_megabytes'],
+        KILLS=kills['number'], KILL_FAULTS=_faults(kills), KILL_COUNTS=_kills(kills),
+        KEPT='; '.join(f'{n} {kept}' for kept, n in kills['kept'].items()),
+        LOST=f'{kills["most_lost_s"]:.2f}', DISK=_disk(disk),
         MACHINE=f'{machine["processor"]}, Python {machine["python"]}, NumPy {machine["numpy"]}',
     )  # fmt: skip
 
