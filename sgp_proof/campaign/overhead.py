@@ -33,17 +33,23 @@ def wait(job):
 
 
 def waiting():
-    """Return by number of workers the seconds that tasks took, beside those without any cost."""
+    """Return by number of workers the seconds that tasks took, beside those without any cost.
+
+    Scheduler and client are in this process: its processor time is what a task costs them.
+    """
     found = {}
     for workers in WORKERS:
         with cluster(None, workers) as client:
             client.wait_for_workers(workers)
             list(run_tasks(client, wait, [{'seconds': 0.1}] * 4 * workers))
-            begun = time.perf_counter()
+            begun, used, load = time.perf_counter(), time.process_time(), os.getloadavg()[0]
             list(run_tasks(client, wait, [{'seconds': WAIT_S}] * WAITS * workers))
-            seconds = time.perf_counter() - begun
+            seconds, used = time.perf_counter() - begun, time.process_time() - used
         ideal = WAITS * WAIT_S
-        found[str(workers)] = {'seconds': seconds, 'ideal': ideal, 'share': ideal / seconds}
+        found[str(workers)] = {
+            'seconds': seconds, 'ideal': ideal, 'share': ideal / seconds, 'load_before': load,
+            'scheduler_ms_per_task': 1e3 * used / (WAITS * workers),
+        }  # fmt: skip
     return {'tasks_per_worker': WAITS, 'task_s': WAIT_S, 'workers': found}
 
 

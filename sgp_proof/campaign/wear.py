@@ -16,7 +16,7 @@ from sgp_proof.result_files import read_result
 QUANTITIES = (('shoulder', 'viscous'), ('shoulder', 'coulomb'), ('elbow', 'viscous'),
               ('elbow', 'coulomb'))  # fmt: skip
 WORN = ('elbow', 'coulomb')
-LEVEL = 0.3
+LEVEL, LENGTH_S = 0.3, 60.0
 HOUR_NS = 3600 * 10**9
 DAY_NS = 24 * HOUR_NS
 
@@ -58,7 +58,8 @@ def draw_results(world, seed, begin=None):
     rng = np.random.default_rng(seed)
     starts, ages, days = _calendar(world, rng)
     n = len(starts)
-    cold = world.warm_up * np.exp(-ages / world.tau_h)
+    middle_h = ages + 0.5 * LENGTH_S / 3600.0
+    cold = world.warm_up * np.exp(-middle_h / world.tau_h)
     values, stds = {}, {}
     for quantity in QUANTITIES:
         each_day = world.day * rng.standard_normal(days[-1] + 1)
@@ -70,7 +71,7 @@ def draw_results(world, seed, begin=None):
         values[quantity] = true + stds[quantity] * rng.standard_normal(n)
     return [
         {
-            'recording': f'{i:04d}.mcap', 'start_ns': int(starts[i]), 'duration_s': 60.0,
+            'recording': f'{i:04d}.mcap', 'start_ns': int(starts[i]), 'duration_s': LENGTH_S,
             'robot': 'arm', 'session': None, 'covariates': {}, 'versions': '',
             'tasks': {'identify': {'rows': [
                 {'kind': 'coefficient', 'joint': joint, 'parameter': f'{joint}.{name}',

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Mapping
-from contextlib import suppress
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,9 @@ from sgp_ros.engine.samples import JointSample
 from sgp_ros.errors import RecordingError, SgpError
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.report.metrics import versions
+
+_FIELDS = ('data', 'temperature', 'relative_humidity', 'fluid_pressure', 'voltage')
+"""Of messages whose number may be a covariate: std_msgs, and some of sensor_msgs."""
 
 
 def examine_recording(job: Mapping[str, Any]) -> dict[str, Any]:
@@ -77,10 +80,8 @@ def mean_of_topic(path: str, topic: str) -> float:
     """
     values = []
     for _, message in open_recording(path).messages(topic):
-        for name in ('data', 'temperature', 'relative_humidity', 'fluid_pressure', 'voltage'):
-            with suppress(TypeError, ValueError, AttributeError):
-                values.append(float(getattr(message, name)))
-                break
+        found = [getattr(message, name, None) for name in _FIELDS]
+        values += [float(x) for x in found if isinstance(x, Real)][:1]
     if not values or not np.isfinite(values).any():
         raise RecordingError(
             f'{topic} of {path} holds no number', 'messages with data or temperature',

@@ -14,15 +14,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from scipy import linalg, optimize
 
-_STARTS = ((-1.0, -1.0), (-1.0, -8.0))
-"""Of the log variances relative to that of y: of e, and of every group."""
+_GRID = (-7.0, -3.5, -1.5, 0.0)
+"""Log variances relative to that of y among which the search begins: the likelihood may have
+several maxima, and where a variance is nearly nothing it is flat and no slope leads away."""
+_PRECISION = {'xatol': 1e-4, 'fatol': 1e-7}
 _BOUNDS = (-16.0, 3.0)
 _NEW = 1e-9
 """Share of a column that those before it must leave."""
+_LEAST = 1e-12
+"""Of the scale of the residuals, which copies of one recording leave none of."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,19 +142,16 @@ def fit_mixed(
 
     both = np.column_stack([X, y])
 
-    def loss(logs: np.ndarray) -> float:
-        spread = spread_of(logs)
+    def loss(logs: Sequence[float]) -> float:
+        spread = spread_of(np.asarray(logs))
         inner = both.T @ spread.solve(both)  # (p + 1, p + 1)
         known = inner[:-1, :-1]
         squares = inner[-1, -1] - inner[-1, :-1] @ np.linalg.solve(known, inner[:-1, -1])
         return float(0.5 * (spread.log_determinant + np.linalg.slogdet(known)[1] + squares))
 
-    found = min(
-        (optimize.minimize(loss, [own, *[other] * len(groups)], method='L-BFGS-B',
-                           bounds=[_BOUNDS] * (1 + len(groups)))
-         for own, other in _STARTS[: 1 + bool(groups)]),
-        key=lambda done: float(done.fun),
-    )  # fmt: skip
+    start = min(product(_GRID, repeat=1 + len(groups)), key=loss)
+    found = optimize.minimize(loss, start, method='Nelder-Mead', options=_PRECISION,
+                              bounds=[_BOUNDS] * len(start))  # fmt: skip
     theta = scale * np.exp(found.x)
     return fit_given(y, X, spread_of(found.x), theta, levels)
 
@@ -172,4 +174,5 @@ def fit_given(
     residual = y - X @ beta
     n, p = X.shape
     factor = float(residual @ spread.solve(residual[:, None])[:, 0]) / max(n - p, 1)
+    factor = max(factor, _LEAST)
     return MixedFit(X, beta, factor * inverse, max(levels - p, 1), residual, spread, theta)

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
+from sgp_ros.apps.campaign_task import mean_of_topic
 from sgp_ros.campaign.recordings import Told, find_recordings, read_covariates
+from sgp_ros.engine.samples import CommandSample, frozen_array
 from sgp_ros.errors import ConfigError, RecordingError
+from sgp_ros.recordings.command_types import FLOAT64, FLOAT64_ARRAY
+from sgp_ros.recordings.writer import RecordingWriter
 
 
 @pytest.fixture
@@ -74,3 +80,15 @@ def test_a_table_that_says_nothing_sure_is_refused(tmp_path, text, said):
     (tmp_path / 'bags.csv').write_text(text)
     with pytest.raises(ConfigError, match=said):
         read_covariates(str(tmp_path / 'bags.csv'), ('1.mcap',), [])
+
+
+def test_the_mean_of_a_topic_is_a_covariate(tmp_path):
+    """Of one number a message; a message of several has none."""
+    for name, kind in (('one', FLOAT64), ('more', FLOAT64_ARRAY)):
+        with RecordingWriter(tmp_path / f'{name}.mcap', command_type=kind) as writer:
+            for i, value in enumerate((20.0, 24.0, math.nan)):
+                writer.write_event(CommandSample(10**9 * (1 + i), frozen_array([value])))
+    assert mean_of_topic(str(tmp_path / 'one.mcap'), '/command') == 22.0
+    for name, topic in (('more', '/command'), ('one', '/temperature')):
+        with pytest.raises(RecordingError, match=topic):
+            mean_of_topic(str(tmp_path / f'{name}.mcap'), topic)

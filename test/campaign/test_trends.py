@@ -92,6 +92,16 @@ def test_one_stray_estimate_is_no_change():
     assert not trend.changes
 
 
+def test_copies_of_one_recording_have_neither_trend_nor_change():
+    results = _only(draw_results(SMALL, 4))[:20]
+    for result in results:
+        result['tasks'] = results[0]['tasks']
+    (trend,) = find_trends(results)
+    assert not trend.changes
+    assert not trend.is_drift
+    assert json.dumps(trend.content(), allow_nan=False)
+
+
 def test_what_only_large_values_assert_has_no_trend():
     """Of effects that a diagnosis finds now and then, those found are no fair sample."""
     results = _only(draw_results(SMALL, 5))
