@@ -19,11 +19,12 @@ from pathlib import Path
 from sgp_proof.campaign.wear import measured
 from sgp_proof.result_files import make_parser, write_result
 from sgp_ros.campaign.cluster import cluster, run_tasks
+from sgp_ros.cli import main
 
 WORKERS = (1, 2, 4, 8)
 WAIT_S, WAITS = 0.5, 20
 BAGS, LENGTH_S = 24, '4'
-SEED = 0
+SEED, PAUSE_S = 0, (5.0, 15.0)
 
 
 def wait(job):
@@ -57,10 +58,9 @@ def make_bags(folder):
     """Write short recordings of a linear axis."""
     for i in range(BAGS):
         out = folder / 'made' / str(i)
-        subprocess.run(
-            [sys.executable, '-m', 'sgp_ros.cli', 'simulate', 'linear_axis', '--duration',
-             LENGTH_S, '--seed', str(100 + i), '--out', str(out), '--quiet'], check=True,
-        )  # fmt: skip
+        arguments = ['simulate', 'linear_axis', '--duration', LENGTH_S, '--seed', str(100 + i)]
+        if main([*arguments, '--out', str(out), '--quiet']):
+            raise SystemExit(1)
         (folder / 'bags').mkdir(exist_ok=True)
         (out / 'linear_axis.mcap').rename(folder / 'bags' / f'{i:02d}.mcap')
     return folder / 'bags'
@@ -94,9 +94,9 @@ def kills(bags, folder):
     while True:
         running = subprocess.Popen(arguments_of(bags, out, 2))
         while running.poll() is None:
-            time.sleep(rng.uniform(1.0, 4.0))
+            time.sleep(rng.uniform(*PAUSE_S))
             workers = children_of(running.pid)
-            if rng.random() < 0.25:
+            if rng.random() < 0.2:
                 running.kill()
                 running.wait()
                 lost_runs += 1
@@ -125,7 +125,7 @@ def children_of(process):
     return found
 
 
-def main():
+def measure():
     """Measure and write."""
     arguments = make_parser(__doc__, 'campaign', ['waiting', 'speed', 'kills']).parse_args()
     with tempfile.TemporaryDirectory() as name:
@@ -141,4 +141,4 @@ def main():
 
 
 if __name__ == '__main__':
-    main()
+    measure()

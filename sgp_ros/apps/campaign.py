@@ -13,7 +13,7 @@ from typing import Any
 
 from sgp_ros import __version__
 from sgp_ros.apps.campaign_task import examine_recording
-from sgp_ros.apps.terminal import strong, warned
+from sgp_ros.apps.terminal import mark_folder, strong, warned
 from sgp_ros.campaign.changes import FALSE_ALARMS
 from sgp_ros.campaign.cluster import cluster, run_tasks
 from sgp_ros.campaign.recordings import Told, find_recordings, read_covariates
@@ -96,8 +96,9 @@ def run_campaign(
     found = find_recordings(bag)
     told = read_covariates(chosen.covariates, tuple(found), remarks)
     jobs = _jobs(found, robot, chosen)
+    (out / RESULTS).mkdir(parents=True, exist_ok=True)
+    mark_folder(out, 'campaign')  # an interrupted run has left its sign
     with replacing_results(out, 'campaign'):
-        (out / RESULTS).mkdir(exist_ok=True)
         open_jobs = [job for job in jobs if not _is_finished(out, job)]
         print(f'{len(jobs)} recordings, {len(jobs) - len(open_jobs)} of them finished before')
         broken = _compute(out, open_jobs, scheduler, workers, progress)

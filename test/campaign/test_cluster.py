@@ -107,6 +107,22 @@ def test_a_killed_campaign_goes_on_to_the_same_table(bags, client, finished, tmp
     assert written == (finished / 'results.parquet').read_bytes()
 
 
+def test_an_interrupted_campaign_goes_on_in_its_folder(bags, client, tmp_path, monkeypatch):
+    """What is finished there is no file of somebody else."""
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    arguments = _arguments(bags, tmp_path / 'out', client)
+    with monkeypatch.context() as patch:
+        patch.setattr(campaign, 'run_tasks', interrupt)
+        assert main(arguments) == 130
+    with monkeypatch.context() as patch:
+        patch.setattr(campaign, 'run_tasks', lambda *_: [(i, 'a bug') for i in range(4)])
+        assert main(arguments) == 0
+    assert pq.read_table(tmp_path / 'out' / 'results.parquet').num_rows == 4
+
+
 def test_another_option_or_recording_is_computed(bags, finished):
     """What is finished counts for the same file, robot, options and version only."""
     found = campaign.find_recordings([str(bags)])
