@@ -164,7 +164,12 @@ def write_identified_recording(out: Path, identified: IdentifiedRecording) -> No
         values, has_bodies = best_coefficients(found), found.consistent is not None
         write_identified(out, found.robot, values, std, has_bodies=has_bodies)
         steps = _steps(out, identified)
-        write_identification(out, found, findings, identified.remarks, steps)
+        tree = None
+        if 'urdf' in found.robot.source:
+            from sgp_ros.robots.urdf_robot import nominal_tree  # noqa: PLC0415 - loads Pinocchio
+
+            tree = nominal_tree(found.robot)
+        write_identification(out, found, findings, identified.remarks, steps, tree)
 
 
 def _steps(out: Path, identified: IdentifiedRecording) -> Steps:

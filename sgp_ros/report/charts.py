@@ -74,6 +74,7 @@ class Chart:
         cells: a map instead of curves.
         limit: ends of the vertical axis; None fits it to the data.
         view: ends of x at first; None shows all.
+        is_log: whether both axes are logarithmic.
         option: label of the button that shows it, where one of several charts is seen at a time.
     """
 
@@ -88,6 +89,7 @@ class Chart:
     cells: Cells | None = None
     limit: tuple[float, float] | None = None
     view: tuple[float, float] | None = None
+    is_log: bool = False
     option: str = ''
 
     def content(self) -> dict[str, Any]:
@@ -95,7 +97,7 @@ class Chart:
         content: dict[str, Any] = {
             'x_label': self.x_label, 'y_label': self.y_label, 'group': self.group,
             'x': _plain(self.x, 7), 'spans': [_plain(ends) for ends in self.spans],
-            'limit': self.limit, 'view': self.view,
+            'limit': self.limit, 'view': self.view, 'log': self.is_log,
             'series': [
                 {'label': s.label, 'tone': s.tone, 'style': s.style, 'y': _plain(s.y),
                  **({} if s.half is None else

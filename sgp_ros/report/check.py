@@ -44,6 +44,7 @@ def render_check(
         setup=[{'place': place(f), 'text': phrase(f), 'p': f'{f.probability:.2f}'} for f in setup],
         joints=content['joints'].items(),
         units={joint.name: joint.unit('position') for joint in robot.joints},
+        has_limits=any(j['range_share'] is not None for j in content['joints'].values()),
         shown=list(charts),
         counts=_counts(content),
         remarks=content['remarks'],
@@ -58,7 +59,7 @@ def _counts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     stamps = ', '.join(f'{content[name]} {name}' for name in ('gaps', 'backward', 'repeated'))
     return [
         ('states', f'{content["states"]} in {content["seconds"]:.4g} s'),
-        ('rate', f'{content["rate_hz"]:.4g} Hz, jitter {jitter:.2g} %'),
+        ('rate', f'{content["rate_hz"]:.4g} Hz, jitter {max(round(jitter, 2), 0.0):g} %'),
         ('commands', f'{content["commands"]}, {kinds}'),
         ('stamps', stamps),
     ]

@@ -38,8 +38,8 @@ from sgp_ros.report.diagnosis_text import (
     visibility_sentences,
     why_it_lost,
 )
-from sgp_ros.report.figures import png
-from sgp_ros.report.files import write_bytes, write_text
+from sgp_ros.report.figures import write_figures
+from sgp_ros.report.files import write_text
 from sgp_ros.report.html import MEANINGS
 from sgp_ros.report.law_search import search_rows
 from sgp_ros.report.metrics import versions
@@ -65,7 +65,7 @@ _VERDICTS = {
 def write_diagnosis(
     out: Path, found: Diagnosis, tree: Tree | None = None, steps: Steps = ()
 ) -> None:
-    """Write `report.html` and its figures as PNG into `out`.
+    """Write `report.html` and its figures as PNG and SVG into `out`.
 
     Args:
         out: folder.
@@ -73,9 +73,7 @@ def write_diagnosis(
         tree: of the robot, for its picture; None for none.
         steps: what to do next.
     """
-    figures = {name: png(figure) for name, figure in draw_diagnosis(found).items()}
-    for name, content in figures.items():
-        write_bytes(out / f'{name}.png', content)
+    figures = write_figures(out, draw_diagnosis(found))
     picture = '' if tree is None else picture_of(found, tree)
     write_text(out / 'report.html', render(found, figures, picture, steps))
 
@@ -137,7 +135,7 @@ def render(
 
 def picture_of(found: Diagnosis, tree: Tree) -> str:
     """Return the robot as it stood in the middle of its motion; pale where nothing is wrong."""
-    shares = dict(joint_shares(found)) if not is_calm(found) else {}
+    shares = {} if is_calm(found) else dict(joint_shares(found))
     return robot_picture(tree, np.median(found.traces.position, axis=0), shares)
 
 

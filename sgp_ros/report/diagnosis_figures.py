@@ -171,8 +171,10 @@ def draw_laws(found: Diagnosis) -> Figure:
         curve = law_curve(found, finding, force)
         j, style = curve.joint, '-' if curve.is_line else '.'
         colour = next((c for f, _, c in _coloured(found, j) if f is finding), FORCES[0])
-        axes.plot(curve.x, curve.measured, style, ms=6, lw=3.5, color=MEASURED, label='measured')
-        axes.plot(curve.x, curve.law, style, ms=1.8, lw=1.2, color=colour, label='the law')
+        axes.plot(curve.x, curve.measured, style, ms=6, lw=3.5, color=MEASURED, label='measured',
+                  rasterized=not curve.is_line)  # fmt: skip
+        axes.plot(curve.x, curve.law, style, ms=1.8, lw=1.2, color=colour, label='the law',
+                  rasterized=not curve.is_line)  # fmt: skip
         axes.axhline(0.0, color=GREY, lw=0.6)
         axes.set(xlabel=curve.label, ylabel=f'effort on {found.joints[j]} [{found.units[j]}]')
         axes.set_title(fill(effect_name(finding), 26), fontsize='medium')

@@ -133,7 +133,7 @@ def cells_of(
 def _map(axes: Axes, found: Diagnosis, j: int, values: np.ndarray, reach: float) -> QuadMesh:
     x, y, mean = cells_of(found, j, values)
     axes.set_facecolor('#D4D4D4')
-    return axes.pcolormesh(x, y, mean.T, cmap='RdBu_r', vmin=-reach, vmax=reach)
+    return axes.pcolormesh(x, y, mean.T, cmap='RdBu_r', vmin=-reach, vmax=reach, rasterized=True)
 
 
 VARIABLES = ('position', 'velocity', 'effort', 'time')

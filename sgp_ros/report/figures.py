@@ -8,19 +8,23 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.results import Estimate, Step
 from sgp_ros.gp.scores import INTERVAL_95, pit
+from sgp_ros.report.files import write_bytes
 
 # Okabe and Ito 2008: told apart with every kind of colour vision.
 MEASURED, PREDICTED, TRUE, GREY = '#B8B8B8', '#0072B2', '#D55E00', '#555555'
 BAND = '#9CC9E5'
 _POINTS = 2500
+_DPI = 110
 _ZOOM_S = 4.0
 _COLUMNS = 3
 
@@ -44,8 +48,27 @@ def draw_all(
 def png(figure: Figure) -> bytes:
     """Return a figure as PNG."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format='png', dpi=110)
+    figure.savefig(buffer, format='png', dpi=_DPI)
     return buffer.getvalue()
+
+
+def svg(figure: Figure) -> bytes:
+    """Return a figure as SVG, its letters as text; the same figure gives the same bytes."""
+    buffer = io.BytesIO()
+    with rc_context({'svg.fonttype': 'none', 'svg.hashsalt': 'sgp'}):
+        figure.savefig(buffer, format='svg', dpi=_DPI, metadata={'Date': None})
+    return buffer.getvalue()
+
+
+def write_figures(out: Path, figures: Mapping[str, Figure]) -> dict[str, bytes]:
+    """Write figures as PNG and SVG into a folder by their stems; return the PNG."""
+    drawn = {}
+    for stem, figure in figures.items():
+        drawn[stem] = png(figure)
+        write_bytes(out / f'{stem}.png', drawn[stem])
+        figure.set_layout_engine('none')  # it is laid out; once more would only cost time
+        write_bytes(out / f'{stem}.svg', svg(figure))
+    return drawn
 
 
 def draw_prediction(engine: Engine, history: History, channel: str, j: int) -> Figure:

@@ -9,8 +9,8 @@ from typing import Any
 from sgp_ros.engine.engine import Engine
 from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.report.charts import Chart
-from sgp_ros.report.figures import History, draw_all, png
-from sgp_ros.report.files import write_bytes, write_text
+from sgp_ros.report.figures import History, draw_all, write_figures
+from sgp_ros.report.files import write_text
 from sgp_ros.report.next_steps import Steps
 from sgp_ros.report.page import render_page
 from sgp_ros.report.run_charts import run_charts
@@ -39,7 +39,7 @@ def write_report(
     checks: Sequence[str] = (),
     steps: Steps = (),
 ) -> list[Path]:
-    """Write `report.html` and the figures as PNG into `out`; return their paths.
+    """Write `report.html` and the figures as PNG and SVG into `out`; return the page and the PNG.
 
     Args:
         out: folder.
@@ -50,11 +50,8 @@ def write_report(
         checks: sentences to stand below the verdict.
         steps: what to do next.
     """
-    figures = {name: png(figure) for name, figure in draw_all(engine, history, truth).items()}
-    paths = []
-    for name, content in figures.items():
-        paths.append(out / f'{name}.png')
-        write_bytes(paths[-1], content)
+    figures = write_figures(out, draw_all(engine, history, truth))
+    paths = [out / f'{name}.png' for name in figures]
     charts = run_charts(engine, history, truth or {})
     page = render(engine, metrics, charts, figures, truth or {}, checks, steps)
     paths.append(out / 'report.html')

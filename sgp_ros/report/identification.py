@@ -8,13 +8,14 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from sgp_ros.batch.identification import Identification
 from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.report.charts import Chart
-from sgp_ros.report.figures import BAND, GREY, MEASURED, PREDICTED, png
-from sgp_ros.report.files import write_bytes, write_text
+from sgp_ros.report.figures import BAND, GREY, MEASURED, PREDICTED, write_figures
+from sgp_ros.report.files import write_text
 from sgp_ros.report.identification_text import (
     called,
     cautions,
@@ -26,9 +27,12 @@ from sgp_ros.report.identification_text import (
 )
 from sgp_ros.report.next_steps import Steps
 from sgp_ros.report.page import render_page
+from sgp_ros.report.robot_picture import robot_picture
 from sgp_ros.report.run_charts import filter_chart, identification_charts
+from sgp_ros.rigid.tree import Tree
 
 _SHOWN_S = 12.0
+_MOST_CARDS = 4
 
 
 def write_identification(
@@ -37,16 +41,28 @@ def write_identification(
     findings: Mapping[str, Any],
     remarks: Sequence[str],
     steps: Steps = (),
+    tree: Tree | None = None,
 ) -> None:
-    """Write `report.html` and the figures as PNG into `out`; `steps` say what to do next."""
-    figures = {'filter': png(draw_filter(findings['filter']))}
+    """Write `report.html` and the figures as PNG and SVG into `out`.
+
+    Args:
+        out: folder.
+        found: the identification.
+        findings: its numbers.
+        remarks: on the recordings.
+        steps: what to do next.
+        tree: of the robot, for its picture; None for none.
+    """
+    drawings = {'filter': draw_filter(findings['filter'])}
     for name in found.held:
-        figures[f'prediction_{_stem(name)}'] = png(draw_prediction(found, name))
-    for name, content in figures.items():
-        write_bytes(out / f'{name}.png', content)
+        drawings[f'prediction_{_stem(name)}'] = draw_prediction(found, name)
+    figures = write_figures(out, drawings)
     charts = identification_charts(found, drawn(found.fits))
     charts['filter'] = filter_chart(findings['filter'])
-    page = render(found.robot.description, findings, figures, remarks, charts, steps)
+    picture = '' if tree is None else picture_of(found, findings, tree)
+    page = render(
+        found.robot.description, findings, figures, remarks, charts, steps, picture=picture
+    )
     write_text(out / 'report.html', page)
 
 
@@ -57,8 +73,10 @@ def render(
     remarks: Sequence[str],
     charts: Mapping[str, Chart] = MappingProxyType({}),
     steps: Steps = (),
+    *,
+    picture: str = '',
 ) -> str:
-    """Return the page as HTML; every text in it is escaped."""
+    """Return the page as HTML; every text in it is escaped, names in the picture are already."""
     regions = list(findings['rows'])
     return render_page(
         'identification.html', charts, figures,
@@ -69,12 +87,18 @@ def render(
         held_note=f'No method has learned from {" or ".join(map(called, findings["held_out"]))}. '
         'Near and far are the halves of its rows that lie closer to and further from the states '
         'learned from.',
-        drawn=drawn(findings['scores']),
         predictions=[name for name in charts if name.startswith('held ')],
         stills=[name for name in figures if name.startswith('prediction_')],
-        picture='',
-        methods=list(findings['scores']),
-        tables=[{'title': name, 'rows': _rows(findings, name)} for name in regions],
+        picture=Markup(picture),  # noqa: S704 - names in it are escaped
+        cards=_cards(findings),
+        target=findings['target'],
+        tables=[
+            {
+                'title': 'Learned from' if name == 'train' else called(name).capitalize(),
+                'rows': _rows(findings, name), 'is_open': name in findings['held_out'],
+            }
+            for name in sorted(regions, key=lambda name: name not in findings['held_out'])
+        ],
         inputs=_inputs(findings),
         joints=[{'name': j, 'unit': findings['units']['position'][j]} for j in findings['joints']],
         rollouts=[
@@ -137,21 +161,58 @@ def draw_prediction(found: Identification, name: str) -> Figure:
     return figure
 
 
+def picture_of(found: Identification, findings: Mapping[str, Any], tree: Tree) -> str:
+    """Return the robot in the middle of its motion, coloured by what the physics alone leaves.
+
+    Of what was held out, each joint relative to the variance of its own target.
+    """
+    left = dict.fromkeys(findings['joints'], 0.0)
+    for name in findings['held_out']:
+        for joint, score in (
+            findings['scores'].get('PR', {}).get(name, {}).get('joints', {}).items()
+        ):
+            left[joint] += score['nmse'] or 0.0
+    total = sum(left.values())
+    shares = {joint: x / total for joint, x in left.items()} if total else {}
+    posture = np.median(found.data.U[:, : len(left)], axis=0)
+    return robot_picture(tree, posture, shares, 'share of what the physics alone leaves by joint')
+
+
+def _cards(findings: Mapping[str, Any]) -> list[dict[str, str]]:
+    """Return the errors of the joints that are predicted worst, without and with Z."""
+    units, spoken = findings['units'][findings['target']], drawn(findings['scores'])
+    methods = [m for m in ('PR', spoken) if m in findings['scores']]
+    methods = list(dict.fromkeys(methods))
+    each = [
+        (score['nmse'] or 0.0, name, joint)
+        for name in findings['held_out']
+        for joint, score in findings['scores'][spoken][name].get('joints', {}).items()
+    ]
+    called_so = ' -> '.join('physics alone' if m == 'PR' else m for m in methods)
+    return [
+        {
+            'value': ' -> '.join(
+                _short(findings['scores'][m][name]['joints'][joint]['rmse']) for m in methods
+            ) + f' {units[joint]}',
+            'label': f'rms error of the {findings["target"]} of {joint} in {called(name)}: '
+                     f'{called_so}',
+        }
+        for _, name, joint in sorted(each, reverse=True)[:_MOST_CARDS]
+    ]  # fmt: skip
+
+
 def _rows(findings: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
-    rows, units = [], findings['units'][findings['target']]
-    speaker = drawn(findings['scores'])
-    for joint in findings['joints']:
-        cells = []
-        for scores in findings['scores'].values():
-            cell = scores[name].get('joints', {}).get(joint)
-            cells.append(
-                {'nmse': '', 'coverage': ''} if cell is None else
-                {'nmse': _short(cell['nmse']), 'coverage': f'{100 * cell["coverage95"]:.0f} %'}
-            )  # fmt: skip
-        best = findings['scores'][speaker][name].get('joints', {}).get(joint)
-        rmse = '' if best is None else f'{best["rmse"]:.3g} {units[joint]}'
-        rows.append({'joint': joint, 'cells': cells, 'rmse': rmse})
-    return rows
+    units = findings['units'][findings['target']]
+    return [
+        {
+            'joint': joint, 'method': method, 'nmse': _short(cell['nmse']),
+            'coverage': f'{100 * cell["coverage95"]:.0f} %',
+            'rmse': f'{_short(cell["rmse"])} {units[joint]}',
+        }
+        for joint in findings['joints']
+        for method, scores in findings['scores'].items()
+        for cell in [scores[name].get('joints', {}).get(joint)] if cell is not None
+    ]  # fmt: skip
 
 
 def _inputs(findings: Mapping[str, Any]) -> str:

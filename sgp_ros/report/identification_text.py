@@ -7,6 +7,8 @@ from typing import Any
 
 from sgp_ros.batch.identification import HELD_OUT
 
+_UNREAL = 0.01
+"""Standard deviations to the nearest real bodies that are worth a word."""
 _CORRELATED = 0.2
 """Correlation from row to row that is worth a word: the filter alone leaves some tenth."""
 
@@ -68,12 +70,20 @@ def cautions(findings: Mapping[str, Any]) -> list[str]:
     ]
     if narrow:
         found.append(f'Intervals of SGP are too narrow on held-out data: {", ".join(narrow)}.')
-    if findings['consistency'] and not findings['consistency']['was_consistent']:
+    if _is_unreal(findings['consistency']):
         found.append(
             'The fitted parameters belong to no real bodies: a mass or an inertia is not '
             'positive, or a friction drives. ' + _nearest(findings['consistency']['distance'])
         )
     return found
+
+
+def _is_unreal(consistency: Mapping[str, Any] | None) -> bool:
+    """Return whether the fitted parameters are those of no bodies, beyond what counts."""
+    if not consistency or consistency['was_consistent']:
+        return False
+    distance = consistency['distance']
+    return distance is None or float(distance) ** 0.5 > _UNREAL
 
 
 def _nearest(distance: float | None) -> str:

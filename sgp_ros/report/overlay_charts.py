@@ -22,8 +22,8 @@ NOMINAL, FINAL = 'nominal robot', 'diagnosed robot'
 _SIDES = (('nominal', NOMINAL, 'nominal', 'dashed'), ('diagnosed', FINAL, 'final', 'line'))
 _MODES = {
     'closed_whole': ('closed loop', 'in closed loop: PD drives follow the recorded targets'),
-    'open_2': ('2 s', 'open loop, restarted from the measured state every 2 s'),
     'open_0.5': ('0.5 s', 'open loop, restarted from the measured state every 0.5 s'),
+    'open_2': ('2 s', 'open loop, restarted from the measured state every 2 s'),
     'open_whole': ('whole', 'open loop from the first state on'),
 }  # fmt: skip
 """Label and words of each replay, in the order in which they are preferred."""

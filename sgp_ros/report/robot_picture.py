@@ -25,13 +25,17 @@ LEVELS = 5
 """Steps of the colour, `share0` to `share4` in `report.css`."""
 
 
-def robot_picture(tree: Tree, posture: np.ndarray, shares: Mapping[str, float]) -> str:
+def robot_picture(
+    tree: Tree, posture: np.ndarray, shares: Mapping[str, float],
+    what: str = 'share of the mismatch by joint',
+) -> str:  # fmt: skip
     """Return the robot in a posture as an `svg` element.
 
     Args:
         tree: of b bodies.
         posture: (k,) positions of the joints that move on their own [rad or m].
-        shares: 0 to 1 by joint; a link has the share of the joint that carries it.
+        shares: 0 to 1 by joint, empty for none; a link has the share of the joint that carries it.
+        what: the shares are, for those who do not see the picture.
     """
     rotations, origins = link_places(tree, posture)
     body, ends = link_segments(tree, rotations, origins)  # (s,), (s, 2, 3)
@@ -50,7 +54,10 @@ def robot_picture(tree: Tree, posture: np.ndarray, shares: Mapping[str, float]) 
             else f'circle cx="{x:.1f}" cy="{y:.1f}" r="8"'
         )
         parts.append(f'<{shape} class="joint {tone[j]}"/>')
-    said = [f'{name} {100.0 * share[j]:.0f} %' for j, name in enumerate(tree.moving_names)]
+    said = [
+        f'{name} {100.0 * share[j]:.0f} %' if shares else name
+        for j, name in enumerate(tree.moving_names)
+    ]
     for j, height in enumerate(_heights(joints[:, 1])):
         x, y = joints[j]
         left = _WIDTH - _LABELS
@@ -58,7 +65,7 @@ def robot_picture(tree: Tree, posture: np.ndarray, shares: Mapping[str, float]) 
             f'<path class="leader" d="M{x + 9:.1f} {y:.1f}L{left - 4:.1f} {height:.1f}"/>'
             f'<text x="{left:.1f}" y="{height + 4.5:.1f}">{escape(said[j])}</text>'
         )
-    label = 'The robot; share of the mismatch by joint: ' + ', '.join(said)
+    label = f'The robot, {what if shares else "its joints"}: {", ".join(said)}'
     return (
         f'<svg class="robot" viewBox="0 0 {_WIDTH:.0f} {_HEIGHT:.0f}" role="img" '
         f'aria-label="{escape(label)}">{"".join(parts)}</svg>'

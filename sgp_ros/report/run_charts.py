@@ -163,7 +163,7 @@ def _cut(values: np.ndarray, ends: np.ndarray) -> np.ndarray:
 
 
 def filter_chart(plan: Mapping[str, Any]) -> Chart:
-    """Return the loss of every cut-off that was tried, over its decimal logarithm."""
+    """Return the loss of every cut-off that was tried."""
     cutoffs = sorted({c['cutoff_hz'] for c in plan['candidates']})
     series = []
     for source, label, tone in (('position', 'velocity differentiated', 'final'),
@@ -171,12 +171,12 @@ def filter_chart(plan: Mapping[str, Any]) -> Chart:
         loss = {c['cutoff_hz']: c['regret'] for c in plan['candidates']
                 if c['velocity_source'] == source}  # fmt: skip
         if loss:
-            y = [math.log10(1.0 + loss[x]) if x in loss else math.nan for x in cutoffs]
+            y = [1.0 + loss[x] if x in loss else math.nan for x in cutoffs]
             series.append(Series(label, np.array(y), tone))
-    taken = math.log10(plan['cutoff_hz'])
+    taken = plan['cutoff_hz']
     return Chart(
         'Loss of each cut-off on held-out stretches',
-        f'The least loss is at {plan["cutoff_hz"]:.3g} Hz, marked by the dashed line.',
-        'log10 of the cut-off in Hz', 'log10(1 + loss in nat)', np.log10(cutoffs), series,
-        spans=[(taken, taken)],
+        f'The chosen cut-off is {taken:.3g} Hz, marked by the dashed line.',
+        'cut-off [Hz]', '1 + loss [nat]', np.array(cutoffs), series,
+        spans=[(taken, taken)], is_log=True,
     )  # fmt: skip

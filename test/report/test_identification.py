@@ -14,13 +14,19 @@ from sgp_ros.batch.blocks import distance_to
 from sgp_ros.batch.identification import IdentificationOptions, identify
 from sgp_ros.batch.regression_data import FilteredData
 from sgp_ros.report.findings import collect_findings, far_half
-from sgp_ros.report.identification import draw_filter, draw_prediction, render
+from sgp_ros.report.identification import draw_filter, draw_prediction, picture_of, render
 from sgp_ros.report.identification_text import cautions, excitation, verdict
+from sgp_ros.rigid.tree import read_urdf
 from sgp_ros.robots.registry import load_robot
 from test.batch.worlds import moved_axis
 from test.report.pages import content_of
 
 LINEAR_AXIS = load_robot('linear_axis')
+AXIS = """
+<robot name="axis"><link name="base"/><link name="cart"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="axis" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
 
 
 @pytest.fixture(scope='module')
@@ -130,7 +136,7 @@ def test_a_constant_target_has_no_nmse_and_the_page_shows_none(changed):
     assert 'nothing of the held-out part' in verdict(changed)
     rows = [row for row in _Cells(_page(changed)).rows if row and row[0] == 'axis']
     assert rows
-    assert all(row[1:-1:2] == [''] * 4 for row in rows)
+    assert all(row[2] == '' for row in rows)
 
 
 def test_the_page_refers_to_nothing_outside_itself(findings):
@@ -159,12 +165,27 @@ def test_parameters_of_the_page_are_those_of_the_findings(findings):
 
 
 def test_scores_of_the_page_are_those_of_the_findings(findings):
-    """One row a region: train, held out, near, far; the last cell is the error with its unit."""
+    """A row for each region and method, what is held out first; its error has a unit."""
     rows = [row for row in _Cells(_page(findings)).rows if row and row[0] == 'axis']
-    for row, region in zip(rows, findings['rows'], strict=True):
-        scores = [s[region]['joints']['axis'] for s in findings['scores'].values()]
-        cells = [x for s in scores for x in (f'{s["nmse"]:.3g}', f'{100 * s["coverage95"]:.0f} %')]
-        assert row[1:] == [*cells, f'{scores[-1]["rmse"]:.3g} N']
+    regions = sorted(findings['rows'], key=lambda name: name not in findings['held_out'])
+    expected = [
+        [method, f'{s["nmse"]:.3g}', f'{100 * s["coverage95"]:.0f} %', f'{s["rmse"]:.3g} N']
+        for region in regions for method, of in findings['scores'].items()
+        for s in [of[region]['joints']['axis']]
+    ]  # fmt: skip
+    assert [row[1:] for row in rows] == expected
+
+
+def test_the_page_draws_the_robot_and_says_errors_in_units_first(found, findings):
+    """An axis has all of what the physics alone leaves."""
+    picture = picture_of(found, findings, read_urdf(AXIS))
+    assert 'axis 100 %' in picture
+    assert 'share of what the physics alone leaves' in picture
+    page = render('', findings, {}, [], picture=picture)
+    physics, both = (findings['scores'][m]['held out']['joints']['axis']['rmse']
+                     for m in ('PR', 'SGP'))  # fmt: skip
+    assert f'<strong>{physics:.3g} → {both:.3g} N</strong>' in page
+    assert picture in page
 
 
 def test_a_good_identification_gets_no_caution(findings):

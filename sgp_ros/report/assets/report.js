@@ -86,7 +86,7 @@
         points: { show: cloud, size: s.tone === 'measured' ? 6 : 3.5, fill: colour, stroke: colour },
       });
     }
-    const scales = { x: { time: false } };
+    const scales = { x: { time: false, distr: chart.log ? 3 : 1 }, y: { distr: chart.log ? 3 : 1 } };
     if (chart.limit) scales.y = { range: chart.limit };
     const c = chart.cells;
     if (c) {
