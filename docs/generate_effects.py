@@ -1,6 +1,6 @@
 """Write docs/effects.md: every effect of the catalogue, as its law says of itself.
 
-python docs/generate_effects.py
+python docs/effect_pictures.py && python docs/generate_effects.py
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from sgp_ros.physics.grammar import FUNCTIONS
 from sgp_ros.physics.parts import LAST
 
 TARGET = Path(__file__).parent / 'effects.md'
+PICTURES = Path(__file__).parent / 'images' / 'effects'
 _HEAD = """# Effects
 
 The {count} effects that a robot may have beside its rigid bodies. `sgp diagnose` names them, a robot YAML
@@ -21,6 +22,9 @@ the catalogue in `sgp_ros/physics`.
 Signs are those of a generalised force: `M a + h = tau + tau_x`, so friction has positive numbers. `q`, `v` and
 `a` are position, velocity and acceleration of the joint. Units are those of a revolute joint; on a prismatic
 one read N for N m and m for rad. Kinds named `viscous` have levels in N m s/rad.
+
+Each picture shows the force along one swing of an arm of two joints, over the variable that the report draws it
+over; its numbers are an example.
 
 ## Laws of your own
 What no effect says is written down as a formula, in the robot YAML:
@@ -71,6 +75,10 @@ def _section(law) -> str:
         f'{law.words[0].upper()}{law.words[1:]}: `{law.formula}`.',
         '',
     ]
+    if (PICTURES / f'{law.name}.svg').exists():
+        over = _OVER.get(law.drawn_over, law.drawn_over)
+        said = f'Force of {law.words} over {over}, on an arm that swings'
+        lines += [f'![{said}](images/effects/{law.name}.svg)', '']
     lines += ['| parameter | unit | |', '|---|---|---|']
     lines += [f'| `{q.name}` | {q.unit} | {_said(q)} |' for q in law.quantities]
     lines += [
@@ -83,9 +91,6 @@ def _section(law) -> str:
         sign = 'the same sign' if law.term.sign > 0.0 else 'the other sign'
         names = ', '.join(f'`{name}`' for name in law.term.names)
         lines.append(f'- Term `{law.term.name}` of a robot YAML: coefficients {names}, {sign}.')
-    if law.is_force:
-        over = _OVER.get(law.drawn_over, law.drawn_over)
-        lines.append(f'- The report draws its force over {over}.')
     if not law.is_online:
         lines.append('- Not modelled online: it depends on more than one time.')
     return '\n'.join([*lines, ''])

@@ -7,10 +7,12 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from sgp_proof.concealed.promises import FACTOR
 from sgp_ros.cli import _parser
+from sgp_ros.physics.catalogue import EFFECTS
 
 ROOT = Path(__file__).parents[1]
 COMMANDS = set(_parser([]).summaries)
@@ -148,3 +150,21 @@ def test_each_real_machine_has_a_page_with_every_picture_of_its_report():
             == machine['pictures']
             == sorted(picture.stem for picture in (pictures / name).iterdir())
         )
+
+
+def test_pictures_of_effects_are_those_of_their_laws():
+    """Every effect that exerts a force has one, drawn from its law; to a fifth of a pixel."""
+    path = ROOT / 'docs/effect_pictures.py'
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    drawn = module.pictures()
+    assert set(drawn) == {name for name, law in EFFECTS.items() if law.is_force}
+    assert set(drawn) == {file.stem for file in module.TARGET.glob('*.svg')}
+    number = r'-?\d+\.\d'
+    for name, picture in drawn.items():
+        committed = (module.TARGET / f'{name}.svg').read_text(encoding='utf-8')
+        new, old = (np.array(re.findall(number, x), float) for x in (picture, committed))
+        assert abs(len(new) - len(old)) <= 8, name  # neighbours that round to one point are one
+        if len(new) == len(old):
+            assert np.abs(new - old).max() <= 0.2, name
