@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import sgp_ros
 from sgp_proof.concealed.promises import FACTOR
 from sgp_ros.cli import _parser
 from sgp_ros.physics.catalogue import EFFECTS
@@ -168,3 +169,19 @@ def test_pictures_of_effects_are_those_of_their_laws():
         assert abs(len(new) - len(old)) <= 8, name  # neighbours that round to one point are one
         if len(new) == len(old):
             assert np.abs(new - old).max() <= 0.2, name
+
+
+def test_the_site_states_its_version_and_its_changes():
+    """In its header and on a page; the changelog of ROS is reStructuredText."""
+    pytest.importorskip('mkdocs', reason='no MkDocs: pip install sgp_ros[docs]')
+    path = ROOT / 'docs/site_hooks.py'
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.on_config({'site_name': 'a'})['site_name'] == f'a {sgp_ros.__version__}'
+    text = module.markdown((ROOT / 'CHANGELOG.rst').read_text(encoding='utf-8'))
+    assert text.startswith('# Changelog for sgp_ros\n')
+    assert re.search(rf'^## {re.escape(sgp_ros.__version__)}\b', text, re.MULTILINE)
+    assert '### Added' in text
+    assert '``' not in text
+    assert '~~~~' not in text
