@@ -118,7 +118,8 @@ def _picture(name: str, motion: ObservedMotion) -> str:
         if np.abs(force[:, j]).max() > least or size > drawn.largest:
             break
         size *= _GROWTH
-    rows = slice(None) if law.drawn_over == 'time' else slice(-round(_PERIOD / _STEP), None)
+    n = round(_PERIOD / _STEP)  # the last period has no future, where filters end
+    rows = slice(None) if law.drawn_over == 'time' else slice(-2 * n, -n)
     x = {
         'position': motion.position[:, j], 'velocity': motion.velocity[:, j],
         'effort': motion.effort[:, j], 'acceleration': motion.acceleration[:, j],

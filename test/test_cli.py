@@ -283,7 +283,7 @@ def test_the_help_groups_the_commands_and_shows_an_example(capsys):
     with pytest.raises(SystemExit):
         main(['--help'])
     text = capsys.readouterr().out
-    parts = ('Look around', '  demo ', 'From your', '  diagnose ', 'With a model', '  bench ')
+    parts = ('Explore', '  demo ', 'Analyse a', '  diagnose ', 'Work with', '  bench ')
     at = [text.index(part) for part in (*parts, 'example')]
     assert at == sorted(at)
     assert text.count('\n  diagnose ') == 1

@@ -72,7 +72,7 @@ def _add_recording(
     parser.add_argument('--command', metavar='TOPIC', help='topic of the commands')
     parser.add_argument(
         '--effort', choices=('auto', 'measured', 'commanded', 'state', 'command'), default='auto',
-        help='the effort that acts; auto: the measured one where there is one (default: auto)',
+        help='source of the effort; auto: measured where available (default: auto)',
     )  # fmt: skip
 
 
@@ -107,18 +107,18 @@ def _add_simulate(add: AddCommand) -> None:
                         help='length [s]')  # fmt: skip
     parser.add_argument('--rate', type=_above(0.0), metavar='HZ', help='sampling rate')
     parser.add_argument('--seed', type=_seed, default=0, metavar='N', help='seed')
-    parser.add_argument('--controller', metavar='NAME', help='what drives it')
+    parser.add_argument('--controller', metavar='NAME', help='controller that drives the robot')
     parser.add_argument(
         '--effect', dest='effects', action='append', default=[], metavar='NAME:joint=J,k=v',
-        help='physics to add; may be repeated',
+        help='effect to add, see `sgp effects`; may be repeated',
     )  # fmt: skip
     parser.add_argument(
         '--physical', action='append', default=[], metavar='NAME=VALUE',
-        help='another value of a physical parameter; may be repeated',
+        help='value of a physical parameter; may be repeated',
     )  # fmt: skip
     parser.add_argument(
         '--sensor', dest='sensors', action='append', default=[], metavar='NAME=VALUE',
-        help='such as bits=14, velocity=no, jitter=0.001, drop=0.005; may be repeated',
+        help='sensor property, such as bits=14, velocity=no or jitter=0.001; may be repeated',
     )  # fmt: skip
     parser.add_argument('--commands', metavar='BAG', help='replay its commands instead, compare')
     parser.add_argument('--nominal', metavar='ROBOT', help='replayed beside ROBOT')
@@ -135,14 +135,16 @@ def _add_replay(add: AddCommand) -> None:
     parser.add_argument('--params', metavar='YAML', help="ROS 2 parameters (default: the robot's)")
     parser.add_argument('--model', metavar='NPZ', help='continue from a saved model')
     parser.add_argument('--frozen', dest='is_learning', action='store_false',
-                        help='predict and score, do not learn')  # fmt: skip
-    parser.add_argument('--truth', metavar='JSON', help='truth.json to compare with')
+                        help='predict and score without learning')  # fmt: skip
+    parser.add_argument(
+        '--truth', metavar='JSON', help='truth.json of a simulation, to compare parameters with'
+    )
 
 
 def _add_identify(add: AddCommand) -> None:
     parser = add(
         'identify', 'sgp_ros.apps.identify:run_identify',
-        'Identify a robot from a whole recording, offline: filters, parameters, URDF, roll-outs.',
+        'Identify a robot offline from a whole recording: parameters, URDF, simulated motion.',
         'sgp identify arm.mcap --robot arm.urdf --test other.mcap --out out/identify',
     )  # fmt: skip
     _add_recording(parser)
@@ -151,11 +153,11 @@ def _add_identify(add: AddCommand) -> None:
     parser.add_argument('--holdout', choices=('tail', 'alternate'), default='tail',
                         help='part held out without --test (default: %(default)s)')  # fmt: skip
     parser.add_argument('--share', type=_above(0.0, 1.0), default=0.4, metavar='X',
-                        help='how much of it (default: %(default)s)')  # fmt: skip
+                        help='share that is held out (default: %(default)s)')  # fmt: skip
     parser.add_argument('--stretch', type=_above(0.0), default=6.0, metavar='S',
-                        help='length of alternate stretches [s]')  # fmt: skip
+                        help='length of stretches of --holdout alternate [s]')  # fmt: skip
     parser.add_argument('--cutoff', type=_above(0.0), metavar='HZ',
-                        help='of the low-pass (default: chosen from the data)')  # fmt: skip
+                        help='cut-off of the low-pass (default: from the data)')  # fmt: skip
     parser.add_argument('--inputs', nargs='+', metavar='NAME',
                         help='what Z sees, such as own:velocity or every:velocity')  # fmt: skip
     _add_gains(parser, has_sim=False)
@@ -167,16 +169,16 @@ def _add_diagnose(add: AddCommand) -> None:
         'Locate, name and model the physics that the nominal robot lacks.',
         'sgp diagnose real.mcap --robot robot.urdf --test real_test.mcap --out out/diagnose',
     )  # fmt: skip
-    _add_recording(parser, 'REAL', '; several of one machine are one diagnosis')
+    _add_recording(parser, 'REAL', '; several recordings of one machine give one diagnosis')
     _add_gains(parser)
     parser.add_argument('--test', dest='tests', action='append', default=[], metavar='BAG',
                         help='held-out recording for the proof; may be repeated; without any, '
                         'a quarter of REAL is held out')  # fmt: skip
     parser.add_argument('--static', action='store_true',
-                        help='rows are settled points, one a pose, without clock')  # fmt: skip
+                        help='the recording holds settled points, one per pose')  # fmt: skip
     parser.add_argument('--bodies', metavar='YAML',
-                        help='mass, com and inertia of links of which the URDF has none; else '
-                        'they are estimated from REAL')  # fmt: skip
+                        help='mass, com and inertia of links for which the URDF gives none; '
+                        'without it they are estimated from REAL')  # fmt: skip
 
 
 def _add_campaign(add: AddCommand) -> None:
@@ -212,16 +214,16 @@ def _add_import(add: AddCommand) -> None:
     parser.add_argument('table', metavar='FILE',
                         help='.csv, .npz, .mat, .parquet, .h5, .json or .jsonl')  # fmt: skip
     parser.add_argument('--map', dest='map_path', metavar='YAML',
-                        help='columns and units (default: a guess, which is written)')  # fmt: skip
-    parser.add_argument('--robot', metavar='ROBOT', help='whose joints they are, for the guess')
+                        help='columns and units (default: guessed and written)')  # fmt: skip
+    parser.add_argument('--robot', metavar='ROBOT', help='robot whose joints the columns are')
     parser.add_argument('--rate', type=_above(0.0), metavar='HZ',
-                        help='of the rows, where the table has no time')  # fmt: skip
+                        help='sampling rate, where the table has no time column')  # fmt: skip
 
 
 def _add_check(add: AddCommand) -> None:
     parser = add(
         'check', 'sgp_ros.apps.check:run_check',
-        'Say whether a recording is fit for a diagnosis: clock, channels, motion, connection.',
+        'Check whether a recording is fit for a diagnosis: clock, channels, motion, set-up.',
         'sgp check real.mcap --robot robot.urdf',
     )  # fmt: skip
     _add_recording(parser)
@@ -241,7 +243,7 @@ def _add_effects(add: AddCommand) -> None:
 def _add_export(add: AddCommand) -> None:
     parser = add(
         'export', 'sgp_ros.apps.export:run_export',
-        'Write a robot as a file of another program, and list what that cannot say.',
+        'Export a robot for another program, and list what its format cannot express.',
         'sgp export out/diagnose/robot_diagnosed.yaml --to mjcf --out out/export',
     )  # fmt: skip
     parser.add_argument('robot', metavar='ROBOT', help='a robot YAML or a model file')
@@ -250,9 +252,9 @@ def _add_export(add: AddCommand) -> None:
         choices=('mjcf', 'urdf', 'sdf', 'isaaclab', 'ros2_control', 'json'), help='the format',
     )  # fmt: skip
     parser.add_argument('--model', metavar='MJCF',
-                        help='to be changed (default: where the robot came from)')  # fmt: skip
+                        help='MJCF to change (default: that of the robot)')  # fmt: skip
     parser.add_argument('--ranges', action='store_true',
-                        help='write value +- 2 std of the numbers too')  # fmt: skip
+                        help='also write value +- 2 std of each number')  # fmt: skip
 
 
 def _add_without_arguments(add: AddCommand) -> None:
@@ -268,26 +270,26 @@ def _add_without_arguments(add: AddCommand) -> None:
 def _add_watch(add: AddCommand) -> None:
     parser = add(
         'watch', 'sgp_ros.ros.watching:run_watch',
-        'Show what a running node says: joints, parameters, warnings, verdict.',
+        'Show the state of a running node: joints, parameters, warnings, verdict.',
         'sgp watch --node /left/sgp_node',
     )  # fmt: skip
     parser.add_argument('--node', default='/sgp_node', metavar='NAME', help='default: %(default)s')
     parser.add_argument('--wait', type=_above(0.0), default=10.0, metavar='S',
-                        help='for its first word [s] (default: %(default)s)')  # fmt: skip
-    parser.add_argument('--once', action='store_true', help='print one picture and end')
+                        help='wait for its first message [s] (default: %(default)s)')  # fmt: skip
+    parser.add_argument('--once', action='store_true', help='print the state once and exit')
     parser.add_argument('--layouts', metavar='DIR', help='write layouts of PlotJuggler, '
                         'Lichtblick and Foxglove for the node and its joints')  # fmt: skip
 
 
 GROUPS = (
-    ('Look around', ('demo', 'robots', 'effects', 'compile')),
-    ('From your recording', ('import', 'check', 'diagnose', 'identify', 'replay')),
-    ('From many recordings', ('campaign',)),
-    ('With a model', ('simulate', 'export')),
-    ('Beside a running robot', ('watch',)),
+    ('Explore', ('demo', 'robots', 'effects', 'compile')),
+    ('Analyse a recording', ('import', 'check', 'diagnose', 'identify', 'replay')),
+    ('Analyse many recordings', ('campaign',)),
+    ('Work with a model', ('simulate', 'export')),
+    ('Watch a running robot', ('watch',)),
 )
 """Titles and commands of the help; others come after them."""
-EXAMPLE = """example, which needs nothing but this package:
+EXAMPLE = """example, no data of your own needed:
   sgp simulate double_pendulum --effect coulomb_friction:joint=elbow,level=0.05 --out out/real
   sgp diagnose out/real/double_pendulum.mcap --robot double_pendulum"""
 

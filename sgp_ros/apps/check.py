@@ -19,7 +19,7 @@ from sgp_ros.engine.samples import Event
 from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import ConfigError, SgpError
 from sgp_ros.report.check import render_check
-from sgp_ros.report.diagnosis_text import phrase
+from sgp_ros.report.diagnosis_text import phrase, plain_name
 from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.report.next_steps import after_check, ending
 from sgp_ros.robots.nominal import Nominal, nominal_model
@@ -67,7 +67,7 @@ def run_check(
         recordings = gather({'': events}, {}, nominal.tree, known, holds_out=False)
         connected = connect(recordings, nominal.tree, lambda x: progress(0.1 + 0.8 * x))
     except SgpError as error:
-        said = f'How the robot is connected cannot be checked: {error}'
+        said = f'The set-up cannot be checked: {error}'
         content |= {'setup': None, 'is_fit': False}
         content['remarks'].append(said)
         print(f'  remark    {said}')
@@ -105,7 +105,7 @@ def _known(
 def print_check(name: str, found: RecordingCheck) -> None:
     """Print what a recording holds."""
     print(f'{name}: {found.states} states in {found.seconds:.4g} s, {found.rate_hz:.4g} Hz, '
-          f'jitter {100.0 * found.jitter:.2g} %')  # fmt: skip
+          f'jitter {100.0 * found.jitter:.2f} %')  # fmt: skip
     if found.commands:
         kinds = ', '.join(found.command_kinds)
         print(f'  commands  {found.commands} at {found.command_rate_hz:.4g} Hz, {kinds}')
@@ -121,11 +121,11 @@ def print_check(name: str, found: RecordingCheck) -> None:
 
 def _print_setup(connected: Connected) -> None:
     if not connected.findings:
-        print('  set-up    no error of the connection explains more than physics does')
+        print('  set-up    no set-up error found')
     for f in connected.findings:
         print(f'  set-up    p {f.probability:.2f}  {f.joint}: {phrase(f)}')
     for e in connected.equivalents:
-        told: Sequence[str] = [f'{effect} of {joint}' for joint, effect in e.effects]
-        print(f'  or        {" and ".join(told)} explains as much')
+        told = ' with '.join(f'{plain_name(effect)} of {joint}' for joint, effect in e.effects)
+        print(f'  alike     this motion cannot separate missing physics from {told}')
     for remark in connected.remarks:
         print(f'  remark    {remark}')

@@ -29,6 +29,7 @@ from sgp_ros.report.diagnosis import (
 )
 from sgp_ros.report.diagnosis_proof import interval_text
 from sgp_ros.report.diagnosis_text import (
+    chance,
     differences_text,
     equivalence_sentence,
     parameter_errors_text,
@@ -244,7 +245,7 @@ def print_diagnosis(found: Diagnosis) -> None:
     best = found.findings[0] if is_missing else None
     if found.findings:
         for f in found.alternatives[:_RIVALS]:
-            print(f'  not       p {f.probability:.2f}  {f.joint}: {phrase(f)}: '
+            print(f'  not       p {chance(f.probability)}  {f.joint}: {phrase(f)}: '
                   f'{why_it_lost(f, best)}')  # fmt: skip
     for e in found.equivalents:
         print(f'  or        {equivalence_sentence(e)}')
@@ -253,7 +254,7 @@ def print_diagnosis(found: Diagnosis) -> None:
     if found.parameter_errors:
         print(f'  bodies    {parameter_errors_text(found.parameter_errors)}')
     print(
-        *(f'  hidden    {sentence}\n' for sentence in visibility_sentences(found)), sep='', end=''
+        *(f'  unseen    {sentence}\n' for sentence in visibility_sentences(found)), sep='', end=''
     )
     for stem, proof in found.proofs.items():
         _print_proof(stem, proof)

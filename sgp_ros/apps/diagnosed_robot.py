@@ -111,8 +111,8 @@ class Online:
         )
         part = '' if math.isinf(self.seconds) else f' of the first {self.seconds:g} s'
         return (
-            f'A node does not take over {named}. With {YAML_NAME} a replay{part} left an nMSE of '
-            f'the effort of {numbers or "nothing, for it did not start to learn"}.'
+            f'The online node does not model {named}. With {YAML_NAME} a replay{part} left an '
+            f'nMSE of the effort of {numbers or "nothing, for it did not start to learn"}.'
         )
 
     def content(self) -> dict[str, Any]:

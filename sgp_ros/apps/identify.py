@@ -259,7 +259,7 @@ def print_findings(findings: Mapping[str, Any]) -> None:
         print(f'  {p["name"]:{width}s} {known}')
     print(excitation(findings['excitation']))
     for text in findings['excitation']['suggestions']:
-        print(f'a motion that would show more: {text}')
+        print(f'a motion that would determine more: {text}')
     for text in cautions(findings):
         print(warned(f'caution: {text}'))
 
@@ -273,7 +273,7 @@ def _print_scores(findings: Mapping[str, Any]) -> None:
                 f'{joint} {_short(s["nmse"])} ({_short(s["rmse"])} {units[joint]})'
                 for joint, s in scores[name].get('joints', {}).items()
             )
-            print(f'  {method:4s} {each or "asks for parameters that are not determined"}')
+            print(f'  {method:4s} {each or "needs parameters that are not determined"}')
 
 
 def _print_rollouts(findings: Mapping[str, Any]) -> None:

@@ -216,19 +216,22 @@ def _clock(found: RecordingCheck) -> list[str]:
 def _motion(found: RecordingCheck, robot: Robot) -> list[str]:
     said = []
     if found.missing:
-        said.append(f'No state names {", ".join(found.missing)}.')
+        said.append(f'No states of {", ".join(found.missing)}.')
     if found.unknown:
         said.append(f'Not joints of {robot.name}: {", ".join(found.unknown)}.')
     still = [name for name, j in found.joints.items() if not j.moves]
     if still:
-        said.append(f'Not moving beyond the noise: {", ".join(still)}. Nothing is said of these.')
+        said.append(f'Not moving beyond the noise, so not diagnosed: {", ".join(still)}.')
     driven = {joint.name for joint in robot.joints if joint.is_actuated}
     none = [n for n, j in found.joints.items() if n in driven and j.effort == 0.0]
     if none and not found.commands:
         said.append(f'Neither effort nor command of {", ".join(none)}.')
     one = [n for n, j in found.joints.items() if j.moves and j.reversals < 2]
     if one:
-        said.append(f'One direction only: {", ".join(one)}. Friction and load look alike there.')
+        said.append(
+            f'One direction only: {", ".join(one)}. Friction and a constant load cannot be '
+            'told apart there.'
+        )
     return said
 
 

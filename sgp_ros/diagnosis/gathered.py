@@ -114,7 +114,7 @@ def gather(
     held = {stem: known.collected(test) for stem, test in tests.items()}
     learned, kept, remarks = _kept_back(raws) if holds_out else (join(raws), {}, ())
     if still:
-        remarks += (f'Nothing can be said of joints that do not move: {", ".join(still)}.',)
+        remarks += (f'Joints that do not move cannot be diagnosed: {", ".join(still)}.',)
     return Recordings(tuple(several), learned, kept, held, still, remarks)
 
 

@@ -69,20 +69,20 @@ def check_sentence(content: Mapping[str, Any], setup: Sequence[Finding]) -> str:
     """Say whether a recording is fit for a diagnosis, and what is wrong with it first."""
     name = content['recording']
     if content['missing']:
-        return f'{name} is not fit: it names no state of {", ".join(content["missing"])}.'
+        return f'{name} is not fit: it has no states of {", ".join(content["missing"])}.'
     if not content['is_fit']:
         return f'{name} is not fit for a diagnosis: {content["remarks"][-1]}'
     still = [joint for joint, j in content['joints'].items() if not j['moves']]
     text = f'{name} is fit for a diagnosis'
     if still:
-        text += f', but of {", ".join(still)} it shows nothing: no motion beyond the noise'
+        text += f', but of {", ".join(still)} there is no motion beyond the noise'
     if setup:
-        text += f'. First mend how the robot is connected: {place(setup[0])}, {phrase(setup[0])}'
+        text += f'. First correct the set-up: {place(setup[0])}, {phrase(setup[0])}'
     told = [
         f'{plain_name(e)} of {j}' for pairs in content.get('equivalents', ()) for j, e in pairs
     ]
     if told:
-        text += f'; this motion cannot tell physics from {" or ".join(told)}'
+        text += f'; this motion cannot separate missing physics from {" or ".join(told)}'
     return f'{text}.'
 
 

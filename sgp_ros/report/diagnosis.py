@@ -27,6 +27,7 @@ from sgp_ros.report.diagnosis_proof import (
     rollouts_sentences,
 )
 from sgp_ros.report.diagnosis_text import (
+    chance,
     differences_text,
     effect_name,
     equivalence_sentence,
@@ -197,7 +198,7 @@ def _rival(f: Finding, best: Finding | None) -> dict[str, str]:
         'name': effect_name(f),
         'joint': f.joint,
         'numbers': ', '.join(numbers(f)),
-        'probability': f'{f.probability:.2f}' if f.probability >= 0.005 else '< 0.01',
+        'probability': chance(f.probability),
         'why': why_it_lost(f, best if is_rated else None),
     }
 
@@ -234,7 +235,7 @@ def _settings(found: Diagnosis) -> list[tuple[str, str]]:
     ]
     if found.simulation:
         shares = ', '.join(f'{joint} {percent(x)}' for joint, x in found.simulation.items())
-        settings.append(('left of the effort of the simulation', shares))
+        settings.append(('residual of the robot file on the simulation', shares))
     return settings
 
 

@@ -99,24 +99,24 @@ def _busiest(found: Diagnosis) -> tuple[float, float] | None:
 def _left(found: Diagnosis, j: int) -> Chart:
     """Return what the models leave of the effort, the laws that were found, and the noise."""
     traces, unit, name = found.traces, found.units[j], found.joints[j]
-    curves = [(f'{NOMINAL} leaves', traces.before[:, j], 'measured', 'thick')]
+    curves = [(NOMINAL, traces.before[:, j], 'measured', 'thick')]
     for i, (finding, force) in enumerate(acting(found, j)):
         curves.append((effect_name(finding), force[:, j], _TONES[i % len(_TONES)], 'line'))
     if not is_calm(found):
-        curves.append((f'{FINAL} leaves', traces.after[:, j], 'final', 'line'))
+        curves.append((FINAL, traces.after[:, j], 'final', 'line'))
     values = [broken(found, y) for _, y, *_ in curves]
     rows = kept(values)
     noise = 2.0 * float(traces.noise[j])
     shown = [(NOMINAL, traces.before[:, j]), (FINAL, traces.after[:, j])]
     shown = shown[: 1 if is_calm(found) else 2]
     return Chart(
-        f'What is left of the effort on {name}',
+        f'Residual of the effort on {name}',
         ', '.join(
             f'{"the" if i else "The"} {model} leaves up to {spoken(np.abs(left).max())} {unit}'
             for i, (model, left) in enumerate(shown)
         )
-        + f'; two standard deviations of the noise of the encoder make {spoken(noise)} {unit}.',
-        'time [s]', f'effort left [{unit}]', traces.time[rows],
+        + f'; two standard deviations of the encoder noise are {spoken(noise)} {unit}.',
+        'time [s]', f'residual [{unit}]', traces.time[rows],
         [
             Series(label, y[rows], tone, style)
             for (label, _, tone, style), y in zip(curves, values, strict=True)
@@ -134,8 +134,8 @@ def _maps(found: Diagnosis, j: int) -> Iterator[tuple[str, Chart]]:
         x, y, mean = cells_of(found, j, values[:, j])
         a, b = np.unravel_index(np.nanargmax(np.abs(mean)), mean.shape)
         yield when, Chart(
-            f'{name}: left by the {model}',
-            f'Largest mean effort left: {spoken(mean[a, b])} {unit}, at position '
+            f'{name}: residual of the {model}',
+            f'Largest mean residual: {spoken(mean[a, b])} {unit}, at position '
             f'{spoken(0.5 * (x[a] + x[a + 1]))} {length} and velocity '
             f'{spoken(0.5 * (y[b] + y[b + 1]))} {length}/s.',
             f'position [{length}]', f'velocity [{length}/s]', cells=Cells(x, y, mean, reach),
@@ -161,7 +161,7 @@ def _band(found: Diagnosis, band: Band, j: int) -> Chart:
     where = ' and '.join(f'{spoken(lo)} to {spoken(hi)} {unit}' for lo, hi in band.regions)
     return Chart(
         f'{band.joint} over {band.variable}: {word} (p {depends.p_values[band.variable]:.2g})',
-        f'Not zero from {where}.' if where else 'Nowhere different from zero beyond chance.',
+        f'Significant from {where}.' if where else 'Nowhere significantly different from zero.',
         f'{band.variable} [{unit}]', f'Z [{found.units[j]}]', band.x,
         [
             Series(label, band.mean[:, i], tone, 'line', band.half[:, i])
@@ -203,9 +203,9 @@ def _shape(found: Diagnosis, j: int) -> Chart:
     rows = order[spread_rows(len(order))]
     y, forward = found.traces.parameters[rows, j], found.traces.velocity[rows, j] > 0.0
     return Chart(
-        f'What has no name on {name}',
-        f'Effort left over {label}: up to {spoken(np.abs(y).max())} {unit}.',
-        label, f'effort left [{unit}]', x[rows],
+        f'Unexplained residual on {name}',
+        f'Residual over {label}: up to {spoken(np.abs(y).max())} {unit}.',
+        label, f'residual [{unit}]', x[rows],
         [
             Series('forward', np.where(forward, y, np.nan), 'final', 'points'),
             Series('backward', np.where(forward, np.nan, y), 'law2', 'points'),

@@ -200,7 +200,7 @@ def draw_shape(found: Diagnosis, unknown: Finding) -> Figure:
     for rows, colour, text in ((forward, FORCES[0], 'forward'), (~forward, FORCES[2], 'backward')):
         axes.plot(x[rows], found.traces.parameters[rows, j], '.', ms=3, color=colour, label=text)
     axes.axhline(0.0, color=GREY, lw=0.6)
-    axes.set(xlabel=label, ylabel=f'left on {unknown.joint} [{found.units[j]}]')
+    axes.set(xlabel=label, ylabel=f'residual on {unknown.joint} [{found.units[j]}]')
     axes.legend(fontsize='small', markerscale=3)
     return figure
 
@@ -211,13 +211,13 @@ def _trace(axes: Axes, found: Diagnosis, j: int, shown: slice) -> dict[str, Arti
     half = 2.0 * float(traces.noise[j])
     before = broken(found, traces.before[:, j])[shown]
     alike: dict[str, Artist] = {}
-    (alike['nominal robot leaves'],) = axes.plot(time, before, color=MEASURED, lw=3.5)
+    (alike['nominal robot'],) = axes.plot(time, before, color=MEASURED, lw=3.5)
     for finding, force, colour in _coloured(found, j):
         axes.plot(time, broken(found, force[:, j])[shown], color=colour, lw=1.1,
                   label=effect_name(finding))  # fmt: skip
     if not is_calm(found):
         left = broken(found, traces.after[:, j])[shown]
-        (alike['final model leaves'],) = axes.plot(time, left, color='#D55E00', lw=0.9)
+        (alike['final model'],) = axes.plot(time, left, color='#D55E00', lw=0.9)
     alike['noise (2 std)'] = axes.axhspan(-half, half, color=BAND, lw=0, zorder=0)
     axes.margins(x=0.01)
     return alike

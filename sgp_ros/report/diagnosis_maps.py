@@ -40,9 +40,9 @@ def important_joints(found: Diagnosis) -> list[int]:
 def draw_location(found: Diagnosis) -> Figure:
     """Draw what nominal robot and final model leave over position and velocity, on one scale."""
     joints = important_joints(found)
-    left = [('left by the nominal robot', found.traces.before)]
+    left = [('residual of the nominal robot', found.traces.before)]
     if not is_calm(found):
-        left.append(('left by the final model', found.traces.after))
+        left.append(('residual of the final model', found.traces.after))
     figure = Figure(figsize=(1.0 + 4.5 * len(left), 0.3 + 3.2 * len(joints)), layout='constrained')
     grid = figure.subplots(len(joints), len(left), squeeze=False, sharex='row', sharey='row')
     for row, j in zip(grid, joints, strict=True):
@@ -53,7 +53,7 @@ def draw_location(found: Diagnosis) -> Figure:
             axes.set_xlabel(f'position [{position_unit(found, j)}]')
             mark_regions(axes, found, j)
         row[0].set_ylabel(f'velocity [{position_unit(found, j)}/s]')
-        figure.colorbar(mesh, ax=row, label=f'mean effort left [{found.units[j]}]')
+        figure.colorbar(mesh, ax=row, label=f'mean residual [{found.units[j]}]')
     return figure
 
 
@@ -78,7 +78,7 @@ def draw_others(found: Diagnosis) -> Figure:
     figure.supxlabel(f'position [{units}]', fontsize='small')
     figure.supylabel(f'velocity [{units} per s]', fontsize='small')
     bar = figure.colorbar(mesh, ax=figure.axes)
-    bar.set_label('effort left, relative\nto the effort', fontsize='small')
+    bar.set_label('residual, relative\nto the effort', fontsize='small')
     return figure
 
 
@@ -180,7 +180,7 @@ def band_sentences(found: Diagnosis, joints: list[str]) -> list[str]:
         if d.joint not in joints or not found.bands:
             continue
         if not own:
-            sentences.append(f'{d.joint}: nowhere beyond chance.')
+            sentences.append(f'{d.joint}: nowhere significant.')
             continue
         best = max(own, key=lambda b: d.scores[b.variable])
         unit = variable_units(found.units[found.joints.index(d.joint)])[best.variable]
@@ -192,7 +192,7 @@ def band_sentences(found: Diagnosis, joints: list[str]) -> list[str]:
 
 def _draw(axes: Axes, band: Band, dependence: Dependence) -> None:
     for i, (lo, hi) in enumerate(band.regions):
-        label = None if i else 'not zero'
+        label = None if i else 'significant'
         axes.axvspan(lo, hi, color=_REGION, alpha=0.35, lw=0, zorder=0, label=label)
     for i, (direction, colour) in enumerate(DIRECTIONS):
         mean, half = band.mean[:, i], band.half[:, i]

@@ -28,6 +28,7 @@ _MEANINGLESS = 1e6
 """Error over variance that only a constant effort gives."""
 _SIMILAR_NATS = 20.0
 _MOST_ERRORS = 3
+_LEAST_CHANCE = 0.005
 
 
 def is_calm(found: Diagnosis) -> bool:
@@ -172,6 +173,11 @@ def parameter_errors_text(errors: Sequence[ParameterError]) -> str:
     return ', '.join(parts) + (f' and {more} more' if more else '')
 
 
+def chance(probability: float) -> str:
+    """Return a probability in two digits, without calling anything impossible."""
+    return f'{probability:.2f}' if probability >= _LEAST_CHANCE else '< 0.01'
+
+
 def why_it_lost(rival: Finding, best: Finding | None) -> str:
     """Return why an alternative is not asserted."""
     if best is None:
@@ -179,9 +185,9 @@ def why_it_lost(rival: Finding, best: Finding | None) -> str:
     gap = rival.log_bayes_factor - best.log_bayes_factor
     count, fewer = _count(rival), _count(best)
     if gap > 0.0 and count > fewer:
-        return f'fits hardly better, with {count} numbers instead of {fewer}'
+        return f'fits hardly better, with {count} parameters instead of {fewer}'
     if gap > -_SIMILAR_NATS and count > fewer:
-        return f'fits no better, with {count} numbers instead of {fewer}'
+        return f'fits no better, with {count} parameters instead of {fewer}'
     return rival.why
 
 

@@ -84,9 +84,9 @@ def render(
         subtitle=description,
         verdict=verdict(findings),
         cautions=cautions(findings),
-        held_note=f'No method has learned from {" or ".join(map(called, findings["held_out"]))}. '
-        'Near and far are the halves of its rows that lie closer to and further from the states '
-        'learned from.',
+        held_note=f'No method was fitted to {" or ".join(map(called, findings["held_out"]))}. '
+        'Near and far are the halves of its rows whose states lie closer to, and further from, '
+        'those learned from.',
         predictions=[name for name in charts if name.startswith('held ')],
         stills=[name for name in figures if name.startswith('prediction_')],
         picture=Markup(picture),  # noqa: S704 - names in it are escaped

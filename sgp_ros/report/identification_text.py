@@ -31,9 +31,7 @@ def verdict(findings: Mapping[str, Any]) -> str:
         sgp, physics = scores.get('SGP'), scores.get('PR')
         best = sgp if sgp is not None else next(iter(scores.values()))
         if best is None:
-            parts.append(
-                f'nothing of {called(name)}: it asks for parameters that are not determined'
-            )
+            parts.append(f'nothing of {called(name)}: it needs parameters that are not determined')
             continue
         text = f'the {findings["target"]} in {called(name)} with a mean nMSE of {best:.2g}'
         if sgp is not None and physics is not None:
@@ -46,7 +44,7 @@ def verdict(findings: Mapping[str, Any]) -> str:
 def _learned(inputs: Sequence[Sequence[str]] | None) -> str:
     if inputs is None or any(inputs):
         return ''
-    return ' Nothing was learned beside the physics: it would not predict better.'
+    return ' A learned process Z beside the physics would not predict better.'
 
 
 def cautions(findings: Mapping[str, Any]) -> list[str]:
@@ -57,9 +55,9 @@ def cautions(findings: Mapping[str, Any]) -> list[str]:
     by_chance = max(_CORRELATED, 3.0 / max(rows, default=1) ** 0.5)  # white noise has the latter
     if not plan['is_white'] and plan['residual_autocorrelation'] > by_chance:
         found.append(
-            'The physics leaves a residual that is not white (correlation '
+            'The residual of the physics is not white (correlation '
             f'{plan["residual_autocorrelation"]:.2f} from row to row): something is missing. '
-            'Intervals of parameters allow for the correlation, not for a bias.'
+            'The intervals of the parameters allow for this correlation, but not for a bias.'
         )
     narrow = [
         f'{joint} ({100 * score["coverage95"]:.0f} %)'
@@ -72,8 +70,9 @@ def cautions(findings: Mapping[str, Any]) -> list[str]:
         found.append(f'Intervals of SGP are too narrow on held-out data: {", ".join(narrow)}.')
     if _is_unreal(findings['consistency']):
         found.append(
-            'The fitted parameters belong to no real bodies: a mass or an inertia is not '
-            'positive, or a friction drives. ' + _nearest(findings['consistency']['distance'])
+            'The fitted parameters are physically impossible: a mass or inertia is not positive, '
+            'or a friction coefficient is negative. '
+            + _nearest(findings['consistency']['distance'])
         )
     return found
 
@@ -88,16 +87,16 @@ def _is_unreal(consistency: Mapping[str, Any] | None) -> bool:
 
 def _nearest(distance: float | None) -> str:
     if distance is None:
-        return 'None near them could be found, so no URDF is written: record more motion.'
-    return f'The nearest real bodies lie {distance**0.5:.2g} standard deviations away.'
+        return 'None was found near them, so no URDF is written: record more motion.'
+    return f'The nearest possible ones are {distance**0.5:.2g} standard deviations away.'
 
 
 def excitation(found: Mapping[str, Any]) -> str:
     """Say how many combinations of parameters the motion determines."""
     text = (
         f'This motion determines {found["rank"]} combinations of parameters, of '
-        f'{found["structural_rank"]} that some motion could show. The least visible one shows '
-        f'{found["condition"]:.3g} times less than the most visible one (condition number).'
+        f'{found["structural_rank"]} that some motion could show. Condition number: '
+        f'{found["condition"]:.3g}.'
     )
     if found['not_excited']:
         text += ' Not determined: ' + '; '.join(found['not_excited']) + '.'
@@ -118,10 +117,10 @@ def filter_sentence(plan: Mapping[str, Any]) -> str:
     """Say which filter was chosen and why."""
     text = filter_choice(plan)
     if len({c['velocity_source'] for c in plan['candidates']}) > 1:
-        text += ' It predicts held-out stretches better than the other one.'
+        text += ' This predicted held-out data better than the alternative.'
     return text + (
-        ' The curve shows what each cut-off loses on held-out stretches, summed over all bands; '
-        'the least one was taken.'
+        ' The curve shows the prediction loss of each cut-off on held-out stretches, summed over '
+        'all bands; the smallest was chosen.'
     )
 
 

@@ -85,7 +85,7 @@ def search_rows(found: Diagnosis) -> list[dict[str, Any]]:
             'chart': f'search {s.joint}',
             'words': f'What is missing on {s.joint} {s.words}.',
             'left': f'This shape leaves {percent(s.left)} of the mean squared effort of '
-                    f'{s.joint}; the best effects of the list leave {percent(s.left_listed)}.',
+                    f'{s.joint}; the best listed effects leave {percent(s.left_listed)}.',
             'conclusion': _conclusion(s),
             'is_asserted': not s.why_not,
             'formulas': [

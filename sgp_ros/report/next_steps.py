@@ -26,13 +26,13 @@ def after_diagnosis(found: Diagnosis, bag: str, robot: str, out: Path) -> Steps:
     diagnosed = _path(out / 'robot_diagnosed.yaml')
     again = f'sgp diagnose {quote(bag)} --robot {quote(robot)} --out {_path(out)}'
     if found.setup:
-        return [('Mend how the robot is connected or described, record, and look again:', again)]
+        return [('Correct the set-up or the robot file, record, and diagnose again:', again)]
     if found.verdict == 'no_mismatch':
         other = f'sgp diagnose {_OTHER} --robot {quote(robot)}'
-        return [('Nothing needs mending here. Try a motion that shows more:', other)]
+        return [('Nothing to correct. A motion that excites more may show more:', other)]
     if found.verdict == 'unexplained':
         learn = f'sgp replay {quote(bag)} --robot {diagnosed}'
-        return [('Let a Gaussian process learn what has no name:', learn)]
+        return [('Learn the unexplained part with a Gaussian process:', learn)]
     return [
         ('Check the corrected robot on another recording:',
          f'sgp replay {_OTHER} --robot {diagnosed}'),
@@ -52,7 +52,7 @@ def after_identification(robot: str, out: Path, *, has_bodies: bool) -> Steps:
     steps = [('Use the identified robot on another recording:',
               f'sgp replay {_OTHER} --robot {identified}')]  # fmt: skip
     if has_bodies:
-        steps.append(('Ask what physics the model lacks:',
+        steps.append(('Find what physics the model lacks:',
                       f'sgp diagnose {_OTHER} --robot {quote(robot)}'))  # fmt: skip
     return steps
 
@@ -61,13 +61,13 @@ def after_replay(out: Path) -> Steps:
     """Return what to do with a model that was learned online."""
     robot, model = _path(out / 'robot_identified.yaml'), _path(out / 'model.npz')
     command = f'sgp replay {_OTHER} --robot {robot} --model {model}'
-    return [('Continue from what was learned, on another recording:', command)]
+    return [('Continue learning on another recording:', command)]
 
 
 def after_demo(bag: Path) -> Steps:
     """Return what to do after the demonstration."""
     return [
-        ('Ask what the model lacked: the friction of the wheel is to be found:',
+        ('Find what the model lacked (the friction of the wheel):',
          f'sgp diagnose {_path(bag)} --robot reaction_wheel_6'),
         ('Use a recording of your own robot:', f'sgp identify {_OTHER} --robot ROBOT.urdf'),
     ]  # fmt: skip
@@ -78,19 +78,19 @@ def after_import(path: Path, robot: str | None, gains: Path | None = None) -> St
     command = f'sgp diagnose {_path(path)} --robot ' + (quote(robot) if robot else 'ROBOT.urdf')
     if gains is not None:
         command += f' --gains {_path(gains)}'
-    return [('Ask what physics the model lacks:', command)]
+    return [('Find what physics the model lacks:', command)]
 
 
 def after_check(bag: str, robot: str, *, is_fit: bool) -> Steps:
     """Return what to do with a recording that was checked."""
     verb = 'diagnose' if is_fit else 'check'
-    said = 'Ask what physics the model lacks:' if is_fit else 'Mend this, then look again:'
+    said = 'Find what physics the model lacks:' if is_fit else 'Correct this, then check again:'
     return [(said, f'sgp {verb} {quote(bag)} --robot {quote(robot)}')]
 
 
 def after_simulation(path: Path, robot: str) -> Steps:
     """Return what to do with a simulated recording of a robot."""
-    return [('Find out what was put in:',
+    return [('Find what was put in:',
              f'sgp diagnose {_path(path)} --robot {quote(robot)}')]  # fmt: skip
 
 

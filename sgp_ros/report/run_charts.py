@@ -49,11 +49,11 @@ def _prediction(engine: Engine, history: History, channel: str, j: int) -> Chart
     measured, mean, variance = (values[:, j] for values in history.channel(channel))
     half = INTERVAL_95 * np.sqrt(np.where(history.scored(), variance, np.nan))
     found = [Series('measured', measured, 'measured', 'thick')]
-    said = f'SGP misses it with an nMSE of {score[joint.name][channel].nmse:.2g}'
+    said = f'nMSE: SGP {score[joint.name][channel].nmse:.2g}'
     alone = engine.baseline_scores().get(joint.name, {}).get(channel)
     if alone is not None and channel == engine.robot.target:
         found.append(Series('physics alone', history.physics()[:, j], 'nominal', 'dashed'))
-        said += f', physics alone with {alone.nmse:.2g}'
+        said += f', physics alone {alone.nmse:.2g}'
     found.append(Series('SGP', mean, 'final', 'line', half))
     rows = kept([s.y for s in found])
     return Chart(
@@ -111,8 +111,8 @@ def _calibration(engine: Engine, history: History) -> Chart:
     held = ', '.join(f'{100.0 * share[at]:.3g} % of {name}' for name, share in shares.items())
     return Chart(
         f'Calibration of the {engine.robot.target}',
-        f'Intervals of 95 % hold {held}. A curve below the diagonal promises too much, one above '
-        'too little.',
+        f'Intervals of 95 % hold {held}. Below the diagonal they are too narrow, above it too '
+        'wide.',
         'stated level', 'share inside', levels, series,
     )  # fmt: skip
 
@@ -140,12 +140,12 @@ def identification_charts(found: Identification, method: str) -> dict[str, Chart
             own = Series(method, _cut(mean[:, j], ends), 'final', 'line', half[:, j])
             rows = kept([s.y for s in (*series, own)])
             misses = ' and '.join(
-                f'{label} misses it by {spoken(_rms(x[:, j] - data.y[:, j]))} {unit}'
+                f'{label} {spoken(_rms(x[:, j] - data.y[:, j]))} {unit}'
                 for label, x in ((method, mean), ('physics alone', alone))
             )
             charts[f'held {name} {joint.name}'] = Chart(
-                f'{target.capitalize()} of {joint.name} in what was held out',
-                f'{misses} (root mean square).', 'time [s]', f'{target} [{unit}]',
+                f'{target.capitalize()} of {joint.name}, held-out data',
+                f'rms error: {misses}.', 'time [s]', f'{target} [{unit}]',
                 data.time[rows], [s.rows(rows) for s in (*series, own)], group=f'held {name}',
             )  # fmt: skip
     return charts

@@ -31,7 +31,7 @@ def verdict_sentence(found: Diagnosis) -> str:
     """Return the finding in one sentence; `+-` is half of a 95 % interval."""
     if found.setup:
         each = [f'{place(f)}: {phrase(f)} (probability {f.probability:.2f})' for f in found.setup]
-        head = f'The recording and the robot file do not fit together: {"; ".join(each)}.'
+        head = f'The recording and the robot file contradict each other: {"; ".join(each)}.'
         rest = verdict_sentence(replace(found, setup=()))
         return head if found.verdict == 'setup_error' else f'{head} Beside that: {rest}'
     if _is_compared(found):
@@ -40,10 +40,10 @@ def verdict_sentence(found: Diagnosis) -> str:
         return _missing(found)
     if found.verdict == 'parameters_only':
         return (
-            'No physics is missing, only parameters of bodies are wrong: '
+            'No physics is missing, only inertial parameters are wrong: '
             f'{parameter_errors_text(found.parameter_errors)} (certainty {found.certainty:.2f}); '
-            f'correcting them explains {percent(explained(found))} of what the nominal robot '
-            'leaves.'
+            f'correcting them explains {percent(explained(found))} of the residual of the '
+            'nominal robot.'
         )
     if found.verdict == 'no_mismatch':
         return _calm(found)
@@ -61,8 +61,12 @@ def held_out_sentence(found: Diagnosis) -> str:
         change = before if found.verdict == 'no_mismatch' else f'{before} before, {after} after'
         parts.append(f'{change} on {recording_name(stem)} ({joint})')
     if not parts:
-        return 'No recording was held out: nothing here shows how far the finding carries.'
-    return 'Left of the variance of the effort on what was held out: ' + '; '.join(parts) + '.'
+        return 'No recording was held out, so nothing shows how well the finding generalises.'
+    return (
+        'Share of the variance of the effort that remains on held-out data: '
+        + '; '.join(parts)
+        + '.'
+    )
 
 
 def _missing(found: Diagnosis) -> str:
@@ -82,7 +86,7 @@ def _missing(found: Diagnosis) -> str:
             subject = 'with corrected bodies it explains'
             if len(found.findings) > 1:
                 subject = 'with corrected bodies they explain'
-        text += f'; {subject} {percent(explained(found))} of what the nominal robot leaves'
+        text += f'; {subject} {percent(explained(found))} of the residual of the nominal robot'
     return text + '.'
 
 
@@ -93,13 +97,13 @@ def _calm(found: Diagnosis) -> str:
     left = float(np.sqrt((found.traces.before[:, j] ** 2).mean()))
     noise, unit = float(found.traces.noise[j]), found.units[j]
     text = (
-        f'No mismatch: the nominal robot leaves {percent(proof.nmse_before[name])} of the '
-        f'variance of the effort, {left:.2g} {unit} rms on {name}'
+        f'No mismatch: the residual of the nominal robot is {left:.2g} {unit} rms on {name}, '
+        f'{percent(proof.nmse_before[name])} of the variance of the effort'
     )
     if left <= 2.0 * noise:
-        text += f', as much as the noise of the encoder ({noise:.2g} {unit})'
+        text += f' and no more than the encoder noise explains ({noise:.2g} {unit})'
     else:
-        text += ', too little to be physics'
+        text += ', too little to count as missing physics'
     return f'{text} (certainty {found.certainty:.2f}).'
 
 
@@ -118,11 +122,11 @@ def _unexplained(found: Diagnosis) -> str:
     on = [f'{name} ({percent(scores[name])})' for name in leading if scores[name] > 0.05]
     text += f'; it depends on {" and ".join(on)}' if on else '; no variable alone explains it'
     if not found.alternatives:
-        return f'{text}; no effect of the list fits.'
+        return f'{text}; no listed effect fits.'
     top = found.alternatives[0]
     nearest = [f for f in found.alternatives if f.log_bayes_factor == top.log_bayes_factor]
     names = ' with '.join(dict.fromkeys(plain_name(f.effect) for f in nearest))
-    return f'{text}; no effect of the list fits: the nearest, {names}, {top.why.split(", ")[0]}.'
+    return f'{text}; no listed effect fits: the nearest, {names}, {top.why.split(", ")[0]}.'
 
 
 def _is_compared(found: Diagnosis) -> bool:
@@ -134,7 +138,7 @@ def _is_compared(found: Diagnosis) -> bool:
 def _against_simulation(found: Diagnosis) -> str:
     """Return what the machine has that its simulation has not, and the other way round."""
     both = '; '.join(f'{place(f)}: {effect_name(f)}' for f in found.shared)
-    both = f' Both have alike {both}.' if both else ''
+    both = f' Both have {both}.' if both else ''
     if found.findings:
         each = [
             f'{place(f)}: {phrase(f)}, in the simulation {", ".join(simulated(f))} '

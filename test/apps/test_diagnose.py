@@ -16,6 +16,7 @@ from sgp_ros.diagnosis.result import VERDICTS
 from sgp_ros.engine.samples import JointSample, frozen_array
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.writer import RecordingWriter
+from sgp_ros.report.page import typeset
 from sgp_ros.rigid.tree import read_urdf
 
 ROOT = Path(__file__).parents[2]
@@ -77,7 +78,7 @@ def test_the_verdict_and_what_is_named_are_true(finished):
     assert json.loads((out / 'diagnosis.json').read_text())['verdict'] == verdict
     sentence = printed.splitlines()[0]
     assert named in sentence
-    assert sentence.replace('+-', '±') in (out / 'report.html').read_text()
+    assert typeset(sentence) in (out / 'report.html').read_text()
     assert str(out / 'report.html') in printed
 
 

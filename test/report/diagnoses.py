@@ -132,7 +132,7 @@ def _overlay(time, position, before, after):
     )  # fmt: skip
 
 
-def search(why_not='the best formula follows the shape only nearly'):
+def search(why_not='the best formula follows the shape only approximately'):
     """Return a search at `elbow` that ended with friction over a place."""
     x = np.linspace(-1.0, 1.0, 41)
     shape = 0.2 + 0.1 * x**2

@@ -59,7 +59,7 @@ def test_missing_physics_is_said_with_joint_name_interval_probability_and_gain()
     """All an engineer asks for first, in one sentence."""
     assert verdict_sentence(diagnosis('missing_physics', [COULOMB])) == (
         'Missing on elbow: Coulomb friction, level 0.3170 +- 0.0020 N m (probability 0.99); '
-        'it explains more than 99.9 % of what the nominal robot leaves.'
+        'it explains more than 99.9 % of the residual of the nominal robot.'
     )
 
 
@@ -110,9 +110,9 @@ def test_wrong_parameters_are_said_beside_the_nominal_ones():
 def test_no_mismatch_is_said_with_the_size_of_what_is_left():
     """As much as the encoder's noise, where that is so."""
     text = verdict_sentence(diagnosis('no_mismatch'))
-    assert text.startswith('No mismatch: the nominal robot leaves')
+    assert text.startswith('No mismatch: the residual of the nominal robot is')
     assert 'N m rms on' in text
-    assert 'as much as the noise of the encoder (0.004 N m)' in text
+    assert 'no more than the encoder noise explains (0.004 N m)' in text
 
 
 def test_the_unexplained_is_said_with_what_it_depends_on_and_the_nearest_effect():
@@ -121,7 +121,7 @@ def test_the_unexplained_is_said_with_what_it_depends_on_and_the_nearest_effect(
     assert text.startswith('Unexplained on elbow: 10 % of the mean squared effort')
     assert 'it depends on velocity (90 %) and position (10 %)' in text
     nearest = EFFECTS['asymmetric_coulomb'].words
-    assert f'no effect of the list fits: the nearest, {nearest}' in text
+    assert f'no listed effect fits: the nearest, {nearest}' in text
 
 
 @pytest.mark.parametrize('name', [*EFFECTS, 'unknown'])
@@ -155,7 +155,7 @@ def test_a_share_below_one_is_never_called_all(share):
 
 def test_a_rival_that_fits_as_well_lost_by_its_parameters():
     """Otherwise by what it leaves, as the diagnosis says."""
-    assert 'with 2 numbers instead of 1' in why_it_lost(ASYMMETRIC, COULOMB)
+    assert 'with 2 parameters instead of 1' in why_it_lost(ASYMMETRIC, COULOMB)
     far = replace(ASYMMETRIC, log_bayes_factor=100.0)
     assert why_it_lost(far, COULOMB) == ASYMMETRIC.why
 

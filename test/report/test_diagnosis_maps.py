@@ -45,7 +45,7 @@ def test_regions_are_shaded_and_said_significant():
     assert not _axes(figure, 'shoulder', 'velocity').patches
     (legend,) = figure.legends
     words = sorted(text.get_text() for text in legend.get_texts())
-    assert words == ['backward', 'forward', 'not zero']
+    assert words == ['backward', 'forward', 'significant']
     assert _axes(figure, 'elbow', 'velocity').get_title() == 'significant (p 0.005)'
     assert _axes(figure, 'elbow', 'time').get_title() == 'not significant (p 0.7)'
 
@@ -64,7 +64,7 @@ def test_the_region_of_a_finding_is_marked_beside_the_band():
 def test_each_joint_is_said_with_the_region_of_its_best_variable():
     found = diagnosis('missing_physics', [COULOMB])
     quiet, loud = band_sentences(found, ['shoulder', 'elbow'])
-    assert quiet == 'shoulder: nowhere beyond chance.'
+    assert quiet == 'shoulder: nowhere significant.'
     assert loud == 'elbow: at velocity from -2 to -0.5 rad/s and 0.5 to 2 rad/s, 80 % of the rows.'
     assert loud in render(found, {'bands': b''})
 

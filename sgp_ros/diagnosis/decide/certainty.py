@@ -63,20 +63,22 @@ class Probabilities:
         """Return what is wrong with a rival that leaves no more than the asserted model."""
         scale, asserted = self.scale, self.asserted
         if min(model.shares) <= COUNTED_SHARE:
-            return 'one of its effects is too small to count as physics'
+            return 'one of its effects is too small to count'
         if not is_sound(model):
-            return 'its effects cancel each other or the bodies'
+            return 'its effects cancel each other or the inertial parameters'
         losses = {
-            'bodies that differ more than is likely': 0.5
+            'inertial parameters further from the nominal ones': 0.5
             * float(model.w @ model.w - asserted.w @ asserted.w),
-            'more numbers than it gains by': PER_EFFECT * (model.laws - asserted.laws)
+            'more parameters than the improvement is worth': PER_EFFECT
+            * (model.laws - asserted.laws)
             + PER_PARAMETER * (model.freedom - asserted.freedom),
-            'more left at other joints': scale.likelihood(asserted) - scale.likelihood(model),
+            'a larger residual at other joints': scale.likelihood(asserted)
+            - scale.likelihood(model),
         }
         worst = max(losses, key=lambda name: losses[name])
         if scale.worth(model) < scale.worth(asserted) and losses[worst] > 0.0:
-            return f'it takes {worst}, which costs {losses[worst]:.2g} nats'
-        return 'it does not predict parts left out, or leaves a joint undescribed'
+            return f'it needs {worst} (cost: {losses[worst]:.2g} nats)'
+        return 'it does not predict held-out parts, or leaves another joint unexplained'
 
 
 def settled(

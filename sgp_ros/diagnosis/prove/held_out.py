@@ -25,8 +25,9 @@ HELD_OUT = 'held_out'
 SHARE = 0.25
 MOST_BLOCKS = 4
 _POSES_SAID = (
-    f'Without --test, one pose in {HELD_BACK} was held out: hypotheses and parameters come from '
-    'the others. Dry friction is taken to stand at its limit against the direction of approach.'
+    f'Without --test, one pose in {HELD_BACK} was held out: the model was chosen and '
+    'fitted on the others. Dry friction is taken to stand at its limit against the direction of '
+    'approach.'
 )
 LEAST_BLOCK_S = 2.4
 """Eight roll-outs; twice the longest filter and what it loses at both ends."""
@@ -49,8 +50,8 @@ def split_sentence(raw: RawTrajectory) -> str:
     where = 'the last quarter' if blocks == 1 else f'the last quarter of each of {blocks} parts'
     return (
         f'Without --test, {where} of the recording was held out ({SHARE * whole:.3g} of '
-        f'{whole:.3g} s): hypotheses and parameters come from the rest alone, and no fit '
-        'followed, so what is proved is what is written.'
+        f'{whole:.3g} s): the model was chosen and fitted on the rest alone, and '
+        'is written as it was tested.'
     )
 
 

@@ -34,7 +34,7 @@ _DELAYS = np.geomspace(0.002, 0.12, 24)
 _TURNS = (-0.1, 0.1, 0.5 * math.pi, -0.5 * math.pi, math.pi)
 
 _REMEDIES = {
-    'encoder_offset': 'Set the zero of {joint} anew, or subtract {offset:.4g} from its positions.',
+    'encoder_offset': 'Re-zero {joint}, or subtract {offset:.4g} from its positions.',
     'position_scale': 'Divide the positions of {joint} by {scale:.5g}: unit or gear ratio.',
     'joint_sign': 'Reverse the sign of {joint} ({channels}).',
     'swapped_joints': 'Exchange {joint} and {other_joint} ({channels}).',

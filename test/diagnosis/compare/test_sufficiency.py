@@ -71,7 +71,7 @@ def test_the_noise_of_a_still_joint_explains_nothing(robots):
     noise = np.random.default_rng(0).normal(0.0, 1e-4, len(world.time))
     shown = np.column_stack([world.position[:, 0], noise])
     found = diagnose(events_of(replace(world, position=shown)), *robots[2], {})
-    assert 'Nothing can be said of joints that do not move: joint1.' in found.remarks
+    assert 'Joints that do not move cannot be diagnosed: joint1.' in found.remarks
     assert 'joint1' not in {f.joint for f in (*found.findings, *found.alternatives)}
 
 
