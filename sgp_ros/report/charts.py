@@ -95,7 +95,7 @@ class Chart:
     def content(self) -> dict[str, Any]:
         """Return what the script reads; NaN becomes null."""
         content: dict[str, Any] = {
-            'x_label': self.x_label, 'y_label': self.y_label, 'group': self.group,
+            'x_label': _signs(self.x_label), 'y_label': _signs(self.y_label), 'group': self.group,
             'x': _plain(self.x, 7), 'spans': [_plain(ends) for ends in self.spans],
             'limit': self.limit, 'view': self.view, 'log': self.is_log,
             'series': [
@@ -151,6 +151,10 @@ def spread_rows(n: int, most: int = MOST_CLOUD) -> np.ndarray:
 def spoken(x: float) -> str:
     """Return a number as it is said: three digits."""
     return f'{x:.3g}'
+
+
+def _signs(label: str) -> str:
+    return label.replace('^2', '²').replace('^3', '³')
 
 
 def _plain(values: Iterable[float], digits: int = 5) -> list[float | None]:

@@ -23,7 +23,9 @@ def cards(found: Diagnosis) -> list[dict[str, str]]:
             'unexplained': 'a learned correction, not by a law',
             'parameters_only': 'corrected parameters of bodies',
         }.get(found.verdict, 'the finding')
-        label = f'of the residual of the nominal robot is explained by {by}'
+        label = (
+            f'of the residual of the nominal robot, in the data learned from, is explained by {by}'
+        )
         shown.append({'value': percent(explained(found)), 'label': label})
     shown += [_effort_card(found, stem) for stem in found.proofs if stem != 'train']
     motion = motion_card(found)

@@ -87,7 +87,7 @@ def search_rows(found: Diagnosis) -> list[dict[str, Any]]:
             'left': f'This shape leaves {percent(s.left)} of the mean squared effort of '
                     f'{s.joint}; the best listed effects leave {percent(s.left_listed)}.',
             'conclusion': _conclusion(s),
-            'is_asserted': not s.why_not,
+            'has_nearest': any(t.words != NAMELESS for t in s.formulas),
             'formulas': [
                 {
                     'formula': t.formula, 'left': percent(t.left),

@@ -9,6 +9,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.result import Diagnosis, Finding
 from sgp_ros.physics.catalogue import exerts_force
+from sgp_ros.physics.law import NAME as LAW
 from sgp_ros.report.diagnosis_proof import recording_name
 from sgp_ros.report.diagnosis_text import (
     UNKNOWN,
@@ -121,10 +122,12 @@ def _unexplained(found: Diagnosis) -> str:
     leading = sorted(scores, key=lambda name: -scores[name])[:_MOST_VARIABLES]
     on = [f'{name} ({percent(scores[name])})' for name in leading if scores[name] > 0.05]
     text += f'; it depends on {" and ".join(on)}' if on else '; no variable alone explains it'
-    if not found.alternatives:
+    formulas = {f.log_bayes_factor for f in found.alternatives if f.effect == LAW}
+    listed = [f for f in found.alternatives if f.log_bayes_factor not in formulas]
+    if not listed:
         return f'{text}; no listed effect fits.'
-    top = found.alternatives[0]
-    nearest = [f for f in found.alternatives if f.log_bayes_factor == top.log_bayes_factor]
+    top = listed[0]
+    nearest = [f for f in listed if f.log_bayes_factor == top.log_bayes_factor]
     names = ' with '.join(dict.fromkeys(plain_name(f.effect) for f in nearest))
     return f'{text}; no listed effect fits: the nearest, {names}, {top.why.split(", ")[0]}.'
 

@@ -122,6 +122,9 @@ def test_the_unexplained_is_said_with_what_it_depends_on_and_the_nearest_effect(
     assert 'it depends on velocity (90 %) and position (10 %)' in text
     nearest = EFFECTS['asymmetric_coulomb'].words
     assert f'no listed effect fits: the nearest, {nearest}' in text
+    law = replace(ASYMMETRIC, effect='law', log_bayes_factor=1e3)
+    beside = verdict_sentence(diagnosis('unexplained', [UNKNOWN], alternatives=[law, ASYMMETRIC]))
+    assert beside == text  # a formula is no listed effect
 
 
 @pytest.mark.parametrize('name', [*EFFECTS, 'unknown'])
