@@ -120,8 +120,8 @@ def _add_simulate(add: AddCommand) -> None:
         '--sensor', dest='sensors', action='append', default=[], metavar='NAME=VALUE',
         help='sensor property, such as bits=14, velocity=no or jitter=0.001; may be repeated',
     )  # fmt: skip
-    parser.add_argument('--commands', metavar='BAG', help='replay its commands instead, compare')
-    parser.add_argument('--nominal', metavar='ROBOT', help='replayed beside ROBOT')
+    parser.add_argument('--commands', metavar='BAG', help='replay its commands and compare')
+    parser.add_argument('--nominal', metavar='ROBOT', help='a second robot to replay beside ROBOT')
     _add_gains(parser, has_sim=False)
 
 
@@ -159,7 +159,7 @@ def _add_identify(add: AddCommand) -> None:
     parser.add_argument('--cutoff', type=_above(0.0), metavar='HZ',
                         help='cut-off of the low-pass (default: from the data)')  # fmt: skip
     parser.add_argument('--inputs', nargs='+', metavar='NAME',
-                        help='what Z sees, such as own:velocity or every:velocity')  # fmt: skip
+                        help='inputs of Z, such as own:velocity or every:velocity')  # fmt: skip
     _add_gains(parser, has_sim=False)
 
 
