@@ -48,17 +48,13 @@ class Effect:
     ...     formula = 'tau_x = -c v^3'
     ...     quantities = (Quantity('c', 'N m s3/rad3', low=0.0),)
     ...     linear = ('c',)
-    ...
     ...     def local(self, x, shape):
     ...         return (-(x.v**3),)
     >>> law = CubicDrag()
-    >>> v = np.array([2.0, -1.0])
-    >>> law.local(OwnMotion(v, v, v, np.sign(v)), EMPTY)
+    >>> law.local(OwnMotion(*np.array([[2.0, -1.0]] * 4)), EMPTY)
     (array([-8.,  1.]),)
     >>> law.model({'c': 0.5})
     (array([], dtype=float64), array([0.5]))
-    >>> law.quantities[0].unit_on(is_prismatic=True)
-    'N s3/m3'
 
     `EFFECTS[law.name] = law` (see `catalogue`) makes it known to everything else.
 
@@ -195,9 +191,13 @@ class Effect:
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
         """Return whether signs and sizes can be: usually what must not be negative is positive."""
         known = self.stated_quantities if self.is_given else self.coefficient_quantities
-        named = zip(known(at.place.kind), at.shape if self.is_given else at.coefficients,
-                    strict=False)  # fmt: skip
+        values = at.shape if self.is_given else at.coefficients
+        named = zip(known(at.place.kind), values, strict=False)
         return all(bool(x > 0.0) for q, x in named if q.low >= 0.0)
+
+    def is_inside(self, at: Placed, motion: SeenMotion) -> bool:
+        """Return whether a fit has not run into a bound where it is no such law; usually so."""
+        return True
 
     def interval(self, at: Placed, motion: SeenMotion) -> tuple[str, list[list[float]]] | None:
         """Return variable and intervals of the region it is confined to; None for everywhere."""

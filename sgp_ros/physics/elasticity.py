@@ -167,11 +167,11 @@ class JointElasticity(Effect):
         }  # fmt: skip
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
+        return bool(at.shape[0] > 0.0 and at.shape[1] > 0.0 and at.shape[2] >= 0.0)
+
+    def is_inside(self, at: Placed, motion: SeenMotion) -> bool:
         """Return whether it is a spring; a fit that ends at the softest one is something else."""
-        softest = self.bounds(motion, at.place)[1][1]
-        return bool(
-            at.shape[0] > 0.0 and 0.0 < at.shape[1] < _SOFT * softest and at.shape[2] >= 0.0
-        )
+        return bool(at.shape[1] < _SOFT * self.bounds(motion, at.place)[1][1])
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         return np.asarray(shape[1] * _of_softness(motion, place, shape))

@@ -18,7 +18,8 @@ def is_credible(model: Model) -> bool:
     is_finite = is_finite and are_apart(model.effects, motion) and is_sound(model)
     power = model.frame.equations.power
     return is_finite and all(
-        _is_confined(s, motion) and _is_needed(s, motion, power) for s in model.effects
+        s.effect.is_inside(s, motion) and _is_confined(s, motion) and _is_needed(s, motion, power)
+        for s in model.effects
     )
 
 
