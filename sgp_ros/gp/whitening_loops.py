@@ -204,6 +204,8 @@ def whitened_numpy(
         white: (n, k w).
         scales: (k,).
     """
-    v = np.asarray(linalg.solve_triangular(L, covariances, lower=True))
+    v = covariances  # SciPy before 1.14 refuses what is empty
+    if len(L):
+        v = np.asarray(linalg.solve_triangular(L, covariances, lower=True))
     explained = (v @ white).reshape(len(scales), -1) * scales[:, None]
     return v, explained.reshape(-1), float(v @ v)
