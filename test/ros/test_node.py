@@ -316,6 +316,7 @@ def test_a_record_survives_a_killed_node(graph: Graph, tmp_path: Path) -> None:
     stream = Stream(graph)
     _ready(graph, stream)
     size = path.stat().st_size
+    stream.publish_until_read(50)
     graph.wait_until(lambda: path.stat().st_size > size, 'a flush')
     assert node.stop(signal.SIGKILL) == -signal.SIGKILL
     recording = open_recording(path)
