@@ -15,12 +15,16 @@ from sgp_ros.batch.least_squares import autocorrelation
 from sgp_ros.batch.posterior import BatchPosterior
 from sgp_ros.batch.regression_data import FilteredData
 from sgp_ros.errors import ConfigError, RecordingError
+from sgp_ros.gp.linear_algebra import svd
 from sgp_ros.gp.methods import METHODS, FitOptions, Inputs
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
+from sgp_ros.gp.posterior import RANK_TOLERANCE, ZERO_COLUMN, column_scale
 from sgp_ros.robots.robot import Robot
 
 FEWEST_ROWS = 10
 """Rows beyond the coefficients per joint without which nothing is fitted."""
+_GAP = 10.0
+"""Factor on both sides of the rank's tolerance within which no singular value is believed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +150,10 @@ def fit_offline(
     prior = prior_of(robot, is_flat=options.has_flat_prior)
     whole = Observations(data.U, data.F, data.y)
     points = np.unique(np.linspace(0, n - 1, min(options.max_points, n)).astype(int))
-    learned = METHODS[method](_rows(whole, points), prior, inputs, options.learning)
+    few = _rows(whole, points), prior
+    if method == 'SGP':  # the others learn with W alone, or without it
+        few = on_determined(*few)
+    learned = METHODS[method](*few, inputs, options.learning)
     physics, process, residual = None, None, whole
     limit = options.max_basis
     if learned.physics is not None:
@@ -176,6 +183,36 @@ def prior_of(robot: Robot, *, is_flat: bool = False) -> CoefficientPrior:
         return CoefficientPrior.flat(len(robot.coefficients))
     mean = np.array([c.prior_mean for c in robot.coefficients])
     return CoefficientPrior.from_std(mean, np.array([c.prior_std for c in robot.coefficients]))
+
+
+def on_determined(
+    data: Observations, prior: CoefficientPrior
+) -> tuple[Observations, CoefficientPrior]:
+    """Return the regression on what rows and prior determine of W, as r coefficients of p.
+
+    Whatever the covariance K = L L^T, the rows of L^-1 F span what those of F span. So
+    W = S^-1 V x with the column scale S of `gp.posterior`, and V (p, r) an orthonormal basis of
+    the rows of F S^-1 and of the prior: the evidence, taken over the determined directions, stays
+    the same to rounding, and each evaluation costs what r columns cost. Data without a clear gap
+    between information and rounding stay as they are.
+
+    Args:
+        data: n rows, directly observed.
+        prior: of p coefficients.
+    """
+    p = prior.size
+    scale = column_scale(data.F, prior.root)
+    rows = np.vstack([data.F.reshape(-1, p), prior.root]) / scale
+    rows[:, scale <= ZERO_COLUMN * scale.max(initial=0.0)] = 0.0
+    size, Vt = svd(np.asarray(np.linalg.qr(rows, mode='r')))[1:]
+    share = size / size.max(initial=np.finfo(float).tiny)
+    is_clear = (share > _GAP * RANK_TOLERANCE) | (share < RANK_TOLERANCE / _GAP)
+    V = Vt[: int((share > RANK_TOLERANCE).sum())].T
+    if not is_clear.all() or V.shape[1] == p:
+        return data, prior
+    into = V / scale[:, None]
+    seen = Observations(data.U, data.F @ into, data.y)
+    return seen, CoefficientPrior(prior.root @ into, prior.target, prior.log_det)
 
 
 def _rows(data: Observations, rows: np.ndarray) -> Observations:

@@ -96,6 +96,8 @@ standard deviation, which has the right unit and does not depend on the unit cho
 
 _RESTART_SPREAD = 1.5
 _REFUSED = 1e25
+TOLERANCE = 1e7 * float(np.finfo(float).eps)
+"""Relative change of the evidence at which a search ends."""
 _SCREENED_LENGTHS = (0.3, 1.0, 3.0)
 _SCREENED_NOISE = (0.1, 1.0, 10.0)
 
@@ -182,6 +184,8 @@ def learn(
     start: Model,
     restarts: int = 0,
     rng: np.random.Generator | None = None,
+    *,
+    tolerance: float = TOLERANCE,
 ) -> LearnedModel:
     """Maximise the evidence from `start` and from `restarts` random perturbations of it.
 
@@ -200,7 +204,7 @@ def learn(
     for _ in range(restarts):
         assert rng is not None
         starts.append(starts[0] + _RESTART_SPREAD * rng.standard_normal(len(starts[0])))
-    search = _Search(data, prior, start)
+    search = _Search(data, prior, start, tolerance)
     for theta in starts:
         search.climb(theta, box)
     if search.best is None:
@@ -219,10 +223,13 @@ def learn(
 class _Search:
     """The negative evidence as the optimiser sees it, remembering the best point."""
 
-    def __init__(self, data: Observations, prior: CoefficientPrior, start: Model) -> None:
+    def __init__(
+        self, data: Observations, prior: CoefficientPrior, start: Model, tolerance: float
+    ) -> None:
         self._data = data
         self._prior = prior
         self._start = start
+        self._tolerance = tolerance
         self.best: np.ndarray | None = None
         self.lowest = np.inf
         self.evaluations = 0
@@ -232,8 +239,9 @@ class _Search:
         """Search from theta (h,) inside a box (h, 2)."""
         low, high = box.T
         optimize.minimize(
-            self._objective, np.clip(theta, low, high), jac=True, method='L-BFGS-B', bounds=box
-        )
+            self._objective, np.clip(theta, low, high), jac=True, method='L-BFGS-B', bounds=box,
+            options={'ftol': self._tolerance},
+        )  # fmt: skip
 
     def _objective(self, theta: np.ndarray) -> tuple[float, np.ndarray]:
         self.evaluations += 1

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sgp_ros.gp.learning import initial_model, learn, screened
+from sgp_ros.gp.learning import TOLERANCE, initial_model, learn, screened
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior, Prediction
 
@@ -27,11 +27,15 @@ class FitOptions:
             the standard deviations.
         restarts: random starts beside that one.
         seed: of these.
+        start: hyper-parameters of a like fit, from which SGP starts in place of the rule.
+        tolerance: relative change of the evidence at which a search ends.
     """
 
     rule: str = 'standardised'
     restarts: int = 0
     seed: int = 0
+    start: Model | None = None
+    tolerance: float = TOLERANCE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,7 +124,7 @@ def fit_sgp(
     data: Observations, prior: CoefficientPrior, inputs: Inputs, options: FitOptions
 ) -> FittedMethod:
     """Semi-parametric Gaussian process: W and Z jointly."""
-    posterior, evidence = _learn(data, prior, inputs, options)
+    posterior, evidence = _learn(data, prior, inputs, options, options.start)
     return FittedMethod(posterior, None, evidence)
 
 
@@ -132,10 +136,12 @@ def _learn(
     prior: CoefficientPrior,
     inputs: tuple[tuple[int, ...] | None, ...],
     options: FitOptions,
+    start: Model | None = None,
 ) -> tuple[Posterior, float]:
-    start = initial_model(data, inputs, options.rule)
-    if options.rule != 'paper':
-        start = screened(data, prior, start)
+    if start is None:
+        start = initial_model(data, inputs, options.rule)
+        if options.rule != 'paper':
+            start = screened(data, prior, start)
     rng = np.random.default_rng(options.seed)
-    learned = learn(data, prior, start, options.restarts, rng)
+    learned = learn(data, prior, start, options.restarts, rng, tolerance=options.tolerance)
     return Posterior(learned.model, data, prior), learned.log_evidence

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from sgp_ros.batch.blocks import distance_to, holdout
-from sgp_ros.batch.fit import OfflineOptions, fit_offline, prior_of
+from sgp_ros.batch.fit import OfflineOptions, fit_offline, on_determined, prior_of
 from sgp_ros.batch.plan import choose_plan
 from sgp_ros.batch.regression_data import FilterPlan, filtered_data
 from sgp_ros.errors import ConfigError, RecordingError
+from sgp_ros.gp.kernels import SquaredExponential
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
+from sgp_ros.gp.posterior import Posterior
 from sgp_ros.gp.scores import INTERVAL_95, coverage95, nmse
 from sgp_ros.robots.registry import load_robot
 from test.batch.worlds import AXIS_TRUTH, emps_signals, moved_axis
@@ -151,3 +154,31 @@ def test_a_real_axis_is_predicted_better_with_the_process(emps, kind):
     both = _relative_error(fit_offline(train, LINEAR_AXIS, 'SGP', options=FEW), test)
     assert alone < 0.0408
     assert both < 0.7 * alone
+
+
+def test_the_evidence_needs_only_what_the_rows_determine():
+    """Nine coefficients of which rows and prior tell seven: fewer columns, the same evidence."""
+    rng = np.random.default_rng(2)
+    F = rng.standard_normal((40, 2, 6)) @ rng.standard_normal((6, 9))
+    F[..., 8] = 0.0
+    data = Observations(rng.standard_normal((40, 2)), F, rng.standard_normal((40, 2)))
+    known = np.full(9, np.inf)
+    known[3] = 0.7
+    prior = CoefficientPrior.from_std(np.arange(9.0), known)
+    few, few_prior = on_determined(data, prior)
+    assert few.F.shape[2] == few_prior.size == 7
+    for noise in (1e-3, 1.0):
+        kernel = SquaredExponential(2.0, (0.5, 3.0), (0, 1))
+        model = Model((kernel, None), (noise, 2.0 * noise))
+        whole, part = Posterior(model, data, prior), Posterior(model, few, few_prior)
+        assert part.log_evidence == pytest.approx(whole.log_evidence, abs=1e-8)
+        np.testing.assert_allclose(
+            part.evidence_gradient(), whole.evidence_gradient(), rtol=1e-8, atol=1e-8
+        )
+
+
+def test_coefficients_that_are_all_determined_stay():
+    """Nothing to leave out: the same numbers, bit for bit."""
+    data = _data(0, force=3.0)
+    whole = Observations(data.U, data.F, data.y), prior_of(LINEAR_AXIS)
+    assert on_determined(*whole) == whole

@@ -112,6 +112,22 @@ def test_learning_recovers_planted_hyperparameters():
         assert learned.model.noise[0] == pytest.approx(0.1, rel=4 * 0.07)
 
 
+def test_a_fit_that_starts_from_another_one_ends_sooner(monkeypatch):
+    """Of like data: no other starts are looked at, and the evidence is as high to a tolerance."""
+    _, data = random_problem(seed=4, n=60)
+    inputs, prior = ((0, 1),) * data.F.shape[1], CoefficientPrior.flat(data.F.shape[2])
+    first = METHODS['SGP'](data, prior, inputs, FitOptions())
+    counted = []
+    monkeypatch.setattr(
+        'sgp_ros.gp.methods.learn',
+        lambda *a, **k: counted.append(found := learn(*a, **k)) or found,
+    )
+    monkeypatch.setattr('sgp_ros.gp.methods.screened', None)
+    METHODS['SGP'](data, prior, inputs, FitOptions(start=first.model, tolerance=1e-6))
+    assert counted[0].evaluations < 10
+    assert counted[0].log_evidence > first.log_evidence - 1e-3
+
+
 def test_learning_starts_from_the_values_of_the_paper():
     """sigma_z = var y, sigma_v = var y / 100, l = var u; or the unit-free standard deviation."""
     _, data = random_problem(6, n=30)
