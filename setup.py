@@ -66,6 +66,8 @@ setup(
         'tables': ['pyarrow>=14', 'h5py>=3'],
         # The dashboard of `sgp watch`.
         'watch': ['rich>=13'],
+        # The file for the viewer Rerun of `sgp diagnose --rerun`.
+        'rerun': ['rerun-sdk>=0.41'],
         # Many recordings on many processes, and their results as one table: `sgp campaign`.
         'campaign': ['distributed>=2024.5', 'pyarrow>=14'],
         # The rivals of `sgp bench`.
@@ -73,6 +75,7 @@ setup(
         'test': [
             'mujoco>=3.2',
             'rich>=13',
+            'rerun-sdk>=0.41; python_version >= "3.11"',
             'xacro>=2',
             'pyarrow>=14',
             'h5py>=3',

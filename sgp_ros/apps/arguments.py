@@ -174,11 +174,11 @@ def _add_diagnose(add: AddCommand) -> None:
     parser.add_argument('--test', dest='tests', action='append', default=[], metavar='BAG',
                         help='held-out recording for the proof; may be repeated; without any, '
                         'a quarter of REAL is held out')  # fmt: skip
-    parser.add_argument('--static', action='store_true',
-                        help='the recording holds settled points, one per pose')  # fmt: skip
+    parser.add_argument('--static', action='store_true', help='rows are settled poses, not motion')
     parser.add_argument('--bodies', metavar='YAML',
                         help='mass, com and inertia of links for which the URDF gives none; '
                         'without it they are estimated from REAL')  # fmt: skip
+    parser.add_argument('--rerun', action='store_true', help='write finding.rrd for Rerun too')
 
 
 def _add_campaign(add: AddCommand) -> None:

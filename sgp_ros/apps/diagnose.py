@@ -10,6 +10,7 @@ from typing import Any
 
 from sgp_ros.apps.diagnosed_robot import replayed, write_diagnosed
 from sgp_ros.apps.finding_file import write_viewed
+from sgp_ros.apps.finding_rerun import rerun_package, write_rerun
 from sgp_ros.apps.recorded import checked, gains_of, read_events, refuse_moving_base
 from sgp_ros.apps.terminal import strong, warned
 from sgp_ros.batch.acceptance import USUAL, require_joints
@@ -23,10 +24,7 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event, JointSample
 from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import RecordingError
-from sgp_ros.report.diagnosis import (
-    write_diagnosis,
-    write_predictions,
-)
+from sgp_ros.report.diagnosis import write_diagnosis, write_predictions
 from sgp_ros.report.diagnosis_proof import interval_text
 from sgp_ros.report.diagnosis_text import (
     chance,
@@ -107,7 +105,7 @@ class Examined:
 
 def run_diagnose(
     bag: str | Sequence[str], robot: str, out: Path, *, progress: Callable[[float], None],
-    **options: Any,
+    rerun: bool = False, **options: Any,
 ) -> dict[str, Any]:  # fmt: skip
     """Diagnose one or several recordings; write diagnosis.json, predictions and the report.
 
@@ -116,13 +114,16 @@ def run_diagnose(
         robot: a URDF, or a robot YAML with one, or a built-in name.
         out: folder of the results.
         progress: called with the share that is done.
+        rerun: whether a file for the viewer Rerun is written too.
         options: fields of `DiagnoseOptions`.
 
     Raises:
         SgpError: as `examine` does.
     """
+    if rerun:
+        rerun_package()  # before minutes of work
     examined = examine(bag, robot, progress=progress, **options)
-    content, found = write_examined(out, examined)
+    content, found = write_examined(out, examined, rerun=rerun)
     print_diagnosis(found)
     print(ending(out, after_diagnosis(found, examined.bag, robot, out)))
     return content
@@ -205,12 +206,12 @@ def _read(
     return found
 
 
-def write_examined(out: Path, examined: Examined) -> tuple[dict[str, Any], Diagnosis]:
+def write_examined(
+    out: Path, examined: Examined, *, rerun: bool = False
+) -> tuple[dict[str, Any], Diagnosis]:
     """Write all files; return the content of diagnosis.json, and the diagnosis with new remarks.
 
-    Args:
-        out: folder of the results.
-        examined: the diagnosis.
+    Arguments are those of `run_diagnose`.
     """
     nominal, found = examined.nominal, examined.found
     diagnosed = replace(found, bodies=nominal.without_stated(found.bodies))
@@ -223,6 +224,8 @@ def write_examined(out: Path, examined: Examined) -> tuple[dict[str, Any], Diagn
     with replacing_results(out, 'diagnose'):
         write_predictions(out, found)
         write_viewed(out, found, nominal.tree, examined.start_ns)
+        if rerun:
+            write_rerun(out / 'finding.rrd', found, nominal.tree, examined.start_ns)
         write_diagnosed(out, nominal.robot, diagnosed, examined.gains)
         checks = {stem: check.content() for stem, check in examined.checks.items()}
         content = {**diagnosis_mapping(found), 'check': checks}
@@ -253,9 +256,8 @@ def print_diagnosis(found: Diagnosis) -> None:
         print(f'  differs   {line}')
     if found.parameter_errors:
         print(f'  bodies    {parameter_errors_text(found.parameter_errors)}')
-    print(
-        *(f'  unseen    {sentence}\n' for sentence in visibility_sentences(found)), sep='', end=''
-    )
+    for sentence in visibility_sentences(found):
+        print(f'  unseen    {sentence}')
     for stem, proof in found.proofs.items():
         _print_proof(stem, proof)
     if found.refused:

@@ -35,8 +35,8 @@ from sgp_ros.report.verdict import verdict_sentence
 from sgp_ros.rigid.tree import Tree
 
 NAME = 'finding.mcap'
-_MARKERS_HZ, _MOST_ROWS, _MOST_ENTRIES = 20.0, 50_000, 1000
-_LINE_LIST, _INFO, _WARN = 5, 20, 30
+MARKERS_HZ, _MOST_ROWS, _MOST_ENTRIES = 20.0, 50_000, 1000
+_LINE_LIST, _INFO, WARN = 5, 20, 30
 _WIDTH_SHARE = 0.03
 """Width of a link in the picture, relative to the robot's extent."""
 
@@ -59,7 +59,7 @@ def write_finding(path: Path, found: Diagnosis, tree: Tree, start_ns: int) -> No
     traces = found.traces
     every = max(1, -(-len(traces.time) // _MOST_ROWS))
     stamps = (start_ns + np.round(1e9 * traces.time).astype(np.int64)).tolist()
-    half = INTERVAL_95 * np.sqrt(np.nanmean(traces.after**2, axis=0))
+    half = half_band(found)
     with RecordingWriter(path) as writer:
         text = new_message('std_msgs/String', data=verdict_sentence(found))
         writer.write('/finding/verdict', 'std_msgs/String', start_ns, text)
@@ -75,31 +75,31 @@ def write_finding(path: Path, found: Diagnosis, tree: Tree, start_ns: int) -> No
                 writer.write_joint_state(topic, sample)
             state = (traces.position[i], traces.velocity[i], traces.effort[i])
             writer.write_joint_state('/joint_states', JointSample(stamps[i], found.joints, *state))
-        for i in _at_rate(traces.time, _MARKERS_HZ):
+        for i in rows_at(traces.time, MARKERS_HZ):
             message = _markers(found, tree, traces.position[i], stamps[i])
             writer.write('/finding/markers', 'visualization_msgs/MarkerArray', stamps[i], message)
-        for i, level, name, text in _entries(found):
+        for i, level, name, text in entries(found):
             log = _log(stamps[i], level, name, text)
             writer.write('/finding/events', 'rcl_interfaces/Log', stamps[i], log)
 
 
-def _at_rate(time: np.ndarray, rate_hz: float) -> list[int]:
+def rows_at(time: np.ndarray, rate_hz: float) -> list[int]:
     """Return the first row of each period."""
     return np.unique(np.floor(time * rate_hz), return_index=True)[1].tolist()
 
 
-def _entries(found: Diagnosis) -> Iterator[tuple[int, int, str, str]]:
+def entries(found: Diagnosis) -> Iterator[tuple[int, int, str, str]]:
     """Yield row, level, joint and text of what begins there."""
     for finding in found.findings:
         said = f'{phrase(finding)} of {finding.joint}'
         place = finding.location
         regions = list(_regions(found, finding))
         if not regions:
-            yield 0, _WARN, finding.joint, f'{said}: everywhere'
+            yield 0, WARN, finding.joint, f'{said}: everywhere'
         for inside, where in regions:
             begins = np.flatnonzero(inside & ~np.append(False, inside[:-1]))
             for i in begins[:_MOST_ENTRIES].tolist():
-                yield i, _WARN, finding.joint, f'{said}: enters {where}'
+                yield i, WARN, finding.joint, f'{said}: enters {where}'
         for t0, t1 in place.time:
             for t, what in ((t0, 'begins'), (t1, 'ends')):
                 i = min(int(np.searchsorted(found.traces.time, t)), len(found.traces.time) - 1)
@@ -127,16 +127,36 @@ def _log(stamp_ns: int, level: int, name: str, text: str) -> Any:
     )  # fmt: skip
 
 
-def _markers(found: Diagnosis, tree: Tree, posture: np.ndarray, stamp_ns: int) -> Any:
+def coloured_links(
+    found: Diagnosis, tree: Tree, posture: np.ndarray
+) -> Iterator[tuple[str, np.ndarray, float]]:
+    """Yield name, ends (2, 3) [m] and share of the mismatch of each link in a posture (k,)."""
     rotations, origins = link_places(tree, posture)
-    body, ends = link_segments(tree, rotations, origins)
-    width = _WIDTH_SHARE * max(float(np.ptp(ends.reshape(-1, 3), axis=0).max()), 1e-3)
     shares = dict(joint_shares(found))
-    markers = []
-    for number, (i, line) in enumerate(zip(body.tolist(), ends, strict=True)):
+    body, ends = link_segments(tree, rotations, origins)
+    for i, line in zip(body.tolist(), ends, strict=True):
         share = 0.0 if i < 0 else shares.get(tree.joint_names[int(tree.follows[i])], 0.0)
-        name = 'ground' if i < 0 else tree.link_names[i]
-        markers.append(_marker(stamp_ns, number, _root(tree), name, line, share, width))
+        yield 'ground' if i < 0 else tree.link_names[i], line, share
+
+
+def colour_of(share: float) -> tuple[float, float, float]:
+    """Return red, green and blue of a share, from grey to red."""
+    grey = 0.75 * (1.0 - share)
+    return 0.75 + 0.25 * share, grey, grey
+
+
+def half_band(found: Diagnosis) -> np.ndarray:
+    """Return half the interval that holds 95 % of what the final model leaves, (k,)."""
+    return INTERVAL_95 * np.sqrt(np.nanmean(found.traces.after**2, axis=0))
+
+
+def _markers(found: Diagnosis, tree: Tree, posture: np.ndarray, stamp_ns: int) -> Any:
+    links = list(coloured_links(found, tree, posture))
+    ends = np.array([line for _, line, _ in links]).reshape(-1, 3)
+    width = _WIDTH_SHARE * max(float(np.ptp(ends, axis=0).max()), 1e-3)
+    markers = [
+        _marker(stamp_ns, number, _root(tree), *link, width) for number, link in enumerate(links)
+    ]
     return new_message('visualization_msgs/MarkerArray', markers=markers)
 
 
@@ -150,7 +170,6 @@ def _marker(
     """Return a line of one link, from grey to red with its share of the mismatch."""
     stamped = header(new_message, stamp_ns)
     stamped.frame_id = frame
-    grey = 0.75 * (1.0 - share)
     zero = _point(np.zeros(3))
     pose = new_message(
         'geometry_msgs/Pose', position=zero,
@@ -160,7 +179,7 @@ def _marker(
     return new_message(
         'visualization_msgs/Marker', header=stamped, ns=name, id=number, type=_LINE_LIST, action=0,
         pose=pose, scale=new_message('geometry_msgs/Vector3', x=width, y=0.0, z=0.0),
-        color=_colour(0.75 + 0.25 * share, grey, grey), lifetime=nothing, frame_locked=False,
+        color=_colour(*colour_of(share)), lifetime=nothing, frame_locked=False,
         points=[_point(end) for end in line], colors=[], texture_resource='',
         texture=new_message(
             'sensor_msgs/CompressedImage', header=header(new_message, 0), format='',
