@@ -2,9 +2,10 @@
 
     python -m sgp_proof.streams.live_diagnosis
 
-The node remembers `WINDOW_S` of the stream of `live_rate`, is asked for a diagnosis, and goes on
-to be sent messages until the verdict. Callbacks and latencies are compared with those of the time
-before. The verdict should come within twice the time that was recorded.
+The node remembers the last minute of an arm that has dry friction its robot file lacks, is asked
+for a diagnosis, and goes on to be sent messages until the verdict. Callbacks and latencies are
+compared with those of the time before. The verdict should come within twice the time that was
+recorded.
 """
 
 from __future__ import annotations
@@ -19,14 +20,48 @@ import numpy as np
 import rclpy
 from std_srvs.srv import Trigger
 
+from sgp_proof.concealed.machines import draw_machine
+from sgp_proof.concealed.robots import urdf
 from sgp_proof.result_files import ROOT, make_parser, write_result
 from sgp_proof.streams.live_rate import BUDGET, Listener, Machine
 from sgp_proof.streams.soak import _publish, _samples
 from sgp_ros.apps.live_processes import LiveProcesses, graph_environment
 from sgp_ros.recordings.model_files import load_parameters
+from sgp_ros.rigid.rigid_body import inverse_dynamics
+from sgp_ros.rigid.tree import read_urdf
 
 RATE_HZ, WARM_UP_S, BLOCK_S = 500.0, 20.0, 5.0
 _START_LIMIT_S = 60.0
+JOINTS, FRICTION = 7, (1, 3.0)
+"""Of the arm, and which joint has dry friction of how many newton metres."""
+
+
+class Arm(Machine):
+    """A drawn arm that moves as the machine of `live_rate`, with the efforts that takes.
+
+    Args:
+        path: where its robot file is written.
+    """
+
+    def __init__(self, path):
+        super().__init__()
+        seed, family, bodies = 0, '', ()
+        while len(bodies) != JOINTS or family != 'arm':
+            family, bodies = draw_machine(np.random.default_rng(seed))
+            seed += 1
+        path.write_text(urdf(family, bodies), encoding='utf-8')
+        self._tree = read_urdf(path.read_text(encoding='utf-8'))
+        self._message.name = list(self._tree.joint_names)
+
+    def signals(self, t):
+        """As that of `Machine`."""
+        q, v, _ = super().signals(t)
+        angle = self._rate * t[:, None, None] + self._start
+        a = -0.3 * (np.sin(angle) * self._rate**2).sum(axis=2)
+        effort = inverse_dynamics(self._tree, self._tree.parameters, q, v, a)
+        joint, level = FRICTION
+        effort[:, joint] += level * np.tanh(v[:, joint] / 1e-3)
+        return q, v, effort + 0.005 * self._rng.standard_normal(q.shape)
 
 
 class Stream:
@@ -34,10 +69,11 @@ class Stream:
 
     Args:
         listener: sends them.
+        machine: makes them.
     """
 
-    def __init__(self, listener):
-        self._listener, self._machine = listener, Machine()
+    def __init__(self, listener, machine):
+        self._listener, self._machine = listener, machine
         self._began_ns, self.sent, self.pause_s = time.time_ns(), 0, 0.0
 
     def send(self, seconds):
@@ -64,12 +100,13 @@ def _summary(parts):
     }  # fmt: skip
 
 
-def _run(window_s, limit_s, graph):
-    processes = LiveProcesses(graph)
+def _run(window_s, limit_s, graph, folder):
+    processes, robot = LiveProcesses(graph), folder / 'arm.urdf'
+    arm = Arm(robot)
     listener = Listener(rclpy.Context(), int(graph['ROS_DOMAIN_ID']))
     try:
         name = processes.start('sgp_ros.ros.sgp_node', {
-            **load_parameters(ROOT / 'config' / 'panda.yaml'), 'robot': 'panda',
+            **load_parameters(ROOT / 'config' / 'panda.yaml'), 'robot': str(robot),
             'command.type': 'none', 'buffer.budget': BUDGET, 'filter.window': 0.1,
             'refit.enabled': False, 'qos.depth': 1000, 'diagnosis.window': window_s,
         })  # fmt: skip
@@ -78,7 +115,7 @@ def _run(window_s, limit_s, graph):
         )
         client = listener.client(Trigger, '/sgp_node/diagnose')
         processes.wait_for(name, client.service_is_ready, _START_LIMIT_S, 'to offer diagnoses')
-        stream = Stream(listener)
+        stream = Stream(listener, arm)
         stream.send(WARM_UP_S)
         before = [stream.send(BLOCK_S) for _ in range(round(window_s / BLOCK_S))]
         asked, future = time.monotonic(), client.call_async(Trigger.Request())
@@ -95,7 +132,8 @@ def _run(window_s, limit_s, graph):
     lost = int(listener.last['samples']['lost'])
     return {
         'window_s': window_s, 'answer': None if answer is None else answer.message,
-        'state': verdict.get('state'), 'verdict': verdict.get('verdict'), 'took_s': took_s,
+        'state': verdict.get('state'), 'verdict': verdict.get('verdict'),
+        'said': listener.said.get('diagnosis'), 'took_s': took_s,
         'resolution_s': BLOCK_S, 'sent': stream.sent, 'counted_lost': lost,
         'publisher_pause_s': stream.pause_s, 'load': os.getloadavg()[0],
         'before': _summary(before), 'during': _summary(during),
@@ -111,9 +149,9 @@ def main():
     with tempfile.TemporaryDirectory() as logs, graph_environment(Path(logs)) as graph:
         graph['PYTHONPATH'] = str(ROOT)
         os.environ.update(graph)
-        run = _run(arguments.window, arguments.limit, graph)
+        run = _run(arguments.window, arguments.limit, graph, Path(logs))
     print(json.dumps(run))
-    write_result(arguments.out, {'rate_hz': RATE_HZ, 'joints': 7, **run})
+    write_result(arguments.out, {'rate_hz': RATE_HZ, 'joints': JOINTS, **run})
 
 
 if __name__ == '__main__':

@@ -85,7 +85,7 @@ class Listener:
         self._executor.add_node(self._node)
         self.publisher = self._node.create_publisher(JointState, 'joint_states', 100)
         self.latencies_s, self.callbacks = [], []
-        self.last = {}
+        self.last, self.said = {}, {}
         self._node.create_subscription(
             JointTrajectory, '/sgp_node/prediction', self._hear, 100
         )  # fmt: skip
@@ -107,6 +107,7 @@ class Listener:
         for status in message.status:
             values = {pair.key: pair.value for pair in status.values}
             self.last[status.name.split(': ')[-1]] = values
+            self.said[status.name.split(': ')[-1]] = status.message
             if 'push_ms_p99' in values:
                 self.callbacks.append(
                     [float(values[f'push_ms_{q}']) for q in ('p50', 'p99', 'max')]
