@@ -55,7 +55,7 @@ def require_within(value: float, name: str, what: str) -> None:
         raise TooMuchError(
             f'{what}: {value:.6g}',
             f'at most {bound(name)}',
-            f'raise SGP_MOST_{name} if it is meant',
+            f'if this is intended, raise the environment variable SGP_MOST_{name}',
         )
 
 
@@ -71,7 +71,7 @@ def require_file(path: Path, name: str = '') -> None:
     """
     found = path.stat()
     if not stat.S_ISREG(found.st_mode):
-        raise TooMuchError(f'{path} is no plain file', 'a file', 'copy its content into one')
+        raise TooMuchError(f'{path} is not a regular file', 'a file', 'copy its content to a file')
     if name:
         require_within(found.st_size / _MEGABYTE, name, f'size of {path} in MB')
 
@@ -191,13 +191,13 @@ def load_yaml(text: str) -> Any:
     for entries, event in enumerate(yaml.parse(text, Loader=yaml.SafeLoader)):
         if isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent)):
             depth += 1
-            require_within(depth, 'DEPTH', 'nesting of YAML')
+            require_within(depth, 'DEPTH', 'nesting depth of the YAML')
         elif isinstance(event, (yaml.MappingEndEvent, yaml.SequenceEndEvent)):
             depth -= 1
         elif isinstance(event, yaml.AliasEvent):
             aliases += 1
-            require_within(aliases, 'ALIASES', 'aliases in YAML')
-        require_within(entries, 'ENTRIES', 'entries of YAML')
+            require_within(aliases, 'ALIASES', 'number of aliases in the YAML')
+        require_within(entries, 'ENTRIES', 'number of entries in the YAML')
     return yaml.safe_load(text)
 
 
@@ -215,8 +215,8 @@ def parse_xml(text: str) -> ET.Element:
         for kind, _ in parser.read_events():
             depth += 1 if kind == 'start' else -1
             entries += 1
-            require_within(depth, 'DEPTH', 'nesting of XML')
-            require_within(entries, 'ENTRIES', 'elements of XML')
+            require_within(depth, 'DEPTH', 'nesting depth of the XML')
+            require_within(entries, 'ENTRIES', 'number of elements in the XML')
     parser.close()
     return ET.fromstring(text)  # noqa: S314  # callers refuse document types and entities
 

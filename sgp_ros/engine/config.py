@@ -38,43 +38,43 @@ class EngineConfig:
     """All settings of the engine. Build it with `from_mapping`."""
 
     reorder_window: float = _setting(
-        'reorder_window', 'float', 0.1, 'Samples are ordered by stamp within this time.',
+        'reorder_window', 'float', 0.1, 'Delay in which samples are sorted by their stamps.',
         unit='s', low=0.0, high=10.0,
     )  # fmt: skip
     max_gap: float = _setting(
-        'max_gap', 'float', 0.25, 'A longer pause between states restarts the filter.',
+        'max_gap', 'float', 0.25, 'Longest pause between states that does not restart the filter.',
         unit='s', low=1e-3, high=60.0,
     )  # fmt: skip
     command_timeout: float = _setting(
-        'command.timeout', 'float', 1.0, 'A command older than this pairs with no state.',
+        'command.timeout', 'float', 1.0, 'Age beyond which a command is no longer used.',
         unit='s', low=1e-3, high=3600.0,
     )  # fmt: skip
     command_joints: tuple[str, ...] = _setting(
         'command.joints', 'str_array', ('',),
-        "Joint order of a command array; [''] takes the robot's actuated joints.",
+        "Joints of a command array, in its order; ['']: the actuated joints of the robot.",
         read_only=True,
     )  # fmt: skip
     effort_source: str = _setting(
         'effort.source', 'str', 'auto',
-        'Where effort comes from; auto takes the measured one where the state carries it.',
+        'Source of the effort; auto: measured if the joint states have it, else the commands.',
         choices=('auto', 'state', 'command'),
     )  # fmt: skip
     filter_window: float = _setting(
         'filter.window', 'float', 0.1,
-        'Length of the differentiation window; half is the delay. -1: the first seconds choose.',
+        'Window of differentiation; the delay is half of it. -1: choose from the first seconds.',
         unit='s', low=-1.0, high=10.0,
     )  # fmt: skip
     filter_degree: int = _setting(
-        'filter.degree', 'int', 4, 'Degree of the polynomial that follows the motion in a window.',
+        'filter.degree', 'int', 4, 'Degree of the polynomial fitted to the motion in a window.',
         low=2, high=8,
     )  # fmt: skip
     filter_hop: float = _setting(
-        'filter.hop', 'float', 0.05, 'Least time between two used windows; 0 uses every one.',
+        'filter.hop', 'float', 0.05, 'Shortest time between two used windows; 0: use all.',
         unit='s', low=0.0, high=10.0,
     )  # fmt: skip
     filter_velocity: str = _setting(
         'filter.velocity', 'str', 'auto',
-        'Where velocity comes from; auto takes the measured one where the state carries it.',
+        'Source of the velocity; auto: measured if the joint states have it, else the position.',
         choices=('auto', 'measured', 'position'),
     )  # fmt: skip
     model_method: str = _setting(
@@ -82,17 +82,17 @@ class EngineConfig:
         choices=('SGP', 'PR', 'GP'), read_only=True,
     )  # fmt: skip
     model_kernel: str = _setting(
-        'model.kernel', 'str', SquaredExponential.name, 'Covariance function of Z.',
+        'model.kernel', 'str', SquaredExponential.name, 'Covariance function of the process Z.',
         choices=KERNELS, read_only=True,
     )  # fmt: skip
     model_residual_inputs: tuple[str, ...] = _setting(
         'model.residual_inputs', 'str_array', ('default',),
-        'What Z sees: default (the choice of the robot), all, own, or names (direction:pole).',
+        'Inputs of Z: default (stated by the robot), own, all, or names such as direction:pole.',
         read_only=True,
     )  # fmt: skip
     parameters_source: str = _setting(
         'parameters.source', 'str', 'joint',
-        'Parameters reported: joint beside Z, or physics alone, where Z can imitate its columns.',
+        'Reported parameters: joint, fitted with Z; or physics, fitted without Z.',
         choices=('joint', 'physics'),
     )  # fmt: skip
     prior_scale: float = _setting(
@@ -101,68 +101,79 @@ class EngineConfig:
     )  # fmt: skip
     intervals_calibration: str = _setting(
         'intervals.calibration', 'str', 'always',
-        'When the errors of predictions set the width of the next intervals: always, only while '
-        'the model learns, or off: as the model states them.',
+        'When intervals are scaled to recent prediction errors: always, only while the model '
+        'learns, or never (off).',
         choices=('always', 'learning', 'off'),
     )  # fmt: skip
     process_weighting: str = _setting(
         'process.weighting', 'str', 'always',
-        'When errors beside those of the physics alone weigh Z in predictions: always, only while '
-        'the model learns, or off: Z counts in full.',
+        'When Z is weighted by its errors beside those of the physics alone: always, only while '
+        'the model learns, or never (off): full weight.',
         choices=('always', 'learning', 'off'),
     )  # fmt: skip
     learning_enabled: bool = _setting(
-        'learning.enabled', 'bool', default=True, description='Learn from samples, not only score.'
+        'learning.enabled',
+        'bool',
+        default=True,
+        description='Learn from samples; false: only predict and score.',
     )
     learning_initial: int = _setting(
-        'learning.initial', 'int', 50, 'Samples gathered before the first model exists.',
+        'learning.initial', 'int', 50, 'Samples collected before the first fit.',
         low=4, high=100_000,
     )  # fmt: skip
     buffer_budget: int = _setting(
-        'buffer.budget', 'int', 300, 'Samples that the process Z is conditioned on.',
+        'buffer.budget', 'int', 300, 'Number of samples in the buffer from which Z predicts.',
         low=4, high=5000,
     )  # fmt: skip
     buffer_remember: bool = _setting(
         'buffer.remember', 'bool', default=True,
-        description='Keep the information of dropped samples on W.',
+        description='Keep what dropped samples say about the parameters W.',
     )  # fmt: skip
     buffer_policy: str = _setting(
         'buffer.policy', 'str', 'oldest',
-        'Which sample leaves a full buffer; coverage parts the closest two inputs of Z.',
+        'Sample that is dropped from a full buffer; coverage: one of the two closest inputs of Z.',
         choices=('oldest', 'least_informative', 'coverage'),
     )  # fmt: skip
     buffer_check_period: int = _setting(
         'buffer.check_period', 'int', 5000,
-        'Learned samples between two comparisons of an exact factor with one computed anew.',
+        'Learned samples between checks of the updated factorisation against a new one.',
         low=10, high=1_000_000,
     )  # fmt: skip
     buffer_mode: str = _setting(
         'buffer.mode', 'str', 'exact',
-        'exact: Z is conditioned on the buffer; basis: on the whole stream, in a basis of Z.',
+        'exact: Z predicts from the buffer; basis: from all samples, with basis functions.',
         choices=('exact', 'basis'), read_only=True,
     )  # fmt: skip
     basis_features: int = _setting(
         'basis.features', 'int', 100,
-        'Most features of the basis of each joint, which tells W in both modes.',
+        'Largest number of basis functions per joint; in both modes W is estimated with them.',
         low=1, high=2000, read_only=True,
     )  # fmt: skip
     forgetting_samples: float = _setting(
         'forgetting.samples', 'float', 0.0,
-        'Learned samples after which what is known of W counts 1/e; 0 never forgets.',
+        'Learned samples after which information on W has decayed to 1/e; 0: never forget.',
         low=0.0, high=1e9,
     )  # fmt: skip
     refit_enabled: bool = _setting(
-        'refit.enabled', 'bool', default=True, description='Refit the hyper-parameters.'
+        'refit.enabled',
+        'bool',
+        default=True,
+        description='Refit the hyper-parameters while running.',
     )
     refit_period: int = _setting(
-        'refit.period', 'int', 200, 'Learned samples between two refits.', low=10, high=1_000_000
+        'refit.period',
+        'int',
+        200,
+        'Number of learned samples between two refits.',
+        low=10,
+        high=1_000_000,
     )
     refit_restarts: int = _setting(
-        'refit.restarts', 'int', 1, 'Starts of the optimiser beside the present values.',
+        'refit.restarts', 'int', 1, 'Random starts of the optimiser beside the present values.',
         low=0, high=20,
     )  # fmt: skip
     seed: int = _setting(
-        'seed', 'int', 0, 'Seed of the restarts of the optimiser.', low=0, high=2**31 - 1
+        'seed', 'int', 0, 'Seed of the random starts of the optimiser.', low=0, high=2**31 - 1
     )
     hyper: tuple[JointHyperparameters, ...] = ()
 
@@ -194,9 +205,9 @@ class EngineConfig:
         problems += _structural_problems(robot, converted, hyper)
         if problems:
             raise ConfigError(
-                f'{len(problems)} wrong settings: ' + ' | '.join(problems),
+                f'{len(problems)} wrong setting(s): ' + ' | '.join(problems),
                 '',
-                'see `ros2 param describe` or the documentation of the settings',
+                'see `ros2 param describe` or docs/settings.md',
             )
         return cls(
             hyper=hyper,
@@ -230,7 +241,9 @@ class EngineConfig:
         ]  # fmt: skip
         if fixed:
             raise ConfigError(
-                f'{", ".join(fixed)} cannot change while running', '', 'restart with the new value'
+                f'{", ".join(fixed)} cannot change while running',
+                '',
+                'restart the node with the new value',
             )
         return self.from_mapping({**present, **changes}, robot)
 
@@ -250,7 +263,9 @@ def _structural_problems(
         if joint and joint not in robot.joint_names
     ]
     if unknown:
-        problems.append(f'command.joints names {unknown}: the robot has {robot.joint_names}')
+        problems.append(
+            f'command.joints contains {unknown}: expected joints of {robot.joint_names}'
+        )
     window = values['filter.window']
     if window < 0.0 and window != AUTOMATIC:
         problems.append(f'filter.window = {window:g}: expected 0 to 10 s, or -1 to choose it')

@@ -104,7 +104,7 @@ def describe(joint: str, unit: str, kernel: type[Kernel]) -> list[Setting]:
             'float_array' if p.is_per_input else 'float',
             _AUTOMATIC if p.is_per_input else 0.0,
             f'{p.description}; '
-            + ('[0.0] estimates them.' if p.is_per_input else '0 estimates it.'),
+            + ('[0.0]: estimate them.' if p.is_per_input else '0: estimate it.'),
             unit=p.unit(unit),
             low=0.0,
             high=p.high,
@@ -112,7 +112,7 @@ def describe(joint: str, unit: str, kernel: type[Kernel]) -> list[Setting]:
         for p in kernel.parameters
     ]
     noise = Setting(
-        prefix + NOISE, 'float', 0.0, 'Variance of the noise; 0 estimates it.',
+        prefix + NOISE, 'float', 0.0, 'Variance of the noise; 0: estimate it.',
         unit=f'({unit})^2', low=0.0, high=_LARGEST_VARIANCE,
     )  # fmt: skip
     return [*described, noise]

@@ -77,7 +77,7 @@ class Setting:
     def _expected(self) -> str:
         text = KINDS[self.kind]
         if self.choices:
-            text += ' out of ' + ', '.join(self.choices)
+            text += ', one of ' + ', '.join(self.choices)
         if math.isfinite(self.low) and math.isfinite(self.high):
             text += f' from {self.low:g} to {self.high:g}'
         elif math.isfinite(self.low):

@@ -54,8 +54,8 @@ class SqliteSource:
         for log_ns, name, data in self._rows(path, query, names):
             if not isinstance(log_ns, int) or not isinstance(data, bytes):
                 raise RecordingError(
-                    f'{path}: a message with {type(log_ns).__name__} and {type(data).__name__}',
-                    'a number for its time, and bytes',
+                    f'{path}: a message of {type(log_ns).__name__} and {type(data).__name__}',
+                    'an integer time and binary data',
                 )
             yield RawMessage(log_ns, str(name), data)
 

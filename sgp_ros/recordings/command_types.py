@@ -85,7 +85,7 @@ class CommandType:
 
 def _decode_array(message: Message, receipt_ns: int) -> CommandSample:
     if not len(message.data):
-        raise MessageError('command without a number', 'one number per commanded joint')
+        raise MessageError('empty command', 'one number per commanded joint')
     return CommandSample(receipt_ns, frozen_array(message.data))
 
 
@@ -135,7 +135,7 @@ def _decode_trajectory(message: Message, receipt_ns: int) -> CommandSample:
     """Return the first point, its efforts or else its positions; it counts from the stamp on."""
     names = joint_names(message.joint_names)
     if not len(message.points):
-        raise MessageError('trajectory without a point', 'efforts or positions in its first point')
+        raise MessageError('trajectory without points', 'efforts or positions in its first point')
     point, stamp = message.points[0], stamp_ns(message, receipt_ns)
     if not len(point.effort) and not len(point.positions) and len(point.velocities):
         velocity = matching(point.velocities, names, 'velocities of the first point')

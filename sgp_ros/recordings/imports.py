@@ -133,7 +133,7 @@ def _gains(out_path: Path, stated: object) -> Path | None:
     if stated is None or is_recorded(stated):  # those of each row are in the recording
         return None
     if not isinstance(stated, dict) or not {'kp', 'kd'} <= set(stated):
-        raise ConfigError(f'gains of the map are {stated!r}', 'kp and kd by joint')
+        raise ConfigError(f'map: gains is {stated!r}', 'kp and kd for each joint')
     return _written(out_path, 'gains', stated)
 
 

@@ -110,9 +110,9 @@ class McapSource:
         except _DAMAGE as error:
             place = path.name, segment.offset
             self._damage[segment.file, segment.offset] = (
-                f'{place[0]}: damaged from byte {place[1]} on, up to byte '
+                f'{place[0]}: damaged from byte {place[1]} to byte '
                 f'{segment.offset + segment.length} ({" ".join(str(error).split())[:80]}); '
-                'what is intact before and behind it was used'
+                'the intact data before and after it were used'
             )
 
 
@@ -210,7 +210,7 @@ def _scan(stream: IO[bytes], path: Path, number: int) -> _FileIndex:
         walk.is_complete = False
     if not walk.is_complete:
         index.remark = (
-            f'{path.name} has no proper end, as after a crash of the recorder: recovered '
+            f'{path.name} is incomplete, as after a crash of the recorder: recovered '
             f'{index.counts.total()} messages'
         )
         if latest_ns:
@@ -279,7 +279,7 @@ def _unpacked(chunk: Chunk) -> Chunk:
     elif chunk.compression == 'lz4' and size <= most:
         data = LZ4FrameDecompressor().decompress(chunk.data, max_length=most + 1)
         chunk, size = replace(chunk, compression='', data=data), len(data)
-    require_within(size / (1 << 20), 'CHUNK_MB', 'size of a chunk in MB')
+    require_within(size / (1 << 20), 'CHUNK_MB', 'chunk size in MB')
     return chunk
 
 

@@ -100,7 +100,7 @@ def joint_names(names: Sequence[str]) -> tuple[str, ...]:
     """
     result = tuple(names)
     if not result:
-        raise MessageError('message without joint names', 'one name per joint')
+        raise MessageError('a message without joint names', 'one name per joint')
     if len(set(result)) != len(result):
         raise MessageError(f'repeated joint names in {list(result)}', 'each joint once')
     return result
@@ -113,7 +113,9 @@ def matching(values: Sequence[float], names: tuple[str, ...], what: str) -> np.n
         MessageError: more or fewer numbers than names.
     """
     if len(values) != len(names):
-        raise MessageError(f'{what} of length {len(values)}', f'length {len(names)} as the names')
+        raise MessageError(
+            f'{what} of length {len(values)}', f'length {len(names)}, one per joint name'
+        )
     return frozen_array(values)
 
 
@@ -203,14 +205,14 @@ def change_from_text(text: str) -> SettingsChange | Reset:
     try:
         content = json.loads(text)
     except ValueError as error:
-        raise MessageError('change of settings that is no JSON', _CHANGE) from error
+        raise MessageError('a settings change that is not JSON', _CHANGE) from error
     if not isinstance(content, dict) or type(content.get('stamp_ns')) is not int:
-        raise MessageError('change of settings without a stamp', _CHANGE)
+        raise MessageError('a settings change without a stamp', _CHANGE)
     if content.get('change') == 'reset':
         return Reset(content['stamp_ns'])
     settings = content.get('settings')
     if content.get('change') != 'settings' or not isinstance(settings, dict):
-        raise MessageError('change of settings of an unknown kind', _CHANGE)
+        raise MessageError('a settings change of unknown kind', _CHANGE)
     values = {name: _setting(name, value) for name, value in settings.items()}
     return SettingsChange(content['stamp_ns'], values)
 
@@ -223,4 +225,6 @@ def _setting(name: str, value: object) -> SettingValue:
             return tuple(value)
         if all(isinstance(item, (int, float)) for item in value):
             return tuple(value)
-    raise MessageError(f'setting {name} of a strange type', 'a number, text or a list of one kind')
+    raise MessageError(
+        f'setting {name} of an unsupported type', 'a number, a string or a list of one of them'
+    )

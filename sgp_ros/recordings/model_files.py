@@ -75,15 +75,15 @@ def load_model(path: Path) -> dict[str, np.ndarray]:
             with np.load(path, allow_pickle=False) as file:
                 arrays = {name: file[name] for name in file.files}
         except (ValueError, EOFError, AttributeError, OSError, zipfile.BadZipFile) as error:
-            raise ConfigError(f'{path} is no saved model', expected) from error
+            raise ConfigError(f'{path} is not a saved model', expected) from error
     kept = arrays.pop(_HASH, None)
     if kept is None or str(kept) != _hash(arrays):
         raise ConfigError(
-            f'{path} is damaged or was changed: its hash is another one', expected, 'save it again'
+            f'{path} is damaged or was edited: its hash does not match', expected, 'save it again'
         )
     wrong = [n for n, x in arrays.items() if x.dtype.kind == 'f' and not np.isfinite(x).all()]
     if wrong:
-        raise ConfigError(f'{path} holds numbers that are not finite in {wrong}', expected)
+        raise ConfigError(f'{path}: numbers in {wrong} are not finite', expected)
     return arrays
 
 

@@ -120,7 +120,7 @@ class Recording:
         topics = [topic for topic in self.topics if topic.name == name]
         if not topics:
             found = [topic.name for topic in self.topics]
-            raise RecordingError(f'{self.path} has topics {found}', f'topic {name}')
+            raise RecordingError(f'{self.path} has the topics {found}', f'topic {name}')
         decode = decoder(topics[0].type, topics[0].encoding)
         with readable(self.path, RecordingError, _KINDS):
             for log_ns, _, data in self._source.messages(topics):
@@ -152,7 +152,7 @@ class Recording:
     def _compare(self, topics: Collection[Topic], found: Counter[str]) -> None:
         """Say where the file holds another number of messages than it says it does."""
         self._missing = {
-            topic.name: f'{topic.name}: {found[topic.name]} of {topic.count} messages readable'
+            topic.name: f'{topic.name}: only {found[topic.name]} of {topic.count} messages read'
             for topic in topics
             if topic.count is not None and found[topic.name] != topic.count
         }
@@ -174,7 +174,7 @@ def open_recording(path: str | Path) -> Recording:
     with readable(path, RecordingError, _KINDS):
         source, remarks = _directory_source(path) if path.is_dir() else (_file_source(path), ())
     if not any(topic.count for topic in source.topics):
-        raise RecordingError(f'{path} holds no message', 'a recording with joint states')
+        raise RecordingError(f'{path} contains no messages', 'a recording with joint states')
     return Recording(path, source, remarks)
 
 
@@ -190,8 +190,10 @@ def _file_source(path: Path) -> Source:
         return SqliteSource([path])
     if head.startswith(b'#ROSBAG V2'):
         return RosbagsSource(path)
-    remedy = f'turn a table into one: sgp import {path}' if path.suffix in _TABLES else ''
-    raise RecordingError(f'{path} is no recording (starts with {head[:8]!r})', _KINDS, remedy)
+    remedy = f'convert the table first: sgp import {path}' if path.suffix in _TABLES else ''
+    raise RecordingError(
+        f'{path} is not a recording (it starts with {head[:8]!r})', _KINDS, remedy
+    )
 
 
 def _directory_source(path: Path) -> tuple[Source, tuple[str, ...]]:
@@ -199,7 +201,7 @@ def _directory_source(path: Path) -> tuple[Source, tuple[str, ...]]:
     if is_compressed or any(path.glob('*.zstd')):
         return RosbagsSource(path), ()
     missing = [name for name in listed if not (path / name).is_file()]
-    remarks = (f'metadata.yaml lists {", ".join(missing)}: not there',) if missing else ()
+    remarks = (f'metadata.yaml lists {", ".join(missing)}, which is missing',) if missing else ()
     files = [path / name for name in listed if name not in missing] or sorted(
         (file for file in path.iterdir() if file.suffix in {'.mcap', '.db3'}), key=_natural_order
     )
@@ -207,7 +209,7 @@ def _directory_source(path: Path) -> tuple[Source, tuple[str, ...]]:
         return _counted(McapSource(files), counts, remarks)
     if files and all(file.suffix == '.db3' for file in files):
         return _counted(SqliteSource(files), counts, remarks)
-    raise RecordingError(f'directory {path} without .mcap files or .db3 files', _KINDS)
+    raise RecordingError(f'directory {path} contains no .mcap or .db3 file', _KINDS)
 
 
 def _counted(
@@ -216,7 +218,7 @@ def _counted(
     """Compare the numbers of messages with those that metadata.yaml has."""
     found = {topic.name: topic.count or 0 for topic in source.topics}
     wrong = [
-        f'metadata.yaml counts {count} messages of {name}, the files hold {found.get(name, 0)}'
+        f'metadata.yaml counts {count} messages on {name}, the files contain {found.get(name, 0)}'
         for name, count in counts.items()
         if found.get(name, 0) != count
     ]

@@ -49,8 +49,8 @@ def load_apart(path: Path) -> Columns:
         )  # fmt: skip
     except subprocess.TimeoutExpired as error:
         raise TooMuchError(
-            f'{path} is not read within {seconds:.0f} s', _KINDS + ' that is intact',
-            'raise SGP_MOST_SECONDS if it is meant',
+            f'{path} could not be read within {seconds:.0f} s', 'an intact file',
+            'to allow more time, raise SGP_MOST_SECONDS',
         ) from error  # fmt: skip
     if done.returncode == 0:
         with np.load(io.BytesIO(done.stdout), allow_pickle=False) as arrays:
@@ -59,7 +59,7 @@ def load_apart(path: Path) -> Columns:
     if done.returncode == _SAID and said:
         raise RecordingError(said[-1])
     raise RecordingError(
-        f'{path} cannot be read: its reader ended with status {done.returncode}', _KINDS,
+        f'{path} cannot be read: the reader stopped with status {done.returncode}', _KINDS,
         'save it again, or as CSV',
     )  # fmt: skip
 

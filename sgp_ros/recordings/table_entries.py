@@ -118,7 +118,7 @@ def chosen(
         if e.label in found:
             kept = found[e.label].column
             if kept != e.column:
-                guess.unsure.append(f'The {role} is {kept}, not {e.column}.')
+                guess.unsure.append(f'The {role} is read from {kept}, not from {e.column}.')
             continue
         found[e.label] = e
     guess.unsure = list(dict.fromkeys(guess.unsure))
@@ -146,15 +146,17 @@ def joint_names(
     if len(labels) == len(hints):
         order = sorted(labels, key=int) if all(x.isdigit() for x in labels) else labels
         said = ', '.join(
-            f'{x or "the only one"} is {h.name}' for x, h in zip(order, hints, strict=True)
+            f'{x or "the only column"} is {h.name}' for x, h in zip(order, hints, strict=True)
         )
         if len(labels) > 1:
-            guess.unsure.append(f'Columns are joints in the order of the robot: {said}.')
+            guess.unsure.append(
+                f'Columns are assigned to joints in the order of the robot file: {said}.'
+            )
         return {x: h.name for x, h in zip(order, hints, strict=True)}
     raise RecordingError(
-        f'positions of {len(labels)} joints ({", ".join(labels)})',
+        f'positions of {len(labels)} joints (columns {", ".join(labels)})',
         f'those of the robot: {", ".join(h.name for h in hints)}',
-        'write a map, or a robot YAML with these joints',
+        'write a map, or a robot YAML with these joints (docs/import.md)',
     )  # fmt: skip
 
 

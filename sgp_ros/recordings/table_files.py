@@ -57,14 +57,16 @@ def _load(path: Path, suffix: str, remarks: list[str]) -> tuple[Columns, Sequenc
         return load_json(path), ()
     if suffix in {'.csv', '.tsv', '.txt', '.dat'}:
         return _load_csv(path, remarks)
-    raise RecordingError(f'{path} with ending {suffix!r}', f'one of {", ".join(ENDINGS)}')
+    raise RecordingError(f'{path} has the file type {suffix!r}', f'one of {", ".join(ENDINGS)}')
 
 
 def _load_csv(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]]:
     try:
         lines = path.read_text(encoding='utf-8-sig').splitlines()
     except UnicodeDecodeError as error:
-        raise RecordingError(f'{path} is no text ({error})', 'a CSV file in UTF-8') from error
+        raise RecordingError(
+            f'{path} is not a text file ({error})', 'a CSV file in UTF-8'
+        ) from error
     header, mark, rest = _header(path, lines)
     names = _names(path, header, mark, rest)
     rows: list[list[str]] = []
@@ -79,20 +81,22 @@ def _load_csv(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]]:
             taken.append(number)
         elif number == last and rows and len(row) < len(names):
             remarks.append(
-                f'{path.name}: line {number}, the last one, ends after {len(row)} of {len(names)} '
-                'values; it is left out, the rows before it are used'
+                f'{path.name}: the last line, {number}, ends after {len(row)} of {len(names)} '
+                'values; it is ignored, all rows before it are used'
             )
         else:
             raise RecordingError(
-                f'{path} line {number} has {len(row)} values', f'{len(names)} as the header'
+                f'{path} line {number} has {len(row)} values', f'{len(names)}, as in the header'
             )
     if not rows:
-        raise RecordingError(f'{path} holds no row', 'a header row, then rows of numbers')
+        raise RecordingError(f'{path} contains no data', 'a header row, then rows of numbers')
     if skipped:
-        remarks.append(f'{path.name}: lines {skipped} hold no number and are taken for header')
+        remarks.append(
+            f'{path.name}: lines {skipped} contain no numbers and are taken as part of the header'
+        )
     longest = max(len(cell) for row in rows for cell in row)
     megabytes = 4e-6 * longest * len(rows) * len(names)  # NumPy keeps the longest for all
-    require_within(megabytes, 'UNPACKED_MB', f'size of the cells of {path} in MB')
+    require_within(megabytes, 'UNPACKED_MB', f'size of the table {path} in MB')
     table = np.char.strip(np.array(rows, dtype=str))  # (n, number of columns)
     if mark == ';':
         table = np.char.replace(table, ',', '.')  # a decimal comma goes with semicolons
@@ -115,9 +119,9 @@ def _header(path: Path, lines: list[str]) -> tuple[str, str, list[tuple[int, str
         fitting = [line for line in titles if not plain or len(_cells(line, _mark(line))) == width]
         if not fitting and plain:
             raise RecordingError(
-                f'{path} has no header row: line {first[0]} holds numbers',
-                'the names of the columns in the first row, such as t,q,tau',
-                'write them there',
+                f'{path} has no header: line {first[0]} already contains numbers',
+                'column names in the first line, such as t,q,tau',
+                'add that line',
             )
         return (fitting or comments or [''])[-1], mark, plain
     return first[1], mark, plain[1:]
@@ -126,12 +130,14 @@ def _header(path: Path, lines: list[str]) -> tuple[str, str, list[tuple[int, str
 def _names(path: Path, header: str, mark: str, rest: list[tuple[int, str]]) -> list[str]:
     """Return the names of the columns, once it is sure that the text can be a table."""
     if '\0' in header or any('\0' in line for _, line in rest):
-        raise RecordingError(f'{path} holds NUL characters', 'a CSV file in UTF-8')
-    require_within(max((len(line) for _, line in rest), default=0), 'LINE', f'a line of {path}')
+        raise RecordingError(f'{path} contains NUL characters', 'a CSV file in UTF-8')
+    require_within(
+        max((len(line) for _, line in rest), default=0), 'LINE', f'length of a line of {path}'
+    )
     names = [name.strip().strip('"') for name in _cells(header, mark)]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise RecordingError(f'{path} has columns {twice} more than once', 'one name each')
+        raise RecordingError(f'{path} has several columns named {twice}', 'unique names')
     return names
 
 

@@ -14,15 +14,15 @@ from sgp_ros.optional import optional_package
 
 Columns = dict[str, np.ndarray]
 
-_PROGRAM = 'pickled data are a program, and nothing is unpickled here'
+_PROGRAM = 'pickle files can run code when they are read, so they are not accepted'
 REFUSED = {
     **dict.fromkeys(('.pkl', '.pickle', '.pt', '.pth', '.joblib', '.p'), _PROGRAM),
-    '.zarr': 'a zarr store is a folder of compressed chunks',
-    '.npy': 'one array has no names of columns',
-    '.xlsx': 'a spreadsheet holds formulas and several sheets',
+    '.zarr': 'zarr stores are not supported',
+    '.npy': 'an .npy array has no column names',
+    '.xlsx': 'spreadsheets are not supported',
 }
 """Ending to the reason why such a file is not read."""
-_REMEDY = 'save the arrays with numpy.savez, or as CSV or Parquet'
+_REMEDY = 'save the data with numpy.savez, as CSV or as Parquet'
 
 
 def refuse(path: Path) -> None:
@@ -124,7 +124,7 @@ def load_json(path: Path) -> Columns:
             content = [json.loads(line) for line in text.splitlines() if line.strip()]
     except (ValueError, RecursionError) as error:
         raise RecordingError(
-            f'{path.name} is no JSON ({error})', 'JSON, or a record a line'
+            f'{path.name} is not JSON ({error})', 'JSON, or JSON Lines with one record per line'
         ) from None
     columns: Columns = {}
     if isinstance(content, list) and content and all(isinstance(x, dict) for x in content):
@@ -137,7 +137,9 @@ def load_json(path: Path) -> Columns:
             if isinstance(value, list):
                 _enter(columns, name, value)
     if not columns:
-        raise RecordingError(f'{path.name} holds no table', 'lists by name, or a list of records')
+        raise RecordingError(
+            f'{path.name} contains no table', 'an object of lists, or a list of records'
+        )
     return columns
 
 

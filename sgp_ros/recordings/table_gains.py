@@ -41,9 +41,9 @@ def add_gains(
                 continue
             if numbers.size not in {1, len(joints)}:
                 raise RecordingError(
-                    f'{name} holds {numbers.size} gains for {len(joints)} joints',
-                    'one, one for each joint, or one of each joint in each row',
-                    'correct it, or write a map without it',
+                    f'{name} contains {numbers.size} gains for {len(joints)} joints',
+                    'one gain, one per joint, or one per joint and row',
+                    'correct it, or write a map without this column',
                 )  # fmt: skip
             each = np.broadcast_to(numbers, len(joints))
             values = {j: float(each[i]) for i, j in enumerate(joints.values())}
@@ -52,7 +52,7 @@ def add_gains(
     if set(found) == {KP, KD} and set(found[KP]) == set(found[KD]):
         guess.content['gains'] = found
     elif found:
-        guess.unsure.append(f'Only {" and ".join(found)} of the gains is there: left out.')
+        guess.unsure.append(f'Of the gains only {" and ".join(found)} is given: not used.')
 
 
 def _place(entry: Entry) -> dict[str, Any]:
@@ -87,8 +87,8 @@ def row_gains(
     for i, role in enumerate((KP, KD)):
         table = stated.get(role) or {}
         if set(table) != set(joints):
-            raise ConfigError(f'gains of the map: {role} of {sorted(map(str, table))}',
-                              f'one for each target: {sorted(joints)}')  # fmt: skip
+            raise ConfigError(f'map: gains.{role} is given for {sorted(map(str, table))}',
+                              f'the joints with targets: {sorted(joints)}')  # fmt: skip
         for j, joint in enumerate(joints):
             found[:, i, j] = _gain(table[joint], columns, rows, f'{role} of {joint}')
     return found
@@ -101,16 +101,16 @@ def _gain(entry: object, columns: Columns, rows: int, place: str) -> np.ndarray:
     else:
         array, index = columns.get(str(entry.get('column'))), entry.get('index', 0)
         if array is None:
-            raise ConfigError(f'gains of the map: {place} in column {entry.get("column")!r}',
+            raise ConfigError(f'map: gains: {place} in column {entry.get("column")!r}',
                               f'one of {sorted(columns)}')  # fmt: skip
         wide = array if array.ndim == 2 else array[:, None]
         if len(wide) != rows or not isinstance(index, int) or not 0 <= index < wide.shape[1]:
-            raise ConfigError(f'gains of the map: {place} has {len(wide)} rows, index {index!r}',
-                              f'{rows} rows, index below {wide.shape[1]}')  # fmt: skip
+            raise ConfigError(f'map: gains: {place} has {len(wide)} rows and index {index!r}',
+                              f'{rows} rows and an index below {wide.shape[1]}')  # fmt: skip
         found = as_numbers(wide[:, index])
         entry_numbers = np.full(rows, np.nan) if found is None else found
     wrong = np.flatnonzero(~(np.isfinite(entry_numbers) & (entry_numbers >= 0.0)))
     if len(wrong):
-        raise ConfigError(f'gains of the map: {place} is {entry_numbers[wrong[0]]:g} in row '
+        raise ConfigError(f'map: gains: {place} is {entry_numbers[wrong[0]]:g} in row '
                           f'{wrong[0]}', 'a number of at least 0')  # fmt: skip
     return entry_numbers

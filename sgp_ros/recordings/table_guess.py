@@ -70,7 +70,8 @@ def guess_map(
     if not positions:
         raise RecordingError(
             f'no column of positions among {sorted(columns)}',
-            'names such as q, position, joint1_pos', 'write a map, see docs/import.md',
+            'a name such as q, position, joint1_pos',
+            'rename a column, or write a map (docs/import.md)',
         )  # fmt: skip
     joints = joint_names(positions, columns, hints, guess)
     hinted = {h.name: h for h in hints}
@@ -92,7 +93,7 @@ def _rows(columns: Columns) -> int:
     for array in columns.values():
         sizes[len(array)] = sizes.get(len(array), 0) + array.size
     if not sizes or max(sizes.values()) < 2:
-        raise RecordingError('a table without rows', 'columns of numbers')
+        raise RecordingError('a table without rows', 'columns of at least two numbers')
     return max(sizes, key=lambda n: sizes[n])
 
 
@@ -112,17 +113,17 @@ def _time(columns: Columns, rows: int, rate_hz: float | None, guess: Guess) -> n
         if not unit:
             continue
         if not is_sure:
-            guess.unsure.append(f'The time {name} is taken to be in {unit}.')
+            guess.unsure.append(f'The time column {name} is assumed to be in {unit}.')
         if len(named) > 1:
             others = ', '.join(n for n in named if n != name)
-            guess.unsure.append(f'The time is {name}, not {others}.')
+            guess.unsure.append(f'The time is read from {name}, not from {others}.')
         guess.content['time'] = {'column': name, 'unit': unit, **_episodes(columns, rows)}
         return stamps * {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}[unit]
     rate_hz = rate_hz or _stated_rate(columns)
     if rate_hz is None:
         raise RecordingError(
             f'no column of time among {sorted(columns)}', 'a name such as t, time, timestamp_ns',
-            'say how often the rows were taken with --rate HZ',
+            'give the sampling rate with --rate HZ',
         )  # fmt: skip
     guess.content['time'] = {'rate': rate_hz}
     return np.arange(rows) / rate_hz
@@ -162,7 +163,7 @@ def _position_units(
     ]  # fmt: skip
     angle, is_sure = position_unit(ranges)
     if ranges and not is_sure:
-        guess.unsure.append(f'Positions are taken to be in {angle}, by their range.')
+        guess.unsure.append(f'Positions are assumed to be in {angle}, judging by their range.')
     for x in positions:
         known = said[x] in {'rad', 'deg', 'rev', 'm', 'mm'}
         units[x] = said[x] if known else (angle if x in turning else 'm')
@@ -180,7 +181,7 @@ def _add_velocities(
     velocities = chosen(entries, VELOCITY, guess)
     for label, e in velocities.items():
         if label not in joints:
-            guess.unsure.append(f'The velocity {e.column} belongs to no position: left out.')
+            guess.unsure.append(f'The velocity {e.column} belongs to no position column: ignored.')
             continue
         unit, said = velocity_unit(
             e.numbers, positions[label].numbers, seconds, units[label], e.said.unit
@@ -198,7 +199,7 @@ def _add_efforts(
     currents = {} if efforts else chosen(entries, CURRENT, guess)
     for label, e in (efforts or currents).items():
         if label not in joints:
-            guess.unsure.append(f'The effort {e.column} belongs to no position: left out.')
+            guess.unsure.append(f'The effort {e.column} belongs to no position column: ignored.')
             continue
         if currents:
             more = {'scale': 1e-3} if e.said.unit == 'mA' else {'scale': 1.0}
@@ -209,7 +210,8 @@ def _add_efforts(
             found[joints[label]]['effort'] = e.place(unit)
     if currents:
         guess.unsure.append(
-            'Efforts are currents in A: state the torque constant as `scale` in the map, in N m/A.'
+            'The efforts are currents in A: enter the torque constant in N m/A as `scale` in the '
+            'map.'
         )
 
 
@@ -230,17 +232,19 @@ def _add_commands(
         column = next(iter(open_ones.values())).column
         if float(np.median(alike)) > 0.5:
             named[POSITION] = open_ones
-            guess.unsure.append(f'{column} stays near the positions: taken for their targets.')
+            guess.unsure.append(
+                f'{column} stays close to the positions: taken as position targets.'
+            )
         else:
             guess.unsure.append(
-                f'Nothing says what {column} commands, and positions do not follow it: left out. '
-                'Enter it in the map under `targets` or `commands`.'
+                f'It is unclear what {column} commands, and the positions do not follow it: '
+                'ignored. Enter it under `targets` or `commands` in the map.'
             )
     copies = [x for x, e in named[POSITION].items()
               if np.array_equal(e.numbers, positions[x].numbers, equal_nan=True)]  # fmt: skip
     if named[POSITION] and len(copies) == len(named[POSITION]):
         column = next(iter(named[POSITION].values())).column
-        guess.unsure.append(f'The target {column} is the measured position itself: left out.')
+        guess.unsure.append(f'The target {column} equals the measured position: ignored.')
         named[POSITION] = {}
     targets = {
         joints[x]: {
@@ -254,8 +258,8 @@ def _add_commands(
         if named[EFFORT]:
             columns = dict.fromkeys(e.column for e in named[EFFORT].values())
             guess.unsure.append(
-                f'Beside targets, {", ".join(columns)} is left out: which of them the drives '
-                'obey is not known.'
+                f'{", ".join(columns)} is ignored: there are targets too, and it is not known '
+                'which of the two the drives follow.'
             )
     elif named[EFFORT]:
         guess.content['commands'] = {

@@ -134,7 +134,7 @@ def read_map(path: str | Path) -> Mapping[str, object]:
     except (YAMLError, UnicodeDecodeError) as error:
         raise ConfigError(f'map {path} is not YAML ({error})', 'a YAML file') from error
     if not isinstance(content, dict):
-        raise ConfigError(f'map {path} holds no mapping', 'keys time and joints')
+        raise ConfigError(f'map {path} is not a mapping', 'the keys time and joints')
     return content
 
 
@@ -152,7 +152,7 @@ def check_map(content: Mapping[str, object], columns: Columns) -> TableMap:
         for joint, parts in check.mapping('joints', content.get('joints')).items()
     }
     if not joints:
-        check.problems.append('joints: at least one is needed')
+        check.problems.append('joints: at least one joint is needed')
     commands = {
         str(joint): check.scaled(f'commands.{joint}', parts, UNITS['effort'])
         for joint, parts in check.mapping('commands', content.get('commands', {})).items()
@@ -162,7 +162,7 @@ def check_map(content: Mapping[str, object], columns: Columns) -> TableMap:
         for joint, parts in check.mapping('targets', content.get('targets', {})).items()
     }
     if commands and targets:
-        check.problems.append('commands and targets: expected one of them')
+        check.problems.append('commands and targets: only one of them may be given')
     default = JOINT_STATE if targets else FLOAT64_ARRAY
     kind = check.command_type(content.get('command_type', default), tuple(commands or targets))
     if check.problems:
@@ -206,7 +206,7 @@ class _Check:
         self.keys('time', content, {'rate'})
         rate = self._number('time', content, 'rate', 1.0)
         if not rate > 0.0:
-            self.problems.append(f'time.rate {rate!r}: expected more than 0 Hz')
+            self.problems.append(f'time.rate {rate!r}: expected a rate above 0 Hz')
         return TimeBase(None, rate, start_ns)
 
     def command_type(self, kind: object, joints: tuple[str, ...]) -> str:
@@ -225,7 +225,7 @@ class _Check:
         content = self.mapping(place, parts)
         self.keys(place, content, set(UNITS))
         if 'position' not in content:
-            self.problems.append(f'{place}: no position')
+            self.problems.append(f'{place}: position is missing')
         return {
             channel: self.scaled(f'{place}.{channel}', content[channel], UNITS[channel])
             for channel in UNITS
@@ -236,7 +236,7 @@ class _Check:
         content = self.mapping(place, parts)
         self.keys(place, content, {'position', 'velocity'})
         if not content:
-            self.problems.append(f'{place}: neither position nor velocity')
+            self.problems.append(f'{place}: expected position, velocity or both')
         return {
             channel: self.scaled(f'{place}.{channel}', content[channel], UNITS[channel])
             for channel in ('position', 'velocity')
@@ -271,7 +271,7 @@ class _Check:
             return 1.0
         factor = units[unit]
         if factor is None and 'scale' not in content:
-            self.problems.append(f'{place}: unit {unit} needs a scale that leads to SI')
+            self.problems.append(f'{place}: unit {unit} needs a scale that converts it to SI')
         return 1.0 if factor is None else factor
 
     def _number(self, place: str, content: dict[str, object], key: str, default: float) -> float:
@@ -290,7 +290,7 @@ class _Check:
             return
         array = self._columns[column]
         if array.dtype.kind not in 'fiubU':
-            self.problems.append(f'{place}.column {column}: holds no numbers')
+            self.problems.append(f'{place}.column {column}: is not numeric')
         width = array.shape[1] if array.ndim == 2 else 1
         if array.ndim > 2:
             self.problems.append(f'{place}.column {column}: has {array.ndim} dimensions')

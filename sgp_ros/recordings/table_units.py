@@ -102,12 +102,12 @@ def velocity_unit(
     slope = float(mean @ rate) / power
     explained = slope * float(mean @ rate) / max(float(mean @ mean), 1e-300)
     if explained < 0.5:
-        return usual, 'does not follow its position'
+        return usual, 'does not match the change of the position'
     other = {'rad': ('deg/s', 57.3), 'deg': ('rad/s', 1.0 / 57.3)}.get(unit)
     if other is not None and 0.7 < slope / other[1] < 1.4:
-        return other[0], f'is taken to be in {other[0]}, by the slope of its position'
+        return other[0], f'is assumed to be in {other[0]}, judging by the change of the position'
     if not 0.7 < slope < 1.4:
-        return usual, f'is {slope:.3g} times the slope of its position'
+        return usual, f'is {slope:.3g} times the rate of change of the position'
     return usual, ''
 
 

@@ -127,7 +127,7 @@ def read_table(
     stamps_ns = _stamps(path, columns, table_map.time, n)
     lengths['time'] = len(stamps_ns)
     if set(lengths.values()) != {n}:
-        raise ConfigError(f'{path}: columns of different length {lengths}', 'one length')
+        raise ConfigError(f'{path}: columns of different lengths {lengths}', 'equal lengths')
     table = _assemble(table_map, values, stamps_ns)
     gains = row_gains(content.get('gains'), columns, table.command_joints, n)
     table = replace(table, command_gains=gains)
@@ -182,9 +182,9 @@ def _without_impossible(
     what = 'lines' if lines else 'rows from 0'
     listed = ', '.join(str(lines[i] if lines else i) for i in np.flatnonzero(wrong)[:_LISTED])
     more = ', ...' if wrong.sum() > _LISTED else ''
-    said = f'{path.name}: {wrong.sum()} of {len(wrong)} rows refused, {what} {listed}{more}'
+    said = f'{path.name}: {wrong.sum()} of {len(wrong)} rows ignored, {what} {listed}{more}'
     if wrong.all():
-        raise RecordingError(said, 'finite numbers below 1e150', 'clean the table')
+        raise RecordingError(said, 'finite numbers below 1e150', 'correct the table')
     kept = ~wrong
     return replace(
         table,
@@ -193,7 +193,10 @@ def _without_impossible(
         commands=None if table.commands is None else table.commands[kept],
         command_rates=None if table.command_rates is None else table.command_rates[kept],
         command_gains=None if table.command_gains is None else table.command_gains[kept],
-        remarks=(*remarks, f'{said}: a position is missing, or a number is not below 1e150'),
+        remarks=(
+            *remarks,
+            f'{said}: a position is missing, or a number is infinite or above 1e150',
+        ),
     )
 
 
@@ -206,7 +209,8 @@ def _values(path: Path, columns: Columns, quantity: Quantity) -> np.ndarray:
         numbers = np.where(column == '', 'nan', column).astype(np.float64)
     except ValueError as error:
         raise RecordingError(
-            f'{path}, column {quantity.column}: {error}', 'numbers, or nothing for a missing one'
+            f'{path}, column {quantity.column}: {error}',
+            'numbers, or an empty cell for a missing value',
         ) from error
     return numbers * quantity.factor + quantity.offset
 
@@ -223,8 +227,8 @@ def _stamps(path: Path, columns: Columns, time: TimeBase, n: int) -> tuple[int, 
         if stamp_ns is None or not 0 <= stamp_ns < _LATEST_NS:
             raise RecordingError(
                 f'{path}, column {time.quantity.column}, row {row}: time {value!r}',
-                'a finite time from 0 s to 2^31 s since the epoch',
-                'clean the table, or set time.unit and time.start in the map',
+                'a time between 0 s and 2^31 s since the epoch',
+                'correct the table, or set time.unit and time.start in the map',
             )
         stamps.append(stamp_ns)
     return _one_after_another(stamps, columns[time.episode]) if time.episode else tuple(stamps)

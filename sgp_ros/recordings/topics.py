@@ -79,9 +79,9 @@ def choose_joint_states(topics: Sequence[Topic], wanted: str | None) -> Topic:
     ]
     if not candidates:
         raise RecordingError(
-            f'no {JOINT_STATE} topic among {_listing(topics)}',
-            'the measured joint states',
-            'record /joint_states too, or name the topic with --joint-states TOPIC',
+            f'no {JOINT_STATE} topic with measured joints among {_listing(topics)}',
+            'a topic with the measured joint states',
+            'record /joint_states, or name the topic with --joint-states TOPIC',
         )
     likely = [topic for topic in candidates if topic.last_name == 'joint_states']
     return _only(candidates, likely, '/joint_states', '--joint-states')
@@ -123,7 +123,7 @@ def _only(candidates: list[Topic], likely: list[Topic], preferred: str, option: 
         if len(group) == 1:
             return group[0]
     raise RecordingError(
-        f'several candidates {_listing(likely or candidates)}',
+        f'several possible topics: {_listing(likely or candidates)}',
         'one topic',
         f'name it with {option} TOPIC',
     )
@@ -135,7 +135,7 @@ def _named(topics: Sequence[Topic], name: str, types: tuple[str, ...], option: s
         raise RecordingError(f'no topic {name} ({option})', f'one of {_listing(topics)}')
     if found[0].type not in types:
         raise RecordingError(
-            f'topic {name} ({option}) of type {found[0].type}', ' or '.join(types)
+            f'topic {name} ({option}) has the type {found[0].type}', ' or '.join(types)
         )
     return found[0]
 

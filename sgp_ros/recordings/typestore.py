@@ -58,7 +58,9 @@ def decoder(kind: str, encoding: str) -> Callable[[bytes], Message]:
         try:
             return read(data, name)
         except (SerdeError, IndexError, MemoryError) as error:
-            raise MessageError(f'bytes that are no {kind}', 'an undamaged message') from error
+            raise MessageError(
+                f'bytes that are not a valid {kind}', 'an intact message'
+            ) from error
 
     return decode
 

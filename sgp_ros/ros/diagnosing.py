@@ -224,7 +224,7 @@ class Diagnosing:
         """
         states = sum(map(_is_state, self._past))
         if self._process is not None:
-            return False, 'a diagnosis is already running; /diagnostics tells its outcome'
+            return False, 'a diagnosis is already running; its outcome will be on /diagnostics'
         try:
             nominal = nominal_model(self._robot)
             open_bodies(self._robot.name, nominal.tree)  # refuses one that cannot move

@@ -106,7 +106,7 @@ class FitHealth:
         }
         target = scores.get(engine.robot.target)
         if target is None or np.isnan(self._square[j]):
-            return OK, 'nothing scored yet', values
+            return OK, 'no prediction scored yet', values
         running = engine.estimator.scoring.scores[engine.robot.target][j]
         recent = float(self._square[j]) * running.n / running.target_squares
         drift = engine.drift[j]
@@ -120,13 +120,15 @@ class FitHealth:
         if weight is not None:
             values['process_weight'] = f'{weight.value:.4f}'
             if weight.value < 0.5:
-                message += f'; Z errs more than the physics alone, has weight {weight.value:.2f}'
+                message += (
+                    f'; Z errs more than the physics alone, its weight is {weight.value:.2f}'
+                )
         if not (drift.is_drifting and recent > LEAST_SHARE):
             return OK, message, values
         message = (
-            f'{joint}: errors have grown beyond chance, recent nMSE {recent:.2g} (usually '
-            f'{target.nmse:.2g}); the robot has changed (load, wear, temperature) or moves as '
-            'never before: look at it, or call ~/diagnose'
+            f'{joint}: errors have grown significantly, recent nMSE {recent:.2g} (before '
+            f'{target.nmse:.2g}); the robot has changed (load, wear, temperature) or moves in '
+            'a new way: inspect it, or call ~/diagnose'
         )
         return WARN, message, values
 
@@ -136,14 +138,14 @@ class FitHealth:
         unknown = [parameter.name for parameter in found if parameter.std is None]
         values = {'parameters': str(len(found)), 'undetermined': str(len(unknown))}
         if not unknown:
-            return OK, f'all of {len(found)} determined', values
+            return OK, f'all {len(found)} parameters determined', values
         some = ', '.join(unknown[:8]) + (' ...' if len(unknown) > 8 else '')
-        message = f'{len(unknown)} of {len(found)} not determined by the motion so far: {some}'
+        message = f'{len(unknown)} of {len(found)} parameters not determined so far: {some}'
         is_early = engine.counts.learned < _ENOUGH * engine.config.learning_initial
         if is_early or set(unknown) <= self._told:
             return OK, message, values
         self._told |= set(unknown)
-        return WARN, f'{message}; move joints that stand still, faster and farther', values
+        return WARN, f'{message}; move all joints, faster and farther', values
 
 
 def _rests(estimate: Estimate, robot: Robot) -> np.ndarray:
@@ -158,8 +160,9 @@ def _rests(estimate: Estimate, robot: Robot) -> np.ndarray:
 
 def _excursion(joint: str, monitor: ExcursionMonitor) -> str:
     if not monitor.is_alarmed:
-        return 'inside what chance allows'
+        return 'no alarm'
     return (
-        f'{joint}: error at {monitor.ratio:.1f} times the half width of its interval, outside for '
-        f'{monitor.lasting_s:.1f} s; a collision, another load or a fault: look at the joint'
+        f'{joint}: error {monitor.ratio:.1f} times the half-width of its 95 % interval, outside '
+        'for '
+        f'{monitor.lasting_s:.1f} s; check the joint for a collision, a new load or a fault'
     )

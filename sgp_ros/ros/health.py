@@ -82,10 +82,10 @@ class Health:
         gain = fit.log_evidence - fit.log_evidence_before
         self.last_fit = {
             '': f'log evidence rose by {gain:.3g} nat',
-            'diverged': 'refused: diverged, nothing that it tried has a usable covariance',
-            'no_better': f'refused: no better, its log evidence is {-gain:.3g} nat lower',
-            'outdated': 'refused: what it was fitted to is forgotten',
-            'no_factor': 'refused: the buffer has no factor under what it found for some joint',
+            'diverged': 'refused: the fit diverged, no usable covariance was found',
+            'no_better': f'refused: no improvement, log evidence {-gain:.3g} nat lower',
+            'outdated': 'refused: outdated, its data have been forgotten',
+            'no_factor': 'refused: the buffer is singular with the new hyper-parameters',
         }[refusal]
 
     def note_failure(self, failure: str) -> None:
@@ -194,18 +194,18 @@ class Health:
                 values |= {f'{name}_p50': f'{p50:.4f}', f'{name}_p99': f'{p99:.4f}'}
                 values[f'{name}_max'] = f'{times.max():.4f}'
         message = (
-            f'predictions come {chosen_s:.3f} s after their stamps, by reorder_window and half of '
-            'filter.window, plus the computation'
+            f'predictions come {chosen_s:.3f} s after their stamps (reorder_window and half of '
+            'filter.window), plus computing time'
         )
         return message, values
 
     def _model(self, engine: Engine) -> tuple[str, int, str, dict[str, str]]:
         config, counts, regression = engine.config, engine.counts, engine.estimator.regression
-        message = 'predicts and learns'
+        message = 'predicting and learning'
         if not engine.is_ready:
-            message = f'gathers the first {config.learning_initial} samples'
+            message = f'collecting the first {config.learning_initial} samples'
         elif not config.learning_enabled:
-            message = 'predicts, does not learn'
+            message = 'predicting, not learning'
         values = {
             'ready': str(int(engine.is_ready)),
             'learning': str(int(config.learning_enabled)),

@@ -84,7 +84,7 @@ class Identification:
         """Take joint states and commands from now on."""
         self._subscribe()
         robot = self._session.engine.robot.name
-        self._node.get_logger().info(f'waits for {self._joint_states} of robot {robot}')
+        self._node.get_logger().info(f'waiting for {self._joint_states} of robot {robot}')
 
     def pause(self) -> None:
         """Take no more joint states and commands; `listen` goes on, after a gap."""
@@ -116,7 +116,7 @@ class Identification:
             Path(filled_name(path, self._name)), topics, str(self._settings['command.type']),
             *(float(str(self._settings[name])) for name in limits),
         )  # fmt: skip
-        self._node.get_logger().info(f'records to {record.path}')
+        self._node.get_logger().info(f'recording to {record.path}')
         return record
 
     def _subscribe(self) -> None:

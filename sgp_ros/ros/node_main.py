@@ -62,7 +62,7 @@ def _answer_help(name: str, summary: str) -> None:
         prog=name,
         usage='%(prog)s [-h] [--ros-args [-p NAME:=VALUE] [--params-file YAML] [-r FROM:=TO] ...]',
         description=summary,
-        epilog=f'`ros2 param describe` tells what a parameter of a running {name} means.',
+        epilog=f'`ros2 param describe` explains the parameters of a running {name}.',
         allow_abbrev=False,
     ).parse_known_args(own)
 

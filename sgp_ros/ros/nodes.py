@@ -96,7 +96,9 @@ class SgpLifecycleNode(LifecycleNode):  # type: ignore[misc]  # rclpy is untyped
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Build the model."""
         if not self._source.robot:
-            self.get_logger().error('no robot yet; start robot_state_publisher, then configure')
+            self.get_logger().error(
+                'no robot description yet; start robot_state_publisher, then configure again'
+            )
             return TransitionCallbackReturn.FAILURE
         try:
             self._identification = Identification(self, self._source.robot)

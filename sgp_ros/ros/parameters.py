@@ -57,9 +57,9 @@ def declare(node: Node, settings: Iterable[Setting]) -> dict[str, SettingValue]:
             values[setting.name] = setting.convert(value)
     if problems:
         raise ConfigError(
-            f'{len(problems)} wrong parameters: ' + ' | '.join(problems),
+            f'{len(problems)} wrong parameter(s):  ' + ' | '.join(problems),
             '',
-            'write a number with a decimal point where a double is wanted',
+            'write a double with a decimal point',
         )
     return values
 

@@ -89,7 +89,7 @@ def free_name(path: Path, *, is_folder: bool = False) -> Path:
                 return tried
             continue
         return tried
-    raise OSError(f'{path}: {_MOST_NUMBERS} runs have this name')
+    raise OSError(f'{path}: {_MOST_NUMBERS} recordings have this name')
 
 
 class Record:

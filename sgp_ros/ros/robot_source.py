@@ -107,7 +107,7 @@ class RobotSource:
             count = self._node.count_publishers(self._topic)
             level = WARN
             message = (
-                f'waits for the robot on {self._topic} ({count} publishers); start '
+                f'waiting for the robot on {self._topic} ({count} publishers); start '
                 'robot_state_publisher, or give parameter robot or robot_description'
             )
             self._node.get_logger().warning(message, throttle_duration_sec=_QUIET_S)
@@ -148,13 +148,13 @@ def refuse_unknown(node: Node, known: Iterable[str], *, is_complete: bool = Fals
         raise ConfigError(
             f'unknown parameters: {", ".join(_with_closest(name, names) for name in unknown)}',
             '',
-            'put those of other nodes in a section with the name of their node',
+            'put parameters of other nodes in a section with the name of that node',
         )
 
 
 def _with_closest(name: str, names: set[str]) -> str:
     close = difflib.get_close_matches(name, sorted(names), n=1)
-    return f'{name} (meant {close[0]}?)' if close else name
+    return f'{name} (did you mean {close[0]}?)' if close else name
 
 
 def _engine_names() -> list[str]:
@@ -180,7 +180,9 @@ def refuse_foreign_files(name: str, arguments: Sequence[str]) -> None:
             continue  # ROS itself has refused it
         sections = list(_sections('', content))
         if not any(_is_for(section, name) for section in sections):
-            raise ConfigError(f'{path} has parameters of {sections}', f'a section {name}: or /**:')
+            raise ConfigError(
+                f'{path} has only parameters of {sections}', f'a section {name}: or /**:'
+            )
 
 
 def _sections(prefix: str, content: object) -> Iterable[str]:

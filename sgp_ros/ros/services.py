@@ -69,15 +69,15 @@ class Services:
 
     def _refit(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.success = self._session.refit()
-        response.message = 'a fit was started; /diagnostics tells its outcome'
+        response.message = 'a fit was started; its outcome will be on /diagnostics'
         if not response.success:
             initial = self._session.engine.config.learning_initial
-            response.message = f'too few samples to fit, learning.initial = {initial} are needed'
+            response.message = f'too few samples to fit; learning.initial = {initial} are needed'
         return response
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._session.reset()
-        response.success, response.message = True, 'everything that was learned is forgotten'
+        response.success, response.message = True, 'everything learned was reset'
         return response
 
     def autosave(self) -> None:

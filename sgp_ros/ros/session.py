@@ -106,8 +106,8 @@ class Session:
             self._swap = Swap(self.engine, answer)
             self._note_fit(self._swap)
         elif isinstance(answer, WorkerLost):
-            self.health.last_fit = f'lost: the worker ended with code {answer.exit_code}'
-            return f'fit {self.health.last_fit}; another starts with the next fit'
+            self.health.last_fit = f'lost: its worker process ended with code {answer.exit_code}'
+            return f'fit {self.health.last_fit}; a new worker starts with the next fit'
         elif self._swap is not None:
             change = self._swap.step()
             if change is not None:

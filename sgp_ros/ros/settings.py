@@ -7,22 +7,23 @@ from sgp_ros.recordings.command_types import COMMAND_TYPES, FLOAT64_ARRAY, NO_CO
 
 ROBOT = Setting(
     'robot', 'str', '',
-    'Name of a built-in robot, or path of a robot file; empty: the robot is in robot_description.',
+    'Built-in robot, or path of a robot file; empty: use robot_description.',
     read_only=True,
 )  # fmt: skip
 DESCRIPTION = Setting(
     'robot_description', 'str', '',
-    'URDF as text; empty: topic robot_description is waited for. Parameter robot comes first.',
+    'URDF as text; empty: wait for it on topic robot_description. Ignored if robot is set.',
     read_only=True,
 )  # fmt: skip
 JOINTS = Setting(
     'joints', 'str_array', ('',),
-    "Joints of robot_description that move, the others are locked; ['']: all of them.",
+    "Joints of robot_description that move; all others are locked. ['']: all joints move.",
     read_only=True,
 )  # fmt: skip
 MODEL_PATH = Setting(
     'model.path', 'str', '',
-    'Saved model (.npz) to go on from, with its settings where none are given; empty: none.',
+    'Saved model (.npz) to continue from; settings that are not given are taken from it. '
+    'Empty: start without a model.',
     read_only=True,
 )  # fmt: skip
 FIRST = (ROBOT, DESCRIPTION, JOINTS, MODEL_PATH)
@@ -31,59 +32,61 @@ FIRST = (ROBOT, DESCRIPTION, JOINTS, MODEL_PATH)
 
 _OTHERS = (
     Setting(
-        'qos.depth', 'int', 200, 'Messages kept for the node while it is busy.',
+        'qos.depth', 'int', 200, 'Number of messages queued while the node is busy.',
         low=1, high=100_000, read_only=True,
     ),
     Setting(
         'record.path', 'str', '',
-        'MCAP file for what the node takes and predicts; may hold {time} and {node}; a taken '
-        'name gets a number; empty: no record.', read_only=True,
+        'MCAP file to record inputs and predictions in; may contain {time} and {node}; an '
+        'existing '
+        'file is kept, and a number is added to the name. Empty: no recording.', read_only=True,
     ),
     Setting(
         'record.split.size', 'float', 0.0,
-        'Size of a record at which its next file begins, in a folder of its name; 0: never.',
+        'File size at which a new file of the record begins; the files share a folder. 0: never.',
         unit='MB', low=0.0, high=1e6, read_only=True,
     ),
     Setting(
         'record.split.age', 'float', 0.0,
-        'Age of a record at which its next file begins, in a folder of its name; 0: never.',
+        'File age at which a new file of the record begins; the files share a folder. 0: never.',
         unit='s', low=0.0, high=1e7, read_only=True,
     ),
     Setting(
         'save.path', 'str', '',
-        'File (.npz) that service save writes; may hold {node}; empty: {node}.npz where the '
-        'node started.', read_only=True,
+        'File (.npz) that the service save writes; may contain {node}. Empty: {node}.npz in the '
+        'working directory.', read_only=True,
     ),
     Setting(
         'save.period', 'float', 0.0,
-        'Time between two saves by itself, and one at the end; 0: on request alone.',
+        'Interval of automatic saves, with one more at shutdown; 0: save only on request.',
         unit='s', low=0.0, high=1e6, read_only=True,
     ),
     Setting(
         'save.restore', 'bool', default=False,
-        description='Go on from the file of save.path where there is one.', read_only=True,
+        description='Continue from the file at save.path if it exists.', read_only=True,
     ),
     Setting(
-        'diagnostics.period', 'float', 1.0, 'Time between two messages on /diagnostics.',
+        'diagnostics.period', 'float', 1.0, 'Interval of messages on /diagnostics.',
         unit='s', low=0.1, high=3600.0, read_only=True,
     ),
     Setting(
         'diagnosis.window', 'float', 60.0,
-        'How much of the past is kept for service diagnose.',
+        'Length of the recent past kept for the service diagnose.',
         unit='s', low=1.0, high=3600.0, read_only=True,
     ),
     Setting(
         'monitor.duration', 'float', 0.3,
-        'Errors alarm on ~/monitor that lie outside their 95 % interval for at least so long.',
+        'Shortest time that an error must stay outside its 95 % interval to raise an alarm on '
+        '~/monitor.',
         unit='s', low=0.0, high=60.0, read_only=True,
     ),
     Setting(
         'monitor.false_alarms', 'float', 1.0,
-        'False alarms of an undisturbed robot that are accepted; fewer need longer errors.',
+        'Accepted rate of false alarms of an undisturbed robot; a lower rate means later alarms.',
         unit='1/h', low=1e-6, high=1000.0, read_only=True,
     ),
     Setting(
-        'parameters.period', 'float', 1.0, 'Time between two messages on ~/parameters.',
+        'parameters.period', 'float', 1.0, 'Interval of messages on ~/parameters.',
         unit='s', low=0.02, high=3600.0, read_only=True,
     ),
 )  # fmt: skip
@@ -94,7 +97,7 @@ def node_settings() -> tuple[Setting, ...]:
     return (
         Setting(
             'command.type', 'str', FLOAT64_ARRAY,
-            'Message type on topic command; none: the effort comes in the joint states.',
+            'Message type on topic command; none: take the effort from the joint states.',
             choices=(NO_COMMAND, *COMMAND_TYPES), read_only=True,
         ),
         *_OTHERS,

@@ -12,7 +12,7 @@ from sgp_ros.ros.node_main import run
 
 def main() -> None:
     """Run the node until SIGINT or SIGTERM."""
-    summary = 'Identify a robot online from joint_states and command; see docs/settings.md.'
+    summary = 'Identify a robot online from joint states and commands; see docs/settings.md.'
     sys.exit(run('sgp_node', summary, _load))
 
 

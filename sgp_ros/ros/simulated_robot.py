@@ -38,31 +38,35 @@ def simulator_settings() -> tuple[Setting, ...]:
     """Return the settings of the node."""
     return (
         Setting(
-            'rate', 'float', 100.0, 'Rate of states and control.',
+            'rate', 'float', 100.0, 'Rate of joint states and control.',
             unit='Hz', low=1.0, high=2000.0, read_only=True,
         ),
-        Setting('seed', 'int', 0, 'Seed of the noise and of the motion.', low=0, read_only=True),
+        Setting('seed', 'int', 0, 'Seed of noise and motion.', low=0, read_only=True),
         Setting(
             'controller', 'str', 'sinusoids',
-            'Who commands; external listens to topic command instead of publishing it.',
+            'Controller of the robot; external: subscribe to topic command instead of publishing '
+            'it.',
             choices=('sinusoids', 'balance', 'zero', EXTERNAL), read_only=True,
         ),
         Setting(
             'command.type', 'str', FLOAT64_ARRAY,
-            'Message type on topic command; a header carries the time from which it holds.',
+            'Message type on topic command; a header stamp is the time at which the command takes '
+            'effect.',
             choices=tuple(COMMAND_TYPES), read_only=True,
         ),
         Setting(
             'effects', 'str_array', ('',),
-            "Effects added to the truth, such as 'coulomb_friction:joint=pole,level=0.01'.",
+            "Effects added to the simulated robot, such as "
+            "'coulomb_friction:joint=pole,level=0.01'.",
             read_only=True,
         ),
         Setting(
-            'encoder_resolution', 'float', 0.0015339807878856412, 'Step of the encoders; 0: none.',
+            'encoder_resolution', 'float', 0.0015339807878856412,
+            'Resolution of the encoders; 0: ideal.',
             unit='rad', low=0.0, high=1.0, read_only=True,
         ),
         Setting(
-            'publish_velocity', 'bool', default=False, description='Measure velocity as well.',
+            'publish_velocity', 'bool', default=False, description='Publish velocities too.',
             read_only=True,
         ),
     )  # fmt: skip

@@ -74,7 +74,7 @@ def _left_over(node: Node) -> str:
     path = save_file(str(given['save.path']), node.get_fully_qualified_name())
     if not given['save.restore'] or not path.is_file():
         return ''
-    node.get_logger().info(f'goes on from {path}')
+    node.get_logger().info(f'continuing from {path}')
     return str(path)
 
 

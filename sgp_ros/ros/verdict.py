@@ -65,7 +65,7 @@ def judge(arrivals: Arrivals) -> tuple[int, str]:
         _most_refused(arrivals)
         or _two_publishers(arrivals)
         or _some_lost(arrivals)
-        or (OK, 'every joint state is used')
+        or (OK, 'all joint states are used')
     )
 
 
@@ -73,11 +73,12 @@ def _most_refused(arrivals: Arrivals) -> tuple[int, str] | None:
     reason, count = _most(arrivals.refused)
     if 2 * count > arrivals.read:
         remedy = _state_remedy(reason, arrivals)
-        return ERROR, f'{count} of {arrivals.read} joint states refused as {reason}: {remedy}'
+        return ERROR, f'{count} of {arrivals.read} joint states refused, {reason}: {remedy}'
     reason, commands = _most(arrivals.commands_refused)
     if 2 * commands > arrivals.commands_read:
         remedy = _command_remedy(reason, arrivals)
-        return ERROR, f'{commands} of {arrivals.commands_read} commands refused as {remedy}'
+        read = arrivals.commands_read
+        return ERROR, f'{commands} of {read} commands refused, {reason}: {remedy}'
     return None
 
 
@@ -85,8 +86,9 @@ def _two_publishers(arrivals: Arrivals) -> tuple[int, str] | None:
     if not arrivals.shared_joints:
         return None
     return WARN, (
-        f'joints {list(arrivals.shared_joints)} come from several publishers of '
-        f'{arrivals.joint_states}: {", ".join(arrivals.publishers)}; stop one, or remap it'
+        f'joints {list(arrivals.shared_joints)} are published by several nodes on '
+        f'{arrivals.joint_states}: {", ".join(arrivals.publishers)}; stop all '
+        'but one, or remap them'
     )
 
 
@@ -94,19 +96,19 @@ def _some_lost(arrivals: Arrivals) -> tuple[int, str] | None:
     if arrivals.lost > _LOST_SHARE * (arrivals.received + arrivals.lost):
         return WARN, (
             f'{arrivals.lost} of {arrivals.received + arrivals.lost} messages on '
-            f'{arrivals.joint_states} are missing by their period: its source paused, or raise '
-            'qos.depth, or take load from this computer or its network'
+            f'{arrivals.joint_states} are missing, judging by their period: the source paused, or '
+            'messages were lost; raise qos.depth, or reduce the load of computer and network'
         )
     if arrivals.unreadable:
-        return WARN, f'{arrivals.unreadable} messages unreadable: {arrivals.unreadable_reason}'
+        return WARN, f'{arrivals.unreadable} messages not readable: {arrivals.unreadable_reason}'
     refused = {**arrivals.refused, **_prefixed(arrivals.commands_refused)}
     if any(refused.values()):
         text = ', '.join(f'{n} {name}' for name, n in refused.items() if n)
         return WARN, f'refused: {text}'
     if arrivals.read >= _FEW and arrivals.estimated == 0:
         return WARN, (
-            f'{arrivals.read} joint states gave no equation: too few lie in one filter.window, '
-            'lengthen it'
+            f'{arrivals.read} joint states gave no equation: too few of them per '
+            'filter.window; increase it'
         )
     return None
 
@@ -117,58 +119,58 @@ def _nothing(arrivals: Arrivals) -> tuple[int, str]:
     if arrivals.received:
         return _no_state(arrivals)
     if not arrivals.publishers:
-        remedy = 'start the robot, or remap with --ros-args -r joint_states:=/its/topic'
-        return WARN, f'nobody publishes {arrivals.joint_states}; {remedy}'
+        remedy = 'start the robot, or remap with --ros-args -r joint_states:=/your/topic'
+        return WARN, f'no publisher on {arrivals.joint_states}; {remedy}'
     return WARN, (
-        f'no message on {arrivals.joint_states} from {len(arrivals.publishers)} publishers; look '
-        'for an incompatible reliability or a stopped robot'
+        f'no message on {arrivals.joint_states} from {len(arrivals.publishers)} publisher(s); '
+        'check that the robot runs and that the QoS reliability is compatible'
     )
 
 
 def _no_state(arrivals: Arrivals) -> tuple[int, str]:
     """Say why messages gave no state of all joints."""
     missing, wanted = list(arrivals.missing_joints), list(arrivals.robot_joints)
-    remedy = 'give a robot file with the joints that are published'
+    remedy = 'use a robot file with the published joints'
     if missing == wanted:
         return ERROR, (
-            f'{arrivals.joint_states} names joints {list(arrivals.seen_joints)}, the robot has '
-            f'{wanted}; {remedy}'
+            f'{arrivals.joint_states} contains the joints {list(arrivals.seen_joints)}, the robot '
+            f'has {wanted}; {remedy}'
         )
     if missing:
         return ERROR, (
-            f'no message on {arrivals.joint_states} names joints {missing} of the robot; '
+            f'no message on {arrivals.joint_states} contains the joints {missing} of the robot; '
             f'publish them, or {remedy}'
         )
-    return WARN, f'one of {", ".join(arrivals.publishers)} has stopped: its joints are waited for'
+    return WARN, f'one of {", ".join(arrivals.publishers)} has stopped: waiting for its joints'
 
 
 def _state_remedy(reason: str, arrivals: Arrivals) -> str:
     names, wanted = list(arrivals.seen_joints), list(arrivals.robot_joints)
     return {
         'unknown_joint': (
-            f'they name {names}, the robot has {wanted}; give parameter robot a YAML file with '
-            'these joint names'
+            f'they contain the joints {names}, the robot has {wanted}; set parameter robot to a '
+            'file with these joint names'
         ),
         'unpaired': _effort_remedy(arrivals)
         if arrivals.command_type == NO_COMMAND
         else (
             f'no command on {arrivals.command} ({arrivals.command_publishers} publishers) within '
-            'command.timeout before them; check topic and command.type, or the clocks of the two'
+            'command.timeout before them; check the topic, command.type and both clocks'
         ),
-        'late': 'they come later than reorder_window permits; raise it, or look at the network',
-        'clock': 'stamps lie far from those of the other states; check the clock of their source',
-        'wrong_length': 'positions, velocities or efforts are not as many as names',
-        'implausible': 'they are far beyond the limits in the model file; check units and sensors',
-        'error': 'an internal error; the log tells the first one, please report it',
-        'duplicate': 'stamps repeat; several publishers, or a source without own stamps',
+        'late': 'they arrived later than reorder_window allows; raise it, or check the network',
+        'clock': 'their stamps are far from those of other states; check the clock of the source',
+        'wrong_length': 'the numbers of positions, velocities or efforts and of names differ',
+        'implausible': 'they are far beyond the limits of the robot file; check units and sensors',
+        'error': 'an internal error; please report the first one in the log',
+        'duplicate': 'stamps repeat; look for several publishers, or a source without stamps',
         'nonfinite': 'positions or velocities are not finite; check the sensors',
-        'gap': 'pauses are longer than max_gap; raise it or the rate',
-    }.get(reason, 'see the documentation')
+        'gap': 'pauses are longer than max_gap; raise max_gap or the publishing rate',
+    }.get(reason, 'see docs/bringup.md')
 
 
 def _effort_remedy(arrivals: Arrivals) -> str:
     return (
-        f'no effort of joints {list(arrivals.without_effort)}; let the driver publish it (with '
+        f'no effort for joints {list(arrivals.without_effort)}; make the driver publish it (with '
         'ros2_control: state_interface effort), or set command.type and topic command'
     )
 
@@ -176,15 +178,17 @@ def _effort_remedy(arrivals: Arrivals) -> str:
 def _command_remedy(reason: str, arrivals: Arrivals) -> str:
     return {
         'wrong_kind': (
-            'wrong_kind: efforts are wanted, the commands are position targets; state the gains '
-            'of the drives in the file of the robot, or set command.type to none and let the '
-            'joint states carry the effort'
+            'expected efforts, but the commands are position targets; state the gains of the '
+            'drives in the robot file, or set command.type to none and publish the effort in the '
+            'joint states'
         ),
-        'wrong_length': 'wrong_length: one number per joint of command.joints is wanted',
-        'unknown_joint': f'unknown_joint: the robot has {list(arrivals.robot_joints)}',
-        'late': 'late: older than reorder_window when they came; check the clocks',
-        'clock': 'clock: their stamps lie far from those of the states; check the clocks',
-    }.get(reason, reason)
+        'wrong_length': 'expected one number per joint of command.joints',
+        'unknown_joint': f'the robot has the joints {list(arrivals.robot_joints)}',
+        'late': 'older than reorder_window on arrival; check the clocks',
+        'clock': 'their stamps are far from those of the states; check the clocks',
+        'nonfinite': 'numbers are not finite; check the controller',
+        'error': 'an internal error; please report the first one in the log',
+    }.get(reason, 'see docs/bringup.md')
 
 
 def _most(counts: Mapping[str, int]) -> tuple[str, int]:

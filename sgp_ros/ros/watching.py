@@ -96,7 +96,7 @@ def run_watch(
             if time.monotonic() > end:
                 others = f'heard of {sorted(picture.others)}' if picture.others else 'is it up?'
                 raise ConfigError(
-                    f'no word of {node} on /diagnostics within {wait:g} s', '',
+                    f'nothing from {node} on /diagnostics within {wait:g} s', '',
                     f'{others}; the same ROS_DOMAIN_ID? --node NAME',
                 )  # fmt: skip
         if layouts is not None:
@@ -226,7 +226,7 @@ def _remarks(picture: Picture) -> Any:
     if diagnosis is not None and not diagnosis.level:
         lines.append((f'diagnosis  {diagnosis.message}', 'cyan'))
     group = optional_package('rich.console', 'for sgp watch', 'watch').Group
-    return group(*(_text(line, style) for line, style in lines or [('all is well', 'green')]))
+    return group(*(_text(line, style) for line, style in lines or [('no problems', 'green')]))
 
 
 def _table(*columns: str) -> Any:

@@ -162,7 +162,7 @@ def _held_still(event):
     [
         (lambda events: events[:40], 'take a longer recording'),
         (lambda events: [_held_still(e) for e in events], 'no joint of planar_2r moves'),
-        (lambda events: [], 'holds no message'),
+        (lambda events: [], 'contains no messages'),
         (lambda events: [e for e in events if isinstance(e, JointSample)], 'effort'),
     ],
     ids=['too short', 'motionless', 'empty', 'no commands'],

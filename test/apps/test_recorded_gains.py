@@ -100,7 +100,7 @@ def test_gains_of_the_wrong_length_are_refused(robot, tmp_path, capsys):
     status, _ = _imported(tmp_path, robot, kp=np.ones(3), kd=np.ones(3))
     said = capsys.readouterr().err
     assert status == 2
-    assert 'kp holds 3 gains for 1 joints; expected one, one for each joint' in said
+    assert 'kp contains 3 gains for 1 joints; expected one gain, one per joint' in said
     assert said.count('\n') == 1
     status, _ = _imported(tmp_path, robot, kp=-KP[:, None], kd=KD[:, None])
     assert status == 2

@@ -70,7 +70,7 @@ def test_every_recording_has_rows_and_a_failure_its_line(finished):
     names = list(dict.fromkeys(row['recording'] for row in rows))
     assert names == ['broken.mcap', 'monday/0.mcap', 'monday/1.mcap', 'tuesday/2.mcap']
     (failed,) = [row['failure'] for row in rows if row['kind'] == 'failure']
-    assert 'is no recording' in failed
+    assert 'is not a recording' in failed
     friction = [row for row in rows if row['parameter'] == 'Fv']
     assert [row['joint'] for row in friction] == ['axis'] * 3
     for row in friction:

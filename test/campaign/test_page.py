@@ -26,7 +26,7 @@ def written(tmp_path_factory):
         result['robot'] = HOSTILE
         rows = result['tasks']['identify']['rows']
         rows[:] = [row for row in rows if row['joint'] == 'elbow']
-    results[7]['tasks'] = {'identify': {'failure': f'{HOSTILE} holds no message'}}
+    results[7]['tasks'] = {'identify': {'failure': f'{HOSTILE} contains no messages'}}
     return out, write_campaign(out, results, ['a remark'])
 
 

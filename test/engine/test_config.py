@@ -50,7 +50,7 @@ def test_a_wrong_setting_is_refused_with_what_was_expected(name, value, expected
 def test_all_wrong_settings_are_listed_at_once():
     """One error names every problem."""
     message = _problems(filter__window=-2.0, filter__degree='x', nonsense=1)
-    assert message.startswith('3 wrong settings')
+    assert message.startswith('3 wrong setting')
     for name in ('filter.window', 'filter.degree', 'nonsense'):
         assert name in message
 

@@ -246,7 +246,7 @@ def test_damaged_chunk_of_an_indexed_file_is_left_out_and_said(tmp_path):
     assert recording.remarks == ()
     states = sum(isinstance(event, JointSample) for event in recording.events())
     assert any('damaged from byte' in remark for remark in recording.remarks)
-    assert any(f'{states} of 500 messages readable' in remark for remark in recording.remarks)
+    assert any(f'{states} of 500 messages read' in remark for remark in recording.remarks)
 
 
 def _cut(path, size):
@@ -263,11 +263,11 @@ def _file(path, content):
     ('make', 'reason'),
     [
         (lambda p: p / 'nothing.mcap', 'no recording at'),
-        (lambda p: p, 'without .mcap'),
+        (lambda p: p, 'contains no .mcap'),
         (lambda p: _file(p / 'x.mcap', b''), 'is empty'),
-        (lambda p: _file(p / 'x.mcap', b'hello, world'), 'is no recording'),
-        (lambda p: worlds.write(p / 'x.mcap', []), 'holds no message'),
-        (lambda p: _cut(worlds.write(p / 'x.mcap', EVENTS), 60), 'holds no message'),
+        (lambda p: _file(p / 'x.mcap', b'hello, world'), 'is not a recording'),
+        (lambda p: worlds.write(p / 'x.mcap', []), 'contains no messages'),
+        (lambda p: _cut(worlds.write(p / 'x.mcap', EVENTS), 60), 'contains no messages'),
         (lambda p: _file(p / 'x.db3', b'SQLite format 3\0' + bytes(200)), 'cannot be read'),
         (lambda p: _cut(_ros1(p / 'x.bag'), 4500), 'cannot be read'),
         (lambda p: worlds.write(p / 'x.mcap', EVENTS[:1]), 'no sensor_msgs/JointState topic'),

@@ -106,16 +106,16 @@ def test_an_action_is_what_the_positions_say(tmp_path):
     """Near them it is their target; else nothing says what it is, and it is left out."""
     summary, _, commands = _read(_npz(tmp_path, t=T, q=Q, action=LATE), tmp_path)
     assert {c.kind for c in commands} == {POSITION}
-    assert any('taken for their targets' in said for said in summary.unsure)
+    assert any('taken as position targets' in said for said in summary.unsure)
     summary, _, commands = _read(_npz(tmp_path, t=T, q=Q, tau=TAU, action=9.0 * TAU), tmp_path)
     assert commands == []
-    assert any('Nothing says what action commands' in said for said in summary.unsure)
+    assert any('It is unclear what action commands' in said for said in summary.unsure)
 
 
 def test_a_target_that_is_the_position_is_no_target(tmp_path):
     summary, _, commands = _read(_npz(tmp_path, t=T, q=Q, q_des=Q, tau=TAU), tmp_path)
     assert commands == []
-    assert any('is the measured position itself' in said for said in summary.unsure)
+    assert any('equals the measured position' in said for said in summary.unsure)
 
 
 def test_targets_of_velocity_stay_what_they_are(tmp_path):
@@ -173,7 +173,7 @@ def test_what_is_never_read_is_refused_with_the_reason(tmp_path, capsys, name):
     assert main(['import', str(tmp_path / name), '--out', str(tmp_path / 'out')]) == 2
     said = capsys.readouterr().err
     assert said.count('\n') == 1
-    assert 'save the arrays with numpy.savez' in said
+    assert 'save the data with numpy.savez' in said
     assert not (tmp_path / 'out').exists()
 
 

@@ -107,7 +107,7 @@ def test_delimiter_is_found_in_the_header(mark, tmp_path):
     table = read_table(_csv(tmp_path, text), MAP)
     assert table.stamps_ns == (500_000_000,)
     np.testing.assert_array_equal(table.channels['position'], [[1.25]])
-    assert '1 of 2 rows refused' in table.remarks[0]
+    assert '1 of 2 rows ignored' in table.remarks[0]
 
 
 def test_decimal_comma_goes_with_semicolons(tmp_path):
@@ -216,15 +216,15 @@ def test_objects_in_npz_are_never_unpickled(tmp_path):
 @pytest.mark.parametrize(
     ('name', 'content', 'reason'),
     [
-        ('x.csv', b'', 'no row'),
-        ('x.csv', b't,q\n', 'no row'),
+        ('x.csv', b'', 'no data'),
+        ('x.csv', b't,q\n', 'no data'),
         ('x.csv', b't,q\n1,2,3\n', 'line 2 has 3 values'),
         ('x.csv', b't,q\n1,two\n', 'column q'),
-        ('x.csv', b'\xff\xfe\x00', 'no text'),
+        ('x.csv', b'\xff\xfe\x00', 'not a text file'),
         ('x.npz', b'hello', 'cannot be read'),
         ('x.mat', b'MATLAB 7.3 MAT-file'.ljust(124) + b'\x00\x02IM', 'HDF5'),
         ('x.mat', b'hello', 'cannot be read'),
-        ('x.xls', b'hello', "ending '.xls'"),
+        ('x.xls', b'hello', "file type '.xls'"),
     ],
 )
 def test_table_that_cannot_be_read_says_why(name, content, reason, tmp_path):
@@ -252,7 +252,7 @@ def test_everything_wrong_with_a_map_is_in_one_error(tmp_path):
         read_table(_csv(tmp_path, 't,q\n0,0\n'), content)
     for part in (
         "'time': not in the table", "time.unit 'h'", "time: unknown key 'scale'", "start 'now'",
-        "'furlong'", "joints.a: unknown key 'jerk'", 'joints.b: no position',
+        "'furlong'", "joints.a: unknown key 'jerk'", 'joints.b: position is missing',
         'joints.b.velocity: unit counts/s needs a scale', 'index 3', "scale 'big'",
         'joints.d: expected a mapping', 'commands.a: unit V needs a scale', "'std_msgs/String'",
         "unknown key 'jonits'", 'the table has t [1], q [1]',
@@ -267,7 +267,7 @@ def test_everything_wrong_with_a_map_is_in_one_error(tmp_path):
         (np.zeros((3, 2)), 2, 'index 2'),
         (np.zeros((3, 2, 2)), None, '3 dimensions'),
         (np.zeros(4), None, 'different length'),
-        (np.array([1j, 2j, 3j]), None, 'no numbers'),
+        (np.array([1j, 2j, 3j]), None, 'not numeric'),
         (np.zeros((3, 2)), 'x', "index 'x'"),
     ],
 )
@@ -279,7 +279,7 @@ def test_array_of_another_shape_is_refused(array, index, reason, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ('text', 'reason'), [(None, 'no map'), ('[1, 2]', 'no mapping'), ('a: [', 'not YAML')]
+    ('text', 'reason'), [(None, 'no map'), ('[1, 2]', 'not a mapping'), ('a: [', 'not YAML')]
 )
 def test_map_file_must_be_a_yaml_mapping(text, reason, tmp_path):
     path = tmp_path / 'map.yaml'
@@ -298,9 +298,9 @@ def test_rate_must_be_positive_and_alone(tmp_path):
 @pytest.mark.parametrize(
     ('text', 'said'),
     [
-        ('t,q\n1,0\n2,0.5\n3', 'line 4, the last one, ends after 1 of 2'),
-        ('t,q\ns,m\n1,0\n2,0.5\n', 'lines [2] hold no number'),
-        ('t,q\n1,0\n\n2,1e280\n3,0.5\n4,nan\n', '2 of 4 rows refused, lines 4, 6'),
+        ('t,q\n1,0\n2,0.5\n3', 'the last line, 4, ends after 1 of 2'),
+        ('t,q\ns,m\n1,0\n2,0.5\n', 'lines [2] contain no numbers'),
+        ('t,q\n1,0\n\n2,1e280\n3,0.5\n4,nan\n', '2 of 4 rows ignored, lines 4, 6'),
         ('% robot 7\n# t,q\n1,0\n2,0.5\n', ''),
         ('# made by a logger\nt,q\n# units: s,m\n1,0\n2,0.5\n', ''),
         ('"t","q"\n"1","0"\n2,0.5\n', ''),
@@ -317,7 +317,7 @@ def test_what_can_be_read_of_a_table_is_used_and_the_rest_is_told(text, said, tm
 
 
 def test_a_table_without_header_says_so(tmp_path):
-    with pytest.raises(RecordingError, match=r'no header row: line 1 holds numbers'):
+    with pytest.raises(RecordingError, match=r'no header: line 1 already contains numbers'):
         read_table(_csv(tmp_path, '1,0\n2,0.5\n'), MAP)
 
 

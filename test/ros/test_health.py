@@ -57,10 +57,10 @@ def test_a_robot_that_changed_is_told():
     ('model', 'evidence', 'refusal', 'said'),
     [
         ('found', 5.0, '', 'log evidence rose by 3 nat'),
-        ('found', 1.5, 'no_better', 'no better, its log evidence is 0.5 nat lower'),
+        ('found', 1.5, 'no_better', 'no improvement, log evidence 0.5 nat lower'),
         (None, -np.inf, 'diverged', 'diverged'),
         ('found', np.nan, 'diverged', 'diverged'),
-        ('found', 5.0, 'no_factor', 'no factor'),
+        ('found', 5.0, 'no_factor', 'singular'),
     ],
 )
 def test_the_reason_of_a_refused_fit_is_told(model, evidence, refusal, said):

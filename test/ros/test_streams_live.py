@@ -92,7 +92,7 @@ def test_states_without_effort_name_the_joints_and_the_remedy(
     _publish_until(
         graph,
         lambda i: states.publish(_state(i * STEP_NS, effort=effort)),
-        lambda: 'no effort of joints' in graph.message('samples'),
+        lambda: 'no effort for joints' in graph.message('samples'),
     )
     assert 'state_interface' in graph.message('samples')
 
@@ -120,7 +120,9 @@ def test_lost_messages_are_counted(graph: Graph) -> None:
         if i < 100 or i % 4:
             states.publish(_state(i * STEP_NS))
 
-    _publish_until(graph, send, lambda: 'missing by their period' in graph.message('samples'))
+    _publish_until(
+        graph, send, lambda: 'missing, judging by their period' in graph.message('samples')
+    )
     assert graph.count('lost') > 0
 
 

@@ -15,19 +15,19 @@ def _arrivals(**known: Any) -> Arrivals:
 
 
 def test_all_is_well_when_every_state_is_used() -> None:
-    assert judge(_arrivals(read=100, estimated=20)) == (OK, 'every joint state is used')
+    assert judge(_arrivals(read=100, estimated=20)) == (OK, 'all joint states are used')
 
 
 @pytest.mark.parametrize(
     ('known', 'level', 'words'),
     [
-        ({}, WARN, ['nobody publishes /arm/joint_states', 'remap']),
+        ({}, WARN, ['no publisher on /arm/joint_states', 'remap']),
         ({'publishers': ('/a', '/b')}, WARN, ['no message on /arm/joint_states from 2']),
         ({'unreadable': 3, 'unreadable_reason': 'no names'}, ERROR, ['no names']),
         (
             {'read': 9, 'refused': {'unknown_joint': 9}, 'seen_joints': ('elbow',)},
             ERROR,
-            ["['elbow']", "['pole', 'wheel']", 'YAML'],
+            ["['elbow']", "['pole', 'wheel']", 'set parameter robot'],
         ),
         (
             {'read': 9, 'refused': {'unpaired': 9}},
@@ -43,14 +43,14 @@ def test_all_is_well_when_every_state_is_used() -> None:
                 'without_effort': ('wheel',),
             },
             ERROR,
-            ["no effort of joints ['wheel']", 'state_interface'],
+            ["no effort for joints ['wheel']", 'state_interface'],
         ),
         (
             {'received': 9, 'missing_joints': ('pole', 'wheel'), 'seen_joints': ('elbow',)},
             ERROR,
             ["['elbow']", "['pole', 'wheel']", 'robot file'],
         ),
-        ({'received': 9, 'missing_joints': ('pole',)}, ERROR, ["names joints ['pole']"]),
+        ({'received': 9, 'missing_joints': ('pole',)}, ERROR, ["contains the joints ['pole']"]),
         ({'received': 9, 'publishers': ('/a', '/b')}, WARN, ['/a, /b', 'stopped']),
         (
             {'read': 9, 'shared_joints': ('pole',), 'publishers': ('/a', '/b')},
@@ -69,7 +69,11 @@ def test_all_is_well_when_every_state_is_used() -> None:
             ['9 of 9 commands', 'command.joints'],
         ),
         ({'read': 9, 'refused': {'gap': 1, 'late': 2}}, WARN, ['1 gap, 2 late']),
-        ({'read': 9, 'unreadable': 1, 'unreadable_reason': 'x'}, WARN, ['1 messages unreadable']),
+        (
+            {'read': 9, 'unreadable': 1, 'unreadable_reason': 'x'},
+            WARN,
+            ['1 messages not readable'],
+        ),
         ({'read': 100, 'estimated': 0}, WARN, ['filter.window']),
     ],
 )
@@ -84,7 +88,7 @@ def test_the_sentence_says_what_was_found_and_what_to_do(
 @pytest.mark.parametrize('reason', REFUSALS)
 def test_every_reason_for_which_states_are_refused_has_a_remedy(reason: str) -> None:
     _, sentence = judge(_arrivals(read=1, refused={reason: 1}))
-    assert 'see the documentation' not in sentence
+    assert 'see docs' not in sentence
 
 
 @pytest.mark.parametrize('reason', COMMAND_REFUSALS)

@@ -83,10 +83,10 @@ def _zip(path):
         ('x.db3', _view, open_recording, 'no plain tables'),
         ('x.mcap', _bomb, open_recording, 'SGP_MOST_CHUNK_MB'),
         ('x.npz', _zip, lambda p: load_columns(p, []), 'SGP_MOST_UNPACKED_MB'),
-        ('pipe.mcap', os.mkfifo, open_recording, 'no plain file'),
-        ('pipe.npz', os.mkfifo, load_model, 'no plain file'),
+        ('pipe.mcap', os.mkfifo, open_recording, 'not a regular file'),
+        ('pipe.npz', os.mkfifo, load_model, 'not a regular file'),
         ('twice.csv', lambda p: p.write_text('t,q,q\n1,2,3\n'), lambda p: load_columns(p, []),
-         'more than once'),
+         'several columns named'),
         ('nul.csv', lambda p: p.write_text('t,q\n1,2\0\n'), lambda p: load_columns(p, []), 'NUL'),
         ('long.csv', lambda p: p.write_text('t,q\n1,' + '2' * 200_000),
          lambda p: load_columns(p, []), 'SGP_MOST_LINE'),
@@ -113,7 +113,7 @@ def test_a_bound_may_be_raised(tmp_path, monkeypatch):
 def test_a_file_that_ends_its_reader_ends_nothing_else(samples, monkeypatch, kind):
     """It is read in a process of its own, here by one that is killed at once."""
     monkeypatch.setattr(sys, 'executable', '/bin/false')
-    with pytest.raises(SgpError, match='its reader ended with status'):
+    with pytest.raises(SgpError, match='the reader stopped with status'):
         load_columns(samples[kind], [])
 
 
