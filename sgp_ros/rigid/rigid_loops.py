@@ -7,7 +7,8 @@ anywhere between i and the root, feels its component along the motion it permits
 one another stand in one module, because that is what the cache of compiled code watches.
 
 Source: Featherstone 2008, Rigid Body Dynamics Algorithms, chapter 5; Atkeson, An, Hollerbach 1986
-for the columns.
+for the columns. Arrays are handed on whole, with the number of a body: a view of one row would
+cost as much as the arithmetic on it.
 """
 
 from __future__ import annotations
@@ -53,21 +54,24 @@ def _at_rest(b: int, gravity: np.ndarray) -> Moving:
 
 
 @_compiled
-def _move(g: Geometry, q: np.ndarray, v: np.ndarray, a: np.ndarray, m: Moving) -> None:
-    """Fill the motion of all bodies for one time; q, v, a (b,)."""
+def _move(
+    g: Geometry, q: np.ndarray, v: np.ndarray, a: np.ndarray, sample: int, m: Moving
+) -> None:
+    """Fill the motion of all bodies for one of the times; q, v, a (n, b)."""
+    turn = m.turn
     for i in g.order:
         j = g.parents[i]
         slides = g.slidings[i]
-        s, c = (0.0, 0.0) if slides else (np.sin(q[i]), 1.0 - np.cos(q[i]))
-        turn = m.turn[i]
+        angle, speed, gain = q[sample, i], v[sample, i], a[sample, i]
+        s, c = (0.0, 0.0) if slides else (np.sin(angle), 1.0 - np.cos(angle))
         for r in range(3):
             for t in range(3):
-                turn[r, t] = (
+                turn[i, r, t] = (
                     g.turns[i, 0, r, t] + s * g.turns[i, 1, r, t] + c * g.turns[i, 2, r, t]
                 )
-        px = g.starts[i, 0] + q[i] * g.slides[i, 0]
-        py = g.starts[i, 1] + q[i] * g.slides[i, 1]
-        pz = g.starts[i, 2] + q[i] * g.slides[i, 2]
+        px = g.starts[i, 0] + angle * g.slides[i, 0]
+        py = g.starts[i, 1] + angle * g.slides[i, 1]
+        pz = g.starts[i, 2] + angle * g.slides[i, 2]
         m.place[i, 0], m.place[i, 1], m.place[i, 2] = px, py, pz
         wx, wy, wz = m.rate[j, 0], m.rate[j, 1], m.rate[j, 2]
         dx, dy, dz = m.spin[j, 0], m.spin[j, 1], m.spin[j, 2]
@@ -76,24 +80,24 @@ def _move(g: Geometry, q: np.ndarray, v: np.ndarray, a: np.ndarray, m: Moving) -
         ay = m.push[j, 1] + dz * px - dx * pz + wz * ux - wx * uz
         az = m.push[j, 2] + dx * py - dy * px + wx * uy - wy * ux
         for t in range(3):
-            m.rate[i, t] = turn[0, t] * wx + turn[1, t] * wy + turn[2, t] * wz
-            m.spin[i, t] = turn[0, t] * dx + turn[1, t] * dy + turn[2, t] * dz
-            m.push[i, t] = turn[0, t] * ax + turn[1, t] * ay + turn[2, t] * az
+            m.rate[i, t] = turn[i, 0, t] * wx + turn[i, 1, t] * wy + turn[i, 2, t] * wz
+            m.spin[i, t] = turn[i, 0, t] * dx + turn[i, 1, t] * dy + turn[i, 2, t] * dz
+            m.push[i, t] = turn[i, 0, t] * ax + turn[i, 1, t] * ay + turn[i, 2, t] * az
         wx, wy, wz = m.rate[i, 0], m.rate[i, 1], m.rate[i, 2]
         ex, ey, ez = g.axes[i, 0], g.axes[i, 1], g.axes[i, 2]
         # what the joint adds: its own motion, turned along by the parent
         hx, hy, hz = wy * ez - wz * ey, wz * ex - wx * ez, wx * ey - wy * ex
         if slides:
-            m.push[i, 0] += a[i] * ex + 2.0 * v[i] * hx
-            m.push[i, 1] += a[i] * ey + 2.0 * v[i] * hy
-            m.push[i, 2] += a[i] * ez + 2.0 * v[i] * hz
+            m.push[i, 0] += gain * ex + 2.0 * speed * hx
+            m.push[i, 1] += gain * ey + 2.0 * speed * hy
+            m.push[i, 2] += gain * ez + 2.0 * speed * hz
         else:
-            m.spin[i, 0] += a[i] * ex + v[i] * hx
-            m.spin[i, 1] += a[i] * ey + v[i] * hy
-            m.spin[i, 2] += a[i] * ez + v[i] * hz
-            m.rate[i, 0] += v[i] * ex
-            m.rate[i, 1] += v[i] * ey
-            m.rate[i, 2] += v[i] * ez
+            m.spin[i, 0] += gain * ex + speed * hx
+            m.spin[i, 1] += gain * ey + speed * hy
+            m.spin[i, 2] += gain * ez + speed * hz
+            m.rate[i, 0] += speed * ex
+            m.rate[i, 1] += speed * ey
+            m.rate[i, 2] += speed * ez
 
 
 @_compiled
@@ -111,57 +115,64 @@ def fill_torque(
     m = _at_rest(b, gravity)
     wrench = np.empty((b + 1, 6))
     for sample in range(len(q)):
-        _move(g, q[sample], v[sample], a[sample], m)
+        _move(g, q, v, a, sample, m)
         for i in range(b):
-            _own_wrench(parameters[i], m.rate[i], m.spin[i], m.push[i], wrench[i])
+            _own_wrench(parameters, m, i, wrench)
         for i in g.order[::-1]:
-            x = wrench[i]
-            s = g.axes[i]
             first = 0 if g.slidings[i] else 3
-            felt = s[0] * x[first] + s[1] * x[first + 1] + s[2] * x[first + 2]
+            felt = (
+                g.axes[i, 0] * wrench[i, first]
+                + g.axes[i, 1] * wrench[i, first + 1]
+                + g.axes[i, 2] * wrench[i, first + 2]
+            )
             tau[sample, g.rows[i]] += g.gains[i] * felt
-            _hand_down(m.turn[i], m.place[i], x, wrench[g.parents[i]])
+            _hand_down(m, wrench, i, g.parents[i])
 
 
 @_compiled
-def _own_wrench(
-    parameters: np.ndarray, w: np.ndarray, d: np.ndarray, a: np.ndarray, wrench: np.ndarray
-) -> None:
-    """Set force and moment (6,) that a body takes to move, about its origin.
+def _own_wrench(parameters: np.ndarray, m: Moving, i: int, wrench: np.ndarray) -> None:
+    """Set force and moment (6,) that body i takes to move, about its origin.
 
     Force `m a + d x h + w x (w x h)`, moment `h x a + I d + w x I w`, first moment h.
     """
-    mass, hx, hy, hz, xx, xy, yy, xz, yz, zz = parameters
-    wh = w[0] * hx + w[1] * hy + w[2] * hz
-    ww = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
-    wrench[0] = mass * a[0] + d[1] * hz - d[2] * hy + w[0] * wh - ww * hx
-    wrench[1] = mass * a[1] + d[2] * hx - d[0] * hz + w[1] * wh - ww * hy
-    wrench[2] = mass * a[2] + d[0] * hy - d[1] * hx + w[2] * wh - ww * hz
-    lx = xx * w[0] + xy * w[1] + xz * w[2]
-    ly = xy * w[0] + yy * w[1] + yz * w[2]
-    lz = xz * w[0] + yz * w[1] + zz * w[2]
-    ix = xx * d[0] + xy * d[1] + xz * d[2]
-    iy = xy * d[0] + yy * d[1] + yz * d[2]
-    iz = xz * d[0] + yz * d[1] + zz * d[2]
-    wrench[3] = hy * a[2] - hz * a[1] + ix + w[1] * lz - w[2] * ly
-    wrench[4] = hz * a[0] - hx * a[2] + iy + w[2] * lx - w[0] * lz
-    wrench[5] = hx * a[1] - hy * a[0] + iz + w[0] * ly - w[1] * lx
+    mass, hx, hy, hz = parameters[i, 0], parameters[i, 1], parameters[i, 2], parameters[i, 3]
+    xx, xy, yy = parameters[i, 4], parameters[i, 5], parameters[i, 6]
+    xz, yz, zz = parameters[i, 7], parameters[i, 8], parameters[i, 9]
+    wx, wy, wz = m.rate[i, 0], m.rate[i, 1], m.rate[i, 2]
+    dx, dy, dz = m.spin[i, 0], m.spin[i, 1], m.spin[i, 2]
+    ax, ay, az = m.push[i, 0], m.push[i, 1], m.push[i, 2]
+    wh = wx * hx + wy * hy + wz * hz
+    ww = wx * wx + wy * wy + wz * wz
+    wrench[i, 0] = mass * ax + dy * hz - dz * hy + wx * wh - ww * hx
+    wrench[i, 1] = mass * ay + dz * hx - dx * hz + wy * wh - ww * hy
+    wrench[i, 2] = mass * az + dx * hy - dy * hx + wz * wh - ww * hz
+    lx = xx * wx + xy * wy + xz * wz
+    ly = xy * wx + yy * wy + yz * wz
+    lz = xz * wx + yz * wy + zz * wz
+    ix = xx * dx + xy * dy + xz * dz
+    iy = xy * dx + yy * dy + yz * dz
+    iz = xz * dx + yz * dy + zz * dz
+    wrench[i, 3] = hy * az - hz * ay + ix + wy * lz - wz * ly
+    wrench[i, 4] = hz * ax - hx * az + iy + wz * lx - wx * lz
+    wrench[i, 5] = hx * ay - hy * ax + iz + wx * ly - wy * lx
 
 
 @_compiled
-def _hand_down(turn: np.ndarray, place: np.ndarray, x: np.ndarray, below: np.ndarray) -> None:
-    """Add a wrench (6,) of a body to that of the body it hangs on, in the frame of that one."""
-    f0 = turn[0, 0] * x[0] + turn[0, 1] * x[1] + turn[0, 2] * x[2]
-    f1 = turn[1, 0] * x[0] + turn[1, 1] * x[1] + turn[1, 2] * x[2]
-    f2 = turn[2, 0] * x[0] + turn[2, 1] * x[1] + turn[2, 2] * x[2]
-    below[0] += f0
-    below[1] += f1
-    below[2] += f2
+def _hand_down(m: Moving, wrench: np.ndarray, i: int, j: int) -> None:
+    """Add the wrench (6,) of body i to that of body j it hangs on, in the frame of that one."""
+    turn, x = m.turn, wrench
+    f0 = turn[i, 0, 0] * x[i, 0] + turn[i, 0, 1] * x[i, 1] + turn[i, 0, 2] * x[i, 2]
+    f1 = turn[i, 1, 0] * x[i, 0] + turn[i, 1, 1] * x[i, 1] + turn[i, 1, 2] * x[i, 2]
+    f2 = turn[i, 2, 0] * x[i, 0] + turn[i, 2, 1] * x[i, 1] + turn[i, 2, 2] * x[i, 2]
+    x[j, 0] += f0
+    x[j, 1] += f1
+    x[j, 2] += f2
     for r in range(3):
-        below[3 + r] += turn[r, 0] * x[3] + turn[r, 1] * x[4] + turn[r, 2] * x[5]
-    below[3] += place[1] * f2 - place[2] * f1
-    below[4] += place[2] * f0 - place[0] * f2
-    below[5] += place[0] * f1 - place[1] * f0
+        x[j, 3 + r] += turn[i, r, 0] * x[i, 3] + turn[i, r, 1] * x[i, 4] + turn[i, r, 2] * x[i, 5]
+    px, py, pz = m.place[i, 0], m.place[i, 1], m.place[i, 2]
+    x[j, 3] += py * f2 - pz * f1
+    x[j, 4] += pz * f0 - px * f2
+    x[j, 5] += px * f1 - py * f0
 
 
 @_compiled
@@ -184,24 +195,24 @@ def fill_regressor(
     for r in range(3):
         world[b, r, r] = 1.0
     for sample in range(len(q)):
-        _move(g, q[sample], v[sample], a[sample], m)
+        _move(g, q, v, a, sample, m)
         Y[sample] = 0.0
         for i in g.order:
             _place(g, m, i, world, origin, screw)
-            _own_columns(m.rate[i], m.spin[i], moments, inertias)
+            _own_columns(m, i, moments, inertias)
             j = i
             while j < b:
                 row = Y[sample, g.rows[j], 10 * i : 10 * i + 10]
                 zx, zy, zz = screw[j, 0], screw[j, 1], screw[j, 2]
                 if g.slidings[j]:
-                    _add_force(world[i], zx, zy, zz, m.push[i], moments, row)
+                    _add_force(world, i, zx, zy, zz, m, moments, row)
                 else:
                     dx = origin[i, 0] - origin[j, 0]
                     dy = origin[i, 1] - origin[j, 1]
                     dz = origin[i, 2] - origin[j, 2]
                     lx, ly, lz = zy * dz - zz * dy, zz * dx - zx * dz, zx * dy - zy * dx
-                    _add_force(world[i], lx, ly, lz, m.push[i], moments, row)
-                    _add_moment(world[i], zx, zy, zz, m.push[i], inertias, row)
+                    _add_force(world, i, lx, ly, lz, m, moments, row)
+                    _add_moment(world, i, zx, zy, zz, m, inertias, row)
                 j = g.parents[j]
 
 
@@ -225,10 +236,10 @@ def _place(
 
 
 @_compiled
-def _own_columns(w: np.ndarray, d: np.ndarray, moments: np.ndarray, inertias: np.ndarray) -> None:
-    """Set the force per first moment (3, 3) and the moment per inertia (3, 6) of a body."""
-    x, y, z = w
-    dx, dy, dz = d
+def _own_columns(m: Moving, i: int, moments: np.ndarray, inertias: np.ndarray) -> None:
+    """Set the force per first moment (3, 3) and the moment per inertia (3, 6) of body i."""
+    x, y, z = m.rate[i, 0], m.rate[i, 1], m.rate[i, 2]
+    dx, dy, dz = m.spin[i, 0], m.spin[i, 1], m.spin[i, 2]
     moments[0, 0], moments[0, 1], moments[0, 2] = -y * y - z * z, x * y - dz, x * z + dy
     moments[1, 0], moments[1, 1], moments[1, 2] = x * y + dz, -x * x - z * z, y * z - dx
     moments[2, 0], moments[2, 1], moments[2, 2] = x * z - dy, y * z + dx, -x * x - y * y
@@ -243,18 +254,20 @@ def _own_columns(w: np.ndarray, d: np.ndarray, moments: np.ndarray, inertias: np
 @_compiled
 def _add_force(
     world: np.ndarray,
+    i: int,
     x: float,
     y: float,
     z: float,
-    push: np.ndarray,
+    m: Moving,
     moments: np.ndarray,
     row: np.ndarray,
 ) -> None:
     """Add what a motion (x, y, z) of the body's origin, in the root's frame, feels."""
-    lx = world[0, 0] * x + world[1, 0] * y + world[2, 0] * z
-    ly = world[0, 1] * x + world[1, 1] * y + world[2, 1] * z
-    lz = world[0, 2] * x + world[1, 2] * y + world[2, 2] * z
-    row[0] += lx * push[0] + ly * push[1] + lz * push[2]
+    p0, p1, p2 = m.push[i, 0], m.push[i, 1], m.push[i, 2]
+    lx = world[i, 0, 0] * x + world[i, 1, 0] * y + world[i, 2, 0] * z
+    ly = world[i, 0, 1] * x + world[i, 1, 1] * y + world[i, 2, 1] * z
+    lz = world[i, 0, 2] * x + world[i, 1, 2] * y + world[i, 2, 2] * z
+    row[0] += lx * p0 + ly * p1 + lz * p2
     for t in range(3):
         row[1 + t] += lx * moments[0, t] + ly * moments[1, t] + lz * moments[2, t]
 
@@ -262,19 +275,21 @@ def _add_force(
 @_compiled
 def _add_moment(
     world: np.ndarray,
+    i: int,
     x: float,
     y: float,
     z: float,
-    push: np.ndarray,
+    m: Moving,
     inertias: np.ndarray,
     row: np.ndarray,
 ) -> None:
     """Add what a rotation (x, y, z) about the body's origin, in the root's frame, feels."""
-    wx = world[0, 0] * x + world[1, 0] * y + world[2, 0] * z
-    wy = world[0, 1] * x + world[1, 1] * y + world[2, 1] * z
-    wz = world[0, 2] * x + world[1, 2] * y + world[2, 2] * z
-    row[1] += push[1] * wz - push[2] * wy
-    row[2] += push[2] * wx - push[0] * wz
-    row[3] += push[0] * wy - push[1] * wx
+    p0, p1, p2 = m.push[i, 0], m.push[i, 1], m.push[i, 2]
+    wx = world[i, 0, 0] * x + world[i, 1, 0] * y + world[i, 2, 0] * z
+    wy = world[i, 0, 1] * x + world[i, 1, 1] * y + world[i, 2, 1] * z
+    wz = world[i, 0, 2] * x + world[i, 1, 2] * y + world[i, 2, 2] * z
+    row[1] += p1 * wz - p2 * wy
+    row[2] += p2 * wx - p0 * wz
+    row[3] += p0 * wy - p1 * wx
     for t in range(6):
         row[4 + t] += wx * inertias[0, t] + wy * inertias[1, t] + wz * inertias[2, t]

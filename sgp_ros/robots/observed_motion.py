@@ -176,11 +176,12 @@ class ObservedMotion:
     def effort_slopes(self, joint: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the slopes of the nominal efforts, (n, k) each.
 
-        They are the derivatives by position, velocity and acceleration of one joint.
+        They are the derivatives by position, velocity and acceleration of one joint: by the last a
+        column of the mass matrix, by the others differences, exact for the velocity.
         """
         if joint not in self._slopes:
             found = []
-            for which in range(3):
+            for which in range(2):
                 ends = []
                 for sign in (1.0, -1.0):
                     states = [self.position, self.velocity, self.acceleration]
@@ -188,7 +189,8 @@ class ObservedMotion:
                     states[which][:, joint] += sign * 1e-4
                     ends.append(self.effort_for(*states))
                 found.append((ends[0] - ends[1]) / 2e-4)
-            self._slopes[joint] = found[0], found[1], found[2]
+            M = mass_matrix(self.tree, self.tree.parameters, self.position)
+            self._slopes[joint] = found[0], found[1], M[:, :, joint].copy()
         return self._slopes[joint]
 
     @cached_property
