@@ -9,14 +9,12 @@ import signal
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
-from typing import Any, TypeGuard
-
-import numpy as np
+from typing import Any
 
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies
 from sgp_ros.diagnosis.compare.sufficiency import require_motion
@@ -28,6 +26,7 @@ from sgp_ros.recordings.messages import Status
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.robot import Robot
 from sgp_ros.ros.fit_process import yield_to_others
+from sgp_ros.ros.past import Command, State, is_state, packed, samples, unpacked
 from sgp_ros.ros.verdict import ERROR, OK, WARN
 
 _PART = 250
@@ -35,11 +34,6 @@ _CANCELLED = 'cancelled'
 _REST_S = 0.001
 _CHECKED_AT_ONCE = 2000
 """Up to so many states, the service itself looks whether the robot moved; else the process."""
-Names = tuple[str, ...]
-State = tuple[int, Names, np.ndarray, np.ndarray | None, np.ndarray | None, int]
-Command = tuple[int, np.ndarray, Names | None, str, np.ndarray | None, int]
-"""Fields of samples, then the time that had passed in the stream [ns]."""
-
 MOST_EVENTS = 200_000
 """Remembered at most, whatever the window: a minute of states and commands at 1.6 kHz each."""
 _LONGEST_NS = 10 * 10**9  # beyond there is a pause, or a stamp is wrong
@@ -127,7 +121,7 @@ def _send(
     with contextlib.suppress(OSError):  # `poll` finds the end of the connection
         connection.send((robot, config, len(past)))
         for start in range(0, len(past), _PART):
-            connection.send(past[start : start + _PART])
+            connection.send(packed(past[start : start + _PART]))
             time.sleep(_REST_S)
 
 
@@ -137,8 +131,8 @@ def _diagnose(connection: Connection) -> None:
         robot, config, count = connection.recv()
         past: list[State | Command] = []
         while len(past) < count:
-            past += connection.recv()
-        connection.send(_outcome(robot, config, _events(past), connection))
+            past += unpacked(connection.recv())
+        connection.send(_outcome(robot, config, samples(past), connection))
     except (EOFError, OSError):
         return  # the node is gone
 
@@ -162,22 +156,8 @@ def _outcome(
         return DiagnosisFailed(' '.join(str(error).split()))
 
 
-def _events(past: Iterable[State | Command]) -> tuple[JointSample | CommandSample, ...]:
-    return tuple(
-        JointSample(*fields[:-1]) if _is_state(fields) else CommandSample(*fields[:-1])
-        for fields in past
-    )
-
-
-def _is_state(fields: State | Command) -> TypeGuard[State]:
-    return isinstance(fields[1], tuple)
-
-
 class Diagnosing:
     """Remembers the recent past of a robot and has it diagnosed elsewhere.
-
-    What is remembered are the fields of the samples, in plain tuples. The garbage collector lets
-    go of those; so many objects it would search for fifty milliseconds while messages wait.
 
     Args:
         robot: what the node identifies.
@@ -211,7 +191,7 @@ class Diagnosing:
     @property
     def events(self) -> tuple[JointSample | CommandSample, ...]:
         """States and commands of the window, in the order in which they came."""
-        return _events(self._past)
+        return samples(self._past)
 
     def start(self, config: EngineConfig) -> tuple[bool, str]:
         """Start a diagnosis of the recent past.
@@ -222,7 +202,7 @@ class Diagnosing:
         Returns:
             Whether it was started, and one sentence.
         """
-        states = sum(map(_is_state, self._past))
+        states = sum(map(is_state, self._past))
         if self._process is not None:
             return False, 'a diagnosis is already running; its outcome will be on /diagnostics'
         try:
