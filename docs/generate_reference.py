@@ -62,7 +62,7 @@ def commands():
         NOTE,
         '',
         'Each command also takes `--out DIR` (folder of the results), `--json` (the result as JSON, alone on stdout), `--quiet`,',
-        '`--force` (write beside files of somebody else) and `--help`. Exit status: 0; 2 for what a user can mend, with one',
+        '`--force` (write even if it contains other files) and `--help`. Exit status: 0; 2 for what a user can mend, with one',
         'line on stderr; 130 if interrupted. Names complete with the Tab key after `pip install argcomplete` and',
         '`eval "$(register-python-argcomplete sgp)"`.',
         '',

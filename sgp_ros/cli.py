@@ -211,7 +211,7 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
             help='folder of the results (default: %(default)s)',
         )  # fmt: skip
         found.add_argument('--force', dest='_force', action='store_true',
-                           help='write into DIR beside files of somebody else')  # fmt: skip
+                           help='write into DIR even if it contains other files')  # fmt: skip
         found.add_argument('--json', dest='_json', action='store_true',
                            help='print the result as JSON; text goes to stderr')  # fmt: skip
         found.add_argument('--quiet', dest='_quiet', action='store_true',

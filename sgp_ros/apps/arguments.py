@@ -72,7 +72,7 @@ def _add_recording(
     parser.add_argument('--command', metavar='TOPIC', help='topic of the commands')
     parser.add_argument(
         '--effort', choices=('auto', 'measured', 'commanded', 'state', 'command'), default='auto',
-        help='source of the effort; auto: measured where available (default: auto)',
+        help='source of the effort; auto: measured if available (default: auto)',
     )  # fmt: skip
 
 

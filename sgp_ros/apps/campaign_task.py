@@ -68,7 +68,7 @@ def _span(job: Mapping[str, Any]) -> dict[str, Any]:
     events = open_recording(job['path']).events(**topics)
     stamps = [event.stamp_ns for event in events if isinstance(event, JointSample)]
     if not stamps:
-        raise RecordingError(f'{job["path"]} holds no state', 'joint states')
+        raise RecordingError(f'{job["path"]} contains no states', 'joint states')
     return {'start_ns': min(stamps), 'duration_s': 1e-9 * (max(stamps) - min(stamps))}
 
 
@@ -84,7 +84,7 @@ def mean_of_topic(path: str, topic: str) -> float:
         values += [float(x) for x in found if isinstance(x, Real)][:1]
     if not values or not np.isfinite(values).any():
         raise RecordingError(
-            f'{topic} of {path} holds no number', 'messages with data or temperature',
+            f'{topic} of {path} contains no numbers', 'messages with data or temperature',
             'give its values with --covariates',
         )  # fmt: skip
     return float(np.nanmean(np.where(np.isfinite(values), values, np.nan)))

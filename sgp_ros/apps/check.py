@@ -18,7 +18,7 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
 from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import ConfigError, SgpError
-from sgp_ros.report.check import render_check
+from sgp_ros.report.check import KINDS, render_check
 from sgp_ros.report.diagnosis_text import phrase, plain_name
 from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.report.next_steps import after_check, ending
@@ -107,7 +107,7 @@ def print_check(name: str, found: RecordingCheck) -> None:
     print(f'{name}: {found.states} states in {found.seconds:.4g} s, {found.rate_hz:.4g} Hz, '
           f'jitter {100.0 * found.jitter:.2f} %')  # fmt: skip
     if found.commands:
-        kinds = ', '.join(found.command_kinds)
+        kinds = ', '.join(KINDS.get(kind, kind) for kind in found.command_kinds)
         print(f'  commands  {found.commands} at {found.command_rate_hz:.4g} Hz, {kinds}')
     for joint, j in found.joints.items():
         channels = [c for c in ('velocity', 'effort') if getattr(j, c) > 0.0]

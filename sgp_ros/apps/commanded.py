@@ -129,7 +129,7 @@ def _write(
     for said in remarks:
         print(f'  remark    {said}')
     if mode is None:
-        print('  remark    no replay stays stable: no recording was written')
+        print('  remark    no replay was stable: no recording was written')
     else:
         print(f'motion of {mode} in {path}')
     return {**content, 'recording': None if mode is None else str(path)}

@@ -100,8 +100,8 @@ class Online:
             promised: what the diagnosis leaves of the effort, by joint.
         """
         named = ', '.join(
-            f'what has no name at {f.joint} (its Gaussian process stays here, a node learns its '
-            'own)' if f.effect not in {*EFFECTS, LAW} else f'{f.effect} of {f.joint}'
+            f'the unexplained part at {f.joint} (a node learns a Gaussian process of its own)'
+            if f.effect not in {*EFFECTS, LAW} else f'{f.effect} of {f.joint}'
             for f in self.left_out
         )  # fmt: skip
         numbers = ', '.join(
@@ -110,10 +110,8 @@ class Online:
             if joint in promised
         )
         part = '' if math.isinf(self.seconds) else f' of the first {self.seconds:g} s'
-        return (
-            f'The online node does not model {named}. With {YAML_NAME} a replay{part} left an '
-            f'nMSE of the effort of {numbers or "nothing, for it did not start to learn"}.'
-        )
+        end = f'gave an nMSE of the effort of {numbers}' if numbers else 'did not start to learn'
+        return f'The online node does not model {named}. A replay{part} with {YAML_NAME} {end}.'
 
     def content(self) -> dict[str, Any]:
         """Return the same for diagnosis.json."""

@@ -41,8 +41,8 @@ def run_effects(
         print(f'{robot} states{":" if own else " none."}')
     for entry in found['robot']:
         numbers = ', '.join(f'{name} {x:g}' for name, x in entry['values'].items())
-        sought = 'sought from ' if entry['is_open'] else ''
-        print(f'{_line(entry)}\n{"":24s}of {entry["joint"]}: {sought}{numbers or "no numbers"}')
+        sought = 'estimated, starting from ' if entry['is_open'] else ''
+        print(f'{_line(entry)}\n{"":24s}of {entry["joint"]}: {sought}{numbers or "no parameters"}')
     progress(1.0)
     return found
 

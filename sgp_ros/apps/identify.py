@@ -147,7 +147,7 @@ def identify_recording(
     for what, refused in (('states', signals.refused), ('commands', signals.commands_refused)):
         counts |= {f'{what} refused: {reason}': n for reason, n in refused.items() if n}
     if signals.left_out:
-        counts['states of stretches too short to be filtered'] = signals.left_out
+        counts['states in stretches too short to be filtered'] = signals.left_out
     findings = collect_findings(found, Path(bag).name, rollouts, counts)
     progress(1.0)
     return IdentifiedRecording(found, findings, tuple(remarks), robot)

@@ -41,7 +41,10 @@ def run_import(
     print(f'{summary.samples} states of {", ".join(summary.joints)} in {summary.path}')
     print(_counts(summary))
     if summary.map_path is not None:
-        print(f'columns were guessed: look at {summary.map_path}, mend it, and give it as --map')
+        print(
+            f'the columns were guessed: check {summary.map_path}, correct it if needed, and pass '
+            'it with --map'
+        )
     if summary.gains_path is not None:
         print(f'gains of the drives in {summary.gains_path}')
     print(next_lines(after_import(summary.path, robot, summary.gains_path)))

@@ -150,4 +150,4 @@ class LiveProcesses:
     def _said(self, module: str) -> str:
         text = self._errors[module].read_text(encoding='utf-8', errors='replace')
         lines = [line for line in text.splitlines() if line.strip()]
-        return 'it said: ' + ' / '.join(lines[-_LAST_LINES:]) if lines else 'it said nothing'
+        return 'it printed: ' + ' / '.join(lines[-_LAST_LINES:]) if lines else 'it printed nothing'

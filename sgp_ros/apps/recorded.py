@@ -118,13 +118,13 @@ def gains_of(
     if path is not None:
         found = read_gains(Path(path), names, driven)
         if has_gains(known):
-            remarks.append('The gains are those given, not those recorded beside the targets.')
+            remarks.append('The given gains are used, not those recorded with the targets.')
     elif has_gains(known):
         found = Gains(np.ones(len(names)), np.ones(len(names)), is_recorded=True)
     elif stated is None or not hold_targets(known, nominal.robot):
         return None
     else:
-        remarks.append('Commands are targets: the gains are those of the file of the robot.')
+        remarks.append('The commands are targets: the gains of the robot file are used.')
         found = checked_gains(stated, 'gains of the robot', names, driven)
     require_gains_of_velocity(known, found)
     return found
@@ -158,5 +158,5 @@ def refuse_moving_base(bag: str) -> None:
             raise RecordingError(
                 f'the base moves {way:.3g} m in {topic.name}',
                 'a base that is fixed to the ground',
-                'record the robot on a stand, or leave out the stretches in which it moves',
+                'record the robot on a stand, or remove the parts in which the base moves',
             )  # fmt: skip

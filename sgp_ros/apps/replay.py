@@ -203,7 +203,7 @@ def write_identified_robot(out: Path, engine: Engine) -> str:
         try:
             bodies = nearest_bodies(robot, values, root, nominal_coefficients(robot))
         except NumericalError as error:
-            remark = f'the identified robot is the plain estimate, possibly impossible: {error}'
+            remark = f'the identified robot may be physically impossible: {error}'
     values = values if bodies is None else bodies.coefficients
     write_identified(out, robot, values, std, has_bodies=not remark)
     return remark

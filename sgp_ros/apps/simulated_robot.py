@@ -80,8 +80,8 @@ def _urdf(nominal: Nominal) -> str:
     text = stated_urdf(nominal.robot, bodies, {j: (float(b), float(c)) for j, b, c in sizes})
     if text is None:
         raise ConfigError(
-            f'robot {nominal.robot.name} states bodies that no URDF can hold',
-            'bodies under `parameters` that leave something for each link',
+            f'robot {nominal.robot.name} states bodies that a URDF cannot express',
+            'bodies under `parameters` that leave each link a positive mass',
         )
     return text
 

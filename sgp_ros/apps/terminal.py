@@ -45,7 +45,8 @@ def require_own_folder(out: Path, command: str) -> None:
     if names and not any(name.startswith(_LISTING) for name in names):
         shown = ', '.join(names[:3]) + (', ...' if len(names) > 3 else '')
         raise ConfigError(
-            f'{out} holds files that sgp did not write ({shown})', 'a new folder or one of sgp',
+            f'{out} contains files that sgp did not write ({shown})',
+            'a new folder, or one that sgp wrote',
             'choose another --out, or add --force',
         )  # fmt: skip
 

@@ -115,7 +115,7 @@ class Accepted:
         said: tuple[str, ...] = ()
         times = self.counts.clock_jumps
         if times:
-            said = (f'Stamps go back: taken as {times + 1} recordings.',)
+            said = (f'The stamps go back: treated as {times + 1} recordings.',)
         found = jumps(self.stamps_ns, self.position)
         found &= np.diff(self.stamps_ns) <= max_gap * 1e9
         places = 1e-9 * (self.stamps_ns[1:][found] - start_ns)
@@ -125,7 +125,7 @@ class Accepted:
         more = f' and {len(places) - _SHOWN_JUMPS} more' if len(places) > _SHOWN_JUMPS else ''
         return (
             *said,
-            f'Positions jump at t = {shown} s{more}: taken as {len(places) + 1} recordings.',
+            f'Positions jump at t = {shown} s{more}: treated as {len(places) + 1} recordings.',
         )
 
     def unwrapped(self, robot: Robot) -> Accepted:
@@ -203,22 +203,22 @@ def _none_accepted(
     if counts.commands_refused['wrong_kind']:
         kind = 'efforts' if commands_are == EFFORT else 'positions'
         return RecordingError(
-            f'no state with an effort: the commands are no {kind}', kind,
+            f'no state has an effort: the commands are not {kind}', kind,
             'give the gains of the drives with --gains gains.yaml' if commands_are == EFFORT
-            else 'leave --gains out',
+            else 'omit --gains',
         )  # fmt: skip
     if counts.refused['unpaired']:
         return RecordingError(
-            f'no state with an effort among {counts.read}, effort source {config.effort_source!r}',
+            f'none of {counts.read} states has an effort, effort source {config.effort_source!r}',
             'an effort in the states, or commands before them',
-            'give the topic of the commands with --command, or another --effort; joints without a '
-            'motor are named under `passive` in a robot YAML',
+            'name the command topic with --command, or choose another --effort; list joints '
+            'without a motor under `passive` in a robot YAML',
         )
     reasons = [f'{count} {reason}' for reason, count in counts.refused.items() if count]
     return RecordingError(
-        f'no usable state of robot {robot.name}: {", ".join(reasons or ["there is none"])}',
+        f'no usable states for robot {robot.name}: {", ".join(reasons or ["there is none"])}',
         f'states of the joints {list(robot.joint_names)}',
-        'look at what was refused, or take another recording',
+        'check the refused states, or use another recording',
     )
 
 
@@ -242,13 +242,13 @@ def require_joints(
     shown = sorted({name for seen in names for name in seen})
     missing = [name for name in wanted if name not in shown]
     near = {name: difflib.get_close_matches(name, shown, 1, 0.0) for name in missing}
-    pairs = ', '.join(f'{name} is nearest to {found[0]}' for name, found in near.items())
+    pairs = ', '.join(f'{name} is closest to {found[0]}' for name, found in near.items())
     raise RecordingError(
-        f'{recording} shows the joints {shown}'
+        f'{recording} contains the joints {shown}'
         if missing
-        else f'no message of {recording} names all joints together; there are {shown}',
+        else f'no message in {recording} contains all joints; found {shown}',
         f'states of the joints {list(wanted)} of {robot.name}' + (f' ({pairs})' if pairs else ''),
-        'name the joints in a robot file, or take the robot of this recording',
+        'rename the joints in a robot file, or use the robot of this recording',
     )
 
 

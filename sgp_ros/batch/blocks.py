@@ -49,7 +49,7 @@ def holdout(
             f'{n} rows of data, hold-out {kind} of {share:g}',
             'rows on either side'
             + (f', in stretches of {length_s:g} s' if kind == 'alternate' else ''),
-            'take a longer recording, another share or shorter stretches',
+            'use a longer recording, another share or shorter stretches',
         )
     return data.rows(~is_held), data.rows(is_held)
 

@@ -64,7 +64,7 @@ def unit_contradictions(
         sure.append(
             f'the positions of {joint.name} go from {ends[0]:.3g} to {ends[1]:.3g}, its limits '
             f'are {joint.lower:.3g} to {joint.upper:.3g} {joint.unit("position")}: '
-            f'in {unit} it fits'
+            f'they would fit in {unit}'
         )
     slope = _slope_of_velocity(states, joint.name)
     if not 1.0 / _NEAR < slope < _NEAR:
@@ -79,7 +79,7 @@ def unit_contradictions(
     if unit:
         open_ones.append(
             f'the effort of {joint.name} reaches {most_effort:.3g}, its limit is '
-            f'{joint.effort_limit:.3g} {joint.unit("effort")}: in {unit} it fits'
+            f'{joint.effort_limit:.3g} {joint.unit("effort")}: it would fit in {unit}'
         )
     return sure, open_ones
 
@@ -103,8 +103,8 @@ def require_units(events: Iterable[Event], robot: Robot) -> None:
             wrong += unit_contradictions(states, joint, ends, 0.0)[0]
     if wrong:
         raise RecordingError(
-            '; '.join(wrong), 'units as stated by the map or by the names of the columns',
-            'state the unit in a map, or leave --robot out where its limits are wrong',
+            '; '.join(wrong), 'the units stated by the map or by the column names',
+            'state the unit in a map, or omit --robot if its limits are wrong',
         )  # fmt: skip
 
 
@@ -194,8 +194,8 @@ def target_contradictions(
         if nearest > _MISSED * wide and (away > 0.0).all() | (away < 0.0).all():
             how = f'stays at least {nearest:.3g} {joint.unit("position")} away from its target'
         elif moved < _SHORT * wide:
-            how = (f'moves through {moved:.3g} of the {wide:.3g} {joint.unit("position")} that '
-                   'its target asks for')  # fmt: skip
+            how = (f'moves {moved:.3g} of the {wide:.3g} {joint.unit("position")} that '
+                   'its target spans')  # fmt: skip
         else:
             continue
         said.append(f'{joint.name} {how}{_why(joint, away, gains, j)}.')
@@ -216,13 +216,15 @@ def _why(joint: Joint, away: np.ndarray, gains: Gains | None, j: int) -> str:
     """Say why a target is not reached, as far as the gains of the drive tell."""
     limit = joint.effort_limit
     if gains is None or gains.is_recorded or not (math.isfinite(limit) and limit > 0.0):
-        return ': a load that its gains do not hold, saturation, or a wrong zero'
+        return (
+            ': possible causes are a load that the gains cannot hold, saturation or a wrong zero'
+        )
     asked = float(np.median(np.abs(gains.kp[j] * away)))
     unit = joint.unit('effort')
     if asked > limit:
-        return (f': its gains ask for {asked:.3g} {unit}, its limit is {limit:.3g} '
-                f'{unit}: the drive is in saturation, or drives another joint')  # fmt: skip
-    return f': a load of {asked:.3g} {unit} that its gains give way to, or a wrong zero'
+        return (f': its gains would need {asked:.3g} {unit}, the limit is {limit:.3g} '
+                f'{unit}: the drive saturates, or drives another joint')  # fmt: skip
+    return f': a load of {asked:.3g} {unit} that the gains cannot hold, or a wrong zero'
 
 
 def require_sense(recording: str, refusals: Sequence[str]) -> None:
@@ -237,8 +239,9 @@ def require_sense(recording: str, refusals: Sequence[str]) -> None:
     """
     if refusals:
         raise RecordingError(
-            f'{recording}: {"; ".join(refusals)}', 'targets of the joints that follow them, in SI',
-            'put the columns or names of the commands right',
+            f'{recording}: {"; ".join(refusals)}',
+            'the targets of the joints that follow them, in SI units',
+            'correct the columns or names of the commands',
         )  # fmt: skip
 
 
@@ -270,8 +273,8 @@ def require_shared_motion(
     if not both:
         raise RecordingError(
             f'the machine moves {", ".join(ours) or "nothing"}, the simulation '
-            f'{", ".join(simulation) or "nothing"}', 'a joint that moves on both',
-            'let the simulation follow the commands of the machine',
+            f'{", ".join(simulation) or "nothing"}', 'a joint that moves in both',
+            'run the simulation with the commands of the machine',
         )  # fmt: skip
     apart = [
         name for name in both
@@ -284,12 +287,12 @@ def require_shared_motion(
     }
     if len(apart) == len(both):
         raise RecordingError(
-            'no joint passes the same positions on machine and simulation: '
+            'no joint passes through the same positions on machine and in simulation: '
             f'{", ".join(told.values())}', 'motions that overlap',
-            'let the simulation follow the commands of the machine',
+            'run the simulation with the commands of the machine',
         )  # fmt: skip
-    said = [f'Machine and simulation pass other positions: {x}.' for x in told.values()]
+    said = [f'Machine and simulation pass different positions: {x}.' for x in told.values()]
     alone = [n for n in (*ours, *simulation) if n not in both]
     if alone:
-        said.append(f'Moving on one of machine and simulation only: {", ".join(alone)}.')
+        said.append(f'Moving only on the machine or only in the simulation: {", ".join(alone)}.')
     return said

@@ -40,7 +40,7 @@ def require_motion(signals: Signals, robot: Robot) -> None:
     names = list(robot.joint_names)
     if not any(_moves(q) for q in signals.position.T):
         raise RecordingError(
-            f'none of the joints {names} moves beyond noise',
+            f'none of the joints {names} moves more than noise',
             'a robot in motion',
             'record the robot while it moves',
         )
@@ -50,9 +50,9 @@ def require_motion(signals: Signals, robot: Robot) -> None:
     constant = [names[j] for j in actuated if not np.ptp(signals.effort[:, j])]
     if constant or not actuated:
         raise RecordingError(
-            f'the effort of {constant or names} never changes',
+            f'the effort of {constant or names} is constant',
             'measured or commanded efforts of the joints that are identified',
-            'record them, or leave such joints out of the robot file',
+            'record them, or lock these joints in the robot file',
         )
 
 

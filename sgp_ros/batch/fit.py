@@ -144,7 +144,7 @@ def fit_offline(
         raise RecordingError(
             f'{n} filtered rows for {p} coefficients',
             f'at least {-(-p // k) + FEWEST_ROWS}',
-            'take a longer recording with more motion, or a higher cut-off',
+            'use a longer recording with more motion, or a higher cut-off',
         )
     inputs = inputs or robot.residual_columns(('default',))
     prior = prior_of(robot, is_flat=options.has_flat_prior)

@@ -157,7 +157,7 @@ def _test_data(name: str, test: Signals, robot: Robot, plan: FilterPlan) -> Filt
         return filtered_data(test, robot, plan)
     except (ConfigError, RecordingError) as error:
         raise RecordingError(
-            f'test recording {name}: {error.found}', error.expected, 'take a longer or denser one'
+            f'test recording {name}: {error.found}', error.expected, 'use a longer or denser one'
         ) from error
 
 
@@ -194,5 +194,5 @@ def information_root(physics: OfflineFit, base: BaseParameters) -> np.ndarray:
     raise NumericalError(
         f'the covariance of {base.rank} base parameters is singular',
         'more independent rows than parameters',
-        'take a longer recording',
+        'use a longer recording',
     )

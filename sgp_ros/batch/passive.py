@@ -44,10 +44,10 @@ def require_balance(
         return
     names = [robot.joint_names[j] for j in empty]
     raise NumericalError(
-        'the fit of the physics collapsed: its coefficients cannot be told from zero'
+        'the fit of the physics failed: its coefficients do not differ from zero'
         + (f', with passive joints {names}' if names else ''),
-        'efforts from which the coefficients follow',
-        'leave passive joints out of the robot file, or drive the others harder',
+        'efforts that determine the coefficients',
+        'lock passive joints in the robot file, or drive the others harder',
     )
 
 

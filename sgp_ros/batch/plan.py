@@ -120,9 +120,9 @@ def choose_plan(signals: Signals, robot: Robot, cutoffs: Sequence[float] = CUTOF
         longest = max(s.stop - s.start for s in signals.segments) / signals.rate
         raise RecordingError(
             f'{len(signals.time) / signals.rate:.3g} s of recording at {signals.rate:.3g} Hz, '
-            f'the longest stretch without a gap {longest:.3g} s',
+            f'longest stretch without a gap {longest:.3g} s',
             f'some {3 * len(robot.coefficients)} rows after a low-pass of {cutoffs[0]:g} Hz',
-            'record longer, without gaps, or take another cut-off',
+            'record longer, without gaps, or choose another cut-off',
         )
     regret = _total_regret(trials)
     candidates = tuple(

@@ -202,35 +202,37 @@ def _joint(states: Sequence[JointSample], name: str, limits: tuple[float, float]
 def _clock(found: RecordingCheck) -> list[str]:
     said = []
     if found.gaps:
-        said.append(f'{found.gaps} gaps of more than {_GAP:g} steps: taken as pauses.')
+        said.append(f'{found.gaps} gaps of more than {_GAP:g} periods: treated as pauses.')
     if found.backward or found.repeated:
         said.append(
             f'{found.backward} backward and {found.repeated} repeated stamps: such states are '
-            'refused, sorted, or begin another round.'
+            'refused or sorted, or start a new segment.'
         )
     if found.jitter > _JITTER:
-        said.append(f'Stamps are uneven: steps vary by {100.0 * found.jitter:.0f} %.')
+        said.append(
+            f'The stamps are uneven: sampling periods vary by {100.0 * found.jitter:.0f} %.'
+        )
     return said
 
 
 def _motion(found: RecordingCheck, robot: Robot) -> list[str]:
     said = []
     if found.missing:
-        said.append(f'No states of {", ".join(found.missing)}.')
+        said.append(f'No states for {", ".join(found.missing)}.')
     if found.unknown:
-        said.append(f'Not joints of {robot.name}: {", ".join(found.unknown)}.')
+        said.append(f'Not joints of {robot.name}, ignored: {", ".join(found.unknown)}.')
     still = [name for name, j in found.joints.items() if not j.moves]
     if still:
-        said.append(f'Not moving beyond the noise, so not diagnosed: {", ".join(still)}.')
+        said.append(f'No motion above the noise, so not diagnosed: {", ".join(still)}.')
     driven = {joint.name for joint in robot.joints if joint.is_actuated}
     none = [n for n, j in found.joints.items() if n in driven and j.effort == 0.0]
     if none and not found.commands:
-        said.append(f'Neither effort nor command of {", ".join(none)}.')
+        said.append(f'Neither effort nor command for {", ".join(none)}.')
     one = [n for n, j in found.joints.items() if j.moves and j.reversals < 2]
     if one:
         said.append(
-            f'One direction only: {", ".join(one)}. Friction and a constant load cannot be '
-            'told apart there.'
+            f'Moving in one direction only: {", ".join(one)}. Friction and a constant load cannot '
+            'be separated there.'
         )
     return said
 
@@ -278,4 +280,6 @@ def _targets(
             copies.append(name)
     if not copies:
         return []
-    return [f'The command of {", ".join(copies)} is the measured position itself: no target.']
+    return [
+        f'The command of {", ".join(copies)} equals the measured position: not used as a target.'
+    ]

@@ -114,7 +114,7 @@ def filtered_data(signals: Signals, robot: Robot, plan: FilterPlan) -> FilteredD
         raise RecordingError(
             f'the longest segment lasts {longest:.3g} s',
             f'more than {2 * trim / signals.rate:.3g} s at a cut-off of {plan.cutoff:g} Hz',
-            'take a longer recording or a higher cut-off',
+            'use a longer recording or a higher cut-off',
         )
     return joined(parts)
 

@@ -82,7 +82,7 @@ def collect_signals(
         raise RecordingError(
             f'{len(accepted.stamps_ns)} states, nowhere {SHORTEST_SEGMENT} of them without a pause'
             f' above {config.max_gap:g} s',
-            'a recording without such pauses',
+            'a recording with fewer pauses',
             'record longer, and more states per second',
         )
     steps = np.concatenate([np.diff(accepted.stamps_ns[rows]) for rows in used])

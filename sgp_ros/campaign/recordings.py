@@ -117,7 +117,7 @@ def read_covariates(path: str | None, names: Sequence[str], remarks: list[str]) 
         else:
             rows[name] = row
     if strangers:
-        remarks.append(f'{path}: {len(strangers)} rows are of no recording here, such as '
+        remarks.append(f'{path}: {len(strangers)} rows match no recording, such as '
                        f'{strangers[0]}')  # fmt: skip
     if len(rows) < len(names):
         remarks.append(f'{path}: nothing on {len(names) - len(rows)} of {len(names)} recordings')
@@ -154,7 +154,7 @@ def _numbers(
                 [float(cell) if str(cell).strip() else math.nan for cell in column.tolist()]
             )
         except (ValueError, TypeError):
-            remarks.append(f'{path}: column {name} holds no numbers and is not used')
+            remarks.append(f'{path}: column {name} is not numeric and is not used')
     return found
 
 

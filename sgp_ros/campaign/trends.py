@@ -148,7 +148,9 @@ def _trend(key: Key, series: Series, frame: Frame, scans: int) -> Trend:
     steps: list[Step] = []
     days = (time - time.mean()) / _DAY_S
     if not has_time:
-        remarks.append('the recordings do not say when they began; a column `time` would')
+        remarks.append(
+            'the start times of the recordings are unknown; give them in a column `time`'
+        )
         fit = problem.fit()
     elif not _add(dict(problem.columns), PER_DAY, days, remarks):
         fit = problem.fit()
@@ -178,7 +180,7 @@ def _usable(
     for x in told.values():
         has_all &= np.isfinite(x[rows])
     if has_all.sum() < LEAST_RECORDINGS:
-        remarks.append('time and covariates are known of too few recordings: neither is used')
+        remarks.append('time and covariates are known for too few recordings: neither is used')
         return np.ones(len(rows), bool), {}
     if not has_all.all():
         remarks.append(f'{(~has_all).sum()} recordings without time or covariates are left out')
@@ -193,7 +195,7 @@ def _add(columns: dict[str, np.ndarray], name: str, x: np.ndarray, remarks: list
     if is_new:
         columns[name] = x
     else:
-        remarks.append(f'{name} does not vary, or only as others do: it has no coefficient')
+        remarks.append(f'{name} is constant, or follows from others: it has no coefficient')
     return is_new
 
 

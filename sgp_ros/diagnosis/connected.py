@@ -36,7 +36,7 @@ from sgp_ros.physics.catalogue import TORQUE_GAIN
 from sgp_ros.physics.parts import MOTOR
 from sgp_ros.rigid.tree import Tree
 
-_CORRECTED = 'All that follows is said of the recording corrected so.'
+_CORRECTED = 'All results below are for the recording corrected in this way.'
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,10 +200,7 @@ def _suspected(plain: Connected, found: Connection) -> Connected:
     told = ', '.join(
         f'{e.hypothesis.effect.replace("_", " ")} ({e.hypothesis.joint})' for e in found.errors
     )
-    said = (
-        f'Check how the robot is connected: {told} would leave less, but not little enough to '
-        'be asserted.'
-    )
+    said = f'Check the set-up: {told} would reduce the residual, but not enough to be asserted.'
     return replace(plain, remarks=(said, *plain.remarks))
 
 

@@ -118,7 +118,7 @@ def doubted_if_none(finding: Finding, effect: EffectAt) -> Finding:
         return finding
     return replace(
         finding, probability=min(finding.probability, DOUBTED),
-        why='the 95 % interval of its size includes that there is none',
+        why='the 95 % interval of its size includes zero',
     )  # fmt: skip
 
 
@@ -191,8 +191,8 @@ def bound_remarks(decision: Decision) -> tuple[str, ...]:
         if names:
             where = joint_name(motion, s.place.joint)
             remarks.append(
-                f'{", ".join(names)} of {s.effect.words} ({where}): at the end of the range that '
-                'this recording can tell, so without an interval; the value may lie beyond'
+                f'{", ".join(names)} of {s.effect.words} ({where}): at the limit of what '
+                'this recording determines, so without an interval; the true value may lie beyond'
             )
     return tuple(remarks)
 
@@ -208,9 +208,13 @@ def _unknown(
     names = equations.motion.tree.joint_names
     seen = [r for r in remainders if r.joint == joint]
     own = depends[joint]
-    on = f'it depends on {", ".join(seen[0].inputs)}' if seen else 'no function of the motion'
+    on = (
+        f'it depends on {", ".join(seen[0].inputs)}'
+        if seen
+        else 'it is not a function of the motion'
+    )
     if seen and not any(own.is_significant(name) for name in own.scores):
-        on = f'Z follows {", ".join(seen[0].inputs)}, but no variable alone beyond chance'
+        on = f'Z follows {", ".join(seen[0].inputs)}, but no single variable significantly'
     share = float(decision.model.mean_square[joint] / equations.power[joint])
     where = region(equations, decision.model.residual[:, joint], joint)
     if where.variables:

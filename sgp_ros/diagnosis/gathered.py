@@ -188,4 +188,4 @@ def suspected(events: Iterable[Event], tree: Tree, known: Knowledge) -> tuple[st
     left = probe.agreement(Correction.none(tree.size)).left.max()
     if left < COUNTED_SHARE or not probe.full.effort.any():
         return ()
-    return tuple(f'Check how the robot is connected. {e.remedy}' for e in search(probe).errors)
+    return tuple(f'Check the set-up. {e.remedy}' for e in search(probe).errors)

@@ -57,7 +57,7 @@ from sgp_ros.robots.robot import Robot
 
 Progress = Callable[[float], None]
 _CALM = ('no_mismatch', 'parameters_only')
-_UNCLEAR = 'What machine and simulation have in common is not known: one of them is unexplained.'
+_UNCLEAR = 'What machine and simulation have in common is unknown: one of them is unexplained.'
 
 
 def diagnose(

@@ -57,7 +57,7 @@ class TorqueGain(Effect):
     words = 'a wrong torque constant'
     formula = 'motor torque = gain x command'
     source = _MECHATRONICS
-    appearance = 'the effort that is left is proportional to the effort'
+    appearance = 'the residual effort is proportional to the effort'
     quantities = (Quantity('gain', '1', is_positive=True, neutral=1.0),)
     linear = ('gain',)
     site = MOTOR
@@ -93,7 +93,7 @@ class DeadZone(_Drive):
     name = 'dead_zone'
     words = 'a dead zone of the drive'
     formula = 'motor torque = u - clip(u, -width, width)'
-    appearance = 'small commands have no consequence; large ones lack a constant'
+    appearance = 'small commands have no effect; large ones act with a constant loss'
     quantities = (Quantity('width', 'N m', low=0.0, is_positive=True),)
     drawn_over = 'effort'
 
@@ -125,7 +125,7 @@ class Saturation(_Drive):
     name = 'saturation'
     words = 'an early saturation of the drive'
     formula = 'motor torque = clip(u, -limit, limit)'
-    appearance = 'the largest commands have less consequence than they should'
+    appearance = 'the largest commands have less effect than they should'
     quantities = (Quantity('limit', 'N m', low=0.0, is_positive=True),)
     drawn_over = 'effort'
 
@@ -164,7 +164,7 @@ class MotorSpeedLimit(Effect):
     words = 'a motor torque that falls with speed'
     formula = 'driving torque at most stall_torque max(1 - |v| / no_load_speed, 0)'
     source = 'Hughes and Drury 2019, Electric Motors and Drives'
-    appearance = 'large efforts at high speed have less consequence than they should'
+    appearance = 'large efforts at high speed have less effect than they should'
     quantities = (
         Quantity('stall_torque', 'N m', low=0.0, is_positive=True),
         Quantity('no_load_speed', 'rad/s', low=0.0, is_positive=True),
@@ -245,7 +245,7 @@ class ActuatorLag(_Late):
     name = 'actuator_lag'
     words = 'a lag of the drive'
     formula = 'time_constant d tau/dt + tau = command'
-    appearance = 'the torque follows quick commands late and rounded off'
+    appearance = 'the torque follows fast commands late and smoothed'
     quantities = (Quantity('time_constant', 's', low=1e-4, is_positive=True),)
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
@@ -262,7 +262,7 @@ class CommandDelay(_Late):
     name = 'command_delay'
     words = 'a delay of the command'
     formula = 'motor torque(t) = command(t - delay)'
-    appearance = 'the motion answers to commands later than they were given, unchanged in shape'
+    appearance = 'the motion responds to commands late, otherwise unchanged'
     quantities = (Quantity('delay', 's', low=0.0, is_positive=True, is_sought=True),)
     takes_all = True
 

@@ -33,7 +33,7 @@ class GravityTilt(Effect):
     words = 'a base that is not level'
     formula = 'gravity in base axes = (Ry(pitch) Rx(roll))^T (0, 0, -9.81)'
     source = _MECHANICS
-    appearance = 'efforts that hold the arm differ as if gravity came from another direction'
+    appearance = 'holding efforts differ as if gravity had another direction'
     quantities = (Quantity('roll', 'rad'), Quantity('pitch', 'rad'))
     site = BASE
     uses_bodies = True
@@ -84,7 +84,7 @@ class Payload(Effect):
     words = 'a payload'
     formula = 'a point mass that is fixed to the last link'
     source = _MECHANICS
-    appearance = 'all joints below carry and accelerate more than the bodies of the file'
+    appearance = 'all joints carry and accelerate more mass than the robot file states'
     quantities = (
         Quantity('mass', 'kg', low=0.0, is_positive=True),
         Quantity('x', 'm', is_scored=False), Quantity('y', 'm', is_scored=False),
@@ -153,7 +153,7 @@ class TipForce(Effect):
     words = 'a constant force on the tool'
     formula = 'tau_x = J_tool(q)^T (fx, fy, fz)'
     source = _MECHANICS
-    appearance = 'efforts that change with the pose as the lever arms of one force do'
+    appearance = 'the residual effort changes with the pose like the lever arms of one force'
     quantities = (Quantity('fx', 'N'), Quantity('fy', 'N'), Quantity('fz', 'N'))
     linear = ('fx', 'fy', 'fz')
     site = TOOL

@@ -48,7 +48,7 @@ class PositionFriction(Effect):
     words = 'friction in a part of the range'
     formula = 'tau_x = -amplitude sign(v), or -amplitude v, where lo <= q <= hi'
     source = 'Armstrong-Helouvry, Dupont, Canudas de Wit 1994, section 2.5'
-    appearance = 'friction that comes and goes at the same positions'
+    appearance = 'friction that is present only at certain positions'
     quantities = (
         Quantity('amplitude', 'N m', low=0.0),
         Quantity('lo', 'rad', is_scored=False),

@@ -39,7 +39,7 @@ class JointCoupling(Effect):
     words = 'a coupling between joints'
     formula = 'tau_x = coefficient tau_source, or the force of stiffness/2 (q - ratio q_source)^2'
     source = MECHANICS
-    appearance = 'the effort that is left follows the effort or the position of another joint'
+    appearance = 'the residual effort follows the effort or the position of another joint'
     quantities = (
         Quantity('coefficient', '1', kinds=('torque',)),
         Quantity('stiffness', 'N m/rad', low=0.0, kinds=('spring',)),
@@ -119,7 +119,7 @@ class CoupledFriction(Effect):
         'ratio times that on the source'
     )
     source = 'Gautier, Janot, Vandanjon 2013'
-    appearance = 'the efforts of two joints step together, where a sum of their speeds reverses'
+    appearance = 'the efforts of two joints step together when a sum of their speeds changes sign'
     quantities = (
         Quantity('ratio', '1'),
         Quantity('coulomb', 'N m', low=0.0),

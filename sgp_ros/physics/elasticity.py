@@ -138,7 +138,7 @@ class JointElasticity(Effect):
         'u = motor_inertia ddtheta + tau, tau = stiffness (theta - q) + damping (dtheta - dq)'
     )
     source = 'Spong 1987'
-    appearance = 'efforts are lacking that grow with the fourth derivative of the motion'
+    appearance = 'the residual effort grows with the fourth derivative of the motion'
     quantities = (
         Quantity('stiffness', 'N m/rad', low=0.0, is_positive=True),
         Quantity('damping', 'N m s/rad', low=0.0, is_scored=False),

@@ -39,7 +39,7 @@ class ViscousFriction(Effect):
     words = 'viscous friction'
     formula = 'tau_x = -b v'
     source = _ARMSTRONG
-    appearance = 'the effort that is left grows in proportion to the velocity'
+    appearance = 'the residual effort is proportional to the velocity'
     quantities = (Quantity('b', 'N m s/rad', low=0.0, is_sought=True),)
     linear = ('b',)
     term = TermForm('viscous', ('viscous',), dynamics='damping', is_dissipative=True)
@@ -83,7 +83,7 @@ class StribeckFriction(Effect):
     words = 'Stribeck friction'
     formula = 'tau_x = -(coulomb + (static - coulomb) exp(-(v / stribeck_velocity)^2)) sign(v)'
     source = _ARMSTRONG
-    appearance = 'a step at each reversal, highest at slow speed; jerky slow motion'
+    appearance = 'a step at each reversal, largest at low speed; stick-slip'
     quantities = (
         Quantity('coulomb', 'N m', low=0.0),
         Quantity('static', 'N m', low=0.0),
@@ -149,7 +149,7 @@ class QuadraticDrag(Effect):
     words = 'quadratic drag'
     formula = 'tau_x = -c |v| v'
     source = _ARMSTRONG
-    appearance = 'the effort that is left grows with the square of the velocity'
+    appearance = 'the residual effort grows with the square of the velocity'
     quantities = (Quantity('c', 'N m s2/rad2', low=0.0),)
     linear = ('c',)
     term = TermForm('quadratic', ('quadratic',))
@@ -245,7 +245,7 @@ class FrictionDrift(Effect):
     words = 'friction that drifts with time'
     formula = 'level(t) = end + (start - end) exp(-t / time_constant)'
     source = 'Simoni, Beschi, Legnani, Visioli 2015'
-    appearance = 'friction at the beginning of a recording differs from that at its end'
+    appearance = 'friction differs between the start and the end of a recording'
     quantities = (
         Quantity('start', 'N m', low=0.0),
         Quantity('end', 'N m', low=0.0),

@@ -38,7 +38,7 @@ class Spring(Effect):
     words = 'a spring'
     formula = 'tau_x = -stiffness (q - rest)'
     source = MECHANICS
-    appearance = 'the effort that is left is a straight line over the position'
+    appearance = 'the residual effort is a straight line over the position'
     quantities = (Quantity('stiffness', 'N m/rad', low=0.0), Quantity('rest', 'rad'))
     linear = ('stiffness', 'rest')
     term = TermForm('spring', ('stiffness',))
@@ -71,7 +71,7 @@ class ConstantLoad(Effect):
     words = 'a constant load'
     formula = 'tau_x = force'
     source = MECHANICS
-    appearance = 'the effort that is left is the same everywhere'
+    appearance = 'the residual effort is the same everywhere'
     quantities = (Quantity('force', 'N m'),)
     linear = ('force',)
     term = TermForm('offset', ('offset',), sign=-1.0)
@@ -90,7 +90,7 @@ class Armature(Effect):
     words = 'rotor inertia'
     formula = 'tau_x = -inertia a'
     source = MECHANICS
-    appearance = 'the effort that is left is proportional to the acceleration'
+    appearance = 'the residual effort is proportional to the acceleration'
     quantities = (Quantity('inertia', 'kg m2', low=0.0),)
     linear = ('inertia',)
     term = TermForm('armature', ('armature',), is_dissipative=True)
@@ -112,7 +112,7 @@ class Cogging(Effect):
     words = 'cogging'
     formula = 'tau_x = amplitude sin(periods q + phase)'
     source = 'Holtz and Springob 1996'
-    appearance = 'a wave of the effort over the position, the same in both directions'
+    appearance = 'the residual effort is periodic in the position, the same in both directions'
     quantities = (
         Quantity('amplitude', 'N m'),
         Quantity('periods', '1/revolution'),

@@ -34,7 +34,7 @@ class Hysteresis(Effect):
     words = 'hysteresis (presliding friction)'
     formula = 'tau_x = -level z, dz/dt = (v - |v| z) / presliding'
     source = 'Dahl 1968'
-    appearance = 'steps at reversals that take a way to build up; loops over the position'
+    appearance = 'steps at reversals that build up over a short distance; loops over the position'
     quantities = (
         Quantity('level', 'N m', low=0.0), Quantity('presliding', 'rad', 1e-9, is_positive=True),
     )  # fmt: skip
@@ -107,9 +107,9 @@ class Backlash(Effect):
 
     name = 'backlash'
     words = 'backlash'
-    formula = 'motor and link play freely within gap; the encoder sits on the motor'
+    formula = 'motor and link move freely within gap; the encoder is on the motor'
     source = 'Nordin and Gutman 2002'
-    appearance = 'bursts of effort each time the load on the gear changes its sign'
+    appearance = 'bursts of effort each time the load on the gear changes sign'
     quantities = (
         Quantity('gap', 'rad', low=0.0, is_positive=True, is_sought=True),
         Quantity('motor_inertia', 'kg m2', 1e-12, is_positive=True, is_optional=True,

@@ -58,7 +58,9 @@ class EncoderEccentricity(Effect):
     words = 'an eccentric encoder'
     formula = 'encoder shows q + amplitude sin(periods q + phase)'
     source = 'Kavanagh 2001'
-    appearance = 'a ripple of the effort over the position that grows with speed and acceleration'
+    appearance = (
+        'a ripple of the residual effort over the position that grows with speed and acceleration'
+    )
     quantities = (
         Quantity('amplitude', 'rad'),
         Quantity('periods', '1/revolution'),
@@ -141,9 +143,9 @@ class VelocityFilterLag(Effect):
 
     name = 'velocity_filter_lag'
     words = 'a lag of the measured velocity'
-    formula = 'the velocity field is the velocity behind a first-order low-pass'
+    formula = 'measured velocity = velocity after a first-order low-pass'
     source = 'a first-order filter in the drive'
-    appearance = 'the velocity field trails the derivative of the position'
+    appearance = 'the measured velocity lags behind the derivative of the position'
     quantities = (Quantity('time_constant', 's', low=1e-4, is_positive=True),)
     is_force = False
     is_online = False

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from sgp_ros.diagnosis.result import Finding
 from sgp_ros.engine.samples import Event, JointSample
@@ -14,9 +15,12 @@ from sgp_ros.report.diagnosis_text import phrase, place, plain_name
 from sgp_ros.report.metrics import versions
 from sgp_ros.report.next_steps import Steps
 from sgp_ros.report.page import render_page
+from sgp_ros.report.robot_picture import picture_of_robot
 from sgp_ros.robots.robot import Robot
 
 _MOST_JOINTS = 12
+KINDS = {'unnamed': 'without joint names'}
+"""Words for kinds of commands that are not their own."""
 
 
 def render_check(
@@ -41,6 +45,7 @@ def render_check(
         title=f'Check of {content["recording"]} for {content["robot"]}',
         verdict=check_sentence(content, setup),
         is_fit=content['is_fit'],
+        picture=Markup(picture_of_robot(robot, _posture(events), {})),  # noqa: S704 - escaped
         setup=[{'place': place(f), 'text': phrase(f), 'p': f'{f.probability:.2f}'} for f in setup],
         joints=content['joints'].items(),
         units={joint.name: joint.unit('position') for joint in robot.joints},
@@ -53,14 +58,25 @@ def render_check(
     )  # fmt: skip
 
 
+def _posture(events: Sequence[Event]) -> dict[str, float]:
+    """Return the median position of each joint that finite states name [rad or m]."""
+    found: dict[str, list[float]] = {}
+    for event in events:
+        if isinstance(event, JointSample) and len(event.position) == len(event.names):
+            for name, x in zip(event.names, event.position, strict=True):
+                if np.isfinite(x):
+                    found.setdefault(name, []).append(float(x))
+    return {name: float(np.median(x)) for name, x in found.items()}
+
+
 def _counts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    kinds = ', '.join(content['command_kinds']) or 'no kind'
+    kinds = ', '.join(KINDS.get(kind, kind) for kind in content['command_kinds'])
     jitter = 100.0 * content['jitter'] if content['jitter'] is not None else 0.0
     stamps = ', '.join(f'{content[name]} {name}' for name in ('gaps', 'backward', 'repeated'))
     return [
         ('states', f'{content["states"]} in {content["seconds"]:.4g} s'),
         ('rate', f'{content["rate_hz"]:.4g} Hz, jitter {max(round(jitter, 2), 0.0):g} %'),
-        ('commands', f'{content["commands"]}, {kinds}'),
+        ('commands', f'{content["commands"]}, {kinds}' if kinds else 'none'),
         ('stamps', stamps),
     ]
 
@@ -69,13 +85,13 @@ def check_sentence(content: Mapping[str, Any], setup: Sequence[Finding]) -> str:
     """Say whether a recording is fit for a diagnosis, and what is wrong with it first."""
     name = content['recording']
     if content['missing']:
-        return f'{name} is not fit: it has no states of {", ".join(content["missing"])}.'
+        return f'{name} cannot be diagnosed: it has no states for {", ".join(content["missing"])}.'
     if not content['is_fit']:
-        return f'{name} is not fit for a diagnosis: {content["remarks"][-1]}'
+        return f'{name} cannot be diagnosed: {content["remarks"][-1]}'
     still = [joint for joint, j in content['joints'].items() if not j['moves']]
-    text = f'{name} is fit for a diagnosis'
+    text = f'{name} can be diagnosed'
     if still:
-        text += f', but of {", ".join(still)} there is no motion beyond the noise'
+        text += f', but without {", ".join(still)}: there is no motion above the noise'
     if setup:
         text += f'. First correct the set-up: {place(setup[0])}, {phrase(setup[0])}'
     told = [

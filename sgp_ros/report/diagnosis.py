@@ -59,7 +59,7 @@ _VERDICTS = {
     'parameters_only': 'Only parameters are wrong',
     'no_mismatch': 'No mismatch',
     'unexplained': 'Unexplained',
-    'setup_error': 'Connected wrongly',
+    'setup_error': 'Set-up error',
 }
 
 

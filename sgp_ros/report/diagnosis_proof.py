@@ -108,7 +108,7 @@ def rollouts_sentences(found: Diagnosis) -> str:
         return ''
     parts = [
         f'{recording_name(stem)} {p.rollouts}'
-        + (f' ({p.failed} left out, as one of the models did not end)' if p.failed else '')
+        + (f' ({p.failed} left out, as one of the models diverged)' if p.failed else '')
         for stem, p in made.items()
     ]
     stem, far = max(made.items(), key=lambda item: item[1].distance)
@@ -117,9 +117,9 @@ def rollouts_sentences(found: Diagnosis) -> str:
     on = 'On what was learned from' if stem == 'train' else f'On {recording_name(stem)}'
     return (
         f'Roll-outs start from measured states and last {HORIZON_S:g} s under the recorded '
-        'commands; 1 is the error of holding the position at their start, and a model that is '
-        f'worse than that exceeds it. {on}, the nominal robot misses {joint} by {misses[0]} of '
-        f'its way, the final model by {misses[1]} (root mean square). '
+        'commands; 1 is the error of staying at the start position, and a model that is '
+        f'worse exceeds it. {on}, the rms error of {joint} is {misses[0]} of its travel for the '
+        f'nominal robot and {misses[1]} for the final model. '
         f'Number of roll-outs: {", ".join(parts)}.'
     )
 
@@ -127,7 +127,7 @@ def rollouts_sentences(found: Diagnosis) -> str:
 def _way(nmse: float) -> str:
     """Return the root of an error as a share of the way, or as a multiple of it."""
     share = math.sqrt(nmse)
-    return f'{100.0 * share:.2g} %' if share < 0.995 else f'{share:.3g} times the length'
+    return f'{100.0 * share:.2g} %' if share < 0.995 else f'{share:.3g} times'
 
 
 def _nats(value: float, interval: tuple[float, float] | None) -> str:

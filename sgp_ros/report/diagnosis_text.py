@@ -145,11 +145,14 @@ def equivalence_sentence(found: Equivalent) -> str:
         f'{plain_name(effect)} {_PLACES.get(joint, f"on {joint}")}'
         for joint, effect in found.effects
     ]
-    text = f'On this motion {" with ".join(parts) or "another set of bodies"} fits as well'
+    others = f'{", ".join(parts[:-1])} and {parts[-1]} together' if parts[1:] else ''.join(parts)
+    text = f'On this motion {others or "another set of bodies"} would fit equally well'
     if not found.motion:
-        return f'{text}; no motion that was tried tells them apart: measure one of them by itself.'
+        return f'{text}; no motion tried can separate them: measure one of them separately.'
     factor = f'{found.contrast:.0f}' if found.contrast < 1e4 else 'more than 10000'
-    return f'{text}; {found.motion} tells them apart: their efforts differ {factor} times as much.'
+    return (
+        f'{text}; {found.motion} separates them: their efforts then differ {factor} times as much.'
+    )
 
 
 def percent(share: float) -> str:
@@ -166,7 +169,9 @@ def percent(share: float) -> str:
 def parameter_errors_text(errors: Sequence[ParameterError]) -> str:
     """Return the surest wrong parameters, such as `mass of fore 1.59 kg instead of 1.17 kg`."""
     if not errors:
-        return 'combinations of masses, centres and inertias that this motion does not separate'
+        return (
+            'combinations of masses, centres of mass and inertias that this motion cannot separate'
+        )
     surest = sorted(errors, key=lambda e: -abs(e.value - e.nominal) / max(e.std, 1e-300))
     parts = [_error(e) for e in surest[:_MOST_ERRORS]]
     more = len(surest) - len(parts)

@@ -6,6 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from markupsafe import Markup
+
 from sgp_ros.engine.engine import Engine
 from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.report.charts import Chart
@@ -13,6 +16,7 @@ from sgp_ros.report.figures import History, draw_all, write_figures
 from sgp_ros.report.files import write_text
 from sgp_ros.report.next_steps import Steps
 from sgp_ros.report.page import render_page
+from sgp_ros.report.robot_picture import picture_of_robot
 from sgp_ros.report.run_charts import run_charts
 
 MEANINGS = {
@@ -22,10 +26,10 @@ MEANINGS = {
     'unpaired': 'no command at or before it, or one that is too old, and no measured effort',
     'unknown_joint': 'a joint of the robot is not in the message',
     'gap': 'the first state after a pause longer than max_gap',
-    'wrong_length': 'positions, velocities or efforts are not as many as names',
+    'wrong_length': 'the numbers of positions, velocities or efforts and of names differ',
     'clock': 'a stamp far from those of the other states',
     'implausible': 'far beyond the limits of position, speed or effort in the model file',
-    'error': 'an internal error of this package struck on it; please report it',
+    'error': 'an internal error of this package; please report it',
 }
 
 
@@ -53,7 +57,8 @@ def write_report(
     figures = write_figures(out, draw_all(engine, history, truth))
     paths = [out / f'{name}.png' for name in figures]
     charts = run_charts(engine, history, truth or {})
-    page = render(engine, metrics, charts, figures, truth or {}, checks, steps)
+    picture = _picture(engine, history, metrics)
+    page = render(engine, metrics, charts, figures, truth or {}, checks, steps, picture)
     paths.append(out / 'report.html')
     write_text(paths[-1], page)
     return paths
@@ -67,8 +72,9 @@ def render(
     truth: Mapping[str, float],
     checks: Sequence[str],
     steps: Steps = (),
+    picture: str = '',
 ) -> str:
-    """Return the page as HTML; every text in it is escaped."""
+    """Return the page as HTML; every text in it is escaped, names in the picture are already."""
     samples = metrics['samples']
     timing = metrics['timing']
     return render_page(
@@ -76,6 +82,8 @@ def render(
         title=f'{metrics["robot"]} identified from {metrics["recording"]}',
         subtitle=engine.robot.description,
         verdict=verdict(metrics),
+        picture=Markup(picture),  # noqa: S704 - names in it are escaped
+        target=engine.robot.target,
         checks=list(checks),
         cards=_cards(metrics),
         predictions=[name for name in charts if name.startswith(('acceleration ', 'effort '))],
@@ -88,7 +96,7 @@ def render(
             f'{samples["read"]} states read, {samples["used"]} used; '
             f'{metrics["commands"]["read"]} commands read, '
             f'{sum(metrics["commands"]["refused"].values())} refused. '
-            f'The filter averages over a window; predictions stand {metrics["delay_s"]:.3g} s '
+            f'The filter averages over a window; predictions lag {metrics["delay_s"]:.3g} s '
             'behind the newest state.'
         ),
         refusals=[
@@ -98,14 +106,31 @@ def render(
         ],
         remarks=metrics['remarks'],
         timing=(
-            f'One push took {timing["push_ms"]["p50"]:.3g} ms (median), '
-            f'{timing["push_ms"]["p99"]:.3g} ms (99 %); the run was '
-            f'{timing["realtime_factor"]:.3g} times faster than the robot.'
+            f'A message took {timing["push_ms"]["p50"]:.3g} ms (median), '
+            f'{timing["push_ms"]["p99"]:.3g} ms (99th percentile); the run was '
+            f'{timing["realtime_factor"]:.3g} times faster than real time.'
         ),
         settings=sorted(metrics['settings'].items()),
         next_steps=list(steps),
         versions=list(metrics['versions'].items()),
     )  # fmt: skip
+
+
+def _picture(engine: Engine, history: History, metrics: Mapping[str, Any]) -> str:
+    """Return the robot in the middle of its motion, coloured by what the physics alone leaves."""
+    robot = engine.robot
+    left = {
+        joint: scores[robot.target]['nmse']
+        for joint, scores in metrics['physics_alone'].items()
+        if robot.target in scores
+    }
+    total = sum(left.values())
+    shares = {joint: x / total for joint, x in left.items()} if total > 0.0 else {}
+    rows = [e.position for e in history.estimates]  # n of (k,)
+    middle = np.median(rows, axis=0) if rows else np.zeros(len(robot.joints))
+    posture = dict(zip(robot.joint_names, middle.tolist(), strict=True))
+    what = 'share of what the physics alone leaves by joint'
+    return picture_of_robot(robot, posture, shares, what)
 
 
 def _cards(metrics: Mapping[str, Any]) -> list[dict[str, str]]:
@@ -186,11 +211,11 @@ def _parameter_row(
 def _parameter_note(metrics: Mapping[str, Any]) -> str:
     if metrics['settings']['parameters.source'] == 'physics':
         return (
-            'The values are those of the physics alone: the process Z sees what the columns are '
-            'made of and could imitate them. Their intervals take the model for complete.'
+            'The values come from a fit of the physics alone, as the process Z could take over '
+            'what the parameters explain. Their intervals assume that the model is complete.'
         )
     return (
-        'The values are the joint posterior of W beside the process Z. The last column is a fit '
-        'of the physics without Z to the same samples: where the two differ by more than the '
-        'interval, physics is missing or Z can imitate a column.'
+        'The values were estimated together with the process Z. The last column is a fit of the '
+        'physics alone to the same samples: where the two differ by more than the interval, '
+        'physics is missing, or Z takes over part of what the parameters explain.'
     )

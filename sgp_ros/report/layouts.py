@@ -21,7 +21,7 @@ Plots = Mapping[str, Curves]
 """Title to curves; each is drawn for every joint."""
 
 FINDING: Plots = {
-    'what the models leave': (
+    'residuals of the models': (
         ('/finding/residual/nominal', 'effort'), ('/finding/residual/final', 'effort'),
         ('/finding/band/lower', 'effort'), ('/finding/band/upper', 'effort'),
     ),
@@ -64,7 +64,7 @@ def write_live_layouts(out: Path, node: str, joints: Sequence[str]) -> None:
     panels = {
         'Indicator!alarm': {
             'path': f'{name}/alarm.data', 'style': 'background', 'rules': rules,
-            'fallbackColor': '#a0a0a0', 'fallbackLabel': 'no word',
+            'fallbackColor': '#a0a0a0', 'fallbackLabel': 'no status',
         },
         'DiagnosticSummary!all': {
             'minLevel': 0, 'pinnedIds': [], 'hardwareIdFilter': '', 'sortByLevel': True,

@@ -29,7 +29,7 @@ def after_diagnosis(found: Diagnosis, bag: str, robot: str, out: Path) -> Steps:
         return [('Correct the set-up or the robot file, record, and diagnose again:', again)]
     if found.verdict == 'no_mismatch':
         other = f'sgp diagnose {_OTHER} --robot {quote(robot)}'
-        return [('Nothing to correct. A motion that excites more may show more:', other)]
+        return [('Nothing to correct. A larger or faster motion may show more:', other)]
     if found.verdict == 'unexplained':
         learn = f'sgp replay {quote(bag)} --robot {diagnosed}'
         return [('Learn the unexplained part with a Gaussian process:', learn)]
@@ -84,13 +84,17 @@ def after_import(path: Path, robot: str | None, gains: Path | None = None) -> St
 def after_check(bag: str, robot: str, *, is_fit: bool) -> Steps:
     """Return what to do with a recording that was checked."""
     verb = 'diagnose' if is_fit else 'check'
-    said = 'Find what physics the model lacks:' if is_fit else 'Correct this, then check again:'
+    said = (
+        'Find what physics the model lacks:'
+        if is_fit
+        else 'Correct the problem, then check again:'
+    )
     return [(said, f'sgp {verb} {quote(bag)} --robot {quote(robot)}')]
 
 
 def after_simulation(path: Path, robot: str) -> Steps:
     """Return what to do with a simulated recording of a robot."""
-    return [('Find what was put in:',
+    return [('Find the effects that were put in:',
              f'sgp diagnose {_path(path)} --robot {quote(robot)}')]  # fmt: skip
 
 

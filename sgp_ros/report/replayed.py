@@ -13,10 +13,10 @@ from sgp_ros.report.page import render_page
 
 _TONES = {'nominal': 'nominal', 'simulated': 'final'}
 _MODES = {
-    'open_0.5': 'anew from the measured state every 0.5 s, under the recorded efforts alone',
-    'open_2': 'anew from the measured state every 2 s, under the recorded efforts alone',
-    'open_whole': 'from the first state on, under the recorded efforts alone',
-    'closed_whole': 'from the first state on, the targets acting through the drives',
+    'open_0.5': 'restarted from the measured state every 0.5 s, driven by the recorded efforts',
+    'open_2': 'restarted from the measured state every 2 s, driven by the recorded efforts',
+    'open_whole': 'from the first state on, driven by the recorded efforts',
+    'closed_whole': 'from the first state on, driven by the recorded targets through the drives',
 }
 
 

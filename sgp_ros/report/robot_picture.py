@@ -11,8 +11,10 @@ from html import escape
 
 import numpy as np
 
+from sgp_ros.errors import ConfigError
 from sgp_ros.rigid.rigid_geometry import full_motion
 from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.robot import Robot
 
 _WIDTH, _HEIGHT, _EDGE, _LABELS = 440.0, 300.0, 24.0, 165.0
 _ELEVATION = np.deg2rad(20.0)
@@ -70,6 +72,27 @@ def robot_picture(
         f'<svg class="robot" viewBox="0 0 {_WIDTH:.0f} {_HEIGHT:.0f}" role="img" '
         f'aria-label="{escape(label)}">{"".join(parts)}</svg>'
     )
+
+
+def picture_of_robot(
+    robot: Robot, positions: Mapping[str, float], shares: Mapping[str, float], what: str = ''
+) -> str:
+    """Return a robot of any kind as an `svg` element; empty for one without nominal bodies.
+
+    Args:
+        robot: whose bodies are drawn.
+        positions: of its joints [rad or m].
+        shares: 0 to 1 by joint, empty for none.
+        what: the shares are.
+    """
+    from sgp_ros.robots.nominal import nominal_model  # noqa: PLC0415 - loads Pinocchio
+
+    try:
+        tree = nominal_model(robot).plain
+    except ConfigError:
+        return ''
+    posture = np.array([positions.get(name, 0.0) for name in tree.moving_names])
+    return robot_picture(tree, posture, shares, what)
 
 
 def link_places(tree: Tree, posture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -34,7 +34,7 @@ def verdict_sentence(found: Diagnosis) -> str:
         each = [f'{place(f)}: {phrase(f)} (probability {f.probability:.2f})' for f in found.setup]
         head = f'The recording and the robot file contradict each other: {"; ".join(each)}.'
         rest = verdict_sentence(replace(found, setup=()))
-        return head if found.verdict == 'setup_error' else f'{head} Beside that: {rest}'
+        return head if found.verdict == 'setup_error' else f'{head} In addition: {rest}'
     if _is_compared(found):
         return _against_simulation(found)
     if found.verdict == 'missing_physics':
@@ -73,7 +73,7 @@ def held_out_sentence(found: Diagnosis) -> str:
 def _missing(found: Diagnosis) -> str:
     if not found.findings:
         return (
-            'Nothing is missing that all recordings have in common, but they differ: '
+            'No physics is missing in all recordings alike, but the recordings differ: '
             f'{"; ".join(differences_text(found))}.'
         )
     first = found.findings[0]
@@ -121,7 +121,7 @@ def _unexplained(found: Diagnosis) -> str:
     scores = {} if of is None else {n: s for n, s in of.scores.items() if of.is_significant(n)}
     leading = sorted(scores, key=lambda name: -scores[name])[:_MOST_VARIABLES]
     on = [f'{name} ({percent(scores[name])})' for name in leading if scores[name] > 0.05]
-    text += f'; it depends on {" and ".join(on)}' if on else '; no variable alone explains it'
+    text += f'; it depends on {" and ".join(on)}' if on else '; no single variable explains it'
     formulas = {f.log_bayes_factor for f in found.alternatives if f.effect == LAW}
     listed = [f for f in found.alternatives if f.log_bayes_factor not in formulas]
     if not listed:
@@ -151,11 +151,11 @@ def _against_simulation(found: Diagnosis) -> str:
         return f'The machine differs from its simulation {"; ".join(each)}.{both}'
     if found.verdict == 'parameters_only':
         return (
-            'The machine has the physics of its simulation, only parameters of bodies differ '
+            'The machine has the physics of its simulation, only inertial parameters differ '
             f'(certainty {found.certainty:.2f}).{both}'
         )
     return (
-        'No mismatch: what differs between machine and simulation is too little to be physics '
+        'No mismatch: machine and simulation differ by too little to be missing physics '
         f'(certainty {found.certainty:.2f}).{both}'
     )
 

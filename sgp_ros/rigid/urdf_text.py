@@ -37,11 +37,13 @@ def parse_urdf(path_or_text: str | Path) -> Urdf:
     """
     place, text = _text(path_or_text)
     if '<!DOCTYPE' in text or '<!ENTITY' in text:
-        raise ConfigError(f'{place} declares a document type', 'a URDF', 'remove <!DOCTYPE ...>')
+        raise ConfigError(
+            f'{place} contains a document type declaration', 'a URDF', 'remove <!DOCTYPE ...>'
+        )
     try:
         root = parse_xml(text)
     except (ET.ParseError, ValueError) as error:
-        raise ConfigError(f'{place} is no XML ({error})', 'a URDF') from error
+        raise ConfigError(f'{place} is not XML ({error})', 'a URDF') from error
     if root.tag != 'robot':
         raise ConfigError(
             f'{place} holds <{root.tag}>', 'a URDF with <robot>', 'expand xacro files first'

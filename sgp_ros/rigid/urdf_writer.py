@@ -110,7 +110,9 @@ class _Places:
         try:
             self._parser.Parse(self._source, True)  # noqa: FBT003  # takes no keywords
         except expat.ExpatError as error:
-            raise ConfigError(f'a robot description that is no XML ({error})', 'a URDF') from error
+            raise ConfigError(
+                f'a robot description that is not XML ({error})', 'a URDF'
+            ) from error
         self._settle()
         return self._root.children[0]
 

@@ -37,7 +37,7 @@ def simulated_model(file: str, robot: Nominal) -> tuple[Nominal, tuple[EffectAt,
     if set(sim.tree.moving_names) != set(names):
         raise ConfigError(
             f'simulation {Path(file).name} with the joints {list(sim.tree.moving_names)}',
-            f'those of the robot, {list(names)}', 'give the model of the same machine',
+            f'those of the robot, {list(names)}', 'give a model of the same machine',
         )  # fmt: skip
     if sim.tree.moving_names != names:
         sim = nominal_model(_with(sim.robot, joints=list(names)))
@@ -46,7 +46,7 @@ def simulated_model(file: str, robot: Nominal) -> tuple[Nominal, tuple[EffectAt,
     if other:
         raise ConfigError(
             f'simulation {Path(file).name} of another machine: {", ".join(other)} there',
-            'joints of the same kind as those of the robot', 'give the model of the same machine',
+            'joints of the same kind as those of the robot', 'give a model of the same machine',
         )  # fmt: skip
     effects = tuple(e for e in sim.effects if e.is_complete and not e.effect.is_on_tree)
     return nominal_model(_bare(sim, robot.robot)), (*joint_friction(sim.tree), *effects)
@@ -57,7 +57,7 @@ def _bare(sim: Nominal, robot: Robot) -> Robot:
     none = dict.fromkeys(sim.tree.joint_names, (0.0, 0.0))
     text = stated_urdf(sim.robot, sim.without_stated(sim.tree.parameters), none)
     if text is None:
-        raise ConfigError(f'simulation {sim.robot.name} with bodies that no URDF can hold')
+        raise ConfigError(f'simulation {sim.robot.name} with bodies that a URDF cannot express')
     passive = [j.name for j in robot.joints if not j.is_actuated]
     gain = {j.name: j.effort_gain for j in robot.joints if j.effort_gain != 1.0}
     kept = [e for e in _effects(sim.robot) if _is_on_tree(e, sim)]
@@ -82,5 +82,5 @@ def _with(robot: Robot, **entries: object) -> Robot:
     problems: list[str] = []
     built = build_urdf_robot({**robot.source, **entries}, Path(), problems)
     if built is None or problems:
-        raise ConfigError(f'robot {robot.name}: ' + ' | '.join(problems), 'a robot as before')
+        raise ConfigError(f'robot {robot.name}: ' + ' | '.join(problems), 'a valid robot file')
     return built

@@ -58,12 +58,11 @@ class Nominal:
     def remarks(self) -> tuple[str, ...]:
         """What a user should know of it."""
         lumped = (
-            f'The bodies of {self.robot.name} are the simplest that have its coefficients: '
-            'mass and centre of a link are no measurement.'
+            f'The bodies of {self.robot.name} are the simplest with its coefficients: '
+            'mass and centre of mass of a link are not measured.'
         )
         unclear = tuple(
-            f'{e.name} of {e.joint} is stated by too few numbers and so not part of the nominal '
-            'robot.'
+            f'{e.name} of {e.joint} is not stated completely and so not part of the nominal robot.'
             for e in self.effects
             if not e.is_complete
         )
@@ -97,12 +96,14 @@ def nominal_model(robot: Robot) -> Nominal:
         document = bodies.document(robot.name, robot.joints, robot.coefficients)
         built = build_urdf_robot(document, Path(), problems)
         if built is None or problems:
-            raise ConfigError(f'robot {robot.name}: ' + ' | '.join(problems), 'bodies that exist')
+            raise ConfigError(
+                f'robot {robot.name}: ' + ' | '.join(problems), 'physically possible bodies'
+            )
         robot = built
     plain = nominal_tree(robot)
     effects = read_effects(robot.source.get('effects'), plain, problems)
     if problems:
-        raise ConfigError(f'robot {robot.name}: ' + ' | '.join(problems), 'as it was before')
+        raise ConfigError(f'robot {robot.name}: ' + ' | '.join(problems), 'valid effects')
     values, remarks = values_of(robot), list[str]()
     loaded = changed_tree(plain, effects)
     effects = (

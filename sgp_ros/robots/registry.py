@@ -64,7 +64,9 @@ def load_robot(name_or_path: str) -> Robot:
     path = find_file(name_or_path, Path())
     expected = f'one of {list(robot_names())} or a robot file (.yaml, {", ".join(MODEL_ENDINGS)})'
     if not path.is_file():
-        raise ConfigError(f'robot {name_or_path!r} is no built-in name and no file', expected)
+        raise ConfigError(
+            f'robot {name_or_path!r} is neither a built-in robot nor a file', expected
+        )
     require_file(path, 'TEXT_MB')
     with readable(path, ConfigError, 'a robot file'):
         return _from_file(path, expected)
@@ -74,7 +76,7 @@ def _from_file(path: Path, expected: str) -> Robot:
     if path.suffix.lower() in MODEL_ENDINGS:
         return _plain(path)
     if path.suffix not in ('.yaml', '.yml'):
-        raise ConfigError(f'robot file {path} with ending {path.suffix!r}', expected)
+        raise ConfigError(f'robot file {path} has the file type {path.suffix!r}', expected)
     return _build(path)
 
 

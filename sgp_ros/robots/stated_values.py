@@ -32,7 +32,7 @@ from sgp_ros.robots.urdf_robot import nominal_tree, urdf_text
 Values = Mapping[str, float]
 ROUNDING = 1e-9
 """Share of a pseudo-inertia below which it may be negative."""
-NO_BODY = 'No body has the parameters that are stated of {link}: those of the URDF count.'
+NO_BODY = 'The stated parameters of {link} are physically impossible: those of the URDF are used.'
 
 
 def values_of(robot: Robot) -> dict[str, float]:

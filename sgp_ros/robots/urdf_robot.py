@@ -116,7 +116,7 @@ def nominal_robot(robot: Robot) -> Robot:
     problems: list[str] = []
     nominal = build_urdf_robot(source, Path(), problems)
     if nominal is None or problems:
-        raise ConfigError(f'URDF {source["urdf"]}: ' + ' | '.join(problems), 'as it was before')
+        raise ConfigError(f'URDF {source["urdf"]}: ' + ' | '.join(problems), 'a valid URDF')
     return nominal
 
 
@@ -134,7 +134,7 @@ def nominal_tree(robot: Robot) -> Tree:
     source = str(robot.source['urdf'])
     tree = _read_tree(Entries(robot.source, problems), _place(source, Path()))
     if tree is None:
-        raise ConfigError(f'URDF {source}: ' + ' | '.join(problems), 'as it was before')
+        raise ConfigError(f'URDF {source}: ' + ' | '.join(problems), 'a valid URDF')
     return tree
 
 

@@ -57,7 +57,7 @@ def declare(node: Node, settings: Iterable[Setting]) -> dict[str, SettingValue]:
             values[setting.name] = setting.convert(value)
     if problems:
         raise ConfigError(
-            f'{len(problems)} wrong parameter(s):  ' + ' | '.join(problems),
+            f'{len(problems)} wrong parameter(s): ' + ' | '.join(problems),
             '',
             'write a double with a decimal point',
         )

@@ -34,7 +34,7 @@ def parse_effect(text: str) -> EffectAt:
     for part in filter(None, (piece.strip() for piece in rest.split(','))):
         key, equals, value = (piece.strip() for piece in part.partition('='))
         if not equals or not value:
-            problems.append(f'{part!r} is no name=value')
+            problems.append(f'{part!r} is not of the form name=value')
         elif key in words:
             problems.append(f'{key} is given twice')
         else:

@@ -63,10 +63,10 @@ def tree_simulator(urdf: str, part: TreePart | None = None) -> Simulator:
 
 def _description(tree: Tree) -> str:
     if not tree.text.stand_ins:
-        return 'The robot of a URDF'
+        return f'Rigid-body robot {tree.text.name}'
     return (
-        f'The robot of a URDF without masses: each link is a ball of {STAND_IN_MASS:g} kg and '
-        f'{STAND_IN_RADIUS:g} m, so its efforts are those of no real machine'
+        f'Robot {tree.text.name} without masses: each link is a ball of {STAND_IN_MASS:g} kg and '
+        f'{STAND_IN_RADIUS:g} m radius, so its efforts are not those of a real machine'
     )
 
 

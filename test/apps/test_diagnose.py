@@ -160,7 +160,7 @@ def _held_still(event):
 @pytest.mark.parametrize(
     ('change', 'said'),
     [
-        (lambda events: events[:40], 'take a longer recording'),
+        (lambda events: events[:40], 'use a longer recording'),
         (lambda events: [_held_still(e) for e in events], 'no joint of planar_2r moves'),
         (lambda events: [], 'contains no messages'),
         (lambda events: [e for e in events if isinstance(e, JointSample)], 'effort'),
@@ -194,7 +194,7 @@ def test_a_recording_that_tells_nothing_ends_in_one_line(
             'case_05/real.mcap',
             'case_05/robot.urdf',
             ('--sim', _case('01') / 'sim.mcap'),
-            "sim.mcap shows the joints ['hinge']",
+            "sim.mcap contains the joints ['hinge']",
         ),
         (
             'case_05/real.mcap',
@@ -203,7 +203,7 @@ def test_a_recording_that_tells_nothing_ends_in_one_line(
             "real_test.mcap shows the joints ['hinge']",
         ),
         ('nowhere.mcap', 'case_05/robot.urdf', (), 'no recording at'),
-        ('case_05/real.mcap', 'nowhere.urdf', (), 'no built-in name and no file'),
+        ('case_05/real.mcap', 'nowhere.urdf', (), 'neither a built-in robot nor a file'),
         ('case_05/real.mcap', 'case_05/robot.urdf', ('--sim', 'nowhere.mcap'), 'nowhere.mcap'),
         ('case_05/real.mcap', 'case_05/robot.urdf', ('--test', 'nowhere.mcap'), 'nowhere.mcap'),
         ('case_05/real.mcap', 'case_05/robot.urdf', ('--joint-states', '/no'), 'no topic /no'),

@@ -232,5 +232,5 @@ def test_what_a_node_does_not_model_is_said_with_what_a_replay_leaves(tmp_path):
         'effort_nmse': scores,
     }  # fmt: skip
     said = found.remark({'elbow': 0.0012})
-    assert 'does not model backlash of elbow, what has no name at shoulder' in said
+    assert 'does not model backlash of elbow, the unexplained part at shoulder' in said
     assert f'elbow {scores["elbow"]:.2g} (here 0.0012)' in said

@@ -351,4 +351,4 @@ def test_a_wrong_connection_is_said_before_bodies_are_estimated(swing, tmp_path,
             writer.write_event(replace(e, position=-e.position + 0.9) if is_state else e)
     out = tmp_path / 'out'
     assert main(_command(tmp_path / 'turned.mcap', swing / 'swing.xml', out)) == 0
-    assert 'Check how the robot is connected.' in (out / 'report.html').read_text()
+    assert 'Check the set-up.' in (out / 'report.html').read_text()

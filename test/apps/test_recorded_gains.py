@@ -81,7 +81,7 @@ def test_given_gains_count_before_recorded_ones(bag, robot, tmp_path):
     events = read_events(str(bag), None, None, [])
     gains = gains_of(str(tmp_path / 'gains.yaml'), nominal, events, remarks)
     assert (gains.is_recorded, list(gains.kp)) == (False, [9.0])
-    assert remarks == ['The gains are those given, not those recorded beside the targets.']
+    assert remarks == ['The given gains are used, not those recorded with the targets.']
 
 
 def test_a_recording_without_gains_beside_one_with_is_refused(bag, robot):
@@ -92,7 +92,7 @@ def test_a_recording_without_gains_beside_one_with_is_refused(bag, robot):
         CommandSample(e.stamp_ns, e.effort, e.names, e.kind) if isinstance(e, CommandSample) else e
         for e in events
     ]
-    with pytest.raises(RecordingError, match='gains of no joint beside the targets; expected kp'):
+    with pytest.raises(RecordingError, match='gains of no joint with the targets; expected kp'):
         collect(bare, nominal.robot, gains=gains)
 
 

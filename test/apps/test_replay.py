@@ -39,7 +39,7 @@ def test_bodies_that_are_not_found_do_not_cost_the_replay(monkeypatch, tmp_path)
     monkeypatch.setattr(consistent.clarabel, 'DefaultSettings', impatient)
     with replacing_results(tmp_path, 'replay'):
         remark = write_identified_robot(tmp_path, engine)
-    assert 'possibly impossible' in remark
+    assert 'may be physically impossible' in remark
     assert '\n' not in remark
     assert not (tmp_path / 'robot_identified.urdf').exists()
     again = load_robot(str(tmp_path / 'robot_identified.yaml'))

@@ -21,13 +21,13 @@ def test_other_joints_are_named_with_the_nearest_of_each():
     with pytest.raises(RecordingError) as caught:
         require_joints([other], ROBOT, 'a.mcap')
     text = str(caught.value)
-    assert "a.mcap shows the joints ['fer_elbow', 'fer_shoulder']" in text
+    assert "a.mcap contains the joints ['fer_elbow', 'fer_shoulder']" in text
     assert "the joints ['shoulder', 'elbow'] of double_pendulum" in text
-    assert 'shoulder is nearest to fer_shoulder, elbow is nearest to fer_elbow' in text
+    assert 'shoulder is closest to fer_shoulder, elbow is closest to fer_elbow' in text
 
 
 def test_joints_that_come_apart_are_refused_and_further_ones_are_not():
-    with pytest.raises(RecordingError, match='no message of x names all joints together'):
+    with pytest.raises(RecordingError, match='no message in x contains all joints'):
         require_joints([_state('shoulder'), _state('elbow')], ROBOT, 'x')
     require_joints([_state('gripper'), _state('elbow', 'gripper', 'shoulder')], ROBOT)
     require_joints([], ROBOT)

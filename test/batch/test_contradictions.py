@@ -50,13 +50,12 @@ def test_units_that_limits_contradict_are_named():
     assert 'fits' not in plain
     assert 'slope' not in plain
     said = _remarks(q=Q * DEGREES)
-    assert (
-        'positions of lift go from -57.3 to 57.3, its limits are -2 to 2 rad: in degrees' in said
-    )
-    assert 'effort of elbow reaches 143, its limit is 20 N m: in kgf cm it fits' in _remarks(
+    assert 'positions of lift go from -57.3 to 57.3, its limits are -2 to 2 rad' in said
+    assert 'they would fit in degrees' in said
+    assert 'effort of elbow reaches 143, its limit is 20 N m: it would fit in kgf cm' in _remarks(
         q=Q, effort=204.0 * np.cos(T)[:, None] * [0.1, 0.7]
     )
-    assert 'in N mm it fits' in _remarks(q=Q, effort=1e4 * Q)
+    assert 'it would fit in N mm' in _remarks(q=Q, effort=1e4 * Q)
     said = _remarks(q=Q, velocity=rate * DEGREES)
     assert 'lift is 57.3 times the slope of its position: one of the two is in deg' in said
     assert 'is 2 times the slope of its position.' in _remarks(q=Q, velocity=2.0 * rate)
@@ -66,7 +65,7 @@ def test_units_that_limits_contradict_are_named():
 
 def test_a_table_with_a_wrong_unit_is_refused():
     require_units(_events(1.9 * Q), ROBOT)
-    with pytest.raises(RecordingError, match='in degrees it fits; expected units as stated'):
+    with pytest.raises(RecordingError, match='expected the units stated'):
         require_units(_events(Q * DEGREES), ROBOT)
 
 
@@ -88,24 +87,24 @@ def test_a_target_that_is_never_reached_is_said_with_its_reason():
     assert not far.refusals
     (said,) = [r for r in far.remarks if 'target' in r]
     assert said.startswith('lift stays at least 2.')
-    assert 'its gains ask for 219 N m, its limit is 20 N m: the drive is in saturation' in said
+    assert 'its gains would need 219 N m, the limit is 20 N m: the drive saturates' in said
     short = check_recording(_events(0.3 * Q, target=LATE), ROBOT)
-    assert any('lift moves through 0.6 of the 2 rad that its target asks for' in r
+    assert any('lift moves 0.6 of the 2 rad that its target spans' in r
                for r in short.remarks)  # fmt: skip
     weak = Gains(np.array([10.0, 10.0]), np.ones(2))
     said, _ = target_contradictions(_events(Q, target=LATE + np.array([0.3, 0.0])), ROBOT, weak)
     assert len(said) == 1
-    assert 'a load of 2.93 N m that its gains give way to, or a wrong zero' in said[0]
+    assert 'a load of 2.93 N m that the gains cannot hold, or a wrong zero' in said[0]
 
 
 def test_machine_and_simulation_must_overlap():
     ours = [{'lift': (0.0, 1.0)}, {'elbow': (2.0, 3.0)}]
     assert require_shared_motion(ours, {'lift': (0.5, 2.0), 'elbow': (2.0, 4.0)}) == []
     (said,) = require_shared_motion(ours, {'lift': (0.5, 2.0), 'elbow': (4.0, 5.0)})
-    assert 'other positions: elbow 2 to 3, in the simulation 4 to 5' in said
+    assert 'different positions: elbow 2 to 3, in the simulation 4 to 5' in said
     (said,) = require_shared_motion(ours, {'lift': (0.5, 2.0)})
-    assert said == 'Moving on one of machine and simulation only: elbow.'
-    with pytest.raises(RecordingError, match='no joint passes the same positions'):
+    assert said == 'Moving only on the machine or only in the simulation: elbow.'
+    with pytest.raises(RecordingError, match='no joint passes through the same positions'):
         require_shared_motion(ours[:1], {'lift': (1.5, 2.0)})
     with pytest.raises(RecordingError, match='machine moves lift, the simulation elbow'):
         require_shared_motion(ours[:1], {'elbow': (0.0, 1.0)})

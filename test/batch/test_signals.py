@@ -75,7 +75,7 @@ def test_rounds_of_a_looped_recording_are_not_mixed():
     assert second.stop - second.start == len(once.position) - 1  # the first one ends the pause
     assert looped.position[second] == pytest.approx(once.position[1:], abs=1e-9)
     assert looped.effort[second][1:] == pytest.approx(once.effort[2:], abs=1e-9)
-    assert 'Stamps go back: taken as 2 recordings.' in looped.remarks
+    assert 'The stamps go back: treated as 2 recordings.' in looped.remarks
 
 
 def test_arrival_order_is_irrelevant():
@@ -185,7 +185,7 @@ def test_refused_commands_are_counted_by_reason():
 def test_a_recording_without_effort_is_refused_with_the_remedy():
     """An actuated joint needs one."""
     states = [_state(0.01 * i, [0.0]) for i in range(30)]
-    with pytest.raises(RecordingError, match='topic of the commands'):
+    with pytest.raises(RecordingError, match='command topic'):
         collect_signals(states, LINEAR_AXIS, EngineConfig(max_gap=0.1))
     with pytest.raises(RecordingError, match='no usable state'):
         collect_signals([], LINEAR_AXIS, EngineConfig(max_gap=0.1))

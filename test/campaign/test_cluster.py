@@ -140,7 +140,7 @@ def test_another_option_or_recording_is_computed(bags, finished):
     ('change', 'said'),
     [
         (['--scheduler', 'tcp://127.0.0.1:1'], 'no Dask scheduler at tcp://127.0.0.1:1'),
-        (['--robot', 'no_robot'], "robot 'no_robot' is no built-in name"),
+        (['--robot', 'no_robot'], "robot 'no_robot' is neither a built-in robot"),
         (['--covariates', 'no.csv'], 'no table at no.csv'),
         (['--sim', 'no.mcap'], 'no file at no.mcap'),
     ],

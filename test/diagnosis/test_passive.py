@@ -45,7 +45,7 @@ def test_a_free_swing_without_efforts_is_diagnosed(passive):
 
 def test_a_driven_link_without_efforts_is_refused(robots):
     events = events_of(_swing(), commands=False)
-    with pytest.raises(RecordingError, match='no state with an effort'):
+    with pytest.raises(RecordingError, match='has an effort'):
         diagnose(events, *robots[1], {})
 
 

@@ -166,11 +166,12 @@ def test_a_rival_that_fits_as_well_lost_by_its_parameters():
 def test_what_cannot_be_told_is_said_with_the_motion_that_would(tmp_path):
     told = Equivalent((('elbow', 'spring'), ('base', 'gravity_tilt')), 'a motion twice as wide', 7)
     sentence = equivalence_sentence(told)
-    assert 'a spring on elbow with a base that is not level at the base fits as well' in sentence
-    assert 'a motion twice as wide tells them apart' in sentence
+    assert 'a spring on elbow and a base that is not level at the base together' in sentence
+    assert 'would fit equally well' in sentence
+    assert 'a motion twice as wide separates them' in sentence
     assert ' 7 times' in sentence
     never = equivalence_sentence(Equivalent((), '', 1.0))
-    assert 'another set of bodies fits as well; no motion that was tried' in never
+    assert 'another set of bodies would fit equally well; no motion tried' in never
     found = replace(diagnosis('parameters_only'), equivalents=(told,))
     write_diagnosis(tmp_path, found)
     assert sentence in (tmp_path / 'report.html').read_text()
@@ -397,8 +398,11 @@ def test_the_proof_tells_near_from_far_with_intervals_and_roll_outs():
     text = _text(render(found, {}))
     assert 'median: real_test 1.5' in text
     assert '0.0004 0.0003 to 0.0005' in text
-    assert 'On real_test, the nominal robot misses shoulder by 30 % of its way' in text
-    assert 'the final model by 2 % (root mean square)' in text
+    assert (
+        'On real_test, the rms error of shoulder is 30 % of its travel for the nominal robot'
+        in text
+    )
+    assert 'and 2 % for the final model' in text
     assert 'learned from 40, real_test 40 (3 left out' in text
     assert 'real_test 1 (0.9 to 1.1) and -2 nat' in text
 

@@ -179,7 +179,7 @@ def test_sdf_names_what_it_leaves_out(tmp_path):
         '<joint name="ground" type="fixed"><parent>world</parent><child>base</child></joint>', ''
     )
     remarks = ' '.join(nominal_model(_robot(tmp_path, text, 'arm.sdf')).remarks)
-    assert 'Plugins are left out: x.' in remarks
+    assert 'Plugins are ignored: x.' in remarks
     assert 'fixed to the ground: base.' in remarks
     with pytest.raises(ConfigError, match='within the model'):
         _robot(tmp_path, SDF % '<include/>', 'arm.sdf')

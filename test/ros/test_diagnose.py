@@ -181,4 +181,4 @@ def test_a_diagnosis_that_fails_says_why(graph: Graph) -> None:
     graph.wait_until(
         lambda: graph.status('diagnosis').get('state') == 'failed', 'the report', PATIENCE_S
     )
-    assert 'no state with an effort' in graph.message('diagnosis')
+    assert 'has an effort' in graph.message('diagnosis')

@@ -33,7 +33,7 @@ def test_text_is_read_as_written():
         ('coulomb_friction:joint=pole,level=-1', ['level = -1', '>= 0']),
         ('coulomb_friction:joint=pole,level=1,b=2', ['no parameter b']),
         ('coulomb_friction:joint=pole,level=1,level=2', ['level is given twice']),
-        ('coulomb_friction:joint=pole,level', ["'level' is no name=value"]),
+        ('coulomb_friction:joint=pole,level', ["'level' is not of the form name=value"]),
         (
             'position_friction:joint=pole,amplitude=1,lo=2,hi=1,kind=coulomb',
             ['lo is not below hi'],

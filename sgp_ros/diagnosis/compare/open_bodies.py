@@ -60,8 +60,8 @@ def open_bodies(robot: str, tree: Tree) -> tuple[int, ...]:
     if not len(found):
         raise ConfigError(
             f'the mass matrix of the nominal robot {robot} is singular',
-            'masses and inertias with which every joint resists acceleration',
-            'correct the inertias of the URDF, or give others by --bodies',
+            'masses and inertias that load every joint',
+            'correct the inertias of the URDF, or give others with --bodies',
         )
     return tuple(int(i) for i in found)
 
@@ -124,8 +124,8 @@ def open_remark(tree: Tree, bodies: Sequence[int]) -> tuple[str, ...]:
         return ()
     links = ', '.join(tree.link_names[i] for i in bodies)
     text = (
-        f'The robot file states no usable inertia of {links}: estimated from this recording, with '
-        'friction and an offset of each joint beside them, and free to differ. Give measured '
-        'ones by --bodies.'
+        f'The robot file has no usable inertia of {links}: it was estimated from this recording, '
+        'with friction and an offset of each joint. Give measured '
+        'values with --bodies.'
     )
     return (text,)

@@ -93,7 +93,7 @@ def require_motion(events: Iterable[Event], robot: str, names: Sequence[str]) ->
             f'no joint of {robot} moves',
             f'a range of positions of {LEAST_MOTION:g} times the noise of the encoder, of one of '
             f'{", ".join(still)}',
-            'take a recording in which the robot moves',
+            'use a recording in which the robot moves',
         )
     return still
 
@@ -132,8 +132,8 @@ def require_signed(raw: RawTrajectory, names: Sequence[str]) -> None:
             found.append(name)
     if found:
         raise RecordingError(
-            f'the effort of {", ".join(found)} is never negative, whichever way it moves',
-            'efforts with their sign',
+            f'the effort of {", ".join(found)} is never negative in either direction of motion',
+            'signed efforts',
             'record signed efforts, or lock these joints in a robot YAML',
         )  # fmt: skip
 
@@ -155,5 +155,5 @@ def require_rows(raw: RawTrajectory, bandwidth: Bandwidth) -> None:
             f'{seconds:.3g} s give {rows} independent rows below {bandwidth.cutoff:.2g} Hz, where '
             'motion and noise put the cut-off',
             f'{LEAST_ROWS} rows',
-            'take a longer recording',
+            'use a longer recording',
         )

@@ -124,7 +124,7 @@ def collect(
     if not stretches:
         raise RecordingError(
             f'{len(seconds)} states, no {SHORTEST_ROWS} without a pause of {config.max_gap:g} s',
-            'at least some seconds of motion', 'take a longer recording',
+            'at least a few seconds of motion', 'use a longer recording',
         )  # fmt: skip
     own_step = float(np.median(np.concatenate([np.diff(seconds[rows]) for rows in stretches])))
     step = max(own_step, least_step)

@@ -54,7 +54,7 @@ class Probabilities:
         )
         left = f'{100 * rest:.3g} % of the mean squared effort'
         if self.asserted.key and self.asserted.key < model.key:
-            said = f'leaves {left} beside the asserted model, that alone {100 * best:.3g} %'
+            said = f'added to the asserted model it leaves {left}, without it {100 * best:.3g} %'
         else:
             said = f'leaves {left}, the asserted model {100 * best:.3g} %'
         return said if rest > best else f'{said}; {self._objection(model)}'
@@ -65,11 +65,11 @@ class Probabilities:
         if min(model.shares) <= COUNTED_SHARE:
             return 'one of its effects is too small to count'
         if not is_sound(model):
-            return 'its effects cancel each other or the inertial parameters'
+            return 'its effects cancel each other or inertial parameters'
         losses = {
             'inertial parameters further from the nominal ones': 0.5
             * float(model.w @ model.w - asserted.w @ asserted.w),
-            'more parameters than the improvement is worth': PER_EFFECT
+            'more parameters than the improvement justifies': PER_EFFECT
             * (model.laws - asserted.laws)
             + PER_PARAMETER * (model.freedom - asserted.freedom),
             'a larger residual at other joints': scale.likelihood(asserted)

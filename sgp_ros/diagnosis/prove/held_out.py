@@ -44,8 +44,8 @@ def split_sentence(raw: RawTrajectory) -> str:
     if not blocks:
         least = LEAST_BLOCK_S / SHARE
         return (
-            f'Nothing was held out: there is no --test, and of {whole:.3g} s nothing can be '
-            f'spared (from {least:.3g} s on a quarter is).'
+            f'Nothing was held out: there is no --test, and {whole:.3g} s are too '
+            f'short (a quarter is held out from {least:.3g} s on).'
         )
     where = 'the last quarter' if blocks == 1 else f'the last quarter of each of {blocks} parts'
     return (
@@ -80,7 +80,7 @@ def split(raw: RawTrajectory) -> tuple[RawTrajectory, RawTrajectory]:
     """
     n, blocks = len(raw.time), block_count(raw)
     if not blocks:
-        raise ValueError(f'{n * raw.step:g} s are too short to hold a block out')
+        raise ValueError(f'{n * raw.step:g} s are too short to hold out a block')
     place = np.arange(n) * blocks / n  # (n,) in parts
     is_held = place % 1.0 >= 1.0 - SHARE
     segment = np.zeros(n, dtype=int)

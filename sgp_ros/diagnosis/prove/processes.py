@@ -39,8 +39,8 @@ def kept_processes(final: FinalModel) -> tuple[tuple[Remainder, ...], tuple[str,
             kept, before = (*kept, remainder), after
             continue
         said = (
-            f'Z of {names[remainder.joint]} was dropped: over parts that it was not learned from, '
-            f'the error of roll-outs is {ratio:.3g} times that of physics alone.'
+            f'Z of {names[remainder.joint]} was dropped: on parts that it was not learned from, '
+            f'the roll-out error is {ratio:.3g} times that of the physics alone.'
         )
         remarks = (*remarks, said)
     return kept, remarks
@@ -112,7 +112,7 @@ def harm(
             ):
                 if beside.get(joint, 0.0) > without.get(joint, np.inf):
                     found.append(
-                        f'Z of {joint} does harm in {stem}: nMSE of its {what} '
+                        f'Z of {joint} makes predictions worse in {stem}: nMSE of its {what} '
                         f'{beside[joint]:.2g}, {without[joint]:.2g} by physics alone.'
                     )
     return tuple(found)

@@ -156,10 +156,10 @@ def _with_plain_laws(equations: Equations, searched: Searched) -> tuple[Model, .
 def _objection(equations: Equations, comparison: Comparison, searched: Searched) -> str:
     """Return what is wrong with the best formula by itself; empty for nothing."""
     if not searched.laws:
-        return 'every formula that was tried would need impossible parameters'
+        return 'every formula tried would need impossible parameters'
     best, scale = searched.laws[0], Scale.of(equations, comparison)
     if scale.worth(best) < scale.worth(searched.smooth):
-        return 'no formula that was tried follows the shape within its band'
+        return 'no formula tried stays within the 95 % band of the shape'
     ratio, chance = searched.lack_of_fit
     if ratio > LACKING and chance < SIGNIFICANT:
         return 'the best formula follows the shape only approximately'
@@ -167,7 +167,7 @@ def _objection(equations: Equations, comparison: Comparison, searched: Searched)
     assert law is not None
     motion = equations.motion
     if law.at_bounds(motion):
-        return 'the best formula has a parameter at the limit of what this motion determines'
+        return 'a parameter of the best formula is at the limit of what this motion determines'
     wide = law.force(moved(motion, np.inf, 1.0, 0.0))
     return '' if np.isfinite(wide).all() else 'the best formula is not finite over the range'
 
@@ -178,11 +178,11 @@ def _doubt(
     """Return why the decision on all models does not assert the law; empty where it does."""
     law = law_of(decision.model, searched.joint)
     if decision.verdict != 'missing_physics' or law is None or searched.joint in decision.unknown:
-        return 'the best formula leaves more than noise, or does not predict held-out parts'
+        return 'the best formula leaves more than noise, or fails to predict held-out parts'
     model = decision.model
     contrasts = Contrasts(equations, model)
     chances = probabilities(equations, comparison, decision, contrasts)
     index = [s is law for s in model.effects].index(True)
     if chances.of(model, index) < LEAST_LAW:
-        return 'other formulas fit this motion as well but would differ in other motions'
+        return 'other formulas fit this motion equally well but differ on other motions'
     return ''

@@ -167,7 +167,7 @@ def _search(found: Explained, searched: Searched) -> LawSearch:
 def _why_not(found: Explained, joint: int) -> str:
     if law_of(found.decision.model, joint) is not None:
         return ''
-    return found.why_not.get(joint, 'a listed effect says the same with fewer parameters')
+    return found.why_not.get(joint, 'a listed effect explains the same with fewer parameters')
 
 
 def sentence(smooth: SmoothForce, shape: Shape, unit: str, per: str) -> str:

@@ -155,7 +155,8 @@ def hand_over(nominal: Nominal) -> Handover:
     text = stated_urdf(nominal.robot, bodies, dynamics)
     if text is None:
         raise ConfigError(
-            f'robot {nominal.robot.name} has bodies that no URDF can hold', 'bodies that exist'
+            f'robot {nominal.robot.name} has bodies that a URDF cannot express',
+            'physically possible bodies',
         )
     found.urdf = text
     return found

@@ -63,8 +63,8 @@ def write_mjcf(handed: Handover, origin: Path | None) -> tuple[str, list[str]]:
     except (ValueError, KeyError) as error:
         where = 'the URDF' if origin is None else origin.name
         raise ConfigError(
-            f'MJCF from {where}: {" ".join(str(error).split())}', 'a file of the same robot',
-            'give the MJCF of the robot, or none to make one from its URDF',
+            f'MJCF from {where}: {" ".join(str(error).split())}', 'an MJCF of the same robot',
+            'name the MJCF of the robot, or omit --model to convert its URDF',
         ) from error  # fmt: skip
     held = [x for x in HELD if x != 'gain' or not handed.has_targets]
     lag = [] if handed.has_targets else ['lag']
@@ -187,10 +187,10 @@ def _change_actuators(library: Any, spec: Any, handed: Handover) -> list[str]:
         own = [a for a in spec.actuators if a.target == name]
         if not own and joints and any(a.trntype == library.mjtTrn.mjTRN_TENDON
                                       for a in spec.actuators):  # fmt: skip
-            left.append(f'{name}: the actuator of its tendon is as it was')
+            left.append(f'{name}: the actuator of its tendon was not changed')
             continue
         if len(own) > 1:
-            left.append(f'{name}: its {len(own)} actuators are as they were')
+            left.append(f'{name}: its {len(own)} actuators were not changed')
             continue
         actuator = own[0] if own else spec.add_actuator(
             name=name, target=name, trntype=library.mjtTrn.mjTRN_JOINT
@@ -216,7 +216,7 @@ def _change_actuators(library: Any, spec: Any, handed: Handover) -> list[str]:
 
 def _delayed(spec: Any, actuator: Any, name: str, numbers: JointNumbers) -> list[str]:
     if not hasattr(actuator, 'delay'):
-        said = f'{name}: delay {numbers.delay:.4g} s, for which this MuJoCo is too old'
+        said = f'{name}: delay {numbers.delay:.4g} s, not supported by this version of MuJoCo'
         return [said] if numbers.delay else []
     if numbers.delay > 0.0:
         actuator.delay = numbers.delay

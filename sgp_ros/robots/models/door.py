@@ -28,10 +28,10 @@ READ = (
 )
 """What is read of a URDF, and what it becomes."""
 LEFT = {
-    'reduction': 'Reductions of <transmission> are left out: efforts and positions count at the '
-    'joint.',
-    'gazebo': 'Springs in <gazebo> are left out: state them under `effects`.',
-    'xacro': 'Elements of xacro in a URDF are left out: name the file .xacro.',
+    'reduction': 'Reductions of <transmission> are ignored: efforts and positions are those at '
+    'the joint.',
+    'gazebo': 'Springs in <gazebo> are ignored: state them under `effects`.',
+    'xacro': 'xacro elements in a URDF are ignored: name the file .xacro.',
 }
 """Remarks on what has no place here."""
 REFUSED = ('floating and planar joints', 'loops of links', 'several links without parent')
@@ -115,7 +115,7 @@ def _kind_of(path: Path) -> str:
     try:
         tag = parse_xml(text).tag
     except ET.ParseError as error:
-        raise ConfigError(f'{path.name} is no XML ({error})', 'URDF, MJCF or SDF') from error
+        raise ConfigError(f'{path.name} is not XML ({error})', 'URDF, MJCF or SDF') from error
     if tag not in _ROOTS:
         raise ConfigError(f'{path.name} holds <{tag}>', 'URDF, MJCF or SDF')
     return _ROOTS[tag]
@@ -128,7 +128,9 @@ def _text(path: Path) -> str:
         raise ConfigError(f'{path.name} is not UTF-8 ({error})', 'a model in UTF-8') from error
     if '<!DOCTYPE' in text or '<!ENTITY' in text:
         raise ConfigError(
-            f'{path.name} declares a document type', 'a model file', 'remove <!DOCTYPE ...>'
+            f'{path.name} contains a document type declaration',
+            'a model file',
+            'remove <!DOCTYPE ...>',
         )
     return text
 

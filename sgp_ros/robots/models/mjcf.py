@@ -43,17 +43,17 @@ READ = (
 """What is read, and what it becomes."""
 LEFT = {
     'contact': 'Contacts are not modelled; none acts where the robot starts; solid bodies',
-    'off': 'Constraints that the file does not switch on',
-    'constraint': 'Constraints of this kind are left out',
-    'motors': 'No actuator: all of these joints are taken to be driven',
-    'follower': 'Rotor and spring of joints that follow or stand are left out',
-    'gravcomp': 'Compensation of gravity (gravcomp) is left out',
-    'damping': 'The nonlinear part of the damping is left out',
-    'stiffness': 'The nonlinear part of the stiffness is left out',
-    'gravity': 'Gravity is 9.81 m/s2 here and not what the file has, in m/s2',
-    'fluid': 'Forces of a surrounding fluid are left out',
-    'tendon': 'Forces of tendons are left out',
-    'other': 'What has no place here',
+    'off': 'Constraints that are not active in the file, ignored',
+    'constraint': 'Constraints of this kind are ignored',
+    'motors': 'No actuator: all of these joints are assumed to be driven',
+    'follower': 'Rotor inertia and springs of joints that follow others or are fixed are ignored',
+    'gravcomp': 'Gravity compensation (gravcomp) is ignored',
+    'damping': 'The nonlinear part of the damping is ignored',
+    'stiffness': 'The nonlinear part of the stiffness is ignored',
+    'gravity': 'Gravity is 9.81 m/s2 here and not that of the file, in m/s2',
+    'fluid': 'Fluid forces are ignored',
+    'tendon': 'Tendon forces are ignored',
+    'other': 'Not supported and ignored',
 }
 """Remarks on what has no place here."""
 REFUSED = (
@@ -170,7 +170,7 @@ class _Reading:
                 raise self.error(
                     f'body {self.body(self.model.jnt_bodyid[j])} has a {word} joint',
                     'a base that is fixed to the ground and joints of one degree of freedom',
-                    'fix it, or take it out of the file',
+                    'fix it, or remove it from the file',
                 )  # fmt: skip
         if not self.model.njnt:
             raise self.error('no joint', 'a robot with joints that move')
@@ -203,7 +203,7 @@ class _Reading:
                 c = m.eq_data[e][:5]
                 start = float(m.qpos0[m.jnt_qposadr[j]])
                 if np.any(c[2:]):
-                    said = f'joint {self.joint(j)} follows another one on a curve'
+                    said = f'joint {self.joint(j)} follows another joint nonlinearly'
                     raise self.error(said, 'a linear equality')
                 if leader < 0:
                     self.locked[self.joint(j)] = start + float(c[0])
@@ -213,7 +213,7 @@ class _Reading:
                     found[j] = self.joint(leader), float(c[1]), offset
             elif kind in {'mjEQ_CONNECT', 'mjEQ_WELD'}:
                 said = 'a connect or weld constraint closes a loop of links'
-                raise self.error(said, 'a tree of links', 'take it out, and what hangs on it')
+                raise self.error(said, 'a tree of links', 'remove it, and the bodies below it')
             else:
                 self.dropped[LEFT['constraint']].append(kind[5:].lower())
         return found

@@ -18,13 +18,13 @@ from sgp_ros.physics.catalogue import ACTUATOR_LAG, COMMAND_DELAY
 from sgp_ros.robots.models.model import ModelJoint, stated
 
 LEFT = {
-    'mixed': 'Gains are left out, for other joints are driven by efforts',
-    'transmission': 'Actuators that act on no single joint are left out',
+    'mixed': 'Gains are ignored, as other joints are driven by efforts',
+    'transmission': 'Actuators that do not act on a single joint are ignored',
     'gain': 'The effort is the control times a gain (`effort_gain` of a robot YAML, where a '
     'recording holds controls)',
     'gear': 'The target is the position times a gear',
-    'law': 'Actuators of this law are left out',
-    'activation': 'The activation of these actuators is left out',
+    'law': 'Actuators of this type are ignored',
+    'activation': 'The activation dynamics of these actuators are ignored',
 }
 """Remarks on what has no place here."""
 

@@ -35,13 +35,13 @@ READ = (
 )
 """What is read, and what it becomes."""
 LEFT = {
-    'root': 'The root is taken to be fixed to the ground',
-    'mass': 'Links without <inertial>, which have 1 kg by the format, are taken to have no mass',
-    'axis': 'A second axis is left out',
-    'plugin': 'Plugins are left out',
-    'integral': 'The integral gain of the controller is left out',
-    'gains': 'Gains are left out, for some joints have none',
-    'gravity': 'Gravity is 9.81 m/s2 along -z here and not what the file has',
+    'root': 'The root is assumed to be fixed to the ground',
+    'mass': 'Links without <inertial>, 1 kg by default in SDF, are assumed to have no mass',
+    'axis': 'A second axis is ignored',
+    'plugin': 'Plugins are ignored',
+    'integral': 'The integral gain of the controller is ignored',
+    'gains': 'Gains are ignored, as some joints have none',
+    'gravity': 'Gravity is 9.81 m/s2 along -z here and not that of the file',
 }
 """Remarks on what has no place here."""
 REFUSED = (
@@ -69,7 +69,7 @@ def read_sdf(path: Path) -> Model:
     try:
         root = parse_xml(_text(path))
     except (ET.ParseError, ValueError) as error:
-        raise ConfigError(f'{path.name} is no XML ({error})', 'SDF') from error
+        raise ConfigError(f'{path.name} is not XML ({error})', 'SDF') from error
     if root.tag != 'sdf':
         raise ConfigError(f'{path.name} holds <{root.tag}>', 'SDF with <sdf>')
     world = root.find('world')
@@ -87,7 +87,9 @@ def read_sdf(path: Path) -> Model:
 def _text(path: Path) -> str:
     text = path.read_text(encoding='utf-8-sig').lstrip()
     if '<!DOCTYPE' in text or '<!ENTITY' in text:
-        raise ConfigError(f'{path.name} declares a document type', 'SDF', 'remove <!DOCTYPE ...>')
+        raise ConfigError(
+            f'{path.name} contains a document type declaration', 'SDF', 'remove <!DOCTYPE ...>'
+        )
     return text
 
 

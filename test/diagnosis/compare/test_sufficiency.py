@@ -56,7 +56,7 @@ def test_nothing_is_said_of_a_recording_of_few_rows(robots, seconds):
     world = simulate(CHAINS[1], 11, seconds, dry=lambda t, q, s: 0.4)
     with pytest.raises(RecordingError, match='independent rows') as refused:
         diagnose(events_of(world, quantum=COARSE), *robots[1], {})
-    assert 'take a longer recording' in str(refused.value)
+    assert 'use a longer recording' in str(refused.value)
 
 
 def test_a_held_out_recording_of_no_rows_is_refused_by_its_name(robots, perfect):

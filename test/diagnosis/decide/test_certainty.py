@@ -35,8 +35,8 @@ def test_a_rival_beside_what_is_asserted_is_told_from_one_in_its_place(equations
     _, equations = equations_for(viscous)
     said = _said(equations, fitted(equations, 'viscous_friction'))
     more = fitted(equations, 'viscous_friction', 'quadratic_drag')
-    assert 'beside the asserted model' in said.why(more)
-    assert 'beside' not in said.why(fitted(equations, 'spring'))
+    assert 'added to the asserted model' in said.why(more)
+    assert 'added' not in said.why(fitted(equations, 'spring'))
 
 
 def test_a_rival_that_leaves_less_is_told_what_is_wrong_with_it(equations_for, viscous):

@@ -67,4 +67,7 @@ def test_harm_on_what_was_held_out_is_said(equations):
     before = {'far': proof(0.2, 0.1)}
     assert harm(remainders, ('joint0',), before, {'far': proof(0.1, 0.1)}) == ()
     (said,) = harm(remainders, ('joint0',), before, {'far': proof(0.1, 0.4)})
-    assert said == 'Z of joint0 does harm in far: nMSE of its roll-outs 0.4, 0.1 by physics alone.'
+    assert said.startswith(
+        'Z of joint0 makes predictions worse in far: nMSE of its roll-outs 0.4,'
+    )
+    assert said.endswith('0.1 by physics alone.')
