@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from sgp_proof.concealed.unlisted import SAME
+from sgp_proof.concealed import second_families as second
+from sgp_proof.concealed.unlisted import HASHES, SAME, SECOND_FROM
 
 ROOT = Path(__file__).parents[1]
 TARGET = Path(__file__).parent / 'unlisted.md'
@@ -50,6 +51,14 @@ python -m sgp_proof.concealed.unlisted out/unlisted
 ```
 A tool of another kind enters by the same files: it writes `out/CASE/diagnosis.json` with the verdict and findings of
 effect `law`, formula and parameters, and `out/CASE/outcome.json` to say that it has run.
+
+A second set waits: {second} worlds of {second_families} families, of which {second_known} are a shape that the search tries, and two
+remember. They were written down and sealed before anything of them was diagnosed; none is scored yet.
+
+```bash
+python -m sgp_proof.concealed.draw --seeds 20800:20826 --tier A --only unlisted --out out/second
+python -m sgp_proof.concealed.unlisted out/second --name unlisted_second
+```
 
 ## Where there is no law
 
@@ -133,13 +142,21 @@ def text():
     numbers = sorted(int(r['case'].rpartition('_')[2]) for r in rows)
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers))), 'scored in order'
     return _HEAD.format(
-        **_no_law(), **_elastic(),
+        **_no_law(), **_elastic(), second=_second(), second_families=len(second.FAMILIES),
+        second_known=len(second.KNOWN_SHAPES),
         failures=_failures(rows), worlds=summary['worlds'], lawless=lawless,
         families=len({r['kind'] for r in rows}), found=_share(summary['found']),
         right=_share(summary['right_joint']), wrong=_share(summary['wrong_names']),
         sealed=result['sealed'], table=_table(rows), machines=_machines(), upper=100.0 * (1.0 - 0.05 ** (1.0 / summary['worlds'])),
         seeds=f'{numbers[0]}:{numbers[0] + result["sealed"]}', least=100.0 * LEAST_LAW,
     )  # fmt: skip
+
+
+def _second():
+    """Return how many worlds of the second set are sealed."""
+    sealed = json.loads(HASHES.read_text(encoding='utf-8'))
+    cases = [name for name in sealed if name.startswith('case_')]
+    return sum(int(name.removeprefix('case_')) >= SECOND_FROM for name in cases)
 
 
 def _no_law():

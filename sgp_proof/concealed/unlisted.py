@@ -2,9 +2,9 @@
 
     python -m sgp_proof.concealed.draw --seeds 6000:6024 --tier A --only unlisted --out DIR
     python -m sgp_proof.concealed.unlisted DIR --seal
-    python -m sgp_proof.concealed.unlisted DIR [--outputs DIR]
+    python -m sgp_proof.concealed.unlisted DIR [--outputs DIR] [--name unlisted]
 
-The first writes worlds, each seed a family in turn. The second writes the hashes of the answers
+The first writes worlds, each seed a family in turn. The second adds the hashes of the answers
 to `sgp_proof/results/unlisted_hashes.json`, which is committed before anything is scored. The
 third diagnoses what was not diagnosed yet, scores what `diagnosis.json` says, and refuses answers
 with other hashes. A tool of another kind enters by the same file: verdict, joint, and findings
@@ -17,11 +17,13 @@ import argparse
 import hashlib
 import json
 import math
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 
+from sgp_proof.concealed import second_families as second
 from sgp_proof.concealed.unknown import OF_TIME, force
 from sgp_proof.result_files import RESULTS, write_result
 from sgp_ros.physics.formula import read_formula
@@ -30,6 +32,9 @@ HASHES = RESULTS / 'unlisted_hashes.json'
 SAME = 0.02
 """Greatest error of a law that is the true one, relative, over the states of the joint."""
 STATES = 2000
+STEP_S = 0.005
+"""Steps of a motion along which laws that remember are compared [s]."""
+_REMEMBERS = re.compile(r'\b(lag|play|delay)\(').search
 
 
 def _contact(q, _v, _m, p):
@@ -71,25 +76,55 @@ FAMILIES = {
     'walk': _walk,
 }
 """Name to force over its size. The last is no function of the motion: nothing is to be found."""
-BUILDERS = {name: force(law) for name, law in FAMILIES.items()}
+SECOND_FROM = 20_000
+"""Seeds from here on conceal a law of the second set."""
+_LAWS = FAMILIES | second.FAMILIES
+BUILDERS = {name: force(law) for name, law in _LAWS.items()}
+BUILDERS |= {name: second.remembering(name) for name in second.REMEMBER}
 
 
 def family_of(seed, *, has_others):
     """Return the family that a seed conceals."""
-    kind = list(FAMILIES)[seed % len(FAMILIES)]
-    return kind if has_others or not kind.endswith('other') else 'gas_spring'
+    known = FAMILIES if seed < SECOND_FROM else second.FAMILIES
+    kind = list(known)[seed % len(known)]
+    alone = 'gas_spring' if seed < SECOND_FROM else 'air_spring'
+    return kind if has_others or not kind.endswith('other') else alone
 
 
 def true_force(parameters, q, v):
-    """Return the force of a family at states (n,), those of its own joint and of the source."""
-    law = FAMILIES[parameters['kind']]
+    """Return the force of a family at states (n,), those of its own joint and of the source.
+
+    Of one that remembers they are a motion in steps of `STEP_S`.
+    """
+    kind, memory = parameters['kind'], np.zeros(len(q[0]))
+    if kind in second.REMEMBER:
+        memory = second.memory_along(kind, q[0], v[0], STEP_S, parameters)
+    law = _LAWS[kind]
     return np.array([
         parameters['a'] * law(q[0][i], v[0][i], SimpleNamespace(
             position={parameters['source']: q[1][i]}, velocity={parameters['source']: v[1][i]},
-            time_s=0.0,
+            time_s=0.0, state=(memory[i],),
         ), parameters)
         for i in range(len(q[0]))
     ])  # fmt: skip
+
+
+def _states(p):
+    """Return positions and velocities of a joint and its source, (n,) each, at random."""
+    rng = np.random.default_rng(0)
+    q = [p['reach'] * rng.uniform(-1.0, 1.0, STATES), rng.uniform(-1.0, 1.0, STATES)]
+    return q, [s * rng.normal(0.0, 1.2, STATES) for s in (p['v'], p['source_v'])]
+
+
+def _motion(p):
+    """Return a motion with about such states, sums of two sines that do not repeat."""
+    t, found = STEP_S * np.arange(STATES), ([], [])
+    for reach, usual, ratio in ((p['reach'], p['v'], 1.618), (1.0, p['source_v'], 1.414)):
+        rate = usual / reach * np.array([1.0, ratio])
+        size = 0.6 * reach * np.array([1.0, 0.7])
+        found[0].append(np.sin(t[:, None] * rate) @ size)
+        found[1].append(np.cos(t[:, None] * rate) @ (size * rate))
+    return found
 
 
 def law_error(effect, finding):
@@ -97,9 +132,8 @@ def law_error(effect, finding):
     p = effect['parameters']
     if p['kind'] in OF_TIME:
         return math.inf
-    rng = np.random.default_rng(0)
-    q = [p['reach'] * rng.uniform(-1.0, 1.0, STATES), rng.uniform(-1.0, 1.0, STATES)]
-    v = [s * rng.normal(0.0, 1.2, STATES) for s in (p['v'], p['source_v'])]
+    remembers = p['kind'] in second.REMEMBER
+    q, v = _motion(p) if remembers or _REMEMBERS(finding['formula']) else _states(p)
     names = [effect['joint'], p['source'] if isinstance(p['source'], str) else '']
     true = true_force(p, q, v)
     numbers = {name: x['value'] for name, x in finding['parameters'].items()}
@@ -112,8 +146,31 @@ def law_error(effect, finding):
 
     if 'tau' in {k for k, _ in formula.signals}:
         return math.inf
-    found = formula.compiled(lambda name: lambda _at: numbers[name], signal)(None)
+    special = {'lag': _lag, 'play': _play, 'delay': _delay}.get
+    found = formula.compiled(
+        lambda name: lambda _at: numbers[name], signal, lambda name, _signals: special(name)
+    )(None)
     return float(np.sqrt(np.mean((found - true) ** 2) / np.mean(true**2)))
+
+
+def _lag(_at, x, time_constant):
+    z = np.array(x, dtype=np.float64)
+    keep = math.exp(-STEP_S / max(time_constant, 1e-9))
+    for i in range(1, len(z)):
+        z[i] = x[i] + (z[i - 1] - x[i]) * keep
+    return z
+
+
+def _play(_at, x, width):
+    z = np.array(x, dtype=np.float64)
+    for i in range(1, len(z)):
+        z[i] = min(max(z[i - 1], x[i] - 0.5 * width), x[i] + 0.5 * width)
+    return z
+
+
+def _delay(_at, x, delay):
+    t = STEP_S * np.arange(len(x))
+    return np.interp(t - delay, t, x)
 
 
 def score(answer, diagnosis):
@@ -165,12 +222,13 @@ def main():
     parser.add_argument('--seal', action='store_true', help='write the hashes of the answers')
     parser.add_argument('--outputs', type=Path, help='where diagnoses are kept')
     parser.add_argument('--diagnosed', action='store_true', help='score what was diagnosed alone')
+    parser.add_argument('--name', default='unlisted', help='of the file of results')
     arguments = parser.parse_args()
     answers = sorted((arguments.worlds / 'answers').glob('*.json'))
+    sealed = json.loads(HASHES.read_text(encoding='utf-8')) if HASHES.exists() else {}
     if arguments.seal:
-        write_result(HASHES, {path.stem: hash_of(path) for path in answers})
+        write_result(HASHES, {path.stem: hash_of(path) for path in answers} | sealed)
         return
-    sealed = json.loads(HASHES.read_text(encoding='utf-8'))
     outputs = arguments.outputs or arguments.worlds / 'out'
     rows = []
     for path in answers:
@@ -185,7 +243,7 @@ def main():
         rows.append(score(json.loads(path.read_text(encoding='utf-8')), diagnosis))
         print(json.dumps(rows[-1]), flush=True)
     report = {'sealed': len(answers), 'summary': summary(rows), 'cases': rows}
-    write_result(RESULTS / 'unlisted.json', report)
+    write_result(RESULTS / f'{arguments.name}.json', report)
     print(json.dumps(report['summary'], indent=1))
 
 

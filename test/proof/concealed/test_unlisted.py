@@ -8,9 +8,17 @@ import sys
 
 import pytest
 
+from sgp_proof.concealed import second_families as second
 from sgp_proof.concealed import unlisted
 from sgp_proof.concealed.unknown import OF_TIME, UNKNOWN
-from sgp_proof.concealed.unlisted import FAMILIES, family_of, law_error, score, summary
+from sgp_proof.concealed.unlisted import (
+    FAMILIES,
+    SECOND_FROM,
+    family_of,
+    law_error,
+    score,
+    summary,
+)
 
 P = {'kind': 'magnetic_brake', 'a': 0.5, 'v': 1.5, 'reach': 1.0, 'source': -1.0, 'source_v': 1.0}
 EFFECT = {'effect': 'unknown', 'joint': 'elbow', 'parameters': P}
@@ -54,6 +62,32 @@ def test_the_families_are_apart():
     assert not set(FAMILIES) & set(UNKNOWN)
     assert {family_of(s, has_others=True) for s in range(len(FAMILIES))} == set(FAMILIES)
     assert set(OF_TIME) & set(FAMILIES)
+
+
+def test_the_second_set_is_apart_from_all_others():
+    """Every family of it is drawn in turn too; what it says of known shapes is of its own."""
+    assert not set(second.FAMILIES) & (set(FAMILIES) | set(UNKNOWN))
+    seeds = range(SECOND_FROM, SECOND_FROM + len(second.FAMILIES))
+    assert {family_of(s, has_others=True) for s in seeds} == set(second.FAMILIES)
+    assert set(second.KNOWN_SHAPES) <= set(second.FAMILIES)
+
+
+@pytest.mark.parametrize(
+    ('kind', 'formula', 'numbers'),
+    [
+        ('one_way_damper', 'a*max(dq[elbow], 0)', {'a': -0.5 / 1.5}),
+        ('lagged_damper', '-a*lag(dq[elbow], T)', {'a': 0.5 / 1.5, 'T': second.LAG_S}),
+        ('play_spring', '-a*play(q[elbow], w)', {'a': 0.5, 'w': 2.0 * second.HALF_PLAY}),
+    ],
+)
+def test_laws_that_remember_are_compared_along_a_motion(kind, formula, numbers):
+    """But for the steps of that motion; without its memory none of them is right."""
+    effect = {'joint': 'elbow', 'parameters': {**P, 'kind': kind}}
+    finding = {'formula': f'tau_x[elbow] = {formula}',
+               'parameters': {name: {'value': x} for name, x in numbers.items()}}  # fmt: skip
+    assert law_error(effect, finding) < 0.01
+    forgets = {**finding, 'formula': 'tau_x[elbow] = -0.3*dq[elbow]'}
+    assert law_error(effect, forgets) > 0.1
 
 
 def test_another_answer_than_the_sealed_one_is_refused(tmp_path, monkeypatch):
