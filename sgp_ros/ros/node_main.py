@@ -48,7 +48,11 @@ def run(name: str, summary: str, load: Callable[[], Callable[[], Node]]) -> int:
 
 
 def settle_memory() -> None:
-    """Exempt what exists from the search for garbage, which would hold up messages for 50 ms."""
+    """Exempt what exists from the search for garbage, which would hold up messages for 50 ms.
+
+    What was exempted before and is garbage by now, such as a node that ended, is collected.
+    """
+    gc.unfreeze()
     gc.collect()
     gc.freeze()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import weakref
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -139,6 +140,18 @@ def test_nodes_are_composed_in_one_process(graph: Graph) -> None:
 def test_a_node_that_cannot_start_raises_in_the_process_that_made_it(context: int) -> None:
     with pytest.raises(ConfigError, match='submarine'):
         SgpNode(parameter_overrides=_overrides(robot='submarine'))
+
+
+@pytest.mark.ros
+def test_a_node_that_ended_leaves_nothing_in_memory(context: int) -> None:
+    """Nodes come and go in one process; what exists is exempt from the search for garbage."""
+    node = SgpNode(parameter_overrides=_overrides(robot='reaction_wheel'))
+    kept = weakref.ref(node)
+    node.destroy_node()
+    del node
+    other = SgpNode(parameter_overrides=_overrides(robot='reaction_wheel'))
+    other.destroy_node()
+    assert kept() is None
 
 
 @pytest.mark.ros
