@@ -8,7 +8,7 @@ asserted only where they, with whatever physics is left, are worth more than all
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -129,7 +129,8 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
     Raises:
         RecordingError: too little is left to decide.
     """
-    plain = compared(recordings, tree, progress)
+    each = in_halves(progress)
+    plain = compared(recordings, tree, next(each))
     # known inertia is what tells units and signs apart
     is_open = recordings.learned.approach is not None or bool(recordings.unstated)
     if is_open or plain.several.decision.verdict == 'no_mismatch':
@@ -139,21 +140,32 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
     # gains can be told from bodies that are known alone
     for knows_bodies in (True, False) if recordings.learned.gains is not None else (False,):
         probe = Probe(recordings.learned, tree, bandwidth, knows_bodies=knows_bodies)
-        tried = _connected(plain, search(probe), tree, progress)
+        tried = _connected(plain, search(probe), tree, each)
         if tried.findings:
             break
     return tried
 
 
+def in_halves(progress: Callable[[float], None]) -> Iterator[Callable[[float], None]]:
+    """Yield the progress of one comparison after the other; how many come is not known ahead.
+
+    Each of them is half of what is left, so that the whole goes on and never back.
+    """
+    left = 1.0
+    while True:
+        left *= 0.5
+        yield lambda share, left=left: progress(1.0 - left * (2.0 - share))  # type: ignore[misc]
+
+
 def _connected(
-    plain: Connected, found: Connection, tree: Tree, progress: Callable[[float], None]
+    plain: Connected, found: Connection, tree: Tree, each: Iterator[Callable[[float], None]]
 ) -> Connected:
     """Return the recordings with errors of the connection undone where that is worth it."""
     if not found.errors:
         return plain
     recordings, correction = plain.recordings, found.errors[-1].correction
     corrected = replace(
-        compared(recordings.corrected(correction), correction.tree(tree), progress),
+        compared(recordings.corrected(correction), correction.tree(tree), next(each)),
         correction=correction,
     )
     if corrected.several.decision.verdict == 'unexplained':
@@ -165,7 +177,7 @@ def _connected(
     if gain >= PER_EFFECT and plain.several.decision.verdict != 'unexplained':
         # on the same band: what is slower has less noise
         cutoff = corrected.equations.filter.cutoff
-        gain = _gain(compared(recordings, tree, progress, cutoff), corrected) - price
+        gain = _gain(compared(recordings, tree, next(each), cutoff), corrected) - price
     least = -ALIKE if _stands_for_gains(plain, found) else PER_EFFECT
     if gain < least:
         return plain if gain < -ALIKE else _beside(plain, found, gain)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis.connected import in_halves
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.result import VERDICTS
@@ -200,6 +201,18 @@ def test_a_locked_joint_gets_no_candidate_and_hides_none(robots):
     assert finding.parameters['b'].value == pytest.approx(0.8, rel=0.02)
     assert 'joint1' not in {f.joint for f in found.alternatives}
     assert np.isfinite(found.predictions['again'].acceleration).all()
+
+
+def test_progress_never_goes_back_however_often_models_are_compared():
+    shares = []
+    each = in_halves(shares.append)
+    for _ in range(4):
+        one = next(each)
+        for share in (0.0, 0.6, 1.0):
+            one(share)
+    assert shares == sorted(shares)
+    assert (shares[0], shares[2]) == (0.0, 0.5)
+    assert shares[-1] < 1.0
 
 
 def test_measured_efforts_do_in_place_of_commands(tmp_path):
