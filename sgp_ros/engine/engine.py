@@ -231,6 +231,8 @@ class Engine(Fold):
         self.order.seal()
 
     def _reset(self, now_ns: int) -> int:
+        for event in (*self.order.pending, *self.clock.suspects):
+            self.intake.refuse(event, 'reset')
         self.order, self.clock = ReorderBuffer(self.order.window_ns), StreamClock(self.config)
         self.began_ns = now_ns
         self._forget()

@@ -16,16 +16,16 @@ from sgp_ros.robots.robot import Robot
 
 REFUSALS = (
     'late', 'duplicate', 'nonfinite', 'unpaired', 'unknown_joint', 'gap', 'wrong_length', 'clock',
-    'implausible', 'error',
+    'implausible', 'reset', 'error',
 )  # fmt: skip
 """Reasons for which a state is refused; each refused state has exactly one."""
 
 COMMAND_REFUSALS = (
-    'late', 'nonfinite', 'unknown_joint', 'wrong_kind', 'wrong_length', 'clock', 'error',
+    'late', 'nonfinite', 'unknown_joint', 'wrong_kind', 'wrong_length', 'clock', 'reset', 'error',
 )  # fmt: skip
 """Reasons for which a command is refused."""
 
-CHANGE_REFUSALS = ('late', 'clock', 'invalid', 'no_factor', 'error')
+CHANGE_REFUSALS = ('late', 'clock', 'invalid', 'no_factor', 'reset', 'error')
 """Reasons for which a change of settings or a reset in a stream is refused."""
 
 REFIT_REFUSALS = ('diverged', 'no_better', 'no_factor', 'outdated')

@@ -29,6 +29,7 @@ MEANINGS = {
     'wrong_length': 'the numbers of positions, velocities or efforts and of names differ',
     'clock': 'a stamp far from those of the other states',
     'implausible': 'far beyond the limits of position, speed or effort in the model file',
+    'reset': 'waited for its order when all was forgotten on request',
     'error': 'an internal error of this package; please report it',
 }
 

@@ -161,6 +161,7 @@ def _state_remedy(reason: str, arrivals: Arrivals) -> str:
         'clock': 'their stamps are far from those of other states; check the clock of the source',
         'wrong_length': 'the numbers of positions, velocities or efforts and of names differ',
         'implausible': 'they are far beyond the limits of the robot file; check units and sensors',
+        'reset': 'they waited for their order when all was forgotten; nothing to do',
         'error': 'an internal error; please report the first one in the log',
         'duplicate': 'stamps repeat; look for several publishers, or a source without stamps',
         'nonfinite': 'positions or velocities are not finite; check the sensors',
@@ -187,6 +188,7 @@ def _command_remedy(reason: str, arrivals: Arrivals) -> str:
         'late': 'older than reorder_window on arrival; check the clocks',
         'clock': 'their stamps are far from those of the states; check the clocks',
         'nonfinite': 'numbers are not finite; check the controller',
+        'reset': 'they waited for their order when all was forgotten; nothing to do',
         'error': 'an internal error; please report the first one in the log',
     }.get(reason, 'see docs/bringup.md')
 

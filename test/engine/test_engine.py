@@ -137,7 +137,11 @@ def test_a_reset_forgets_and_is_repeatable():
         record.extend(step.released)
         estimates.extend(step.estimates)
         if i == 500:
+            waiting = engine.waiting_events
             record.append(engine.reset())
+            counts = engine.counts
+            assert (counts.refused['reset'], counts.commands_refused['reset']) == waiting
+            assert sum(waiting) > 0
             assert not engine.is_ready
             assert engine.parameters() == ()
     again = Engine(PENDULUM, config(refit__enabled=False))

@@ -106,7 +106,7 @@ def test_a_wrong_change_in_a_stream_is_refused():
     engine, _, failures = _run([*events[:101], *wrong, *events[101:]])
     assert not failures
     assert engine.counts.changes_refused == {
-        'late': 0, 'clock': 1, 'invalid': 2, 'no_factor': 0, 'error': 0,
+        'late': 0, 'clock': 1, 'invalid': 2, 'no_factor': 0, 'reset': 0, 'error': 0,
     }  # fmt: skip
     assert engine.config.filter_hop == config().filter_hop
 
