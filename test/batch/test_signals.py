@@ -177,7 +177,7 @@ def test_refused_commands_are_counted_by_reason():
     signals = collect_signals([*events, *bad], CART, EngineConfig(max_gap=0.1))
     assert signals.commands_refused == {
         'late': 0, 'wrong_length': 1, 'unknown_joint': 1, 'wrong_kind': 0, 'nonfinite': 1,
-        'clock': 0, 'error': 0,
+        'clock': 0, 'reset': 0, 'error': 0,
     }  # fmt: skip
     assert signals.effort[3:-3] == pytest.approx(1.0)
 
