@@ -66,7 +66,7 @@ PROOF_ROOMS = {
     'columns': set(),
     'commands': set(),
     'unchanged': {'result_files'},
-    'bench': {'result_files', 'concealed'},
+    'bench': {'result_files', 'concealed', 'campaign'},
     'paper': {'columns'},
     'real': {'result_files', 'columns'},
     'streams': {'result_files', 'paper', 'real', 'concealed'},

@@ -9,17 +9,19 @@ from pathlib import Path
 from typing import Any
 
 from sgp_proof.bench.evidence import bench_evidence
-from sgp_proof.bench.recordings import bench_diagnose, bench_identify
+from sgp_proof.bench.recordings import bench_diagnose, bench_identify, bench_stages
 from sgp_proof.bench.replay import bench_replay
 from sgp_proof.bench.rivals import RIVALS
 from sgp_proof.bench.step import bench_step
+from sgp_proof.campaign.overhead import bench_campaign
 from sgp_proof.result_files import machine
 from sgp_ros.errors import ConfigError
 from sgp_ros.report.files import write_text
 
 BENCHES = {
     'step': bench_step, 'evidence': bench_evidence, 'replay': bench_replay,
-    'diagnose': bench_diagnose, 'identify': bench_identify,
+    'diagnose': bench_diagnose, 'identify': bench_identify, 'stages': bench_stages,
+    'campaign': bench_campaign,
 }  # fmt: skip
 """Name to what returns the rows."""
 

@@ -6,6 +6,7 @@ a process of its own, as a user starts it, imports and report included.
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import subprocess
@@ -19,6 +20,8 @@ from typing import Any
 import numpy as np
 
 from sgp_proof.bench.rivals import Rivals
+from sgp_proof.bench.stages import stages_of
+from sgp_proof.bench.sysid import SYSID_KEYS, sysid_row
 from sgp_proof.concealed.machines import draw_machine
 from sgp_proof.concealed.robots import urdf
 from sgp_ros.apps.simulation import write_simulated
@@ -27,13 +30,18 @@ from sgp_ros.simulation.recording import simulate
 from sgp_ros.simulation.tree_simulator import tree_simulator
 
 RATE_HZ = 200.0
+STAGED = (('diagnose', 3, 60.0), ('diagnose', 7, 60.0), ('identify', 7, 60.0))
+"""Command, joints and seconds of which the stages are timed."""
 SIZES = {
-    'diagnose': ((3, 20.0), (3, 60.0), (3, 180.0), (7, 20.0), (7, 60.0)),
-    'identify': ((3, 20.0), (3, 60.0), (7, 20.0)),
+    'diagnose': ((3, 20.0), (3, 60.0), (3, 180.0), (7, 20.0), (7, 60.0), (7, 900.0)),
+    'identify': ((3, 20.0), (3, 60.0), (7, 20.0), (7, 60.0)),
 }
 """Joints and seconds, by command."""
 _SEED = 36
-_FRICTION = ('coulomb_friction:joint=joint_2,level=3',)
+_JOINT, _LEVEL = 'joint_2', 3.0
+_FRICTION = (f'coulomb_friction:joint={_JOINT},level={_LEVEL:g}',)
+_RIVALLED = ('diagnose', 3, 60.0)
+"""Command, joints and seconds at which `mujoco.sysid` is asked too."""
 
 
 def bench_diagnose(
@@ -50,6 +58,23 @@ def bench_identify(
     return _rows('identify', progress, is_quick=is_quick)
 
 
+def bench_stages(
+    _rivals: Rivals, progress: Callable[[float], None], *, is_quick: bool
+) -> list[dict[str, Any]]:
+    """Return one row per stage of commands: processor seconds, imports and all."""
+    rows: list[dict[str, Any]] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for i, (command, joints, seconds) in enumerate(STAGED):
+            size = (1, 12.0) if is_quick else (joints, seconds)
+            robot, recording = draw_recording(Path(folder), *size)
+            words = [command, str(recording), '--robot', str(robot)]
+            found = stages_of([*words, '--out', str(Path(folder) / f'out_{i}')])
+            head = {'command': command, 'joints': size[0], 'seconds': size[1]}
+            rows += [{**head, 'stage': name, 'processor_s': x} for name, x in found.items()]
+            progress((i + 1) / len(STAGED))
+    return rows
+
+
 def _rows(
     command: str, progress: Callable[[float], None], *, is_quick: bool
 ) -> list[dict[str, Any]]:
@@ -59,8 +84,15 @@ def _rows(
         for i, (joints, seconds) in enumerate(sizes):
             robot, recording = draw_recording(Path(folder), joints, seconds)
             words = [command, str(recording), '--robot', str(robot)]
-            found = measured([*words, '--out', str(Path(folder) / f'out_{i}')])
-            rows.append({'joints': joints, 'seconds': seconds, **found})
+            out = Path(folder) / f'out_{i}'
+            row = {'joints': joints, 'seconds': seconds, **measured([*words, '--out', str(out)])}
+            if command == 'diagnose':
+                row |= named(out)
+            if (command, joints, seconds) == _RIVALLED:
+                row |= sysid_row(robot, recording, _JOINT, _LEVEL)
+            elif command == 'diagnose':
+                row |= dict.fromkeys(SYSID_KEYS, '')
+            rows.append(row)
             progress((i + 1) / len(sizes))
     return [row | _exponents(row, rows) for row in rows]
 
@@ -83,6 +115,17 @@ def draw_recording(folder: Path, joints: int, seconds: float) -> tuple[Path, Pat
     recording = folder / f'arm_{joints}_{seconds:g}.mcap'
     write_simulated(simulate(simulation, seconds), recording)
     return robot, recording
+
+
+def named(out: Path) -> dict[str, Any]:
+    """Return the first finding of a diagnosis, and how far the level of friction is off."""
+    findings = json.loads((out / 'diagnosis.json').read_text(encoding='utf-8'))['findings']
+    if not findings:
+        return {'named': '', 'off_percent': ''}
+    first = findings[0]
+    level = first['parameters'].get('level', {}).get('value')
+    off = '' if level is None else 100.0 * abs(level - _LEVEL) / _LEVEL
+    return {'named': f'{first["effect"]} of {first["joint"]}', 'off_percent': off}
 
 
 def measured(words: list[str]) -> dict[str, float]:

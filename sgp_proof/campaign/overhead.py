@@ -33,25 +33,25 @@ def wait(job):
     return {}
 
 
-def waiting():
+def waiting(counts=WORKERS, waits=WAITS):
     """Return by number of workers the seconds that tasks took, beside those without any cost.
 
     Scheduler and client are in this process: its processor time is what a task costs them.
     """
     found = {}
-    for workers in WORKERS:
+    for workers in counts:
         with cluster(None, workers) as client:
             client.wait_for_workers(workers)
             list(run_tasks(client, wait, [{'seconds': 0.1}] * 4 * workers))
             begun, used, load = time.perf_counter(), time.process_time(), os.getloadavg()[0]
-            list(run_tasks(client, wait, [{'seconds': WAIT_S}] * WAITS * workers))
+            list(run_tasks(client, wait, [{'seconds': WAIT_S}] * waits * workers))
             seconds, used = time.perf_counter() - begun, time.process_time() - used
-        ideal = WAITS * WAIT_S
+        ideal = waits * WAIT_S
         found[str(workers)] = {
             'seconds': seconds, 'ideal': ideal, 'share': ideal / seconds, 'load_before': load,
-            'scheduler_ms_per_task': 1e3 * used / (WAITS * workers),
+            'scheduler_ms_per_task': 1e3 * used / (waits * workers),
         }  # fmt: skip
-    return {'tasks_per_worker': WAITS, 'task_s': WAIT_S, 'workers': found}
+    return {'tasks_per_worker': waits, 'task_s': WAIT_S, 'workers': found}
 
 
 def make_bags(folder):
@@ -123,6 +123,25 @@ def children_of(process):
         if parent == process and b'spawn_main' in line:
             found.append(int(place.name))
     return found
+
+
+def bench_campaign(_rivals, progress, *, is_quick):
+    """Return one row per number of workers: tasks that wait, and recordings where there are cores.
+
+    As `sgp bench campaign`.
+    """
+    counts, waits = ((1,), 2) if is_quick else (WORKERS, WAITS)
+    found = waiting(counts, waits)['workers']
+    progress(0.5)
+    rates = {}
+    if not is_quick:
+        with tempfile.TemporaryDirectory() as name:
+            rates = speed(make_bags(Path(name)), Path(name))
+    return [
+        {'workers': n, **found[str(n)],
+         'recordings_per_s': rates.get(str(n), {}).get('recordings_per_s', '')}
+        for n in counts
+    ]  # fmt: skip
 
 
 def measure():
