@@ -193,6 +193,15 @@ class ObservedMotion:
             self._slopes[joint] = found[0], found[1], M[:, :, joint].copy()
         return self._slopes[joint]
 
+    @property
+    def remembered(self) -> int:
+        """How many numbers `effort_slopes` holds."""
+        return sum(3 * by_q.size for by_q, _, _ in self._slopes.values())
+
+    def forget(self) -> None:
+        """Let go of what `effort_slopes` holds; it is computed again when it is asked for."""
+        self._slopes.clear()
+
     @cached_property
     def last_body_columns(self) -> np.ndarray:
         """Efforts per inertial parameter of the last link, (n, k, 10)."""

@@ -16,6 +16,8 @@ from sgp_ros.robots.observed_motion import ObservedMotion
 
 MOST_HELD = 30_000_000
 """Numbers that are remembered before all are forgotten: 240 MB."""
+MOST_SLOPES = 15_000_000
+"""Slopes of efforts that motions of changed bodies hold before they let go of them: 120 MB."""
 
 
 class Columns:
@@ -41,7 +43,11 @@ class Columns:
             return motion
         key = w.tobytes()
         if key not in self._motions:
-            if len(self._motions) > 20:
+            others, too_many = self._motions.values(), len(self._motions) > 20
+            if too_many or sum(o.remembered for o in others) > MOST_SLOPES:
+                for other in others:  # columns of theirs, which are kept, hold them
+                    other.forget()
+            if too_many:
                 self._motions.clear()
             tree = motion.tree
             change = (w @ self._equations[frozenset()].directions).reshape(tree.parameters.shape)

@@ -141,3 +141,19 @@ def test_screening_finds_the_interval_of_friction_in_a_place(equations_for):
     assert best.place == Place(0, 'viscous')
     bin_width = np.ptp(world.position) / 40
     np.testing.assert_allclose(best.shape, [0.1, 0.5], atol=2.0 * bin_width)
+
+
+def test_slopes_of_motions_that_are_done_with_are_let_go(equations_for, heavy, monkeypatch):
+    """Those of a long recording take hundreds of megabytes a model; asked again, the same."""
+    _, equations = equations_for(heavy[2])
+    columns = Columns(equations)
+    first, second = (columns.corrected(w) for w in np.eye(equations.base.shape[2])[:2])
+    before = [x.copy() for x in first.effort_slopes(1)]
+    assert first.remembered == 3 * first.position.size
+    monkeypatch.setattr('sgp_ros.diagnosis.explain.regression.MOST_SLOPES', 0)
+    assert columns.corrected(np.eye(equations.base.shape[2])[0]) is first
+    assert first.remembered
+    columns.corrected(np.eye(equations.base.shape[2])[2])
+    assert first.remembered == second.remembered == 0
+    for one, other in zip(before, first.effort_slopes(1), strict=True):
+        np.testing.assert_array_equal(one, other)
