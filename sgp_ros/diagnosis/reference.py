@@ -158,7 +158,7 @@ def _reference(
     equations: Equations, findings: list[Finding], shared: list[Finding], shift: np.ndarray
 ) -> Reference:
     """Return the comparison; `shift` (p,) is by how much the bodies differ."""
-    moved = ((equations.base @ shift) ** 2).mean(axis=0) / _moving_power(equations)
+    moved = (equations.force_of_bodies(shift) ** 2).mean(axis=0) / _moving_power(equations)
     calm = 'parameters_only' if moved.max() > COUNTED_SHARE else 'no_mismatch'
     findings.sort(key=lambda f: -f.probability)
     verdict = 'missing_physics' if findings else calm

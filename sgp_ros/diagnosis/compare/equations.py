@@ -18,6 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.bodies import Factor, body_directions
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
@@ -30,44 +31,12 @@ from sgp_ros.rigid.rigid_body import mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
 
-SPREAD = 0.25
-"""Prior standard deviation of mass and inertia, relative; of the centre, to the radius."""
-OPEN_SPREAD = 1.0
-"""The same of bodies that the robot file leaves open."""
-
-
 _OTHER_PLACES = {index: name for name, index in PLACES.items()}
 
 _BLOCK = 2000
 """Rows whose regressor is held at a time: that of a long recording would not fit in memory."""
 POSES = 32
 """Positions over which the inertia of a robot is averaged."""
-
-
-@dataclass(frozen=True, eq=False)
-class Factor:
-    """Base of one joint (N, p) as `Q @ R`, which no scale of its rows changes.
-
-    A frame scales the rows of each joint by another number. Only the small triangles are factored
-    again then: `[R_1 / s_1; ...; R_k / s_k; I] = S R` gives the basis `diag(Q_1, ..., Q_k, I) S`
-    of all rows, orthonormal to rounding. O(k p^3) a frame instead of O(N k p^2).
-
-    Attributes:
-        Q: (N, r) orthonormal, of the columns that are not zero.
-        R: (r, p).
-    """
-
-    Q: np.ndarray
-    R: np.ndarray
-
-    @classmethod
-    def of(cls, base: np.ndarray) -> Factor:
-        """Return the factor of a base (N, p)."""
-        seen = np.flatnonzero(base.any(axis=0))
-        Q, own = np.linalg.qr(base[:, seen])
-        R = np.zeros((len(own), base.shape[1]))
-        R[:, seen] = own
-        return cls(Q, R)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +48,8 @@ class Equations:
         filter: from n to N rows.
         time: (N,) [s].
         d: (N, k) discrepancy [N m or N].
-        base: (N, k, p) force per standard deviation of each inertial parameter's change.
+        bases: of each joint, (N, p) force per standard deviation of each inertial parameter's
+            change; those that a hypothesis does not change are shared.
         directions: (p, 10 b) change of the inertial parameters per unit of the coefficients.
         power: (k,) mean squared effort that shares refer to [N^2 m^2 or N^2].
         noise: (k,) standard deviation that the encoders' noise gives d [N m or N].
@@ -95,7 +65,7 @@ class Equations:
     filter: ParallelFilter
     time: np.ndarray
     d: np.ndarray
-    base: np.ndarray
+    bases: tuple[np.ndarray, ...]
     directions: np.ndarray
     power: np.ndarray
     noise: np.ndarray
@@ -108,11 +78,24 @@ class Equations:
     def factors(self) -> tuple[Factor, ...]:
         """Base of each joint; those that dry friction does not change are shared."""
         found = []
-        for j in range(self.base.shape[1]):
-            base = self.base[:, j]
-            is_same = self.free is not None and np.array_equal(base, self.free.base[:, j])
+        for j, base in enumerate(self.bases):
+            is_same = self.free is not None and np.array_equal(base, self.free.bases[j])
             found.append(self.free.factors[j] if is_same and self.free else Factor.of(base))
         return tuple(found)
+
+    @property
+    def size(self) -> int:
+        """Number p of changes of the inertial parameters."""
+        return len(self.directions)
+
+    @property
+    def base(self) -> np.ndarray:
+        """All bases in one new array, (N, k, p)."""
+        return np.stack(self.bases, axis=1)
+
+    def force_of_bodies(self, w: np.ndarray) -> np.ndarray:
+        """Return the force of a change of the bodies, w (p,), in the rows, (N, k) [N m or N]."""
+        return np.stack([base @ w for base in self.bases], axis=1)
 
     def compact(self, columns: np.ndarray, joint: int, *, is_inertial: bool) -> np.ndarray:
         """Return columns (n, m) of one joint as its rows (N, m), or (n, k, m) as (N, k, m).
@@ -134,7 +117,7 @@ class Equations:
         if not held:
             return self
         motion, tree = self.motion, self.motion.tree
-        d, base, moving = self.d.copy(), self.base.copy(), self.moving.copy()
+        d, bases, moving = self.d.copy(), list(self.bases), self.moving.copy()
         for j in held:
             rows = self.rests[:, j]
             q = motion.position[rows]
@@ -147,9 +130,9 @@ class Equations:
             d[:, j] -= self.filter(needed)
             Y = np.zeros((len(motion.time), len(self.directions)))
             Y[rows] = torque_regressor(tree, q, v, a)[:, j] @ self.directions.T
-            base[:, j] += self.filter(Y)
+            bases[j] = bases[j] + self.filter(Y)
             moving[rows, j] = 0.0
-        return replace(self, d=d, base=base, moving=moving, free=self)
+        return replace(self, d=d, bases=tuple(bases), moving=moving, free=self)
 
     @cached_property
     def poses(self) -> tuple[ObservedMotion, ...]:
@@ -210,46 +193,6 @@ def joint_name(motion: ObservedMotion, joint: int) -> str:
     return _OTHER_PLACES.get(joint) or motion.tree.joint_names[joint]
 
 
-def body_directions(tree: Tree, unstated: Collection[int] = ()) -> np.ndarray:
-    """Return changes of the inertial parameters, one standard deviation each, (p, 10 b).
-
-    Per body: mass at the same centre and size, the centre along three axes, six entries of the
-    inertia about the centre.
-
-    Args:
-        tree: nominal robot.
-        unstated: bodies that its file leaves open.
-    """
-    rows = []
-    for body, values in enumerate(tree.parameters):
-        spread = OPEN_SPREAD if body in unstated else SPREAD
-        mass = max(float(values[0]), 1e-6)
-        c = values[1:4] / mass
-        about = 0.5 * (values[4] + values[6] + values[9])
-        radius = float(np.sqrt(max(about / mass, 1e-6)))
-        shift = np.array(_point(c))
-        own = values[4:] - mass * shift
-        size = float(np.clip(own[[0, 2, 5]].mean(), 1e-3 * mass * radius**2, None))
-        changes = np.zeros((10, 10))
-        changes[0] = spread * values
-        for axis in range(3):
-            e = np.eye(3)[axis] * 0.5 * spread * radius
-            changes[1 + axis, 1:4] = mass * e
-            changes[1 + axis, 4:] = mass * (_point(c + e) - _point(c - e)) / 2.0
-        for entry in range(6):
-            changes[4 + entry, 4 + entry] = spread * size
-        full = np.zeros((10, tree.parameters.size))
-        full[:, 10 * body : 10 * body + 10] = changes
-        rows.append(full)
-    return np.concatenate(rows)
-
-
-def _point(c: np.ndarray) -> np.ndarray:
-    """Return xx, xy, yy, xz, yz, zz of a unit mass at c."""
-    x, y, z = c
-    return np.array([y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y])
-
-
 def _smoothing_error(
     raw: RawTrajectory, motion: ObservedMotion, low: ParallelFilter, bandwidth: Bandwidth
 ) -> np.ndarray:
@@ -278,12 +221,12 @@ def make_equations(
     k = tree.size
     d = low(motion.nominal_effort - motion.effort - motion.stated_force) * motion.moves
     directions = body_directions(tree, unstated)
-    base = np.empty((len(d), k, len(directions)))
+    bases = tuple(np.empty((len(d), len(directions))) for _ in range(k))
     for rows, out in low.blocks(_BLOCK):
         states = motion.position[rows], motion.velocity[rows], motion.acceleration[rows]
         Y = torque_regressor(tree, *states)
         for j in range(k):
-            base[out, j] = -low.piece(Y[:, j] @ directions.T, out) * motion.moves[j]
+            bases[j][out] = -low.piece(Y[:, j] @ directions.T, out) * motion.moves[j]
     power = np.where(
         tree.is_actuated[:k],
         (motion.effort**2).mean(axis=0),
@@ -293,7 +236,7 @@ def make_equations(
     inertia = motion.mass_diagonal.mean(axis=0)
     variance = inertia**2 * (2 * np.pi) ** 4 * raw.noise_density * bandwidth.cutoff**5 / 5.0
     equations = Equations(
-        motion, low, motion.time[low.rows], d, base, directions, power, np.sqrt(variance),
+        motion, low, motion.time[low.rows], d, bases, directions, power, np.sqrt(variance),
         np.ones(motion.position.shape), resting(raw, motion, bandwidth),
         _smoothing_error(raw, motion, low, bandwidth),
     )  # fmt: skip

@@ -125,7 +125,7 @@ def left_out(columns: Columns, model: Model, candidates: tuple[EffectAt, ...]) -
     """
     equations, sigma = model.frame.equations, model.sigma
     N, k = equations.d.shape
-    p = equations.base.shape[2] if model.is_free else 0
+    p = equations.size if model.is_free else 0
     y, X = equations.d / sigma, [equations.base[:, :, :p] / sigma[:, None]]
     for candidate in candidates:
         x = columns.of(candidate, equations, model.w) / sigma[:, None]

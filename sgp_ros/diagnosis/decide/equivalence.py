@@ -168,8 +168,9 @@ def _without_prior(equations: Equations, parameters: Model) -> Model:
     )[0]
     log_inertia = equations.log_inertia(w, np.zeros((k, k)))
     return replace(
-        parameters, w=w, log_inertia=log_inertia, residual=equations.d - equations.base @ w
-    )
+        parameters, w=w, log_inertia=log_inertia,
+        residual=equations.d - equations.force_of_bodies(w),
+    )  # fmt: skip
 
 
 def _contains(rival: Model, model: Model) -> bool:

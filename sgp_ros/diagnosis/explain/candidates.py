@@ -172,7 +172,7 @@ def _solved(
         forces.append(x @ own)
     left = equations.d - sum(forces, np.zeros_like(equations.d))
     w = frame.parameters(left)
-    residual = left - equations.base @ w
+    residual = left - equations.force_of_bodies(w)
     mean = (residual**2).mean(axis=0)
     log_inertia = equations.log_inertia(w, added_inertia(placed, equations))
     # what is measured is the motion: the floor is one of accelerations

@@ -42,7 +42,7 @@ class Frame:
     def of(cls, equations: Equations, sigma: np.ndarray, *, is_free: bool) -> Frame:
         """Return the frame for rows of these standard deviations."""
         factors = equations.factors
-        p = equations.base.shape[2] if is_free else 0
+        p = equations.size if is_free else 0
         parts = [f.R[:, :p] / s for f, s in zip(factors, sigma, strict=True)]
         S, R = np.linalg.qr(np.concatenate([*parts, np.eye(p)]))
         ends = np.cumsum([len(part) for part in parts])
@@ -108,7 +108,7 @@ class Frame:
     def parameters(self, unexplained: np.ndarray) -> np.ndarray:
         """Return w (p,) that explains best what effects (N, k) leave of the target."""
         if not self.is_free:
-            return np.zeros(self.equations.base.shape[2])
+            return np.zeros(self.equations.size)
         u = self._explained((unexplained / self.sigma)[:, :, None])
         return np.linalg.solve(self.R, u[:, 0])
 

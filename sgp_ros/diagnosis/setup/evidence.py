@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.equations import body_directions
+from sgp_ros.diagnosis.compare.bodies import body_directions
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, observe
 from sgp_ros.diagnosis.criteria import INDEPENDENT_ROWS, SHAPE_ERROR

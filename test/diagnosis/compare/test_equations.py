@@ -7,10 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.compare.equations import (
-    body_directions,
-    make_equations,
-)
+from sgp_ros.diagnosis.compare.bodies import body_directions
+from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.explain import regression
 from sgp_ros.diagnosis.explain.candidates import fit

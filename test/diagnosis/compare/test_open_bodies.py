@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.compare.equations import body_directions
+from sgp_ros.diagnosis.compare.bodies import body_directions
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies, with_open_bodies
 from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.pipeline import diagnose

@@ -70,7 +70,7 @@ def equations_of(truth):
     d = d + noise * np.random.default_rng(2).normal(size=d.shape)
     power = (seen.effort**2).mean(axis=0)
     still = np.zeros(seen.position.shape, dtype=bool)
-    empty = np.zeros((*d.shape, 0))
+    empty = (np.zeros((len(d), 0)),) * d.shape[1]
     return Equations(
         seen, low, seen.time[rows], d, empty, np.zeros((0, 20)), power, np.full(2, 1e-9),
         np.ones(seen.position.shape), still, np.zeros(2),

@@ -60,11 +60,10 @@ def test_frames_of_any_scale_share_the_factors_of_the_joints(equations_for, heav
         rows = np.concatenate([(equations.base / sigma[:, None]).reshape(N * k, p), np.eye(p)])
         np.testing.assert_allclose(frame.Q.T @ frame.Q, np.eye(p), atol=1e-12)
         np.testing.assert_allclose(frame.Q @ frame.R, rows, atol=1e-11 * np.abs(rows).max())
-    base = equations.base.copy()
-    base[:, 1] *= 2.0
-    held = replace(equations, base=base, free=equations)
+    bases = equations.bases[0], 2.0 * equations.bases[1]
+    held = replace(equations, bases=bases, free=equations)
     assert held.factors[0] is equations.factors[0]
-    np.testing.assert_allclose(held.factors[1].Q @ held.factors[1].R, base[:, 1], atol=1e-11)
+    np.testing.assert_allclose(held.factors[1].Q @ held.factors[1].R, bases[1], atol=1e-11)
 
 
 def test_what_remains_is_told_apart_by_joint(equations_for, heavy):
