@@ -114,6 +114,7 @@ def text():
     tables = [f'## sgp {name}\n{_table(result[name])}' for name in COMMANDS if name in result]
     return PAGE.format(
         machine=', '.join(f'{k} {v}' for k, v in result['machine'].items()),
+        remark=result.get('remark', ''),
         tables='\n\n'.join(tables), targets=_targets(result), stages=_stages(result),
         rivals=_rivals(result),
     )  # fmt: skip
@@ -125,6 +126,7 @@ def main():
         known = json.loads(RESULT.read_text(encoding='utf-8')) if RESULT.exists() else {}
         chosen = {name: given[name] for name in (*COMMANDS, 'stages') if name in given}
         known |= {'schema': given['schema'], 'machine': given['machine'], **chosen}
+        known['remark'] = given.get('remark', '')
         RESULT.write_text(json.dumps(known, indent=1) + '\n', encoding='utf-8')
     TARGET.write_text(text(), encoding='utf-8')
 
