@@ -60,11 +60,27 @@ def _disk(result):
     return f'{names}: faults: {"; ".join(result["faults"]) or "none"}.'
 
 
+def _gate_time(result):
+    lines = [
+        '| stream | what | equation, with and without [µs] | grows by | other steps [µs] | stream grows by |',
+        '|---|---|---|---|---|---|',
+    ]
+    for name, parts in result['streams'].items():
+        for part, x in parts.items():
+            both = (x['us_equation'], x['us_message'])
+            equation, message = (f'{y["with"]:.1f}, {y["without"]:.1f}' for y in both)
+            lines.append(
+                f'| {name}, {result["rates_hz"][name]:g} Hz | {part} | {equation} | '
+                f'{100 * x["growth_equation"]:.1f} % | {message} | {100 * x["growth"]:.1f} % |'
+            )
+    return '\n'.join(lines)
+
+
 def text() -> str:
     """Return the page."""
     events, files, gates = (_load(f'robust_{n}') for n in ('events', 'files', 'gates'))
     messages, kills, disk = (_load(f'robust_{n}') for n in ('messages', 'kills', 'disk'))
-    summary = gates['summary']
+    gate_time, summary = _load('robust_gate_time'), gates['summary']
     rate = summary['falsely_refused'] / summary['equations']
     machine = events['environment']
     return TEMPLATE.read_text(encoding='utf-8').format(
@@ -76,7 +92,7 @@ def text() -> str:
         LARGEST=f'{LARGEST:g}', BOUND=f'{1e2 / LARGEST**2:.2g}', STREAMS=len(gates['clean']),
         GARBAGE=_garbage(summary), MESSAGES=messages['messages'],
         MESSAGE_FAULTS=_faults(messages), MESSAGE_MB=messages['peak_megabytes'],
-        KILLS=kills['number'], KILL_FAULTS=_faults(kills), KILL_COUNTS=_kills(kills),
+        GATE_TIME=_gate_time(gate_time), KILLS=kills['number'], KILL_FAULTS=_faults(kills), KILL_COUNTS=_kills(kills),
         KEPT='; '.join(f'{n} {kept}' for kept, n in kills['kept'].items()),
         LOST=f'{kills["most_lost_s"]:.2f}', DISK=_disk(disk),
         MACHINE=f'{machine["processor"]}, Python {machine["python"]}, NumPy {machine["numpy"]}',
