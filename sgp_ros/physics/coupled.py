@@ -137,8 +137,15 @@ class CoupledFriction(Effect):
         return frozenset({place.joint, place.source})
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
-        """Return whether it never drives."""
-        w = self._speed(motion, at.place, float(at.shape[0]))
+        """Return whether it never drives, and the source's speed counts beside the joint's.
+
+        A ratio of next to nothing is the plain friction of one joint, with a speed that is off by
+        less than what its smoothing leaves.
+        """
+        ratio = float(at.shape[0])
+        if abs(ratio) * _LOPSIDED < _scale(motion.velocity, at.place):
+            return False
+        w = self._speed(motion, at.place, ratio)
         force = at.coefficients * np.array([1.0, np.sqrt(np.mean(w**2))])
         return bool(np.max(force) > 0.0 and np.all(force > -0.05 * np.max(force)))
 

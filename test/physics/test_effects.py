@@ -345,6 +345,7 @@ def test_the_report_says_the_numbers_that_went_into_the_columns(name, shape, c, 
         ('end_stop', [1.0], [-300.0, 4.0], {'side': 1}), ('torque_gain', [], [-1.5], {}),
         ('payload', [-0.1, 0, 0, 0], [1.0], {}),
         ('coupled_friction', [1.0], [0.3, -0.2], {'source': 2}),
+        ('coupled_friction', [0.002], [0.3, 0.2], {'source': 2}),
         ('command_delay', [0.0], [1.0], {}), ('encoder_eccentricity', [3.0, 0.3, 0.1], [1.0], {}),
     ],
 )  # fmt: skip
