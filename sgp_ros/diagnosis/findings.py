@@ -9,7 +9,14 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations, joint_name
 from sgp_ros.diagnosis.compare.velocity_sensor import SensorLag
-from sgp_ros.diagnosis.criteria import DOUBTED, INTERVAL, NUMBER_ERROR, REGION_ENERGY
+from sgp_ros.diagnosis.connected import Connected
+from sgp_ros.diagnosis.criteria import (
+    COUNTED_SHARE,
+    DOUBTED,
+    INTERVAL,
+    NUMBER_ERROR,
+    REGION_ENERGY,
+)
 from sgp_ros.diagnosis.decide.certainty import Probabilities
 from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision
 from sgp_ros.diagnosis.decide.differences import Several
@@ -263,3 +270,30 @@ def parameter_errors(
             if abs(now - then) > 2.0 * std and abs(now - then) > 1e-9:
                 found.append(ParameterError(link, name, float(now), std, float(then), unit))
     return tuple(found)
+
+
+def verdict_of(
+    decision: Decision,
+    wrong: tuple[ParameterError, ...],
+    connected: Connected,
+    *,
+    is_missing: bool,
+) -> str:
+    """Return the verdict of a diagnosis.
+
+    Bodies are wrong where one of them differs, or all of them together by what counts as physics.
+
+    Args:
+        decision: on the models.
+        wrong: bodies that differ.
+        connected: with errors of the connection, if any.
+        is_missing: whether anything beside the models is missing physics.
+    """
+    if decision.verdict not in {'no_mismatch', 'parameters_only'}:
+        return decision.verdict
+    if is_missing:
+        return 'missing_physics'
+    if connected.findings:
+        return 'setup_error'
+    is_calm = not wrong and connected.nominal.max() < COUNTED_SHARE
+    return 'no_mismatch' if is_calm else decision.verdict

@@ -28,6 +28,7 @@ from sgp_ros.diagnosis.findings import (
     bound_remarks,
     differences,
     parameter_errors,
+    verdict_of,
 )
 from sgp_ros.diagnosis.gathered import Knowledge, Recordings, gather
 from sgp_ros.diagnosis.locate.bands import bands
@@ -144,6 +145,7 @@ def _diagnosed(
     on_z += _harm(final, {k: x for k, x in parts.items() if k != 'train'}, proofs)
     doubts = reasons_to_doubt(proofs, recordings.still)
     on_all = replace(decision, model=model)
+    wrong = parameter_errors(whole, model, recordings.unstated)
     findings, forces = asserted(whole, on_all, lags, learned, chances, depends)
     findings, differ = tuple(map(connected.against_rivals, findings)), differences(several, names)
     certainty = certainty_of((*findings, *differ), equations, comparison)
@@ -154,11 +156,11 @@ def _diagnosed(
         robot=robot,
         joints=tree.moving_names,
         units=tuple('N' if p else 'N m' for p in tree.is_prismatic[: tree.size]),
-        verdict=_verdict(decision, connected, is_missing=bool(lags or differ)),
+        verdict=verdict_of(decision, wrong, connected, is_missing=bool(lags or differ)),
         certainty=_certainty(certainty, connected, is_doubted=bool(doubts)),
         findings=findings,
         alternatives=alternatives(decision, chances),
-        parameter_errors=parameter_errors(whole, model, recordings.unstated),
+        parameter_errors=wrong,
         proofs=proofs,
         predictions=_predictions(final, connected, tree),
         dependences=depends,
@@ -227,13 +229,6 @@ def _settled(several: Several) -> tuple[Several, Contrasts, Probabilities]:
         return several, contrasts, probabilities(equations, comparison, decision, contrasts)
     decision, contrasts, chances = settled(equations, comparison, decision)
     return replace(several, decision=decision, model=decision.model), contrasts, chances
-
-
-def _verdict(decision: Decision, connected: Connected, *, is_missing: bool) -> str:
-    is_calm = decision.verdict in _CALM
-    if is_calm and connected.findings and not is_missing:
-        return 'setup_error'
-    return 'missing_physics' if is_missing and is_calm else decision.verdict
 
 
 def _final(

@@ -1,0 +1,34 @@
+"""The verdict where nothing is missing."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE
+from sgp_ros.diagnosis.findings import verdict_of
+
+LITTLE, MUCH = 0.5 * COUNTED_SHARE, 2.0 * COUNTED_SHARE
+
+
+@pytest.mark.parametrize(
+    ('said', 'wrong', 'nominal', 'setup', 'is_missing', 'verdict'),
+    [
+        ('parameters_only', (), LITTLE, (), False, 'no_mismatch'),
+        ('parameters_only', (), MUCH, (), False, 'parameters_only'),
+        ('parameters_only', ('mass',), LITTLE, (), False, 'parameters_only'),
+        ('no_mismatch', (), LITTLE, (), False, 'no_mismatch'),
+        ('no_mismatch', (), LITTLE, (), True, 'missing_physics'),
+        ('parameters_only', ('mass',), MUCH, ('sign',), False, 'setup_error'),
+        ('parameters_only', ('mass',), MUCH, ('sign',), True, 'missing_physics'),
+        ('unexplained', (), LITTLE, ('sign',), True, 'unexplained'),
+    ],
+)
+def test_bodies_are_wrong_where_one_is_or_where_all_together_count(
+    said, wrong, nominal, setup, is_missing, verdict
+):
+    decision = SimpleNamespace(verdict=said)
+    connected = SimpleNamespace(findings=setup, nominal=np.array([0.0, nominal]))
+    assert verdict_of(decision, wrong, connected, is_missing=is_missing) == verdict
