@@ -31,6 +31,8 @@ from sgp_ros.robots.urdf_robot import nominal_tree
 ASSERTED = 0.5
 """Least probability of what counts as asserted, as the schema of diagnosis.json has it [1]."""
 _CALM = ('no_mismatch', 'parameters_only')
+_HALVES = (COULOMB_FRICTION.name, CONSTANT_LOAD.name)
+"""What friction that differs with direction is made of."""
 
 
 def answer(wanted, machine, effects, parts, urdf_path):
@@ -134,9 +136,12 @@ def score(answer, diagnosis):
     """Return the row of one world."""
     found = {(f['effect'], f['joint']) for f in asserted(diagnosis)}
     named, missed, allowed = [], [], set()
+    lopsided = _lopsided(answer)
     for effect in answer['effects']:
         joint = effect['joint']
         sets = [{(name, joint) for name in names} for names in effect['names']]
+        if effect['effect'] in _HALVES:
+            sets += [{x} for x in lopsided if x[1] == joint]
         allowed |= set().union(*sets)
         if effect['is_asked']:
             hit = any(names <= found for names in sets)
@@ -169,6 +174,17 @@ def failed(answer):
         'right_findings': 0, 'right': False, 'is_calm': not missed, 'alarm': False,
         'parameters': [], 'certainty': None, 'held_out': {},
     }  # fmt: skip
+
+
+def _lopsided(answer):
+    """Return where Coulomb friction and a constant load are friction that differs by direction."""
+    level, load = (
+        {e['joint']: abs(e['parameters'].get(number, np.inf))
+         for e in answer['effects'] if e['effect'] == name}
+        for name, number in ((COULOMB_FRICTION.name, 'level'), (CONSTANT_LOAD.name, 'force'))
+    )  # fmt: skip
+    joints = [j for j in level if load.get(j, np.inf) <= level[j] < np.inf]  # no level is negative
+    return {(ASYMMETRIC_COULOMB.name, j) for j in joints}
 
 
 def _equivalents(answer):

@@ -79,6 +79,17 @@ def test_equivalent_names_are_right_and_what_is_not_asked_for_may_be_asserted():
     assert several.score(answer, _diagnosis(found[0]))['missed'] == [['asymmetric_coulomb', 'a']]
 
 
+@pytest.mark.parametrize(('load', 'is_right'), [(-0.3, True), (-0.7, False)])
+def test_a_load_beside_dry_friction_is_friction_that_differs_with_direction(load, is_right):
+    """As long as it is not the larger of the two: no direction drives."""
+    sizes = {'coulomb_friction': {'level': 0.5}, 'constant_load': {'force': load}}
+    answer = _answer(*(('a', [[name]], True) for name in sizes))
+    for entry in answer['effects']:
+        entry['parameters'] = sizes[entry['effect']]
+    row = several.score(answer, _diagnosis(('asymmetric_coulomb', 'a', 0.9)))
+    assert row['right'] == is_right
+
+
 @pytest.mark.parametrize(('probability', 'count'), [(0.5, 0), (0.51, 1)])
 def test_a_wrong_law_counts_once_it_is_asserted(probability, count):
     """At one half or less it is none, as the schema has it."""
