@@ -9,7 +9,6 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations, joint_name
 from sgp_ros.diagnosis.compare.velocity_sensor import SensorLag
-from sgp_ros.diagnosis.connected import Connected
 from sgp_ros.diagnosis.criteria import (
     COUNTED_SHARE,
     DOUBTED,
@@ -274,10 +273,10 @@ def parameter_errors(
 
 def verdict_of(
     decision: Decision,
-    wrong: tuple[ParameterError, ...],
-    connected: Connected,
-    *,
-    is_missing: bool,
+    wrong: Sequence[ParameterError],
+    setup: Sequence[Finding],
+    nominal: np.ndarray,
+    beside: Sequence[object],
 ) -> str:
     """Return the verdict of a diagnosis.
 
@@ -286,14 +285,15 @@ def verdict_of(
     Args:
         decision: on the models.
         wrong: bodies that differ.
-        connected: with errors of the connection, if any.
-        is_missing: whether anything beside the models is missing physics.
+        setup: errors of the connection.
+        nominal: (k,) shares of the discrepancy from the nominal robot.
+        beside: missing physics beside the models.
     """
     if decision.verdict not in {'no_mismatch', 'parameters_only'}:
         return decision.verdict
-    if is_missing:
+    if beside:
         return 'missing_physics'
-    if connected.findings:
+    if setup:
         return 'setup_error'
-    is_calm = not wrong and connected.nominal.max() < COUNTED_SHARE
+    is_calm = not wrong and nominal.max() < COUNTED_SHARE
     return 'no_mismatch' if is_calm else decision.verdict

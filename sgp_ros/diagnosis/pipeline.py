@@ -135,28 +135,27 @@ def _diagnosed(
     several, laws = extended(connected.several)
     raw, tree, names = recordings.learned, whole.motion.tree, recordings.names
     several, sides, chances = _settled(several)
-    equations = several.equations
-    comparison, decision, model = several.comparison, several.decision, several.model
+    equations, model = several.equations, several.model
+    comparison, decision = several.comparison, several.decision
     depends = dependences(equations, comparison.base.residual)
     lags = [lag for lag in sensor_lags(raw, equations) if lag.is_physics]
     final, learned, on_z = _final(several, whole)
     parts = {'train': raw, **recordings.kept, **recordings.held}
     proofs = {stem: prove(final, part, tree, stem) for stem, part in parts.items()}
     on_z += _harm(final, {k: x for k, x in parts.items() if k != 'train'}, proofs)
-    doubts = reasons_to_doubt(proofs, recordings.still)
-    on_all = replace(decision, model=model)
+    doubts, on_all = reasons_to_doubt(proofs, recordings.still), replace(decision, model=model)
     wrong = parameter_errors(whole, model, recordings.unstated)
     findings, forces = asserted(whole, on_all, lags, learned, chances, depends)
     findings, differ = tuple(map(connected.against_rivals, findings)), differences(several, names)
-    certainty = certainty_of((*findings, *differ), equations, comparison)
     progress(1.0)
+    certainty = certainty_of((*findings, *differ), equations, comparison)
     if reasons_to_doubt({'train': proofs['train']}, recordings.still):
         findings = tuple(replace(f, probability=min(f.probability, DOUBTED)) for f in findings)
     return Diagnosis(
         robot=robot,
         joints=tree.moving_names,
         units=tuple('N' if p else 'N m' for p in tree.is_prismatic[: tree.size]),
-        verdict=verdict_of(decision, wrong, connected, is_missing=bool(lags or differ)),
+        verdict=verdict_of(decision, wrong, connected.findings, connected.nominal, lags or differ),
         certainty=_certainty(certainty, connected, is_doubted=bool(doubts)),
         findings=findings,
         alternatives=alternatives(decision, chances),

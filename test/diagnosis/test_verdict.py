@@ -14,21 +14,21 @@ LITTLE, MUCH = 0.5 * COUNTED_SHARE, 2.0 * COUNTED_SHARE
 
 
 @pytest.mark.parametrize(
-    ('said', 'wrong', 'nominal', 'setup', 'is_missing', 'verdict'),
+    ('said', 'wrong', 'nominal', 'setup', 'beside', 'verdict'),
     [
-        ('parameters_only', (), LITTLE, (), False, 'no_mismatch'),
-        ('parameters_only', (), MUCH, (), False, 'parameters_only'),
-        ('parameters_only', ('mass',), LITTLE, (), False, 'parameters_only'),
-        ('no_mismatch', (), LITTLE, (), False, 'no_mismatch'),
-        ('no_mismatch', (), LITTLE, (), True, 'missing_physics'),
-        ('parameters_only', ('mass',), MUCH, ('sign',), False, 'setup_error'),
-        ('parameters_only', ('mass',), MUCH, ('sign',), True, 'missing_physics'),
-        ('unexplained', (), LITTLE, ('sign',), True, 'unexplained'),
+        ('parameters_only', (), LITTLE, (), (), 'no_mismatch'),
+        ('parameters_only', (), MUCH, (), (), 'parameters_only'),
+        ('parameters_only', ('mass',), LITTLE, (), (), 'parameters_only'),
+        ('no_mismatch', (), LITTLE, (), (), 'no_mismatch'),
+        ('no_mismatch', (), LITTLE, (), ('lag',), 'missing_physics'),
+        ('parameters_only', ('mass',), MUCH, ('sign',), (), 'setup_error'),
+        ('parameters_only', ('mass',), MUCH, ('sign',), ('lag',), 'missing_physics'),
+        ('unexplained', (), LITTLE, ('sign',), ('lag',), 'unexplained'),
     ],
 )
 def test_bodies_are_wrong_where_one_is_or_where_all_together_count(
-    said, wrong, nominal, setup, is_missing, verdict
+    said, wrong, nominal, setup, beside, verdict
 ):
     decision = SimpleNamespace(verdict=said)
-    connected = SimpleNamespace(findings=setup, nominal=np.array([0.0, nominal]))
-    assert verdict_of(decision, wrong, connected, is_missing=is_missing) == verdict
+    shares = np.array([0.0, nominal])
+    assert verdict_of(decision, wrong, setup, shares, beside) == verdict
