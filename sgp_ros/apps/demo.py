@@ -86,7 +86,7 @@ def run_demo(
 
 
 _EXPLANATION = (
-    'The model knows gravity, the wheel angle and the motor voltage. It does not know the viscous '
+    'The model contains gravity, the wheel angle and the motor voltage. It lacks the viscous '
     'friction and the back-EMF of the motor, which the simulated wheel has; the process Z learned '
     'them, so that they do not bias the parameters. Compare with the fit of the physics alone.'
 )

@@ -107,7 +107,7 @@ def filter_choice(plan: Mapping[str, Any]) -> str:
     """Say which filter was chosen."""
     taken = 'as measured' if plan['velocity_source'] == 'measured' else 'from the position'
     return (
-        'Both sides of the equation of motion passed a low-pass without delay of '
+        'Both sides of the equation of motion were filtered by a zero-phase low-pass of '
         f'{plan["cutoff_hz"]:g} Hz; {plan["rate_hz"]:.3g} rows per second were kept. '
         f'The velocity was taken {taken}.'
     )

@@ -97,14 +97,13 @@ def model_remarks(engine: Engine, asked: EngineConfig) -> list[str]:
         if held:
             counts = engine.counts
             remarks.append(
-                f'dry friction can hold {", ".join(held)} at rest, where no effort follows from '
-                f'the motion: {counts.held} of {counts.estimated} equations were within what it '
-                'may take; they are not scored for the joint that it holds, and a model with Z '
-                'learns nothing from them'
+                f'dry friction can hold {", ".join(held)} at rest, where the motion does not '
+                f'determine the effort: {counts.held} of {counts.estimated} equations are not '
+                'scored for the joint at rest, and a model with Z does not learn from them'
             )
         if left_out:
             remarks.append(
-                f'not modelled online, so the scores of these joints fall behind those of the '
+                'not modelled online, so these joints are predicted less well than in the '
                 f'diagnosis: {", ".join(left_out)}'
             )
     remarks += [
@@ -114,8 +113,8 @@ def model_remarks(engine: Engine, asked: EngineConfig) -> list[str]:
         if weight.n and weight.mean < 0.5
     ]
     remarks += [
-        f'{p.name} ended at {p.value:.3g} {p.unit}, below {c.low:g}: no such value exists. '
-        'Something that the model lacks stands behind it, or the motion does not determine it'
+        f'{p.name} ended at {p.value:.3g} {p.unit}, below {c.low:g}, which is impossible: '
+        'physics is missing from the model, or the motion does not determine the parameter'
         for p, c in zip(engine.parameters(), robot.coefficients, strict=False)
         if p.value < c.low
     ]
@@ -132,8 +131,8 @@ def stream_remarks(engine: Engine, failures: Sequence[str]) -> list[str]:
     remarks, counts = [], engine.counts
     if counts.clock_jumps:
         remarks.append(
-            f'the clock of the recording jumped {counts.clock_jumps} times: a new segment began, '
-            'what was learned stayed'
+            f'the clock of the recording jumped {counts.clock_jumps} times: each began a new '
+            'segment, and what was learned was kept'
         )
     remarks += [
         f'{n} changes of settings in the recording were refused: {reason}'

@@ -143,6 +143,7 @@ def test_the_command_writes_json_with_the_set_up(tmp_path, capsys):
     page = content_of((out / 'report.html').read_text())
     assert 'can be diagnosed' in page
     assert 'cannot separate missing physics from' in page
+    assert '<svg class="robot"' in page
     assert found['setup'] == []
     assert found['equivalents'] == [[['hinge', 'encoder_offset']]]
     assert (

@@ -200,7 +200,7 @@ def test_a_recording_that_tells_nothing_ends_in_one_line(
             'case_05/real.mcap',
             'case_05/robot.urdf',
             ('--test', _case('01') / 'real_test.mcap'),
-            "real_test.mcap shows the joints ['hinge']",
+            "real_test.mcap contains the joints ['hinge']",
         ),
         ('nowhere.mcap', 'case_05/robot.urdf', (), 'no recording at'),
         ('case_05/real.mcap', 'nowhere.urdf', (), 'neither a built-in robot nor a file'),

@@ -214,7 +214,7 @@ BAD = {
         [replace(s, effort=frozen_array([np.nan, np.nan])) for s in SAMPLES], (), 'effort',
     ),
     'zero effort': (
-        [replace(s, effort=frozen_array([0.0, 0.0])) for s in SAMPLES], (), 'never changes',
+        [replace(s, effort=frozen_array([0.0, 0.0])) for s in SAMPLES], (), 'is constant',
     ),
     'commands': (SAMPLES, ('--effort', 'command'), '--command'),
     'inputs': (SAMPLES, ('--inputs', 'own:speed'), 'own:velocity'),

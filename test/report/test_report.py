@@ -51,6 +51,7 @@ def test_the_page_says_the_finding_first_and_compares_with_the_truth(finished, t
     assert page.index('The model predicts') < page.index('<img')
     assert page.count('<tr>') > 5
     assert 'true value' in page
+    assert ('<svg class="robot"' in page) == (engine.robot.bodies is not None)
     content_of(page)
     assert {p.name for p in paths} >= {'report.html', 'parameters.png', 'calibration.png'}
     assert not list(tmp_path.glob('.sgp_growing_*'))
