@@ -152,11 +152,11 @@ def is_growing(name: str) -> bool:
     return name.startswith(_GROWING) and '/' not in name
 
 
-def remove_growing(folder: Path) -> None:
-    """Remove what runs that were killed have left in a folder."""
+def remove_growing(folder: Path, of: int = 0) -> None:
+    """Remove what runs that were killed have left in a folder, and what process `of` has."""
     for path in folder.glob(f'{_GROWING}*'):
         process = path.name.removeprefix(_GROWING).partition('_')[0]
-        if process.isdecimal() and not _is_alive(int(process)):
+        if process.isdecimal() and (int(process) == of or not _is_alive(int(process))):
             path.unlink(missing_ok=True)
 
 

@@ -58,11 +58,16 @@ def replacing_results(out: Path, command: str) -> Iterator[None]:
     with _locked(out / f'.sgp_{command}.lock'):
         _make_moves(out, command)
         remove_growing(out)
-        with waiting_files(out) as waiting:
-            yield
-        with _undisturbed():
-            _note_moves(out, command, waiting)
-            _make_moves(out, command)
+        try:
+            with waiting_files(out) as waiting:
+                yield
+            with _undisturbed():
+                _note_moves(out, command, waiting)
+                _make_moves(out, command)
+        except BaseException:  # a signal may come between the making of a file and its care
+            if not (out / f'.sgp_{command}.moves').exists():
+                remove_growing(out, of=os.getpid())
+            raise
 
 
 @contextlib.contextmanager

@@ -15,6 +15,7 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.recordings.model_files import load_model, save_model
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.writer import RecordingWriter
+from sgp_ros.report import files
 from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.strangers import create_beside
 
@@ -147,3 +148,41 @@ def test_a_note_of_moves_reaches_no_other_folder(tmp_path):
         pass
     assert victim.read_text() == 'mine'
     assert not (out / 'y').exists()
+
+
+@pytest.mark.parametrize('moment', ['beside a growing file', 'before the names'])
+def test_an_interrupted_run_leaves_no_growing_file(tmp_path, monkeypatch, moment):
+    """Wherever the signal comes: after a file was made, or once all of them are complete."""
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    def run():
+        with replacing_results(tmp_path, 'replay'):
+            write_text(tmp_path / 'metrics.json', '{}')
+            if moment != 'before the names':
+                create_beside(tmp_path / 'report.html')[0].close()
+                interrupt()
+
+    if moment == 'before the names':
+        monkeypatch.setattr(files, '_note_moves', interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        run()
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupt_takes_nothing_that_has_a_name_to_come(tmp_path, monkeypatch):
+    """What is noted is completed by the next run."""
+    make_moves, calls = files._make_moves, []
+
+    def cut_off(out, command):
+        calls.append(command)
+        if len(calls) == 2:
+            raise OSError('no space')
+        make_moves(out, command)
+
+    monkeypatch.setattr(files, '_make_moves', cut_off)
+    with pytest.raises(OSError, match='no space'), replacing_results(tmp_path, 'replay'):
+        write_text(tmp_path / 'metrics.json', '{}')
+    with replacing_results(tmp_path, 'replay'):
+        assert (tmp_path / 'metrics.json').read_text() == '{}'
