@@ -142,7 +142,7 @@ def test_joined_recordings_are_taken_apart_and_said():
     """All states stay in use, on either side of the join."""
     for found in (collect(_joined_events(), HINGE), collect_signals(_joined_events(), HINGE)):
         assert found.segments == (slice(0, 800), slice(800, 1600))
-        assert found.remarks == ('Positions jump at t = 4 s: taken as 2 recordings.',)
+        assert found.remarks == ('Positions jump at t = 4 s: treated as 2 recordings.',)
 
 
 def test_only_turns_of_a_joint_without_limits_are_no_joins():

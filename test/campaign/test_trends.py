@@ -73,7 +73,7 @@ def test_a_told_temperature_and_a_robot_take_their_share():
     term = _terms(trend)['temperature']
     assert term.low < -0.005 < term.high < 0.0
     assert trend.scatter['robots'] > 0.03
-    assert any('always does not vary' in said for said in trend.remarks)
+    assert any('always is constant' in said for said in trend.remarks)
 
 
 def test_recordings_without_time_have_no_trend_in_time():

@@ -194,7 +194,7 @@ def test_arrays_of_a_tree_are_read_only():
 @pytest.mark.parametrize(
     ('text', 'found'),
     [
-        ('<robot', 'no XML'),
+        ('<robot', 'not XML'),
         ('<sdf/>', '<sdf>'),
         ('<!DOCTYPE r [<!ENTITY x "y">]><robot>&x;</robot>', 'document type'),
         ('<robot name="r"/>', '0 links'),

@@ -119,8 +119,8 @@ def test_windows_line_ends_stay():
         (URDF, {'arm': np.ones(9)}, {}, 'link arm'),
         (URDF, {'hook': random_body(0), 'tip': random_body(1)}, {}, 'fixed to link hook'),
         (URDF, {}, {'turn': (np.nan, 0.0)}, 'joint turn'),
-        ('<robot><link></robot>', {}, {}, 'no XML'),
-        ('', {}, {}, 'no XML'),
+        ('<robot><link></robot>', {}, {}, 'not XML'),
+        ('', {}, {}, 'not XML'),
         ('<sdf/>', {}, {}, '<sdf>'),
     ],
 )

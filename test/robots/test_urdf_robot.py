@@ -180,7 +180,7 @@ def test_a_wrong_urdf_is_refused_in_one_line(tmp_path):
     """Alone and from a robot YAML; also where there is none."""
     broken = _write(tmp_path, urdf='<robot')
     for path in (broken, str(tmp_path / 'arm.urdf')):
-        with pytest.raises(ConfigError, match='no XML') as caught:
+        with pytest.raises(ConfigError, match='not XML') as caught:
             load_robot(path)
         assert '\n' not in str(caught.value)
     (tmp_path / 'arm.urdf').unlink()

@@ -347,10 +347,13 @@ def test_a_full_disk_ends_the_record_and_not_the_node(graph: Graph, tmp_path: Pa
     [
         ({'robot': 'submarine'}, 'submarine'),
         ({'robot': 'panda', 'filter__window': 1}, 'filter.window'),
-        ({'robot': 'panda', 'filter__window': -2.0, 'buffer__budget': 1}, '2 wrong parameters'),
+        ({'robot': 'panda', 'filter__window': -2.0, 'buffer__budget': 1}, '2 wrong parameter'),
         ({'robot': 'panda', 'command__type': 'std_msgs/Bool'}, 'command.type'),
         ({'robot': 'panda', 'model__path': '/no/model.npz'}, 'no model file /no/model.npz'),
-        ({'robbot': 'panda', 'hello': 3}, 'unknown parameters: hello, robbot (meant robot?)'),
+        (
+            {'robbot': 'panda', 'hello': 3},
+            'unknown parameters: hello, robbot (did you mean robot?)',
+        ),
         ({'robot': 'panda', 'hyper__elbow__noise_variance': 1.0}, 'hyper.elbow.noise_variance'),
     ],
 )

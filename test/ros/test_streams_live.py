@@ -78,7 +78,7 @@ def test_two_publishers_of_one_joint_are_named(graph: Graph) -> None:
         one.publish(_state(i * STEP_NS))
         other.publish(_state(i * STEP_NS + 10**6, shift=1.0))
 
-    _publish_until(graph, send, lambda: 'several publishers' in graph.message('samples'))
+    _publish_until(graph, send, lambda: 'published by several nodes' in graph.message('samples'))
     assert "['pole', 'wheel']" in graph.message('samples')
     assert '/client' in graph.message('samples')
 

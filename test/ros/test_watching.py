@@ -83,5 +83,5 @@ def test_a_node_that_is_not_there_is_one_line() -> None:
         capture_output=True, text=True, check=False, timeout=90.0, env=os.environ, cwd=ROOT,
     )  # fmt: skip
     assert done.returncode == 2
-    assert 'no word of /nobody' in done.stderr
+    assert 'nothing from /nobody' in done.stderr
     assert len(done.stderr.splitlines()) == 1

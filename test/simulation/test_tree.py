@@ -131,7 +131,7 @@ def test_last_joint_carries_the_tool():
 @pytest.mark.parametrize(
     ('text', 'part'),
     [
-        ('<robot', 'no XML'),
+        ('<robot', 'not XML'),
         ('<model/>', '<model>'),
         ('<robot name="r"><link name="a"/></robot>', 'no joint that moves'),
         ('<!DOCTYPE robot><robot name="r"/>', 'document type'),
