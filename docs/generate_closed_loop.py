@@ -46,10 +46,10 @@ _TAIL = """
   of the connection begins with the delay where that is worth its price; the delay stays and is named as physics.
 * **Gains and bodies.** Where no effort is measured, gains and bodies of twice the size move alike. Gains are therefore looked for
   with the bodies of the robot's file first, beside rotors and dry friction.
-* **Gains beside a delay in slow motion** (world 21) are named, but with numbers far beyond their intervals, and with probability
-  .99. A delay that is shorter by d, with `kd'/kp' = kd/kp + d` and `kp' = M/(M/kp + d kd/kp + d^2/2)`, moves alike to second order,
-  so that motion much slower than the loop hardly tells the two apart. The search goes from one error to the next and stops in this
-  valley, and its intervals hold the other numbers fixed. A joint search with joint intervals is what is missing.
+* **Gains beside a delay in slow motion.** A delay that is shorter by d, with `kd'/kp' = kd/kp + d` and
+  `kp' = M/(M/kp + d kd/kp + d^2/2)`, moves alike to second order, so that motion much slower than the loop hardly tells the two
+  apart. All numbers are searched at once, with and without each error, and the intervals are those with all others free: in such
+  motion they are wide. Of gains it is expected that they are stated rightly to a factor of e^0.5.
 * **kd and viscous friction** are one law where the log has no target of the velocity. Where `kp` is as stated, the answer is viscous
   friction; where it is not, the drive. A motor that multiplies all it is asked for is named as gains.
 * **Drives with a slow clock.** A drive that computes once a step of h, and not continuously, acts h/2 late: viscous friction comes
