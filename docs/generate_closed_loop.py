@@ -50,6 +50,8 @@ _TAIL = """
   `kp' = M/(M/kp + d kd/kp + d^2/2)`, moves alike to second order, so that motion much slower than the loop hardly tells the two
   apart. All numbers are searched at once, with and without each error, and the intervals are those with all others free: in such
   motion they are wide. Of gains it is expected that they are stated rightly to a factor of e^0.5.
+  Where a single joint has both, they are still missed (worlds 21 and 405; in 21 a rotor is named that is not there, and the gains
+  have wrong numbers).
 * **kd and viscous friction** are one law where the log has no target of the velocity. Where `kp` is as stated, the answer is viscous
   friction; where it is not, the drive. A motor that multiplies all it is asked for is named as gains.
 * **Drives with a slow clock.** A drive that computes once a step of h, and not continuously, acts h/2 late: viscous friction comes
