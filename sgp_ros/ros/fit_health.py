@@ -162,7 +162,7 @@ def _excursion(joint: str, monitor: ExcursionMonitor) -> str:
     if not monitor.is_alarmed:
         return 'no alarm'
     return (
-        f'{joint}: error {monitor.ratio:.1f} times the half-width of its 95 % interval, outside '
+        f'{joint}: error {monitor.ratio:.3g} times the half-width of its 95 % interval, outside '
         'for '
         f'{monitor.lasting_s:.1f} s; check the joint for a collision, a new load or a fault'
     )

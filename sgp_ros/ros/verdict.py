@@ -170,8 +170,9 @@ def _state_remedy(reason: str, arrivals: Arrivals) -> str:
 
 
 def _effort_remedy(arrivals: Arrivals) -> str:
+    named = f'joints {list(arrivals.without_effort)}' if arrivals.without_effort else 'some joints'
     return (
-        f'no effort for joints {list(arrivals.without_effort)}; make the driver publish it (with '
+        f'no effort for {named}; make the driver publish it (with '
         'ros2_control: state_interface effort), or set command.type and topic command'
     )
 
