@@ -34,7 +34,7 @@ LAYERS = {
         'mujoco', 'physics.catalogue', 'physics.effect', 'physics.effect_at', 'physics.parts',
         'physics.law', 'physics.grammar', 'rigid', 'optional', 'errors',
     },
-    'engine': {'numpy', 'gp', 'physics', 'rigid', 'robots', 'errors'},
+    'engine': {'numpy', 'numba', 'gp', 'physics', 'rigid', 'robots', 'errors'},
     'batch': NUMERIC | {
         'numba', 'gp', 'physics', 'rigid', 'robots', 'engine', 'errors',
     },

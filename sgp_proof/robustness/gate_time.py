@@ -4,8 +4,8 @@
 
 Two engines take the same stream in turns of `TURN` events, and each begins every other turn; the
 gates of one of them do nothing. Times are those of the processor. A step that completes a window
-predicts and learns, the others only take a message, so both kinds are counted apart; what a second
-of the stream costs is the sum of both, each by its median. `whole steps` is measured the same way:
+predicts and learns, the others only take a state or a command: each of these kinds has its median,
+and what a second of the stream costs is their sum. `whole steps` is measured the same way:
 what it costs that a step on which a bug strikes leaves no trace.
 """
 
@@ -34,7 +34,6 @@ TURN, WARM_UP_S, MEASURED_S = 200, 20.0, 40.0
 SETTINGS = {'buffer.budget': 300, 'refit.enabled': False}
 STREAMS = {'reaction_wheel': 1000.0, 'panda': 500.0}
 """Robot to the messages a second of its states."""
-_STILL = np.zeros((2, 100))
 
 NOTHING = {
     'gates': (
@@ -43,7 +42,7 @@ NOTHING = {
         (Gate, 'judge', lambda *_, **__: False),
         (Gate, 'take', lambda *_: None),
         (Limits, 'permit', lambda *_: True),
-        (windows, '_roughness', lambda *_: _STILL),
+        (windows, 'fill_roughness', lambda *_: None),
     ),
     'whole steps': (
         (Journal, 'begin', lambda *_: None),
@@ -86,7 +85,8 @@ def _turn(engine, events, found):
     for event in events:
         began = time.thread_time_ns()
         step = engine.push(event)
-        found[bool(step.estimates)].append(time.thread_time_ns() - began)
+        passed = time.thread_time_ns() - began
+        found[2 if step.estimates else isinstance(event, CommandSample)].append(passed)
 
 
 def _measure(name, part):
@@ -97,10 +97,10 @@ def _measure(name, part):
     first = round(len(events) * WARM_UP_S / (WARM_UP_S + MEASURED_S))
     ways = {'with': contextlib.nullcontext, 'without': lambda: _without(part)}
     engines = {way: Engine(robot, config) for way in ways}
-    times = {way: ([], []) for way in ways}
+    times = {way: _no_times() for way in ways}
     for number, at in enumerate(range(0, len(events), TURN)):
         for way in sorted(ways, reverse=bool(number % 2)):
-            found = times[way] if at >= first else ([], [])
+            found = times[way] if at >= first else _no_times()
             with ways[way]():
                 _turn(engines[way], events[at : at + TURN], found)
     counts = [engine.counts.estimated for engine in engines.values()]
@@ -109,16 +109,25 @@ def _measure(name, part):
     return _row(times, engines['with'])
 
 
+def _no_times():
+    """Return lists for states, commands and equations."""
+    return [], [], []
+
+
 def _row(times, engine):
-    medians = {way: [1e-3 * float(np.median(kind)) for kind in kinds]
-               for way, kinds in times.items()}  # fmt: skip
-    numbers = [len(kind) for kind in times['with']]
-    total = {way: float(np.dot(numbers, both)) for way, both in medians.items()}
+    numbers = np.array([len(kind) for kind in times['with']])
+    medians = {
+        way: np.array([1e-3 * float(np.median(kind or [0.0])) for kind in kinds])
+        for way, kinds in times.items()
+    }
+    total = {way: float(numbers @ each) for way, each in medians.items()}
+    message = {way: float(numbers[:2] @ each[:2] / numbers[:2].sum())
+               for way, each in medians.items()}  # fmt: skip
     return {
-        'equations': numbers[1], 'other_steps': numbers[0],
-        'us_message': {way: both[0] for way, both in medians.items()},
-        'us_equation': {way: both[1] for way, both in medians.items()},
-        'growth_equation': medians['with'][1] / medians['without'][1] - 1.0,
+        'equations': int(numbers[2]), 'other_steps': int(numbers[:2].sum()),
+        'us_message': message,
+        'us_equation': {way: float(each[2]) for way, each in medians.items()},
+        'growth_equation': float(medians['with'][2] / medians['without'][2] - 1.0),
         'growth': total['with'] / total['without'] - 1.0,
         'refused': engine.counts.implausible,
     }  # fmt: skip

@@ -156,15 +156,15 @@ class Estimator:
         y, held = without_rest(equation.slack, prediction.mean, y)
         channels = {target_name: target, self._robot.complement: complement}
         errors = measured - mean
-        is_wrong |= self.gate.is_surprised(errors, target.raw_variance, ~held)
+        is_wrong |= self.gate.is_surprised(errors, target.raw_variance, held)
         if self.gate.judge(equation, is_wrong=is_wrong):
             self._counts.implausible += 1
             return estimated(self._robot, equation, channels)
         if is_wrong and self.before is None and self._config.learning_enabled:
             self.before = Before.of(regression, self.baseline, self.gate)
-        self.gate.take(errors, ~held)
+        self.gate.take(errors, held)
         if self.before is not None:
-            if self.before.is_better(errors, (u, f, y), ~held):
+            if self.before.is_better(errors, (u, f, y), held):
                 return self._revert(self.before, equation)
             if not self.before.left:
                 self.before = None

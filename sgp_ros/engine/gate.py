@@ -19,14 +19,13 @@ better one, by `EVIDENCE` nats, what came in between was no robot, and it takes 
 from __future__ import annotations
 
 import copy
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from statistics import median
 from typing import Any, TypeVar
 
 import numpy as np
 
+from sgp_ros.engine.gate_loops import is_beyond, is_far_off, keep_distances, take_errors
 from sgp_ros.engine.windows import Equation
 from sgp_ros.gp.regression import Regression
 
@@ -45,6 +44,7 @@ COMPARED = 20
 FAR, _RUN = 50.0, 4
 _USUAL = 31
 _LEAST_USUAL = 5
+_ROUGHNESS = SHARE, ROUGH, _LEAST_USUAL
 T = TypeVar('T')
 
 
@@ -52,9 +52,10 @@ class Gate:
     """The tests of k joints, and how often they refused of late.
 
     Attributes:
-        n, mean_square: errors seen, and the fading mean of their squares, by joint.
+        n, mean_square: errors seen, and the fading mean of their squares, by joint, (k,).
         usual: largest distances from the polynomial in the last windows, of the positions of the
-            joints, then of measured velocities.
+            joints, then of measured velocities, (2 k, u); the oldest one is replaced.
+        known: how many of these were kept so far, (2 k,).
         recent: whether there was a refusal, of the last `PATIENCE` times.
         time: of the last of these, a number of steps.
 
@@ -63,9 +64,10 @@ class Gate:
     """
 
     def __init__(self, k: int) -> None:
-        self.n = [0] * k
-        self.mean_square = [0.0] * k
-        self.usual: list[list[float]] = [[] for _ in range(2 * k)]
+        self.n = np.zeros(k, dtype=np.int64)
+        self.mean_square = np.zeros(k)
+        self.usual = np.zeros((2 * k, _USUAL))
+        self.known = np.zeros(2 * k, dtype=np.int64)
         self.recent: list[bool] = []
         self.time = 0
 
@@ -76,33 +78,22 @@ class Gate:
 
     def is_rough(self, equation: Equation) -> bool:
         """Whether a sample of the window is far off the others; otherwise the window is usual."""
-        distances, spans = equation.roughness.tolist()
-        is_rough = any(
-            distance > SHARE * span > 0.0
-            and len(known) >= _LEAST_USUAL
-            and distance > ROUGH * median(known)
-            for known, distance, span in zip(self.usual, distances, spans, strict=True)
-        )
+        found = equation.roughness
+        is_rough: bool = is_far_off(found, self.usual, self.known, _ROUGHNESS)
         if not is_rough or not self.is_patient:
-            for known, distance in zip(self.usual, distances, strict=True):
-                if distance > 0.0:  # else a joint that rests shows one value only
-                    known.append(distance)
-                    del known[:-_USUAL]
+            keep_distances(found, self.usual, self.known)
         return is_rough
 
-    def is_surprised(self, errors: np.ndarray, variance: np.ndarray, is_told: np.ndarray) -> bool:
+    def is_surprised(self, errors: np.ndarray, variance: np.ndarray, held: np.ndarray) -> bool:
         """Whether an error (k,) is beyond all that the model, or those before it, let expect.
 
         Args:
             errors: of the joints.
             variance: that the model expects of them, (k,).
-            is_told: joints that the equation tells of, (k,).
+            held: joints that the equation does not tell of, (k,).
         """
-        columns = (errors.tolist(), variance.tolist(), self.mean_square, self.n, is_told.tolist())
-        return any(
-            told and n >= FIRST and abs(error) > LARGEST * math.sqrt(max(v, square))
-            for error, v, square, n, told in zip(*columns, strict=True)
-        )
+        found: bool = is_beyond(errors, variance, held, self.mean_square, self.n, (LARGEST, FIRST))
+        return found
 
     def judge(self, equation: Equation, *, is_wrong: bool) -> bool:
         """Note whether an equation is implausible; return whether it is refused."""
@@ -115,27 +106,27 @@ class Gate:
             self.time = time
         return is_wrong and self.is_patient
 
-    def take(self, errors: np.ndarray, is_told: np.ndarray) -> None:
-        """Take the errors (k,) of an equation that is not refused, of the joints it tells of."""
-        for j, (error, told) in enumerate(zip(errors.tolist(), is_told.tolist(), strict=True)):
-            if not told:
-                continue
-            self.n[j] += 1
-            square = error**2
-            self.mean_square[j] += (square - self.mean_square[j]) / min(self.n[j], MEMORY)
+    def take(self, errors: np.ndarray, held: np.ndarray) -> None:
+        """Take the errors (k,) of an equation that is learned, but for those of held joints."""
+        take_errors(errors, held, self.mean_square, self.n, MEMORY)
 
     def state(self) -> dict[str, Any]:
         """Return everything as plain values; `restore` takes it back."""
+        usual = [
+            np.roll(distances[:known], -known).tolist()
+            for distances, known in zip(self.usual, self.known.tolist(), strict=True)
+        ]
         return {
-            'n': list(self.n), 'mean_square': list(self.mean_square), 'recent': list(self.recent),
-            'usual': [list(known) for known in self.usual], 'time': self.time,
+            'n': self.n.tolist(), 'mean_square': self.mean_square.tolist(),
+            'recent': list(self.recent), 'usual': usual, 'time': self.time,
         }  # fmt: skip
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Continue exactly where `state` was taken."""
-        self.n, self.mean_square = list(state['n']), list(state['mean_square'])
+        self.n, self.mean_square = np.array(state['n']), np.array(state['mean_square'])
         self.recent, self.time = list(state['recent']), state['time']
-        self.usual = [list(known) for known in state['usual']]
+        for s, distances in enumerate(state['usual']):
+            self.usual[s, : len(distances)], self.known[s] = distances, len(distances)
 
 
 @dataclass(slots=True)
@@ -166,7 +157,7 @@ class Before:
         self,
         errors: np.ndarray,
         equation: tuple[np.ndarray, np.ndarray, np.ndarray],
-        is_told: np.ndarray,
+        held: np.ndarray,
     ) -> bool:
         """Compare with the model that went on, whose errors (k,) are given.
 
@@ -176,12 +167,12 @@ class Before:
         Args:
             errors: of that model.
             equation: input (d,), regressor (k, p) and target (k,).
-            is_told: joints that the equation tells of, (k,).
+            held: joints that the equation does not tell of, (k,).
         """
         u, f, y = equation
         own = y - self.regression.predict(u, f).mean
         self.left -= 1
-        if is_told.all():
+        if not held.any():
             self.errors = [*self.errors, np.abs([errors, own]).tolist()][-COMPARED:]
         if len(self.errors) < COMPARED:
             return False

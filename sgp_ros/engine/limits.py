@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from operator import le
-
 import numpy as np
 
+from sgp_ros.engine.gate_loops import NOTHING, is_within
 from sgp_ros.robots.robot import Robot
 
 LIMIT_MARGIN = 3.0
@@ -36,14 +34,13 @@ class Limits:
         lower, upper = (np.array([getattr(j, n) for j in joints]) for n in ('lower', 'upper'))
         is_bounded = np.isfinite(lower) & np.isfinite(upper) & (upper > lower)
         reach = np.where(is_bounded, upper - lower, 0.0)
-        self._low = np.where(is_bounded, lower - reach, -np.inf).tolist()
-        self._high = np.where(is_bounded, upper + reach, np.inf).tolist()
-        self._speed, self._effort = (
-            [_margin(getattr(joint, name)) for joint in joints]
-            for name in ('velocity_limit', 'effort_limit')
-        )
-        limits = [*self._high, *self._speed, *self._effort]
-        self._are_any = bool(np.isfinite(limits).any())
+        self._bounds = np.array([
+            np.where(is_bounded, lower - reach, -np.inf),
+            np.where(is_bounded, upper + reach, np.inf),
+            *([_margin(getattr(joint, name)) for joint in joints]
+              for name in ('velocity_limit', 'effort_limit')),
+        ])  # fmt: skip
+        self._are_any = bool(np.isfinite(self._bounds).any())
         self.impossible = 0
 
     def permit(
@@ -52,19 +49,14 @@ class Limits:
         """Whether a state, (k,) each, is possible, or the limits are wrong."""
         if not self._are_any or self.impossible > RARE * PERSISTENT:
             return True
-        places = position.tolist()
-        is_within = (
-            _are_below(self._low, places)
-            and _are_below(places, self._high)
-            and (velocity is None or _are_below(map(abs, velocity.tolist()), self._speed))
-            and (effort is None or _are_below(map(abs, effort.tolist()), self._effort))
+        is_possible: bool = is_within(
+            position,
+            NOTHING if velocity is None else velocity,
+            NOTHING if effort is None else effort,
+            self._bounds,
         )
-        self.impossible = max(self.impossible - 1, 0) if is_within else self.impossible + RARE
-        return is_within
-
-
-def _are_below(numbers: Iterable[float], bounds: Iterable[float]) -> bool:
-    return all(map(le, numbers, bounds))  # of a few numbers, faster than arrays
+        self.impossible = max(self.impossible - 1, 0) if is_possible else self.impossible + RARE
+        return is_possible
 
 
 def _margin(limit: float) -> float:

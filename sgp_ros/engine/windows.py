@@ -11,12 +11,13 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, bisect_right
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from operator import attrgetter
 
 import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.gate_loops import fill_roughness
 from sgp_ros.engine.held_commands import CommandHistory
 from sgp_ros.engine.intake import State
 from sgp_ros.engine.rest import friction_slack
@@ -27,8 +28,6 @@ from sgp_ros.robots.robot import Robot
 _stamp = attrgetter('stamp_ns')
 _LEAST_STATES = 3
 _LEAST_SHARE = 1e-3
-_ROUNDING = 1e-12
-"""Distance from a polynomial, over the size of the signal, that is rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,8 +54,8 @@ class Equation:
     state_rows: np.ndarray
     slopes: np.ndarray
     complement_joints: tuple[int, ...]
-    slack: np.ndarray | None = None
-    roughness: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))
+    slack: np.ndarray | None
+    roughness: np.ndarray
 
     def regressor(self, complement: np.ndarray) -> np.ndarray:
         """Return f (k, p) for complement signals (c,)."""
@@ -142,15 +141,17 @@ class WindowFilter:
             source = np.array([state.velocity for state in window])
         velocity, acceleration = weights.derivatives(source, measured=measured)
         smooth = weights.values @ position
-        signals, followed = position, smooth
+        k = position.shape[1]
+        roughness = np.zeros((2, 2 * k))
+        fill_roughness(position, smooth, weights.others, 0, roughness)
         if measured:
-            signals, followed = np.hstack([position, source]), np.hstack([smooth, velocity])
+            fill_roughness(source, velocity, weights.others, k, roughness)
         return self._assemble(
             window,
             at,
             weights,
             acceleration,
-            _roughness(signals, followed, weights.values.diagonal(), 2 * position.shape[1]),
+            roughness,
             Motion(
                 smooth,
                 velocity,
@@ -230,7 +231,9 @@ class WindowFilter:
             return cached[2]
         times = offsets_ns * 1e-9
         form = WeakForm.from_velocities(times) if measured else WeakForm.from_positions(times)
-        weights = _Weights(form, form.nodes(), *polynomial_smoother(times, self._degree))
+        values, slopes, curvatures = polynomial_smoother(times, self._degree)
+        others = np.maximum(1.0 - values.diagonal(), _LEAST_SHARE)
+        weights = _Weights(form, form.nodes(), values, slopes, curvatures, others)
         self._cached = (offsets_ns, measured, weights)
         return weights
 
@@ -241,29 +244,6 @@ def _weighted(weights: np.ndarray, rows: np.ndarray) -> np.ndarray:
     return np.asarray(np.dot(weights[None], flat).reshape(rows.shape[1:]))
 
 
-def _roughness(
-    signals: np.ndarray, followed: np.ndarray, shares: np.ndarray, width: int
-) -> np.ndarray:
-    """Return how far a sample is from the polynomial of the others, and how far they move, (2, s).
-
-    Without a sample the polynomial would miss it by its distance over one less its own share in
-    what follows it (the deleted residual, Allen 1974).
-
-    Args:
-        signals: (m, s).
-        followed: by the polynomial, (m, s).
-        shares: of each sample in its own smoothed value, (m,).
-        width: of the result, filled up by zeros.
-    """
-    high, low = signals.max(axis=0), signals.min(axis=0)
-    distance = np.abs(signals - followed)
-    distance[distance <= _ROUNDING * np.maximum(np.abs(high), np.abs(low))] = 0.0
-    off = (distance / np.maximum(1.0 - shares, _LEAST_SHARE)[:, None]).max(axis=0)
-    found = np.zeros((2, width))
-    found[:, : len(off)] = off, high - low
-    return found
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Weights:
     form: WeakForm
@@ -271,6 +251,7 @@ class _Weights:
     values: np.ndarray
     slopes: np.ndarray
     curvatures: np.ndarray
+    others: np.ndarray
 
     def derivatives(self, source: np.ndarray, *, measured: bool) -> tuple[np.ndarray, np.ndarray]:
         """Return velocities and accelerations of measured velocities, or of positions."""
