@@ -16,7 +16,7 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.gathered import Knowledge
-from sgp_ros.diagnosis.prove.overlay import overlay
+from sgp_ros.diagnosis.prove.overlay import overlays
 from sgp_ros.diagnosis.prove.prediction import FinalModel
 from sgp_ros.diagnosis.shown import Overlay
 from sgp_ros.engine.config import EngineConfig
@@ -90,7 +90,8 @@ def _replayed(
     equations = make_equations(raw, nominal.tree, choose_bandwidth(raw, nominal.tree))
     start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
     plain = fit(Columns(equations), (), start, is_free=False, steps=1)
-    found = overlay(FinalModel(plain, plain, equations, ()), raw, nominal.tree, (name,))
+    final = FinalModel(plain, plain, equations, ())
+    found = overlays(final, {name: raw}, nominal.tree, (name,)).get(name)
     if found is None:
         raise ConfigError('settled points', 'a recording of a motion')
     return raw, found

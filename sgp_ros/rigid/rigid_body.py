@@ -73,6 +73,18 @@ def mass_matrix(tree: Tree, parameters: np.ndarray, q: np.ndarray) -> np.ndarray
     return M
 
 
+def mass_and_bias(
+    tree: Tree, parameters: np.ndarray, q: np.ndarray, v: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the joint-space inertia (n, k, k) and the torques without acceleration (n, k)."""
+    full, g = full_motion(tree, q, v, np.zeros_like(q)), geometry(tree)
+    table, n = _table(tree, parameters), len(full[0])
+    M, tau = np.zeros((n, g.size, g.size)), np.zeros((n, g.size))
+    fill_mass(g, full[0], table, M)
+    fill_torque(g, tree.gravity.copy(), *full, table, tau)
+    return M, tau
+
+
 def forward_dynamics(
     tree: Tree, parameters: np.ndarray, q: np.ndarray, v: np.ndarray, tau: np.ndarray
 ) -> np.ndarray:
@@ -89,8 +101,7 @@ def forward_dynamics(
         NumericalError: a mass matrix that is not positive definite; the parameters are then none
             that a body can have.
     """
-    M = mass_matrix(tree, parameters, q)
-    bias = inverse_dynamics(tree, parameters, q, v, np.zeros_like(M[:, 0]))
+    M, bias = mass_and_bias(tree, parameters, q, v)
     try:
         np.linalg.cholesky(M)
     except np.linalg.LinAlgError as error:

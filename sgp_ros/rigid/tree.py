@@ -127,7 +127,7 @@ class Tree:
     @property
     def size(self) -> int:
         """Number of joints that move on their own, k."""
-        return int(np.sum(self.follows == np.arange(len(self.follows))))
+        return sum(i == j for i, j in enumerate(self.follows.tolist()))
 
     @property
     def moving_names(self) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.parts import Place, SmallEffect
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 MOST_HELD = 30_000_000
@@ -76,6 +76,14 @@ class Columns:
         return self._kept(
             key, equations, joint, lambda: candidate.columns(motion), is_inertial=is_inertial
         )
+
+    def small(
+        self, start: EffectAt, small: SmallEffect, equations: Equations, motion: ObservedMotion
+    ) -> Seen:
+        """Return the filtered columns of an effect that is small, to first order in its size."""
+        key = (*start.key, start.shape.tobytes(), motion, 'small')
+        place, shape = start.place, start.shape
+        return self._kept(key, equations, place.joint, lambda: small.columns(motion, place, shape))
 
     def bins(
         self, effect: Effect, place: Place, equations: Equations

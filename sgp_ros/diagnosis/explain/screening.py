@@ -151,10 +151,8 @@ def _small_trial(
     look: _Look, start: EffectAt, small: SmallEffect, motion: ObservedMotion
 ) -> Trial | None:
     """Return the trial of an effect that is linear in its size while it is small."""
-    raw = small.columns(motion, start.place, start.shape)
-    equations, joint = look.rest.equations, start.place.joint
-    x = equations.compact(raw, joint, is_inertial=False)
-    found = Products.of(look.rest, Seen(equations, x, joint))
+    seen = look.columns.small(start, small, look.rest.equations, motion)
+    found = Products.of(look.rest, seen)
     c = found.coefficients()
     shape = small.shape(start.shape, c)
     placed = start.with_shape(shape)

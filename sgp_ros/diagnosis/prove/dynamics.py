@@ -18,7 +18,7 @@ from sgp_ros.diagnosis.locate.remainder import Remainder
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.elasticity import JointElasticity
-from sgp_ros.rigid.rigid_body import mass_matrix
+from sgp_ros.rigid.rigid_body import mass_and_bias
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -65,10 +65,10 @@ class DiagnosedDynamics:
         """
         m, k = q.shape
         still = np.zeros((m, k))
-        M = mass_matrix(self.tree, self.tree.parameters, q)
+        M, bias = mass_and_bias(self.tree, self.tree.parameters, q, v)
         others, stated = self._beside_acceleration
         here = self._motion(q, v, still, loads, stated)
-        drive = loads[:, k : 2 * k] + here.effort - here.effort_for(q, v, still)
+        drive = loads[:, k : 2 * k] + here.effort - (bias + self.tree.damping[:k] * v)
         drive += extra_force(others, here)
         inertial, stated = self._with_acceleration
         if inertial.effects or stated:
@@ -148,7 +148,7 @@ class DiagnosedDynamics:
     ) -> ObservedMotion:
         """Return states as the effects see them; loads are repeated as often as needed."""
         k = q.shape[1]
-        given = np.tile(loads, (len(q) // len(loads), 1))
+        given = loads if len(q) == len(loads) else np.tile(loads, (len(q) // len(loads), 1))
         return ObservedMotion(
             self.tree, given[:, 2 * k], self.step, q, v, a, given[:, :k], None, stated=stated,
             recording=given[:, 2 * k + 1], sign=np.sign,
@@ -208,6 +208,11 @@ def remembered_force(model: Model, motion: ObservedMotion, tree: Tree) -> np.nda
     """Return the force of the effects with memory along a motion, (n, k) [N m or N]."""
     stated = _chosen(motion.stated, _has_memory)
     return extra_force(_part(model, _has_memory), replace(motion, tree=tree, stated=stated))
+
+
+def remembers(model: Model, motion: ObservedMotion) -> bool:
+    """Return whether some effect of a model or of the nominal robot has memory."""
+    return any(_has_memory(x.effect) for x in (*model.effects, *motion.known))
 
 
 def _has_memory(effect: Effect) -> bool:

@@ -17,6 +17,7 @@ import numpy as np
 
 from sgp_ros.batch.zero_phase import ZeroPhase
 from sgp_ros.diagnosis.compare.equations import resting
+from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
     RawTrajectory,
@@ -26,7 +27,7 @@ from sgp_ros.diagnosis.compare.trajectory import (
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.locate.remainder import Remainder
 from sgp_ros.diagnosis.prove.prediction import FinalModel
-from sgp_ros.diagnosis.prove.rollouts import RolloutWindows, cut, roll_out
+from sgp_ros.diagnosis.prove.rollouts import RolloutWindows, cut, roll_outs
 from sgp_ros.diagnosis.shown import Overlay, Replay
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.gains import Gains
@@ -48,61 +49,103 @@ class _Side:
     remainders: tuple[Remainder, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class _View:
+    """A recording that is a motion.
+
+    Attributes:
+        raw: the recording.
+        motion: n rows.
+        low: filter of its equations.
+        rows: (N,) that are shown.
+        bandwidth: of the filters.
+    """
+
+    raw: RawTrajectory
+    motion: ObservedMotion
+    low: ParallelFilter
+    rows: np.ndarray
+    bandwidth: Bandwidth
+
+    @classmethod
+    def of(cls, final: FinalModel, raw: RawTrajectory, tree: Tree) -> _View | None:
+        """Return the view of a recording; None of settled points, and where no row is left."""
+        if raw.approach is not None:
+            return None
+        cutoff, rate = final.equations.filter.cutoff, 1.0 / raw.step
+        bandwidth = Bandwidth(min(cutoff, 0.3 * rate), min(2.5 * cutoff, 0.4 * rate))
+        motion, low = observe(raw, tree, bandwidth), parallel_filter(raw, bandwidth)
+        rows = low.rows[motion.time[low.rows] <= motion.time[0] + _KEPT_S]
+        return cls(raw, motion, low, rows, bandwidth) if len(rows) else None
+
+    def efforts(self, final: FinalModel, sides: Mapping[str, _Side]) -> dict[str, np.ndarray]:
+        """Return the efforts that each model takes for this motion, (N, k)."""
+        motion, count = self.motion, len(self.rows)
+        rests = resting(self.raw, motion, self.bandwidth)
+        acting = self.acting
+        return {
+            name: acting + self.low(final.imbalance(s.model, motion, rests, s.remainders))[:count]
+            for name, s in sides.items()
+        }
+
+    @property
+    def acting(self) -> np.ndarray:
+        """Effort that acted, (N, k)."""
+        return self.low(self.motion.effort)[: len(self.rows)]
+
+    @property
+    def modes(self) -> list[_Mode]:
+        """What is replayed of it."""
+        trim = ZeroPhase(1.0 / self.raw.step, self.bandwidth.state_cutoff).trim
+        gains = self.raw.gains
+        known = None if gains is None or gains.is_recorded else gains
+        return _modes(self.motion, trim, known)
+
+
 def overlays(
-    final: FinalModel, parts: Mapping[str, RawTrajectory], tree: Tree
-) -> dict[str, Overlay]:
-    """Return the motions of both models over each recording that is a motion, by stem."""
-    found = {stem: overlay(final, part, tree) for stem, part in parts.items()}
-    return {stem: x for stem, x in found.items() if x is not None}
-
-
-def overlay(
-    final: FinalModel, raw: RawTrajectory, tree: Tree,
+    final: FinalModel, parts: Mapping[str, RawTrajectory], tree: Tree,
     names: Sequence[str] = ('nominal', 'diagnosed'),
-) -> Overlay | None:  # fmt: skip
-    """Return the motions of both models over that of a recording; None of settled points.
+) -> dict[str, Overlay]:  # fmt: skip
+    """Return the motions of both models over each recording that is a motion, by stem.
 
     Args:
         final: nominal and final model.
-        raw: any recording of the robot.
+        parts: recordings of the robot, by stem.
         tree: nominal robot.
         names: of both models; of one name, that of the nominal one alone.
     """
-    if raw.approach is not None:
-        return None
-    cutoff, rate = final.equations.filter.cutoff, 1.0 / raw.step
-    bandwidth = Bandwidth(min(cutoff, 0.3 * rate), min(2.5 * cutoff, 0.4 * rate))
-    motion, low = observe(raw, tree, bandwidth), parallel_filter(raw, bandwidth)
-    rows = low.rows[motion.time[low.rows] <= motion.time[0] + _KEPT_S]
-    if not len(rows):
-        return None
-    rests = resting(raw, motion, bandwidth)
-    trim = ZeroPhase(rate, bandwidth.state_cutoff).trim
+    found = {stem: _View.of(final, part, tree) for stem, part in parts.items()}
+    views = {stem: view for stem, view in found.items() if view is not None}
     both = _Side(final.nominal, ()), _Side(final.model, final.remainders)
     sides = dict(zip(names, both, strict=False))
-    effort = low(motion.effort)[: len(rows)]
-    efforts = {
-        name: effort + low(final.imbalance(s.model, motion, rests, s.remainders))[: len(rows)]
-        for name, s in sides.items()
-    }
-    known = None if raw.gains is None or raw.gains.is_recorded else raw.gains
-    replays = {
-        mode: {name: _replayed(final, s, windows, rows, gains) for name, s in sides.items()}
-        for mode, windows, gains in _modes(motion, trim, known)
-    }
-    return Overlay(
-        motion.time[rows], motion.position[rows], effort, efforts, replays,
-        float(motion.time[-1] - motion.time[0]),
-    )  # fmt: skip
+    modes = [(stem, *mode) for stem, view in views.items() for mode in view.modes]
+    replays: dict[str, dict[str, dict[str, Replay]]] = {stem: {} for stem in views}
+    for gains in {id(g): g for *_, g in modes}.values():
+        own = [(stem, mode, windows) for stem, mode, windows, g in modes if g is gains]
+        for name, s in sides.items():
+            rolled = roll_outs([w for *_, w in own], s.model, final.equations, s.remainders, gains)
+            for (stem, mode, windows), positions in zip(own, rolled, strict=True):
+                shown = _replayed(windows, views[stem].rows, *positions)
+                replays[stem].setdefault(mode, {})[name] = shown
+    return {
+        stem: Overlay(
+            view.motion.time[view.rows], view.motion.position[view.rows], view.acting,
+            view.efforts(final, sides), replays[stem],
+            float(view.motion.time[-1] - view.motion.time[0]),
+        )
+        for stem, view in views.items()
+    }  # fmt: skip
 
 
-def _modes(
-    motion: ObservedMotion, trim: int, gains: Gains | None
-) -> list[tuple[str, RolloutWindows, Gains | None]]:
-    """Return name, windows and, in closed loop, gains of each replay that has a window."""
+_Mode = tuple[str, RolloutWindows, Gains | None]
+"""Name, windows and, in closed loop, gains of a replay."""
+
+
+def _modes(motion: ObservedMotion, trim: int, gains: Gains | None) -> list[_Mode]:
+    """Return each replay that has a window."""
     end = motion.starts[1] if len(motion.starts) > 1 else len(motion.time)
     whole = min((end - 2 * trim - 2) * motion.step, _LONGEST_S)
-    found: list[tuple[str, RolloutWindows, Gains | None]] = []
+    found: list[_Mode] = []
     for name, horizon in _HORIZONS_S.items():
         found.append((name, cut(motion, trim, horizon), None))
     if whole > 0.0:
@@ -114,11 +157,10 @@ def _modes(
 
 
 def _replayed(
-    final: FinalModel, side: _Side, windows: RolloutWindows, rows: np.ndarray, gains: Gains | None
+    windows: RolloutWindows, rows: np.ndarray, rolled: np.ndarray, ends: np.ndarray
 ) -> Replay:
     """Return the positions of a model at the rows (N, k) until it leaves, and their errors."""
     motion = windows.motion
-    rolled, ends = roll_out(windows, side.model, final.equations, side.remainders, gains)
     spread = np.ptp(motion.position, axis=0)
     low, high = motion.position.min(axis=0), motion.position.max(axis=0)
     near = (rolled > low - _FAR * spread) & (rolled < high + _FAR * spread)  # not NaN either

@@ -13,6 +13,7 @@ up to the error with which the window before ends.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,10 +23,10 @@ from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.locate.remainder import Remainder
 from sgp_ros.diagnosis.prove.dynamics import (
-    DiagnosedDynamics,
     ServoedDynamics,
     dynamics_of,
     remembered_force,
+    remembers,
 )
 from sgp_ros.diagnosis.prove.elastic import ElasticDynamics, springs_of
 from sgp_ros.robots.gains import Gains
@@ -127,65 +128,133 @@ def roll_out(
         positions (m, n + 1, k) [rad or m], and (m,) which windows ended with finite numbers and,
         where effects remember, with a fixed point.
     """
-    motion = windows.motion
-    dynamics = dynamics_of(model, equations, motion, remainders)
-    effort = motion.effort
-    if gains is not None:
-        effort = effort + gains.kp * motion.position + gains.kd * motion.velocity
-    springs = springs_of(model, motion)
-    if springs:
-        dynamics = ElasticDynamics.of(dynamics, springs, gains)
-    elif gains is not None:
-        dynamics = ServoedDynamics.of(dynamics, gains)
-    force = remembered_force(model, motion, dynamics.tree)
-    ways = np.sqrt(windows.held.mean(axis=0) / windows.steps) + 1e-300
-    before, settled = None, np.zeros(len(windows.first), dtype=bool)
+    return roll_outs((windows,), model, equations, remainders, gains)[0]
+
+
+def roll_outs(
+    several: Sequence[RolloutWindows],
+    model: Model,
+    equations: Equations,
+    remainders: tuple[Remainder, ...] = (),
+    gains: Gains | None = None,
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Roll out a model from windows of several recordings and lengths, each as `roll_out`.
+
+    They step together: a step costs little more for many states than for one.
+    """
+    sets = [_Set(windows, model, equations, remainders, gains) for windows in several]
+    left = sets
     for _ in range(MOST_ROUNDS):
-        q, v = _rolled(windows, dynamics, force, effort)
+        for one, (q, v) in zip(left, _rolled(left), strict=True):
+            one.take(q, v)
+        left = [one for one in left if not one.is_done]
+    return [(one.q, one.ended) for one in sets]
+
+
+class _Set:
+    """Windows of one recording, what acts in them, and how they were rolled out last.
+
+    Args:
+        windows: of the recording.
+        model, equations, remainders, gains: as of `roll_out`.
+
+    Attributes:
+        dynamics: of the model.
+        q: (m, n + 1, k) positions.
+        ended: (m,) which windows ended as they should.
+        is_done: whether another round would change nothing.
+    """
+
+    def __init__(
+        self, windows: RolloutWindows, model: Model, equations: Equations,
+        remainders: tuple[Remainder, ...], gains: Gains | None,
+    ) -> None:  # fmt: skip
+        motion = windows.motion
+        dynamics = dynamics_of(model, equations, motion, remainders)
+        self._effort = motion.effort
+        if gains is not None:
+            self._effort = self._effort + gains.kp * motion.position + gains.kd * motion.velocity
+        springs = springs_of(model, motion)
+        if springs:
+            dynamics = ElasticDynamics.of(dynamics, springs, gains)
+        elif gains is not None:
+            dynamics = ServoedDynamics.of(dynamics, gains)
+        self.windows, self.dynamics, self._model = windows, dynamics, model
+        self._force = remembered_force(model, motion, dynamics.tree)
+        self._ways = np.sqrt(windows.held.mean(axis=0) / windows.steps) + 1e-300
+        self.q = np.full((*windows.nodes.shape, motion.position.shape[1]), np.nan)
+        self.ended = np.zeros(len(windows.first), dtype=bool)
+        self.is_done = False
+
+    @property
+    def loads(self) -> np.ndarray:
+        """What acts during each step, (m, n, 2 k + 2), see `DiagnosedDynamics`."""
+        motion = self.windows.motion
+        recording = -np.ones(len(motion.time)) if motion.recording is None else motion.recording
+        signals = self._effort, self._force, motion.time[:, None], recording[:, None]
+        return np.concatenate([self.windows.means(x) for x in signals], axis=2)
+
+    def take(self, q: np.ndarray, v: np.ndarray) -> None:
+        """Take positions and velocities (m, n + 1, k) of a round, and what is remembered then."""
         finite = np.isfinite(q).all(axis=(1, 2)) & np.isfinite(v).all(axis=(1, 2))
-        if before is not None:
-            settled = finite & (np.abs(q - before).max(axis=1) < CONVERGED * ways).all(axis=1)
-        again = remembered_force(model, _moved(windows, q, v, finite), dynamics.tree)
-        if np.array_equal(again, force) or settled[finite].all():
-            return q, finite
-        before, force = q, again
-    return q, settled
+        change = np.abs(q - self.q).max(axis=1)  # NaN in the first round, which settles nothing
+        settled = finite & (change < CONVERGED * self._ways).all(axis=1)
+        self.q, again = q, self._force
+        if remembers(self._model, self.windows.motion):
+            moved = _moved(self.windows, q, v, finite)
+            again = remembered_force(self._model, moved, self.dynamics.tree)
+        is_same = np.array_equal(again, self._force)
+        self.is_done = is_same or bool(settled[finite].all())
+        self.ended, self._force = finite if self.is_done else settled, again
 
 
-def _rolled(
-    windows: RolloutWindows, dynamics: DiagnosedDynamics, force: np.ndarray, effort: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    motion, nodes = windows.motion, windows.nodes
-    recording = -np.ones(len(motion.time)) if motion.recording is None else motion.recording
-    loads = np.concatenate(
-        [
-            windows.means(effort), windows.means(force),
-            windows.means(motion.time[:, None]), windows.means(recording[:, None]),
-        ],
-        axis=2,
-    )  # (m, n, 2 k + 2)  # fmt: skip
-    h = windows.stride * motion.step
-    substeps = _substeps(dynamics, windows, loads, h)
-    start = dynamics.started(motion, nodes[:, 0])
-    q, v = (np.full((*nodes.shape, start[0].shape[1]), np.nan) for _ in range(2))
-    q[:, 0], v[:, 0] = start
+def _rolled(sets: Sequence[_Set]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return positions and velocities (m, n + 1, k) of each set; those of one step go together."""
+    loads = [one.loads for one in sets]
+    steps = [one.windows.stride * one.windows.motion.step for one in sets]
+    substeps = [_substeps(*x) for x in zip(sets, loads, steps, strict=True)]
+    alike: dict[tuple[float, float, int], list[int]] = {}
+    for i in sorted(range(len(sets)), key=lambda i: -sets[i].windows.steps):
+        alike.setdefault((sets[i].dynamics.step, steps[i], substeps[i]), []).append(i)
+    found: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+    for (_, h, count), which in alike.items():
+        together = _together([sets[i] for i in which], [loads[i] for i in which], h, count)
+        found |= dict(zip(which, together, strict=True))
+    return [found[i] for i in range(len(sets))]
+
+
+def _together(
+    sets: list[_Set], loads: list[np.ndarray], h: float, substeps: int
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return positions and velocities of sets, longest first, in steps of h [s]."""
+    dynamics, paths = sets[0].dynamics, []
+    for one in sets:
+        nodes = one.windows.nodes
+        start = one.dynamics.started(one.windows.motion, nodes[:, 0])
+        path = np.full((2, *nodes.shape, start[0].shape[1]), np.nan)
+        path[:, :, 0] = start
+        paths.append(path)
+    q, v = np.concatenate([path[:, :, 0] for path in paths], axis=1)
+    ends = np.cumsum([path.shape[1] for path in paths])
     with np.errstate(all='ignore'):  # a roll-out that diverges overflows, and is counted
-        for i in range(windows.steps):
-            state = q[:, i], v[:, i]
+        for i in range(sets[0].windows.steps):
+            moving = sum(one.windows.steps > i for one in sets)
+            now = np.concatenate([x[:, i] for x in loads[:moving]])
+            state = q[: len(now)], v[: len(now)]
             for _ in range(substeps):
-                state = advance(dynamics, *state, loads[:, i], h / substeps)
-            q[:, i + 1], v[:, i + 1] = state
-    return dynamics.shown(q), dynamics.shown(v)
+                state = advance(dynamics, *state, now, h / substeps)
+            q, v = state
+            for path, end in zip(paths[:moving], ends, strict=False):
+                path[:, :, i + 1] = q[end - path.shape[1] : end], v[end - path.shape[1] : end]
+    return [(dynamics.shown(path[0]), dynamics.shown(path[1])) for path in paths]
 
 
-def _substeps(
-    dynamics: DiagnosedDynamics, windows: RolloutWindows, loads: np.ndarray, h: float
-) -> int:
+def _substeps(one: _Set, loads: np.ndarray, h: float) -> int:
     """Return how many substeps the fastest motion along the recording needs."""
-    rows = windows.nodes[:, :-1:4].ravel()
-    motion = windows.motion
+    rows = one.windows.nodes[:, :-1:4].ravel()
     some = loads[:, ::4].reshape(-1, loads.shape[2])
-    rate = dynamics.fastest_rate(*dynamics.started(motion, rows), some)
+    start = one.dynamics.started(one.windows.motion, rows)
+    rate = one.dynamics.fastest_rate(*start, some)
     if not math.isfinite(rate):
         return 1
     return int(np.clip(math.ceil(rate * h / _STABLE), 1, _MOST_SUBSTEPS))
