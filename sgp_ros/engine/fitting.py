@@ -1,4 +1,10 @@
-"""Fits hyper-parameters to a snapshot of the buffer: a pure function, for any process."""
+"""Fits hyper-parameters to a snapshot of the buffer: a pure function, for any process.
+
+The evidence trusts the model. Samples that repeat each other, as those of a robot at rest, raise
+it without bound where the noise falls to nothing and Z to a length at which nothing is alike: such
+a model knows them by heart and nothing else. So a fit has to predict too, each sample from the
+others: an output keeps its hyper-parameters where new ones do it worse, or worse than a constant.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +18,9 @@ from sgp_ros.gp.kernels import SquaredExponential
 from sgp_ros.gp.learning import initial_model, learn, screened
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 from sgp_ros.gp.posterior import Posterior
+
+WORSE = 1.01
+"""Mean squared error of left-out samples, over that before, from which on a fit predicts worse."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,6 +55,7 @@ class FitResult:
         log_evidence: at these, up to a constant of the snapshot [nat].
         log_evidence_before: at the hyper-parameters of the request [nat].
         evaluations: of the evidence.
+        is_worse: whether all of them were refused because they predict worse.
     """
 
     number: int
@@ -53,13 +63,15 @@ class FitResult:
     log_evidence: float
     log_evidence_before: float
     evaluations: int
+    is_worse: bool = False
 
     @property
     def refusal(self) -> str:
         """Why it is of no use, one of `results.REFIT_REFUSALS`; empty where it is better."""
         if self.model is None or not math.isfinite(self.log_evidence):
             return 'diverged'
-        return '' if self.log_evidence > self.log_evidence_before else 'no_better'
+        is_better = self.log_evidence > self.log_evidence_before and not self.is_worse
+        return '' if is_better else 'no_better'
 
 
 def fit(request: FitRequest) -> FitResult:
@@ -68,9 +80,10 @@ def fit(request: FitRequest) -> FitResult:
     # The constant of the prior's determinant cancels in every comparison on one snapshot.
     prior = CoefficientPrior(request.base_root[known], request.base_target[known], 0.0)
     try:
-        before = Posterior(request.model, request.data, prior).log_evidence
+        known_by = Posterior(request.model, request.data, prior)
+        before = known_by.log_evidence
     except NumericalError:
-        before = -math.inf
+        known_by, before = None, -math.inf
     candidates = [(request.model, 0)]
     if request.restarts:
         kernels = request.model.kernels
@@ -88,4 +101,43 @@ def fit(request: FitRequest) -> FitResult:
         evaluations += learned.evaluations
         if learned.log_evidence > lowest:
             best, lowest = learned.model, learned.log_evidence
-    return FitResult(request.number, best, lowest, before, evaluations)
+    is_worse = False
+    if best is not None and known_by is not None:
+        best, lowest, is_worse = _predicting(best, lowest, known_by)
+    return FitResult(request.number, best, lowest, before, evaluations, is_worse)
+
+
+def _predicting(
+    found: Model, log_evidence: float, before: Posterior
+) -> tuple[Model | None, float, bool]:
+    """Return a fit in which outputs that it predicts worse keep what they had.
+
+    Args:
+        found: by the fit.
+        log_evidence: of it [nat].
+        before: posterior under the hyper-parameters in force.
+
+    Returns:
+        The model, its evidence, and whether every output keeps what it had.
+    """
+    data = before.data
+    after, known = (
+        np.nanmean(posterior.left_out_errors() ** 2, axis=0)
+        for posterior in (Posterior(found, data, before.prior), before)
+    )
+    n = len(data.U)
+    constant = (
+        data.y.var(axis=0) * (n / (n - 1)) ** 2
+    )  # what their mean misses left-out samples by
+    is_worse = after > WORSE * np.minimum(known, constant)
+    if not is_worse.any() or is_worse.all():
+        return found, log_evidence, bool(is_worse.all())
+    old = before.model
+    model = Model(
+        tuple(a if w else b for w, a, b in zip(is_worse, old.kernels, found.kernels, strict=True)),
+        tuple(a if w else b for w, a, b in zip(is_worse, old.noise, found.noise, strict=True)),
+    )
+    try:
+        return model, Posterior(model, data, before.prior).log_evidence, False
+    except NumericalError:
+        return None, -math.inf, False

@@ -15,7 +15,6 @@ import numpy as np
 from scipy import linalg
 
 from sgp_ros.gp.blocks import Block, build_blocks
-from sgp_ros.gp.kernel import Kernel
 from sgp_ros.gp.linear_algebra import (
     column_space,
     null_space,
@@ -105,9 +104,7 @@ class Posterior:
     """
 
     def __init__(self, model: Model, data: Observations, prior: CoefficientPrior) -> None:
-        self.model = model
-        self.data = data
-        self.prior = prior
+        self.model, self.data, self.prior = model, data, prior
         require_finite(data.U, data.F, data.y)
         self._blocks = build_blocks(model, data)
         A = np.vstack([block.A for block in self._blocks] + [prior.root])
@@ -171,6 +168,21 @@ class Posterior:
         gradients = [part for part in parts if part is not None]
         return np.concatenate([*gradients, noise * np.array(self.model.noise)])
 
+    def left_out_errors(self) -> np.ndarray:
+        """Return y (n, k) less what all other rows predict, `alpha_i / (C^-1)_ii`. O(n^3).
+
+        NaN where the others leave it undetermined. Rasmussen and Williams 2006, equation 5.12.
+        """
+        errors, start = [], 0
+        for block in self._blocks:
+            part = slice(start, start := start + len(block.b))
+            residual, left = self._solution.residual[part], self._solution.left[part]
+            alpha = block.unwhiten(residual)
+            rest = alpha**2 - _curvature(block, residual, left).diagonal()
+            taken = (block.unwhiten(left) ** 2).sum(axis=1)
+            errors.append(np.where(rest > NULL_TOLERANCE * taken, alpha / rest, np.nan))
+        return np.concatenate(errors).reshape(len(self._blocks), -1).T
+
     def predict(self, U: np.ndarray, F: np.ndarray) -> Prediction:
         """Predict X at inputs U (q, d) with regressors F (q, k, p).
 
@@ -192,7 +204,8 @@ class Posterior:
                 kernel = self.model.kernels[component]
                 mean[:, component] += v.T @ self._solution.residual[start:stop]
                 G[:, component] -= v.T @ block.A
-                covariance[:, component, component] += _diagonal(kernel, U)
+                assert kernel is not None
+                covariance[:, component, component] += kernel.diagonal(U)
                 for other_column, other in enumerate(block.components):
                     w = cross[other_column]
                     if w is not None:
@@ -218,10 +231,6 @@ class Posterior:
         n = len(self.data.U)
         weighted = H * np.outer(block.gain[:, column], block.gain[:, column])
         return weighted.reshape(n, len(block.b) // n, n, -1).sum(axis=(1, 3))
-
-
-def _diagonal(kernel: Kernel | None, U: np.ndarray) -> np.ndarray:
-    return np.zeros(len(U)) if kernel is None else kernel.diagonal(U)
 
 
 def column_scale(F: np.ndarray, root: np.ndarray) -> np.ndarray:

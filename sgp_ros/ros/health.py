@@ -83,7 +83,9 @@ class Health:
         self.last_fit = {
             '': f'log evidence rose by {gain:.3g} nat',
             'diverged': 'refused: the fit diverged, no usable covariance was found',
-            'no_better': f'refused: no improvement, log evidence {-gain:.3g} nat lower',
+            'no_better': 'refused: it predicts samples that are left out of it worse'
+            if fit.is_worse
+            else f'refused: no improvement, log evidence {-gain:.3g} nat lower',
             'outdated': 'refused: outdated, its data have been forgotten',
             'no_factor': 'refused: the buffer is singular with the new hyper-parameters',
         }[refusal]
