@@ -12,7 +12,7 @@ from scipy import stats
 
 ROOT = Path(__file__).parents[1]
 TARGET = ROOT / 'docs' / 'closed_loop.md'
-_LOOKED_AT = 12
+_LOOKED_AT = {*range(12), 19, 21}
 """Worlds on which misses were looked at and mended."""
 _HEAD = """# Logs of position control without efforts
 
@@ -28,8 +28,8 @@ joint are right and every number is to 15 % or within three standard deviations.
 Of {count} components in {with_hidden} worlds, **{named} are named**; everything is right in {all_named} of these worlds;
 {spurious} of {worlds} worlds have something asserted that is not there. The number of worlds is small: the page says what was
 measured, and no more. The aim, nine of ten components, is {aim}; an interval of 95 % (Clopper and Pearson) reaches from {low} %
-to {high} %. Worlds 0 to 11 are those on which misses of an earlier state were looked at and mended, so what is said of them
-flatters: of the {fresh} components in later worlds, {fresh_named} are named.
+to {high} %. Worlds 0 to 11, 19 and 21 are those on which misses of earlier states were looked at and mended, so what is said of
+them flatters: of the {fresh} components in the other worlds, {fresh_named} are named.
 
 | component | named |
 |---|---|
@@ -46,10 +46,12 @@ _TAIL = """
   of the connection begins with the delay where that is worth its price; the delay stays and is named as physics.
 * **Gains and bodies.** Where no effort is measured, gains and bodies of twice the size move alike. Gains are therefore looked for
   with the bodies of the robot's file first, beside rotors and dry friction.
-* **Gains beside a delay in slow motion** (world 21) are named, but with numbers far beyond their intervals, and with probability
-  .99. A delay that is shorter by d, with `kd'/kp' = kd/kp + d` and `kp' = M/(M/kp + d kd/kp + d^2/2)`, moves alike to second order,
-  so that motion much slower than the loop hardly tells the two apart. The search goes from one error to the next and stops in this
-  valley, and its intervals hold the other numbers fixed. A joint search with joint intervals is what is missing.
+* **Gains beside a delay in slow motion.** A delay that is shorter by d, with `kd'/kp' = kd/kp + d` and
+  `kp' = M/(M/kp + d kd/kp + d^2/2)`, moves alike to second order, so that motion much slower than the loop hardly tells the two
+  apart. All numbers are searched at once, with and without each error, and the intervals are those with all others free: in such
+  motion they are wide. Of gains it is expected that they are stated rightly to a factor of e^0.5.
+  Where a single joint has both, they are still missed (worlds 21 and 405; in 21 a rotor is named that is not there, and the gains
+  have wrong numbers).
 * **kd and viscous friction** are one law where the log has no target of the velocity. Where `kp` is as stated, the answer is viscous
   friction; where it is not, the drive. A motor that multiplies all it is asked for is named as gains.
 * **Drives with a slow clock.** A drive that computes once a step of h, and not continuously, acts h/2 late: viscous friction comes
@@ -65,7 +67,8 @@ def text() -> str:
     named, count = s['components_named']
     low = stats.beta.ppf(0.025, named, count - named + 1) if named else 0.0
     high = stats.beta.ppf(0.975, named + 1, count - named) if named < count else 1.0
-    fresh = [n for case in found['cases'][_LOOKED_AT:] for n in case['named']]
+    cases = [c for c in found['cases'] if int(c['case'][-3:]) not in _LOOKED_AT]
+    fresh = [n for case in cases for n in case['named']]
     head = _HEAD.format(
         fresh=len(fresh), fresh_named=sum(fresh),
         aim='met' if low >= 0.9 else 'not proved', low=round(100 * low),

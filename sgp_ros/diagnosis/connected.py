@@ -32,7 +32,7 @@ from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.evidence import Probe
 from sgp_ros.diagnosis.setup.search import Connection, search
 from sgp_ros.diagnosis.shown import Predictions
-from sgp_ros.physics.catalogue import TORQUE_GAIN
+from sgp_ros.physics.catalogue import COMMAND_DELAY, TORQUE_GAIN
 from sgp_ros.physics.parts import MOTOR
 from sgp_ros.rigid.tree import Tree
 
@@ -53,6 +53,8 @@ class Connected:
         remarks: what is to be done about them.
         rivals: joints with an error of the connection that would explain as much, not asserted.
         trust: probability of the physics against these.
+        has_rival_gains: whether these are gains of drives.
+        delay_std: what errors of the connection add to the uncertainty of a delay [s].
     """
 
     recordings: Recordings
@@ -64,13 +66,22 @@ class Connected:
     remarks: tuple[str, ...] = ()
     rivals: tuple[str, ...] = ()
     trust: float = 1.0
+    has_rival_gains: bool = False
+    delay_std: float = 0.0
 
     def against_rivals(self, finding: Finding) -> Finding:
         """Return physics with its probability against errors of the connection elsewhere.
 
-        At the same joint the two are one law: a motor of another gain, efforts in another unit.
+        At the same joint the two are one law: a motor of another gain, efforts in another unit;
+        of the gains of a drive, this is so of the motor's gain alone. Beside gains that were
+        searched with it, a delay is less certain.
         """
-        if not self.rivals or self.rivals == (finding.joint,):
+        delay = finding.parameters.get('delay')
+        if finding.effect == COMMAND_DELAY.name and delay is not None and self.delay_std > 0.0:
+            delay = replace(delay, std=math.hypot(delay.std or 0.0, self.delay_std))
+            finding = replace(finding, parameters={**finding.parameters, 'delay': delay})
+        is_one_law = not self.has_rival_gains or finding.effect == TORQUE_GAIN.name
+        if not self.rivals or (self.rivals == (finding.joint,) and is_one_law):
             return finding
         return replace(finding, probability=finding.probability * self.trust)
 
@@ -185,6 +196,7 @@ def _connected(
         corrected,
         findings=tuple(_finding(found, i, gain) for i in range(len(found.errors))),
         equivalents=_equal(found),
+        delay_std=found.delay_std,
         remarks=(*(f'{e.remedy} {_CORRECTED}' for e in found.errors), *recordings.remarks),
     )
 
@@ -221,7 +233,9 @@ def _beside(plain: Connected, found: Connection, gain: float) -> Connected:
     told = tuple((e.hypothesis.joint, e.hypothesis.effect) for e in found.errors)
     return replace(
         plain, equivalents=(Equivalent(told, '', 1.0),),
-        rivals=tuple(joint for joint, _ in told), trust=1.0 / (1.0 + math.exp(TEMPER * gain)),
+        rivals=tuple(joint for joint, _ in told),
+        has_rival_gains=any(e.hypothesis.is_of_gains for e in found.errors),
+        trust=1.0 / (1.0 + math.exp(TEMPER * gain)),
     )  # fmt: skip
 
 
@@ -245,7 +259,8 @@ def _finding(found: Connection, number: int, gain: float) -> Finding:
     """Return an error with its probability against its rivals and against none."""
     e = found.errors[number]
     rivals = [r.worth - e.worth for r in found.rivals[number]]
-    odds = math.exp(-TEMPER * gain) + sum(math.exp(min(TEMPER * r, 50.0)) for r in rivals)
+    odds = math.exp(-TEMPER * gain) + math.exp(-TEMPER * e.needed)
+    odds += sum(math.exp(min(TEMPER * r, 50.0)) for r in rivals)
     numbers: dict[str, Parameter] = {
         name: Parameter(float(x), float(s) if math.isfinite(s) and s > 0.0 else None, unit)
         for name, x, s, unit in zip(

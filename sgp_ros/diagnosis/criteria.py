@@ -37,6 +37,10 @@ UNSIGNED_SHARE = 0.1
 UNSIGNED_ZERO, UNSIGNED_LOW = 0.1, 0.02
 """Effort near zero, of its root mean square, and how often a fold is there [1]. Convention."""
 
+GAINS_STD = 0.5
+"""Prior standard deviation of the logarithm by which gains differ from those stated [1].
+Convention."""
+
 SENSOR_REST = 0.2
 """Greatest part of the velocity's error that a lag of the sensor may leave [1]. Convention."""
 

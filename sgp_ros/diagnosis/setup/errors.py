@@ -16,7 +16,6 @@ import numpy as np
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.physics.catalogue import COMMAND_DELAY
 from sgp_ros.physics.drive import Servo
-from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 BASE, ALL = 'base', 'all'
@@ -86,6 +85,15 @@ class Hypothesis:
         return np.array([1.0 if name in _FACTORS else 0.0 for name in self.names])
 
     @property
+    def is_of_gains(self) -> bool:
+        """Whether its numbers are factors of the gains of a drive."""
+        return 'kp' in self.names
+
+    def steps_at(self, x: np.ndarray) -> np.ndarray:
+        """Return first steps of a search from numbers (m,); of factors and delays relative."""
+        return self.steps * np.abs(x) if 'scale' in self.names or self.is_physics else self.steps
+
+    @property
     def key(self) -> tuple[str, str, tuple[str, ...]]:
         """What is asserted, without numbers."""
         return self.effect, self.joint, tuple(self.words.values())
@@ -99,7 +107,7 @@ def hypotheses(motion: ObservedMotion) -> list[Hypothesis]:
     for j in joints:
         found += _of_joint(motion, j)
     for i, j in combinations(joints, 2):
-        found += _swaps(tree, i, j)
+        found += _swaps(motion, i, j)
     driven = [j for j in joints if tree.is_actuated[j]]
     if len(driven) > 1 and not isinstance(motion.drive, Servo):
         found.append(_effort_scale(driven, ALL))
@@ -127,7 +135,7 @@ def _of_joint(motion: ObservedMotion, j: int) -> Iterator[Hypothesis]:
     )  # fmt: skip
     special = (1e3, 1e-3) if slides else (DEGREES, 1.0 / DEGREES)
     yield _position_scale([j], name, (*_SCALES, *special))
-    for channels, (moves, acts) in CHANNELS.items():
+    for channels, (moves, acts) in _channels(motion):
         if acts and not tree.is_actuated[j]:
             continue
         yield _discrete('joint_sign', name, _sign(j, moves, acts), {'channels': channels})
@@ -140,6 +148,15 @@ def _of_joint(motion: ObservedMotion, j: int) -> Iterator[Hypothesis]:
             np.full(3, 0.03 * reach),
             lambda c, x: replace(c, origins=_moved(c.origins, tree.size, j, x)),
         )  # fmt: skip
+
+
+def _channels(motion: ObservedMotion) -> list[tuple[str, tuple[bool, bool]]]:
+    """Return the channels that may be wrong together.
+
+    A drive that holds a target by a position of the wrong sign, or of another joint, runs away.
+    """
+    is_closed = isinstance(motion.drive, Servo)
+    return [(name, both) for name, both in CHANNELS.items() if all(both) or not is_closed]
 
 
 def _position_scale(joints: Sequence[int], name: str, starts: Sequence[float]) -> Hypothesis:
@@ -185,9 +202,10 @@ def _swap(i: int, j: int, moves: bool, acts: bool) -> Callable[[Correction], Cor
     )
 
 
-def _swaps(tree: Tree, i: int, j: int) -> Iterator[Hypothesis]:
+def _swaps(motion: ObservedMotion, i: int, j: int) -> Iterator[Hypothesis]:
+    tree = motion.tree
     both = bool(tree.is_actuated[i] and tree.is_actuated[j])
-    for channels, (moves, acts) in CHANNELS.items():
+    for channels, (moves, acts) in _channels(motion):
         if both or not acts:
             words = {'other_joint': tree.joint_names[j], 'channels': channels}
             yield _discrete('swapped_joints', tree.joint_names[i], _swap(i, j, moves, acts), words)

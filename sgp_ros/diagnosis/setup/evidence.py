@@ -13,7 +13,6 @@ place of bodies and friction. Viscous friction is left out there: with `kd` it i
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,12 +51,18 @@ class Agreement:
         unknowns: number of the set that is best: 0 none, 1 bodies or rotors, 2 friction too.
         left: (k,) share of the mean squared effort that is left with them.
         discrepancy: (N, k) from the nominal robot, relative to the rms effort of each joint.
+        rest: (N, k) what is left of it with the unknowns.
+        share: (k,) `left` with the errors of signals and filters that no model explains.
+        rows: of all that count as independent.
     """
 
     evidence: float
     unknowns: int
     left: np.ndarray
     discrepancy: np.ndarray
+    rest: np.ndarray
+    share: np.ndarray
+    rows: float
 
     def distance(self, other: Agreement) -> float:
         """Return the greatest share of a joint's effort by which two discrepancies differ."""
@@ -136,22 +141,31 @@ class Probe:
             other = delayed(self.full.effort, self._raw, clock)
         return Acting(proportional, damping, other)
 
-    def agreement(self, correction: Correction) -> Agreement:
-        """Return how well the recording agrees with the robot once it is corrected."""
+    def agreement(self, correction: Correction, unknowns: int | None = None) -> Agreement:
+        """Return how well the recording agrees with the robot once it is corrected.
+
+        Args:
+            correction: what is undone.
+            unknowns: number of the set of unknowns; None for the best.
+        """
         motion = correction.motion(self.motion, self.acting(correction.clock))
-        unknowns = self._unknowns_of(correction.moves, motion)
-        d = unknowns.nominal - self.filter(motion.effort + motion.stated_force)
+        columns = self._unknowns_of(correction.moves, motion)
+        d = columns.nominal - self.filter(motion.effort + motion.stated_force)
         power = self._delivered(motion, correction)
         rms = np.sqrt(power)
         # by how much the density of recorded accelerations exceeds that of relative errors
         volume = -0.5 * float(np.log(power / self.power)[self.driven].sum())
         volume -= float(np.log(np.abs(correction.scale)).sum())
+        rows = min(INDEPENDENT_ROWS, len(d))
         found = []
-        for value, left, w in self._with(d, unknowns, power):
+        for number in range(3) if unknowns is None else (unknowns,):
+            value, rest, share, w = self._with(number, d, columns, power)
             shift = self._log_inertia(motion.tree, w, motion.position[self._pose]) + volume
-            found.append((value + min(INDEPENDENT_ROWS, len(d)) * shift, left))
-        best = max(range(3), key=lambda i: found[i][0])
-        return Agreement(found[best][0], best, found[best][1], d / rms)
+            left = (rest**2).mean(axis=0) / power
+            found.append(
+                Agreement(value + rows * shift, number, left, d / rms, rest / rms, share, rows)
+            )
+        return max(found, key=lambda f: f.evidence)
 
     def _delivered(self, motion: ObservedMotion, correction: Correction) -> np.ndarray:
         """Return the size of the efforts to which errors are relative, (k,) mean squares.
@@ -196,11 +210,11 @@ class Probe:
         return float(np.linalg.slogdet(M)[1].mean()) - self.nominal_inertia
 
     def _with(
-        self, d: np.ndarray, unknowns: Unknowns, power: np.ndarray
-    ) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
-        """Yield the evidence of efforts, what is left, and changes of bodies.
+        self, number: int, d: np.ndarray, unknowns: Unknowns, power: np.ndarray
+    ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+        """Return the evidence of efforts, what is left, its share, and changes of bodies.
 
-        For each set of unknowns of unit prior: none, bodies, bodies and friction.
+        For a set of unknowns of unit prior: none, bodies, or bodies and friction.
         """
         N, k = d.shape
         rows = min(INDEPENDENT_ROWS, N)
@@ -208,21 +222,22 @@ class Probe:
         floor = (1e-5 + SHAPE_ERROR * np.minimum(square / power, 1.0)) * power
         p = unknowns.bodies.shape[2]
         size = FRICTION * np.sqrt(power)
-        products = unknowns.products(d, size)
-        for count in (0, p, p + 3 * k):
-            variance, left = square + floor, d
-            occam, b = 0.0, np.zeros(count)
-            for _ in range(_ROUNDS if count else 0):
-                A, g = (x[:count, ...] for x in products.weighted(rows / N / variance))
-                A = A[:, :count] + np.eye(count)
-                b = np.linalg.solve(A, g)
-                left = d - unknowns.force(b, size)
-                variance = (left**2).mean(axis=0) + floor
-            if count:
-                occam = 0.5 * float(np.linalg.slogdet(A)[1])
-            share = variance / power
-            value = -0.5 * rows * float(np.log(share).sum()) - 0.5 * float(b @ b) - occam
-            yield value, (left**2).mean(axis=0) / power, b[:p] if count else np.zeros(p)
+        count = (0, p, p + 3 * k)[number]
+        variance, left = square + floor, d
+        occam, b = 0.0, np.zeros(count)
+        products = unknowns.products(d, size) if count else None
+        for _ in range(_ROUNDS if products is not None else 0):
+            assert products is not None
+            A, g = (x[:count, ...] for x in products.weighted(rows / N / variance))
+            A = A[:, :count] + np.eye(count)
+            b = np.linalg.solve(A, g)
+            left = d - unknowns.force(b, size)
+            variance = (left**2).mean(axis=0) + floor
+        if count:
+            occam = 0.5 * float(np.linalg.slogdet(A)[1])
+        share = variance / power
+        value = -0.5 * rows * float(np.log(share).sum()) - 0.5 * float(b @ b) - occam
+        return value, left, share, b[:p] if count else np.zeros(p)
 
 
 def _spread(raw: RawTrajectory, every: int) -> list[np.ndarray]:

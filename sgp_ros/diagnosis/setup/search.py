@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -12,6 +13,7 @@ from sgp_ros.diagnosis.criteria import COUNTED_SHARE, PER_EFFECT, PER_PARAMETER
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.errors import Hypothesis, hypotheses
 from sgp_ros.diagnosis.setup.evidence import Agreement, Probe
+from sgp_ros.diagnosis.setup.joint import Together
 
 _REFINED = 6
 """Hypotheses of which the numbers are searched to the end."""
@@ -32,6 +34,7 @@ class Tried:
         std: (m,) standard deviations.
         correction: that undoes it, and what was found before it.
         agreement: of the recording that is corrected so.
+        needed: evidence less its price that is lost without it, all others searched anew [nats].
     """
 
     hypothesis: Hypothesis
@@ -39,6 +42,7 @@ class Tried:
     std: np.ndarray
     correction: Correction
     agreement: Agreement
+    needed: float = math.inf
 
     @property
     def remedy(self) -> str:
@@ -49,7 +53,7 @@ class Tried:
     @property
     def worth(self) -> float:
         """Evidence less the price of the hypothesis [nats]."""
-        return self.agreement.evidence - PER_EFFECT - PER_PARAMETER * len(self.numbers)
+        return self.agreement.evidence - _price(self.hypothesis)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +64,13 @@ class Connection:
         errors: in the order in which they were found.
         rivals: of each, best first.
         start: agreement of the recording as it is.
+        delay_std: what these add to the uncertainty of a delay of the targets [s].
     """
 
     errors: tuple[Tried, ...]
     rivals: tuple[tuple[Tried, ...], ...]
     start: Agreement
+    delay_std: float = 0.0
 
 
 def search(probe: Probe) -> Connection:
@@ -85,8 +91,10 @@ def search(probe: Probe) -> Connection:
             chains.append(_grown(probe, [first], first.agreement, rivals))
     if all(c[-1].agreement.left.max() > COUNTED_SHARE for c in chains):
         chains.append(_grown(probe, [], start, rivals))
-    errors = _of_the_connection(probe, max(chains, key=lambda c: _worth(c, start)))
-    return Connection(tuple(errors), tuple(rivals[e.hypothesis.key] for e in errors), start)
+    best = max(chains, key=lambda c: _worth(c, start))
+    errors = _of_the_connection(probe, best)
+    late = max((float(e.std[0]) for e in best if e.hypothesis.is_physics), default=0.0)
+    return Connection(tuple(errors), tuple(rivals[e.hypothesis.key] for e in errors), start, late)
 
 
 def _physics(probe: Probe, h: Hypothesis) -> Tried:
@@ -102,7 +110,7 @@ def _physics(probe: Probe, h: Hypothesis) -> Tried:
 
 def _worth(errors: Sequence[Tried], start: Agreement) -> float:
     """Return the evidence with all errors undone less their prices [nats]."""
-    price = sum(PER_EFFECT + PER_PARAMETER * len(e.numbers) for e in errors)
+    price = sum(_price(e.hypothesis) for e in errors)
     return (errors[-1].agreement if errors else start).evidence - price
 
 
@@ -112,17 +120,15 @@ def _grown(
 ) -> list[Tried]:  # fmt: skip
     """Return errors with those that are worth their price beside them, one after the other."""
     for _ in range(_MOST - len(errors)):
-        known = [e.hypothesis.key for e in errors]
         correction = errors[-1].correction if errors else Correction.none(probe.motion.tree.size)
-        ranked = _ranked(probe, correction, now, known)
+        is_late = any(e.hypothesis.is_physics for e in errors)
+        ranked = _ranked(probe, correction, now, errors, is_beside_delay=is_late)
+        if is_late:
+            ranked = _beside(probe, errors, ranked)
         if not ranked or ranked[0].worth < now.evidence + PER_EFFECT:
             break
-        errors = [*errors, ranked[0]]
         rivals[ranked[0].hypothesis.key] = tuple(ranked[1:])
-        if len(errors) > 1:
-            errors = _together(probe, errors)
-        if errors[-1].agreement.evidence <= now.evidence:
-            break
+        errors = _together(probe, [*errors, ranked[0]]) if errors else ranked[:1]
         now = errors[-1].agreement
     return errors
 
@@ -137,43 +143,66 @@ def _of_the_connection(probe: Probe, errors: Sequence[Tried]) -> list[Tried]:
     return kept
 
 
-def _together(probe: Probe, errors: list[Tried]) -> list[Tried]:
-    """Return errors whose numbers are searched anew, each beside all others; the last has all.
+def _beside(probe: Probe, errors: Sequence[Tried], ranked: Sequence[Tried]) -> list[Tried]:
+    """Return further errors with all numbers searched at once, best first."""
+    chains = [_chain(_joint(probe, [*errors, t]).best()) for t in ranked]
+    found = [c[-1] for c in chains if c[-1].agreement.distance(c[-2].agreement) > COUNTED_SHARE]
+    return sorted(found, key=lambda t: -t.worth)
 
-    One that the others make superfluous is left out.
+
+def _together(probe: Probe, errors: Sequence[Tried]) -> list[Tried]:
+    """Return errors with all their numbers searched at once; the last one undoes all.
+
+    One that the others, with their numbers searched anew, make superfluous is left out.
     """
-    none = Correction.none(probe.motion.tree.size)
-    numbers = [e.numbers for e in errors]
-    for i in range(len(errors)):
-        others = none
-        for j, e in enumerate(errors):
-            others = others if j == i else e.hypothesis.applied(others, numbers[j])
-        found = _refined(probe, others, errors[i].hypothesis, numbers[i])
-        without = probe.agreement(others).evidence
-        if found.worth < without:
-            return _chain(probe, [e for j, e in enumerate(errors) if j != i])
-        numbers[i] = found.numbers
-        errors[i] = replace(errors[i], numbers=found.numbers, std=found.std)
-    return _chain(probe, errors)
+    found = _joint(probe, errors).best()
+    while True:
+        fewer = [_without(found, i) for i in range(len(found.hypotheses))]
+        needed = [found.evidence - f.evidence - _price(h)
+                  for f, h in zip(fewer, found.hypotheses, strict=True)]  # fmt: skip
+        least = int(np.argmin(needed))
+        if needed[least] >= 0.0 or len(fewer) == 1:
+            break
+        found = fewer[least]
+    return [replace(e, needed=x) for e, x in zip(_chain(found), needed, strict=True)]
 
 
-def _chain(probe: Probe, errors: list[Tried]) -> list[Tried]:
+def _price(h: Hypothesis) -> float:
+    return PER_EFFECT + PER_PARAMETER * len(h.names)
+
+
+def _joint(probe: Probe, errors: Sequence[Tried]) -> Together:
+    return Together(
+        probe, tuple(e.hypothesis for e in errors), tuple(e.numbers for e in errors)
+    )  # fmt: skip
+
+
+def _without(found: Together, i: int) -> Together:
+    """Return all but one of some errors, with their numbers searched anew."""
+    hypotheses, numbers = list(found.hypotheses), list(found.numbers)
+    del hypotheses[i], numbers[i]
+    return Together(found.probe, tuple(hypotheses), tuple(numbers)).best()
+
+
+def _chain(found: Together) -> list[Tried]:
     """Return errors with the corrections that undo them one after the other."""
-    correction = Correction.none(probe.motion.tree.size)
-    chain = []
-    for e in errors:
-        correction = e.hypothesis.applied(correction, e.numbers)
-        chain.append(replace(e, correction=correction, agreement=probe.agreement(correction)))
+    correction = Correction.none(found.probe.motion.tree.size)
+    std, chain = found.std(), []
+    for h, x, s in zip(found.hypotheses, found.numbers, std, strict=True):
+        correction = h.applied(correction, x)
+        chain.append(Tried(h, x, s, correction, found.probe.agreement(correction)))
     return chain
 
 
 def _ranked(
-    probe: Probe, base: Correction, now: Agreement, known: list[tuple[str, str, tuple[str, ...]]]
-) -> list[Tried]:
+    probe: Probe, base: Correction, now: Agreement, errors: Sequence[Tried], *,
+    is_beside_delay: bool,
+) -> list[Tried]:  # fmt: skip
     """Return the hypotheses that are worth most on top of a correction, best first.
 
     What makes less than counts as physics is none.
     """
+    known = [e.hypothesis.key for e in errors]
     screened = []
     for h in hypotheses(probe.full):
         if h.key in known:
@@ -186,6 +215,9 @@ def _ranked(
             value = max(value, _value(probe, base, h, x))
         screened.append((value, h, x))
     screened.sort(key=lambda s: -s[0])
+    if is_beside_delay:  # with other numbers of the delay, gains are others too
+        drives = [s for s in screened[_REFINED:] if s[1].is_of_gains]
+        return [_refined(probe, base, h, x) for _, h, x in screened[:_REFINED] + drives]
     found = [_refined(probe, base, h, x) for _, h, x in screened[:_REFINED]]
     found = [t for t in found if t.agreement.distance(now) > COUNTED_SHARE]
     return sorted(found, key=lambda t: -t.worth)
@@ -200,7 +232,7 @@ def _value(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> floa
 def _parabola(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> np.ndarray:
     """Return x after one step to the vertex along each number, where that is better."""
     x = x.copy()
-    for i, step in enumerate(_steps(h, x)):
+    for i, step in enumerate(h.steps_at(x)):
         e = np.zeros(len(x))
         e[i] = step
         low, mid, high = (_value(probe, base, h, x + s * e) for s in (-1.0, 0.0, 1.0))
@@ -212,17 +244,12 @@ def _parabola(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> n
     return x
 
 
-def _steps(h: Hypothesis, x: np.ndarray) -> np.ndarray:
-    """Return steps of a search; factors and delays are searched in steps relative to these."""
-    return h.steps * np.abs(x) if 'scale' in h.names or h.is_physics else h.steps
-
-
 def _refined(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> Tried:
     """Return a hypothesis with the numbers that agree best; one that changes nothing is 0."""
     m = len(x)
     std = np.zeros(m)
     if m:
-        simplex = np.concatenate([x[None], x + np.diag(_steps(h, x))])
+        simplex = np.concatenate([x[None], x + np.diag(h.steps_at(x))])
         found = optimize.minimize(
             lambda y: -_value(probe, base, h, y), x, method='Nelder-Mead',
             options={'initial_simplex': simplex, 'maxfev': 45 * m, 'xatol': 1e-6, 'fatol': 0.02},
@@ -238,7 +265,7 @@ def _spread(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> np.
     """Return the standard deviations of numbers from the curvature of the evidence, (m,)."""
     std = np.full(len(x), np.inf)
     centre = _value(probe, base, h, x)
-    for i, step in enumerate(_steps(h, x)):
+    for i, step in enumerate(h.steps_at(x)):
         e = np.zeros(len(x))
         e[i] = 0.3 * step
         bend = 2.0 * centre - _value(probe, base, h, x - e) - _value(probe, base, h, x + e)

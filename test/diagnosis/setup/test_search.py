@@ -10,6 +10,7 @@ from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.errors import hypotheses
 from sgp_ros.diagnosis.setup.evidence import Probe
+from sgp_ros.diagnosis.setup.joint import Together
 from sgp_ros.diagnosis.setup.search import search
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.gains import read_gains
@@ -69,6 +70,21 @@ def test_gains_are_found_beside_a_delay_of_the_targets():
     assert error.hypothesis.key == ('gain_scale', 'shoulder', ())
     assert error.numbers == pytest.approx([0.8, 1.0], abs=0.02)
     assert error.correction.clock == 0.0
+
+
+def test_a_delay_and_gains_are_searched_together():
+    """From numbers that are wrong in both."""
+    raw, tree = _raw(CASES / 'case_08')
+    late = replace(raw, drive=raw.drive.changed(lambda targets: targets, -0.02))
+    probe = Probe(late, tree, choose_bandwidth(late, tree), knows_bodies=True)
+    known = {h.key[:2]: h for h in hypotheses(probe.full)}
+    gains = known['gain_scale', 'shoulder']
+    (delay,) = (h for h in known.values() if h.is_physics)
+    start = np.array([0.005]), np.array([1.1, 0.8])
+    both = Together(probe, (delay, gains), start).best()
+    assert both.numbers[0] == pytest.approx([0.02], abs=0.001)
+    assert both.numbers[1] == pytest.approx([0.8, 1.0], abs=0.02)
+    assert all((std > 0.0).all() and (std < 0.02).all() for std in both.std())
 
 
 def test_what_corrects_an_error_makes_the_recording_agree():
