@@ -43,7 +43,8 @@ _TAIL = """
 
 ## What to know
 * **Gains and a delay.** As long as a delay of the targets is there, the gains of every drive look wrong. So a search for errors
-  of the connection begins with the delay where that is worth its price; the delay stays and is named as physics.
+  of the connection begins with the delay where that is worth its price; the delay stays and is named as physics. The comparison of
+  physics begins once more from the delay with what every joint has: a late target looks like viscous friction and rotors everywhere.
 * **Gains and bodies.** Where no effort is measured, gains and bodies of twice the size move alike. Gains are therefore looked for
   with the bodies of the robot's file first, beside rotors and dry friction.
 * **Gains beside a delay in slow motion.** A delay that is shorter by d, with `kd'/kp' = kd/kp + d` and

@@ -151,8 +151,9 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
     # gains can be told from bodies that are known alone
     for knows_bodies in (True, False) if recordings.learned.gains is not None else (False,):
         probe = Probe(recordings.learned, tree, bandwidth, knows_bodies=knows_bodies)
-        tried = _connected(plain, search(probe), tree, each)
-        if tried.findings:
+        found = search(probe)
+        tried = _connected(plain, found, tree, each)
+        if tried.findings or (knows_bodies and not found.errors and found.is_explained):
             break
     return tried
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 from pathlib import Path
@@ -80,6 +81,14 @@ def test_the_page_leads_from_model_and_log_to_a_corrected_model(tmp_path, monkey
         assert program == 'sgp'
         assert main(words) == 0, capsys.readouterr().err
     assert 'not in mjcf' not in capsys.readouterr().out
+    found = json.loads((tmp_path / 'out' / 'diagnose' / 'diagnosis.json').read_text())
+    assert not found['setup']
+    assert {(f['joint'], f['effect']) for f in found['findings']} == {
+        ('all', 'command_delay'),
+        ('shoulder', 'coulomb_friction'),
+        ('elbow', 'coulomb_friction'),
+        ('elbow', 'armature'),
+    }
     errors = [
         np.sqrt(np.mean((_followed(path, targets) - q) ** 2, axis=0))
         for path in (tmp_path / 'arm.xml', tmp_path / 'out' / 'export' / 'arm.xml')

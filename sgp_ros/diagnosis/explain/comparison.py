@@ -14,6 +14,8 @@ from sgp_ros.diagnosis.explain.fitted_model import Model, floors
 from sgp_ros.diagnosis.explain.joint_search import by_joint, uncoupled, usual
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
+from sgp_ros.physics.catalogue import COMMAND_DELAY
+from sgp_ros.physics.drive import Servo
 from sgp_ros.physics.effect_at import EffectAt
 
 FIRST, SECOND, PARENTS = 12, 5, 6
@@ -97,9 +99,24 @@ def _more(columns: Columns, best: Model) -> list[Model]:
     """
     if (best.mean_square / best.frame.equations.power).max() < COUNTED_SHARE:
         return []
-    free = fit(columns, (), best.sigma, is_free=True)
-    found = [*by_joint(columns, best), *by_joint(columns, usual(columns, free))]
+    starts = [best, usual(columns, fit(columns, (), best.sigma, is_free=True))]
+    if isinstance(best.frame.equations.motion.drive, Servo):
+        starts += _late(columns, best.sigma)
+    found = [model for start in starts for model in by_joint(columns, start)]
     return _ranked(m for m in found if len(m.effects) > 2)
+
+
+def _late(columns: Columns, sigma: np.ndarray) -> Iterator[Model]:
+    """Yield what nearly every joint has beside a delay of targets, of both variants.
+
+    A target that is late by T acts at every joint much as viscous friction kp T and a rotor
+    kd T - kp T^2/2; a search that has taken these would not come back to the delay.
+    """
+    motors = COMMAND_DELAY.places(columns.equations(frozenset()).motion)
+    for is_free in (False, True):
+        base = fit(columns, (), sigma, is_free=is_free)
+        found = [s for _, s in screen(columns, base, [COMMAND_DELAY]) if s.place in motors[-1:]]
+        yield from (usual(columns, base, (s,)) for s in found[:1])
 
 
 def _exchanged(columns: Columns, ranked: list[Model]) -> list[Model]:

@@ -117,13 +117,18 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
     return [m for m in (model, *rivals) if m.effects and is_credible(m)]
 
 
-def usual(columns: Columns, base: Model) -> Model:
+def usual(columns: Columns, base: Model, first: tuple[EffectAt, ...] = ()) -> Model:
     """Return the model with the laws that nearly every joint has, where they can be seen.
 
     A search that starts from nothing adds first what stands best for all of them together.
+
+    Args:
+        columns: of the recording.
+        base: without effects.
+        first: effects beside them.
     """
     motion = base.frame.equations.motion
-    effects = tuple(
+    effects = first + tuple(
         EffectAt(law, place)
         for law in USUAL
         for place in law.places(motion)
@@ -137,7 +142,7 @@ def usual(columns: Columns, base: Model) -> Model:
             kept = [s for s, share in pairs if share > COUNTED_SHARE]
         if len(kept) == len(pairs):
             return model
-        effects = tuple(EffectAt(s.effect, s.place) for s in kept)
+        effects = tuple(EffectAt(s.effect, s.place, s.shape) for s in kept)
 
 
 def _blocks(model: Model) -> Iterator[_Block]:

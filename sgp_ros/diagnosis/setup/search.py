@@ -64,13 +64,20 @@ class Connection:
         errors: in the order in which they were found.
         rivals: of each, best first.
         start: agreement of the recording as it is.
+        end: agreement once errors, and physics that hides them, are undone.
         delay_std: what these add to the uncertainty of a delay of the targets [s].
     """
 
     errors: tuple[Tried, ...]
     rivals: tuple[tuple[Tried, ...], ...]
     start: Agreement
+    end: Agreement
     delay_std: float = 0.0
+
+    @property
+    def is_explained(self) -> bool:
+        """Whether what is left does not count as physics at any joint."""
+        return float(self.end.left.max()) <= COUNTED_SHARE
 
 
 def search(probe: Probe) -> Connection:
@@ -94,7 +101,9 @@ def search(probe: Probe) -> Connection:
     best = max(chains, key=lambda c: _worth(c, start))
     errors = _of_the_connection(probe, best)
     late = max((float(e.std[0]) for e in best if e.hypothesis.is_physics), default=0.0)
-    return Connection(tuple(errors), tuple(rivals[e.hypothesis.key] for e in errors), start, late)
+    end = best[-1].agreement if best else start
+    others = tuple(rivals[e.hypothesis.key] for e in errors)
+    return Connection(tuple(errors), others, start, end, late)
 
 
 def _physics(probe: Probe, h: Hypothesis) -> Tried:
