@@ -112,7 +112,9 @@ def _by_motion(equations: Equations, r: np.ndarray, joint: int) -> float:
     return explained_share(learn(data, prior, start).model, U, r, part)
 
 
-def left_out(columns: Columns, model: Model, candidates: tuple[EffectAt, ...]) -> np.ndarray:
+def left_out(
+    columns: Columns, model: Model, candidates: tuple[EffectAt, ...]
+) -> tuple[np.ndarray, float]:
     """Return what a model with some of its candidates leaves of parts left out in turn.
 
     Args:
@@ -121,7 +123,8 @@ def left_out(columns: Columns, model: Model, candidates: tuple[EffectAt, ...]) -
         candidates: of the model, those that are kept.
 
     Returns:
-        Mean squares of the residual, (PARTS, k) [N^2 m^2 or N^2].
+        Mean squares of the residual, (PARTS, k) [N^2 m^2 or N^2], and how unlikely the bodies are
+        that follow: minus the log prior of their changes, averaged over the parts [nats].
     """
     equations, sigma = model.frame.equations, model.sigma
     N, k = equations.d.shape
@@ -141,34 +144,40 @@ def left_out(columns: Columns, model: Model, candidates: tuple[EffectAt, ...]) -
     grams = [np.tensordot(A[part == i], A[part == i], ((0, 1), (0, 1))) for i in range(PARTS)]
     sides = [np.tensordot(A[part == i], y[part == i], ((0, 1), (0, 1))) for i in range(PARTS)]
     prior = np.diag(np.concatenate([np.ones(p), np.zeros(A.shape[2] - p)]))
-    found = np.empty((PARTS, k))
+    found, unlikely = np.empty((PARTS, k)), 0.0
     for i in range(PARTS):
         G = sum(grams[:i] + grams[i + 1 :], prior)
         c = np.linalg.lstsq(G, sum(sides[:i] + sides[i + 1 :], np.zeros(len(G))), rcond=1e-12)[0]
         r = (y[part == i] - A[part == i] @ c) * sigma
         found[i] = (r**2).mean(axis=0)
-    return found
+        unlikely += 0.5 * float(c[:p] @ c[:p]) / PARTS
+    return found, unlikely
 
 
-def support(columns: Columns, model: Model, floor: np.ndarray) -> list[float]:
+def support(columns: Columns, model: Model, floor: np.ndarray, rows: float) -> np.ndarray:
     """Return how much better parts left out are predicted with each effect than without it.
+
+    Bodies that could stand for an effect, as for the inertia of a rotor, predict as much: then it
+    counts how unlikely they are.
 
     Args:
         columns: of the recording.
         model: fitted.
         floor: (k,) mean squares below which residuals do not count [N^2 m^2 or N^2].
+        rows: that count as independent.
 
     Returns:
-        Half the sum over joints of the log ratio of mean squares, averaged over the parts, by
-        effect [nats per independent row].
+        By effect: half the sum over joints of the log ratio of mean squares, averaged over the
+        parts, times the rows, and by how much likelier the bodies are [nats].
     """
-    whole = left_out(columns, model, model.effects) + floor
+    whole, unlikely = left_out(columns, model, model.effects)
     found = []
     for candidate in model.effects:
         rest = tuple(s for s in model.effects if s is not candidate)
-        without = left_out(columns, model, rest) + floor
-        found.append(float(0.5 * np.log(without / whole).sum(axis=1).mean()))
-    return found
+        without, strained = left_out(columns, model, rest)
+        better = 0.5 * np.log((without + floor) / (whole + floor)).sum(axis=1).mean()
+        found.append(rows * float(better) + strained - unlikely)
+    return np.array(found)
 
 
 def without(equations: Equations, model: Model, is_dropped: Callable[[EffectAt], bool]) -> Model:
@@ -198,7 +207,7 @@ def supported(
     for model in ranked:
         found = model
         while found.effects and is_credible(found):
-            told = rows * np.array(support(columns, found, floor))
+            told = support(columns, found, floor, rows)
             if told.min() > EVIDENCE:
                 return found
             if len(found.effects) <= 2:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import MOST_OPPOSED, SLIGHT_REST
 from sgp_ros.diagnosis.explain.fitted_model import Model, beyond_plain
 from sgp_ros.diagnosis.explain.screening import WIDEST, are_apart
@@ -16,9 +17,9 @@ def is_credible(model: Model) -> bool:
     motion = model.frame.equations.motion
     is_finite = model.is_possible() and bool(np.isfinite(model.score))
     is_finite = is_finite and are_apart(model.effects, motion) and is_sound(model)
-    power = model.frame.equations.power
+    equations = model.frame.equations
     return is_finite and all(
-        s.effect.is_inside(s, motion) and _is_confined(s, motion) and _is_needed(s, motion, power)
+        s.effect.is_inside(s, motion) and _is_confined(s, motion) and _is_needed(s, equations)
         for s in model.effects
     )
 
@@ -31,17 +32,17 @@ def is_sound(model: Model) -> bool:
     return sum(model.filtered_shares) < MOST_OPPOSED * there
 
 
-def _is_needed(s: EffectAt, motion: ObservedMotion, power: np.ndarray) -> bool:
+def _is_needed(s: EffectAt, equations: Equations) -> bool:
     """Return whether plain laws would leave more of a law than is adequate in any case.
 
     Not so one whose shape is at its lower bound: there it is one of them.
     """
     if not s.effect.plain or s.place.source >= 0:
         return True
-    if s.is_least(motion):
+    if s.is_least(equations.motion):
         return False
-    left = beyond_plain(s, s.columns(motion) @ s.coefficients, motion)
-    return float((left**2).mean()) > SLIGHT_REST * float(power[s.place.joint])
+    left = beyond_plain(s, s.columns(equations.motion) @ s.coefficients, equations)
+    return float((left**2).mean()) > SLIGHT_REST * float(equations.power[s.place.joint])
 
 
 def _is_confined(s: EffectAt, motion: ObservedMotion) -> bool:

@@ -116,7 +116,7 @@ class Model:
                 continue
             force = s.effect.whole(equations.motion, s)
             if s.place.source >= 0:
-                force = beyond_plain(s, force, equations.motion)
+                force = beyond_plain(s, force, equations)
             power = equations.power if force.ndim == 2 else equations.power[s.place.joint]
             found.append(float(((force**2).mean(axis=0) / power).max()))
         return found
@@ -126,16 +126,21 @@ def _extra_laws(s: EffectAt) -> int:
     return len(s.effect.plain) if s.place.source >= 0 else 0
 
 
-def beyond_plain(s: EffectAt, force: np.ndarray, motion: ObservedMotion) -> np.ndarray:
-    """Return what plain laws of one joint do not say of a force, (n, k) or (n,) as given."""
+def beyond_plain(s: EffectAt, force: np.ndarray, equations: Equations) -> np.ndarray:
+    """Return what plain laws of one joint do not say of a force, (n, k) or (n,) as given.
+
+    Nothing is said of a joint while dry friction holds it: that takes up any force.
+    """
     if not s.effect.plain:
         return force
-    left = force.copy()
+    left, motion = force.copy(), equations.motion
     for joint in (s.place.joint, s.place.source):
         if joint >= 0:
+            moving = equations.moving[:, joint]
             alone = [EFFECTS[n].columns(motion, Place(joint), EMPTY) for n in s.effect.plain]
-            x = np.concatenate(alone, axis=1)
+            x = np.concatenate(alone, axis=1) * moving[:, None]
             own = left if left.ndim == 1 else left[:, joint]
+            own *= moving
             own -= x @ np.linalg.lstsq(x, own, rcond=1e-9)[0]
     return left
 

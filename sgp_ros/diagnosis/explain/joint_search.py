@@ -178,8 +178,11 @@ def _best(model: Model, trials: Iterable[Model], *, is_whole: bool = True) -> Mo
 
 
 def _grown(columns: Columns, model: Model, block: _Block) -> Model:
-    """Add the effects of a block that are worth their price, as long as something is left."""
-    while block.left(model) > COUNTED_SHARE:
+    """Add the effects of a block that are worth their price, as long as something is left.
+
+    That is a residual, or bodies so unlikely that they may stand for what is missing.
+    """
+    while block.left(model) > COUNTED_SHARE or 0.5 * float(model.w @ model.w) > PER_EFFECT:
         found = _distinct(screen(columns, model, block.effects, block.joints), TRIALS)
         arranged = _arranged(model, block)
         trials = [_fitted(columns, model, arranged, s) for s in found]
@@ -216,11 +219,13 @@ def _changes(
         yield without
         if s.effect.plain:
             yield from uncoupled(columns, without, s)
-        others = [e for e in block.effects if e is not s.effect and not (
+        is_own = s.place.joint not in PLACES.values()
+        laws = block.effects if is_own else tuple(model.frame.equations.motion.catalogue.values())
+        others = [e for e in laws if e is not s.effect and not (
             is_simple and (len(e.quantities) > 1 or e.shape_names()))]  # fmt: skip
         is_richer = len(s.effect.quantities) > 1
         if others and (is_richer or not is_simple):
-            joints = (s.place.joint,) if s.place.joint not in PLACES.values() else block.joints
+            joints = (s.place.joint,) if is_own else None
             found = _distinct(screen(columns, without, others, joints), 1)
             yield from (_fitted(columns, model, arranged, other) for other in found)
 

@@ -113,12 +113,12 @@ def test_parts_are_predicted_by_a_fit_to_the_others(damped, is_free):
     """As least squares on the rows that remain, written out."""
     model = fitted(damped, 'viscous_friction', 'spring', is_free=is_free)
     columns = Columns(damped)
-    found = left_out(columns, model, model.effects)
+    found, unlikely = left_out(columns, model, model.effects)
     x = [columns.of(s, damped, model.w)[:, 0] for s in model.effects]
     p = damped.base.shape[2] if is_free else 0
     A = np.concatenate([damped.base[:, 0, :p], *x], axis=1) / model.sigma[0]
     y, part = damped.d[:, 0] / model.sigma[0], parts_of(len(damped.d))
-    prior = np.eye(p, A.shape[1])
+    prior, priors = np.eye(p, A.shape[1]), []
     for i in range(PARTS):
         rows = part != i
         c = np.linalg.lstsq(
@@ -126,14 +126,16 @@ def test_parts_are_predicted_by_a_fit_to_the_others(damped, is_free):
         )[0]
         left = (y[~rows] - A[~rows] @ c) * model.sigma[0]
         assert found[i, 0] == pytest.approx(np.mean(left**2), rel=1e-3)
+        priors.append(0.5 * c[:p] @ c[:p])
+    assert unlikely == pytest.approx(np.mean(priors), rel=1e-3)
 
 
 def test_an_effect_that_is_there_has_support_and_one_beside_it_none(damped):
     floor = 1e-5 * damped.power
     model = fitted(damped, 'viscous_friction', 'cogging')
-    there, beside = support(Columns(damped), model, floor)
-    assert INDEPENDENT_ROWS * there > 10.0 * EVIDENCE
-    assert INDEPENDENT_ROWS * beside < EVIDENCE
+    there, beside = support(Columns(damped), model, floor, INDEPENDENT_ROWS)
+    assert there > 10.0 * EVIDENCE
+    assert beside < EVIDENCE
 
 
 def test_a_model_with_an_effect_without_support_gives_way(damped):
@@ -159,8 +161,8 @@ def test_an_effect_without_support_is_not_asserted(equations_for):
     model = fitted(equations, 'constant_load')
     comparison = Comparison(*bases, (model,), ())
     scale = Scale.of(equations, comparison)
-    gain = support(Columns(equations), model, scale.floor * scale.power)
-    assert scale.rows * gain[0] < EVIDENCE
+    gain = support(Columns(equations), model, scale.floor * scale.power, scale.rows)
+    assert gain[0] < EVIDENCE
     decision = decide(equations, comparison)
     assert decision.verdict != 'missing_physics'
     assert decision.tentative is None
