@@ -105,6 +105,11 @@ LEAST_ODDS = 0.01
 """A rival below this, relative to the asserted model, is not looked at closely [1]. Convention."""
 ALIKE = math.log(20.0) / TEMPER
 """Difference of the fits below which a recording prefers neither model [nats]. Convention."""
+PER_UNUSUAL = ALIKE
+"""What a law that few joints have must be worth beyond the price of an effect [nats]. Convention.
+
+Odds of one to twenty against laws that nearly every joint with a motor has, or that add to them.
+"""
 CLEARER = 2.0
 """Ratio of mean squared differences from which another motion separates models [1]. Convention."""
 CALM_SHARE = 0.002

@@ -87,6 +87,7 @@ class Effect:
         is_of_command: it lies before the motor's current: a measured effort is behind it.
         has_memory: its force at a time depends on other times too, of the motion or the commands.
         is_open: a robot may have it or not, and its numbers are not known.
+        is_usual: nearly every joint with a motor has it.
     """
 
     name: str = ''
@@ -120,6 +121,7 @@ class Effect:
     is_of_command: bool = False
     has_memory: bool = False
     is_open: bool = False
+    is_usual: bool = False
 
     @property
     def key(self) -> str:
@@ -204,10 +206,7 @@ class Effect:
         return None
 
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return the force per coefficient where it follows from one joint's own motion.
-
-        Element by element, for arrays of any shape.
-        """
+        """Return the force per coefficient from one joint's own motion, element by element."""
         raise NotImplementedError
 
     def whole(self, motion: SeenMotion, at: Placed) -> np.ndarray:

@@ -44,6 +44,7 @@ class ViscousFriction(Effect):
     linear = ('b',)
     term = TermForm('viscous', ('viscous',), dynamics='damping', is_dissipative=True)
     drawn_over = 'velocity'
+    is_usual = True
 
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (-x.v,)
@@ -65,6 +66,7 @@ class CoulombFriction(Effect):
     term = TermForm('coulomb', ('coulomb',), dynamics='friction', is_dissipative=True)
     drawn_over = 'velocity'
     is_dry = True
+    is_usual = True
 
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (-x.s,)

@@ -75,6 +75,7 @@ class ConstantLoad(Effect):
     quantities = (Quantity('force', 'N m'),)
     linear = ('force',)
     term = TermForm('offset', ('offset',), sign=-1.0)
+    is_usual = True
 
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (np.ones_like(x.q),)
@@ -97,6 +98,7 @@ class Armature(Effect):
     drawn_over = 'acceleration'
     is_inertial = True
     sees_acceleration = True
+    is_usual = True
 
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (-x.a,)

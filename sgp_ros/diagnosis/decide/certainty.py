@@ -20,7 +20,6 @@ from sgp_ros.diagnosis.criteria import (
     LEAST_ASSERTED,
     LEAST_ODDS,
     MOST_CERTAIN,
-    PER_EFFECT,
     PER_PARAMETER,
     TEMPER,
 )
@@ -69,8 +68,8 @@ class Probabilities:
         losses = {
             'inertial parameters further from the nominal ones': 0.5
             * float(model.w @ model.w - asserted.w @ asserted.w),
-            'more parameters than the improvement justifies': PER_EFFECT
-            * (model.laws - asserted.laws)
+            'more parameters than the improvement justifies, or rarer effects': model.law_price
+            - asserted.law_price
             + PER_PARAMETER * (model.freedom - asserted.freedom),
             'a larger residual at other joints': scale.likelihood(asserted)
             - scale.likelihood(model),

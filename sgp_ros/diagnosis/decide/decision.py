@@ -28,7 +28,6 @@ from sgp_ros.diagnosis.criteria import (
     INDEPENDENT_ROWS,
     LEAST_SHARE,
     NOTHING_EXPLAINED,
-    PER_EFFECT,
     PER_PARAMETER,
     SHAPE_ERROR,
     SLIGHT_REST,
@@ -168,7 +167,7 @@ class Scale:
     def worth(self, model: Model) -> float:
         """Return the fit of a model, less the price of its freedom [nats]."""
         unlikely = sum(s.effect.surprise(s) for s in model.effects)
-        price = PER_EFFECT * model.laws + PER_PARAMETER * model.freedom
+        price = model.law_price + PER_PARAMETER * model.freedom
         return self.fit(model) - price - unlikely
 
 

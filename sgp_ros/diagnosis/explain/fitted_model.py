@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import FLOOR_SHARE
+from sgp_ros.diagnosis.criteria import FLOOR_SHARE, PER_EFFECT, PER_UNUSUAL
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.regression import dry_joints
 from sgp_ros.physics.catalogue import EFFECTS
-from sgp_ros.physics.effect import EMPTY
+from sgp_ros.physics.effect import EMPTY, Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -67,6 +67,18 @@ class Model:
     def laws(self) -> int:
         """Number of laws: one of two joints holds its plain ones, waves at one place are one."""
         return sum((not s.place.number) + _extra_laws(s) for s in self.effects)
+
+    @property
+    def law_price(self) -> float:
+        """What laws must be worth, the more where few joints have them [nats].
+
+        Those of which the prior says how unlikely their numbers are have paid by that.
+        """
+        unusual = sum(
+            type(e).surprise is Effect.surprise and not (e.is_usual or e.plain or e.is_open)
+            for e in (s.effect for s in self.effects)
+        )
+        return PER_EFFECT * self.laws + PER_UNUSUAL * unusual
 
     @property
     def cost(self) -> float:

@@ -28,13 +28,7 @@ from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import Trial, screen
-from sgp_ros.physics.catalogue import (
-    ARMATURE,
-    CONSTANT_LOAD,
-    COULOMB_FRICTION,
-    EFFECTS,
-    VISCOUS_FRICTION,
-)
+from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import JOINT, MOTOR, PLACES, Place
@@ -43,8 +37,6 @@ SWEEPS = 4
 """Most sweeps over the joints."""
 TRIALS = 3
 """Screened candidates that are fitted."""
-USUAL = (COULOMB_FRICTION, VISCOUS_FRICTION, ARMATURE, CONSTANT_LOAD)
-"""Laws that nearly every motorised joint has."""
 
 
 def gain(trial: Model, model: Model, *, is_whole: bool = True) -> float:
@@ -64,8 +56,7 @@ def gain(trial: Model, model: Model, *, is_whole: bool = True) -> float:
     rows = np.minimum(len(of.residual) / factors, INDEPENDENT_ROWS)
     prior = 0.5 * float(model.w @ model.w - trial.w @ trial.w)
     inertia = float(rows.mean()) * (trial.log_inertia - model.log_inertia)
-    price = PER_EFFECT * (trial.laws - model.laws)
-    price += PER_PARAMETER * (trial.size - model.size)
+    price = trial.law_price - model.law_price + PER_PARAMETER * (trial.size - model.size)
     return float(rows @ np.log(model.sigma / trial.sigma)) + inertia + prior - price
 
 
@@ -130,7 +121,8 @@ def usual(columns: Columns, base: Model, first: tuple[EffectAt, ...] = ()) -> Mo
     motion = base.frame.equations.motion
     effects = first + tuple(
         EffectAt(law, place)
-        for law in USUAL
+        for law in EFFECTS.values()
+        if law.is_usual
         for place in law.places(motion)
         if motion.moves[place.joint] and shows(law, place, motion)
     )

@@ -21,7 +21,6 @@ from sgp_ros.diagnosis.decide.equivalence import Contrasts, moved
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors, imbalance
-from sgp_ros.diagnosis.explain.joint_search import USUAL
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.unlisted.search import Searched, law_of, own_effects, search
@@ -80,7 +79,7 @@ def _is_slight(equations: Equations, listed: Model, searched: Searched) -> bool:
     Friction that creeps a little near rest is friction.
     """
     joint, motion = searched.joint, equations.motion
-    if not all(s.effect in USUAL for s in own_effects(listed, joint)):
+    if not all(s.effect.is_usual for s in own_effects(listed, joint)):
         return False
     ends = (imbalance(m, equations, motion)[:, joint] for m in (listed, searched.smooth))
     apart = np.subtract(*ends)
