@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import LACKING, LEAST_LAW, SIGNIFICANT, SLIGHT_REST
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, LACKING, LEAST_LAW, SIGNIFICANT
 from sgp_ros.diagnosis.decide.certainty import probabilities
 from sgp_ros.diagnosis.decide.decision import Decision, Scale, decide, refused
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, moved
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
-from sgp_ros.diagnosis.explain.fitted_model import Model, floors, imbalance
+from sgp_ros.diagnosis.explain.fitted_model import Model, floors
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.unlisted.search import Searched, law_of, own_effects, search
@@ -74,16 +74,15 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
 
 
 def _is_slight(equations: Equations, listed: Model, searched: Searched) -> bool:
-    """Return whether the smooth force differs from usual laws by less than counts.
+    """Return whether the smooth force differs from usual laws by less than counts as physics.
 
     Friction that creeps a little near rest is friction.
     """
-    joint, motion = searched.joint, equations.motion
+    joint = searched.joint
     if not all(s.effect.is_usual for s in own_effects(listed, joint)):
         return False
-    ends = (imbalance(m, equations, motion)[:, joint] for m in (listed, searched.smooth))
-    apart = np.subtract(*ends)
-    return bool((apart**2).mean() < SLIGHT_REST * equations.power[joint])
+    apart = listed.residual[:, joint] - searched.smooth.residual[:, joint]
+    return bool((apart**2).mean() < COUNTED_SHARE * equations.power[joint])
 
 
 def _joints(equations: Equations, comparison: Comparison, decision: Decision) -> list[int]:
