@@ -26,10 +26,14 @@ from sgp_ros.diagnosis.criteria import (
 from sgp_ros.diagnosis.decide.cross_validation import without
 from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision, Scale
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
+from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.credibility import is_credible, is_sound
 from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.result import Difference, Finding
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import JOINT, MOTOR
 
 
@@ -85,10 +89,12 @@ def settled(
 ) -> tuple[Decision, Contrasts, Probabilities]:
     """Return the decision without findings that are improbable, with probabilities of the rest.
 
-    What is asserted beside others is at least `LEAST_ASSERTED` probable; the others are fitted
-    again without it, if they can have the numbers that follow. The most probable one stays:
-    something is missing there.
+    What is asserted beside others is at least `LEAST_ASSERTED` probable. What is not gives way to
+    the plain law that it adds to, of which others are rivals that add to it too, or is left out;
+    unless a model that was compared, of which all is probable, is worth more than what is left.
+    The most probable one stays: something is missing there.
     """
+    dropped: set[object] = set()
     while True:
         contrasts = Contrasts(equations, decision.model)
         chances = probabilities(equations, comparison, decision, contrasts)
@@ -97,11 +103,32 @@ def settled(
         if decision.verdict != 'missing_physics' or len(p) < 2 or min(p) >= LEAST_ASSERTED:
             return decision, contrasts, chances
         weakest = effects[int(np.argmin(p))]
-        kept = without(equations, decision.model, lambda s, out=weakest: s is out)  # type: ignore[misc]
-        if not is_credible(kept):
-            return decision, contrasts, chances
+        dropped.add(weakest.key)
+        kept = _without(equations, decision.model, weakest)
         rivals = (decision.model, *decision.rivals)
-        decision = replace(decision, model=kept, rivals=rivals)
+        known = [m for m in rivals if _is_probable(m, chances) and not dropped & m.key]
+        best = max([kept, *filter(chances.scale.counts, known)], key=chances.scale.worth)
+        if not is_credible(best):
+            return decision, contrasts, chances
+        decision = replace(decision, model=best, rivals=rivals)
+
+
+def _is_probable(model: Model, chances: Probabilities) -> bool:
+    """Return whether a model has effects, each of which is probable enough to be asserted."""
+    p = [chances.of(model, i) for i in range(len(model.effects))]
+    return min(p, default=0.0) >= LEAST_ASSERTED
+
+
+def _without(equations: Equations, model: Model, effect: EffectAt) -> Model:
+    """Return a model with the plain law of an effect in its place, or else without it."""
+    fewer = without(equations, model, lambda s: s is effect)
+    place, plain = effect.place, effect.effect.plain[:1]
+    if not plain or place.source >= 0 or place.kind or (plain[0], place) in model.key:
+        return fewer
+    simple = (*fewer.effects, EffectAt(EFFECTS[plain[0]], place))
+    simpler = fit(Columns(equations), simple, model.sigma, is_free=model.is_free, w=model.w,
+                  still=len(fewer.effects))  # fmt: skip
+    return simpler if is_credible(simpler) else fewer
 
 
 def probabilities(
