@@ -75,7 +75,6 @@ class ConstantLoad(Effect):
     quantities = (Quantity('force', 'N m'),)
     linear = ('force',)
     term = TermForm('offset', ('offset',), sign=-1.0)
-    is_usual = True
 
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (np.ones_like(x.q),)
@@ -154,8 +153,9 @@ class Cogging(Effect):
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
         """Return one wave in the range of motion, three a turn, and the shortest one resolved."""
-        j = place.joint
-        least = peak_width(motion, j) if motion.tree.is_prismatic[j] else LEAST_PERIODS
+        j, least = place.joint, peak_width(motion, place.joint)
+        if not motion.tree.is_prismatic[j]:
+            least = max(least, LEAST_PERIODS)
         return np.array([least]), np.array([max(most_periods(motion, j), 1.5 * least)])
 
     def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:

@@ -79,7 +79,8 @@ def _is_slight(equations: Equations, listed: Model, searched: Searched) -> bool:
     Friction that creeps a little near rest is friction.
     """
     joint = searched.joint
-    if not all(s.effect.is_usual for s in own_effects(listed, joint)):
+    own = own_effects(listed, joint)
+    if not all(s.effect.is_usual or s.effect in _PLAIN for s in own):
         return False
     apart = listed.residual[:, joint] - searched.smooth.residual[:, joint]
     return bool((apart**2).mean() < COUNTED_SHARE * equations.power[joint])

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sgp_ros.diagnosis.criteria import PER_UNUSUAL
 from sgp_ros.diagnosis.unlisted.shapes import UNITS, SmoothForce
 from sgp_ros.physics.formula import Formula, read_formula
 from sgp_ros.physics.law import FormulaLaw
@@ -121,7 +122,8 @@ def formulas(smooth: SmoothForce, motion: ObservedMotion) -> Iterator[FoundLaw]:
         ]
         size = formula.folded(lambda _node: 1.0, lambda _node, parts: 1.0 + sum(parts))
         words = NEAREST.get(f'{shape} {smooth.gate}'.strip(), NAMELESS)
-        yield FoundLaw(smooth, formula, joint, parameters, words, PER_PIECE * size)
+        price = PER_UNUSUAL + PER_PIECE * size
+        yield FoundLaw(smooth, formula, joint, parameters, words, price)
 
 
 def _texts(smooth: SmoothForce) -> Iterator[tuple[str, str]]:
