@@ -74,13 +74,13 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
 
 
 def _is_slight(equations: Equations, listed: Model, searched: Searched) -> bool:
-    """Return whether the smooth force differs from usual laws by less than counts as physics.
+    """Return whether the smooth force differs from plain laws by less than counts as physics.
 
-    Friction that creeps a little near rest is friction.
+    Friction that creeps a little near rest is friction, a spring that hardens a little a spring.
+    A law with a shape of its own could be bent to stand for another one.
     """
     joint = searched.joint
-    own = own_effects(listed, joint)
-    if not all(s.effect.is_usual or s.effect in _PLAIN for s in own):
+    if any(len(s.shape) for s in own_effects(listed, joint)):
         return False
     apart = listed.residual[:, joint] - searched.smooth.residual[:, joint]
     return bool((apart**2).mean() < COUNTED_SHARE * equations.power[joint])
