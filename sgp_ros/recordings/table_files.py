@@ -14,6 +14,7 @@ from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.model_files import require_unpacked
 from sgp_ros.recordings.table_apart import READERS, load_apart
 from sgp_ros.recordings.table_formats import load_json, refuse
+from sgp_ros.recordings.table_units import as_numbers, is_number
 from sgp_ros.strangers import readable, require_file, require_within
 
 Columns = dict[str, np.ndarray]
@@ -23,6 +24,8 @@ ENDINGS = (
 """Of files that are read."""
 _DELIMITERS = (';', '\t', ',', ' ')
 _COMMENTS = '#%'
+_FEW = 0.1
+"""Share of the cells of a column up to which those that are no numbers are mistakes."""
 _IN_BRACKETS = re.compile(r'\[[^\]]*\]')
 _APART = re.compile(r'\[[^\]]*\]|\S+')
 _TIME = re.compile(r'\d{4}-\d\d-\d\d[T ]\d')
@@ -50,7 +53,7 @@ def load_columns(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]
 
 def _load(path: Path, suffix: str, remarks: list[str]) -> tuple[Columns, Sequence[int]]:
     if suffix == '.npz':
-        return _load_npz(path), ()
+        return _load_npz(path, remarks), ()
     if suffix in READERS:
         return load_apart(path), ()
     if suffix in {'.json', '.jsonl', '.ndjson'}:
@@ -100,7 +103,30 @@ def _load_csv(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]]:
     table = np.char.strip(np.array(rows, dtype=str))  # (n, number of columns)
     if mark == ';':
         table = np.char.replace(table, ',', '.')  # a decimal comma goes with semicolons
-    return {name: _column(table[:, i]) for i, name in enumerate(names)}, taken
+    columns = {name: _column(table[:, i]) for i, name in enumerate(names)}
+    for name, column in columns.items():
+        _require_numbers(path, name, column, taken, remarks)
+    return columns, taken
+
+
+def _require_numbers(
+    path: Path, name: str, cells: np.ndarray, lines: list[int], remarks: list[str]
+) -> None:
+    """Refuse a column (n,) of numbers with a few cells that are none; say it where they are more.
+
+    Such a column would be left out as one of texts is, and nobody would know.
+    """
+    if cells.ndim > 1 or as_numbers(cells) is not None:
+        return
+    wrong = [i for i, cell in enumerate(cells) if cell and not is_number(cell)]
+    if not wrong or len(wrong) == np.count_nonzero(cells):
+        return
+    said = f'{path.name} line {lines[wrong[0]]}, column {name}: {str(cells[wrong[0]])[:40]!r}'
+    if len(wrong) < _FEW * len(cells):
+        raise RecordingError(
+            said, 'a number, or an empty cell for a missing one', 'correct it, or drop the column'
+        )
+    remarks.append(f'{said} is no number; a column with {len(wrong)} such cells is not used')
 
 
 def _header(path: Path, lines: list[str]) -> tuple[str, str, list[tuple[int, str]]]:
@@ -161,11 +187,7 @@ def _is_value(cell: str) -> bool:
     text = cell.strip()
     if text.startswith('[') or _TIME.match(text):
         return True
-    try:
-        float(text.replace(',', '.'))
-    except ValueError:
-        return False
-    return True
+    return is_number(text.replace(',', '.'))
 
 
 def _column(cells: np.ndarray) -> np.ndarray:
@@ -176,13 +198,17 @@ def _column(cells: np.ndarray) -> np.ndarray:
     return np.array(rows, dtype=str) if len({len(row) for row in rows}) == 1 else cells
 
 
-def _load_npz(path: Path) -> Columns:
+def _load_npz(path: Path, remarks: list[str]) -> Columns:
     try:
         require_unpacked(path)
         with np.load(path, allow_pickle=False) as content:
-            return dict(_plain_arrays(content))
+            columns = dict(_plain_arrays(content))
+            left = [name for name in content.files if name not in columns]
     except (ValueError, OSError, zipfile.BadZipFile, EOFError, AttributeError) as error:
         raise RecordingError(f'{path} cannot be read ({error})', 'a NumPy .npz file') from error
+    if left:
+        remarks.append(f'{path.name}: {left} hold Python objects and are not read')
+    return columns
 
 
 def _plain_arrays(content: np.lib.npyio.NpzFile) -> Iterator[tuple[str, np.ndarray]]:
@@ -190,6 +216,8 @@ def _plain_arrays(content: np.lib.npyio.NpzFile) -> Iterator[tuple[str, np.ndarr
     for name in content.files:
         try:
             array = content[name]
-        except ValueError:
+        except ValueError as error:
+            if 'allow_pickle' not in str(error):
+                raise
             continue
         yield name, np.atleast_1d(array)

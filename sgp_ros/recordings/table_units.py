@@ -20,12 +20,21 @@ def as_numbers(column: np.ndarray) -> np.ndarray | None:
     """Return a column as float64, nothing as NaN; None where it holds no numbers."""
     if column.dtype.kind in 'fiub':
         return column.astype(np.float64)
-    if column.dtype.kind != 'U':
-        return None
+    if column.dtype.kind != 'U' or (np.char.find(column, '_') >= 0).any():
+        return None  # Python takes 1_0 for 10
     try:
         return np.where(column == '', 'nan', column).astype(np.float64)
     except ValueError:
         return None
+
+
+def is_number(cell: str) -> bool:
+    """Return whether a cell holds a number."""
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return '_' not in cell
 
 
 def time_unit(stamps: np.ndarray, said: str) -> tuple[str, bool]:

@@ -29,6 +29,7 @@ from sgp_ros.recordings.command_types import COMMAND_TYPES
 from sgp_ros.recordings.table_files import Columns, load_columns
 from sgp_ros.recordings.table_gains import row_gains
 from sgp_ros.recordings.table_map import Quantity, TableMap, TimeBase, check_map
+from sgp_ros.recordings.table_units import as_numbers, is_number
 
 _ISO = re.compile(r'(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:\d\d)?')
 _GREATEST = 1e150
@@ -205,13 +206,13 @@ def _values(path: Path, columns: Columns, quantity: Quantity) -> np.ndarray:
     column = _vector(columns, quantity)
     if column.dtype.kind != 'U':
         return column.astype(np.float64) * quantity.factor + quantity.offset
-    try:
-        numbers = np.where(column == '', 'nan', column).astype(np.float64)
-    except ValueError as error:
+    numbers = as_numbers(column)
+    if numbers is None:
+        wrong = next(str(cell) for cell in column if cell and not is_number(str(cell)))
         raise RecordingError(
-            f'{path}, column {quantity.column}: {error}',
+            f'{path}, column {quantity.column}: {wrong[:40]!r}',
             'numbers, or an empty cell for a missing value',
-        ) from error
+        )
     return numbers * quantity.factor + quantity.offset
 
 

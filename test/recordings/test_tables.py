@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import re
+import zipfile
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from scipy.io import savemat
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.recordings.imports import import_table
 from sgp_ros.recordings.reader import open_recording
+from sgp_ros.recordings.table_files import load_columns
 from sgp_ros.recordings.table_map import read_map
 from sgp_ros.recordings.tables import read_table
 from test.recordings import worlds
@@ -211,6 +214,45 @@ def test_objects_in_npz_are_never_unpickled(tmp_path):
     np.savez(tmp_path / 'x.npz', t=np.zeros(1), q=np.array([{}]))
     with pytest.raises(ConfigError, match=r'q.*not in the table'):
         read_table(tmp_path / 'x.npz', MAP)
+
+
+def test_an_array_that_is_damaged_is_not_left_out(tmp_path):
+    """Beside one of objects, which is, and is said."""
+    path = tmp_path / 'x.npz'
+    np.savez(path, t=np.arange(3.0), q=np.arange(3.0), o=np.array([{}]))
+    remarks = []
+    columns, _ = load_columns(path, remarks)
+    assert set(columns) == {'t', 'q'}
+    assert remarks == ["x.npz: ['o'] hold Python objects and are not read"]
+    with zipfile.ZipFile(path) as file:
+        parts = {name: file.read(name) for name in file.namelist()}
+    with zipfile.ZipFile(path, 'w') as file:
+        for name, data in parts.items():
+            file.writestr(name, data.replace(b'(3,)', b'(9,)') if name == 'q.npy' else data)
+    with pytest.raises(RecordingError, match='cannot be read'):
+        load_columns(path, [])
+
+
+@pytest.mark.parametrize('wrong', ['12..5', '1_0', '0x10', '1d5', 'two'])
+def test_a_cell_that_is_no_number_does_not_cost_its_column_in_silence(wrong, tmp_path):
+    """A few are refused by line, more are told; a column of texts is nobody's loss."""
+    rows = [f'{i},{i},{wrong if i % 30 == 7 else i},label' for i in range(60)]
+    path = _csv(tmp_path, '\n'.join(['t,q,tau,note', *rows]))
+    with pytest.raises(RecordingError, match=rf"line 9, column tau: '{re.escape(wrong)}'"):
+        load_columns(path, [])
+    rows = [f'{i},{i},{wrong if i % 3 == 0 else i},label' for i in range(60)]
+    remarks = []
+    load_columns(_csv(tmp_path, '\n'.join(['t,q,tau,note', *rows])), remarks)
+    assert len(remarks) == 1
+    assert 'column tau' in remarks[0]
+    assert 'a column with 20 such cells is not used' in remarks[0]
+
+
+def test_missing_cells_and_texts_are_no_mistakes(tmp_path):
+    rows = [f'{i},{i},{"" if i % 3 else i},note {i}' for i in range(20)]
+    remarks = []
+    load_columns(_csv(tmp_path, '\n'.join(['t,q,tau,note', *rows])), remarks)
+    assert remarks == []
 
 
 @pytest.mark.parametrize(
