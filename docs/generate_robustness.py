@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+from dataclasses import fields
 from pathlib import Path
 
+import numpy as np
+
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.gate import LARGEST
 
 ROOT = Path(__file__).parents[1]
 TARGET = Path(__file__).parent / 'robustness.md'
+WITHIN = 1.1
 TEMPLATE = Path(__file__).parent / 'templates' / 'robustness.txt'
 
 
@@ -27,22 +32,45 @@ def _faults(result):
     return 'none' if not found else '; '.join(f'{what}: {n}' for what, n in found.items())
 
 
-def _garbage(summary):
-    rows = {name: found for name, found in summary.items() if isinstance(found, dict)}
+def _garbage(rows):
+    """Return the table over all streams but those of a robot that comes to rest."""
     lines = [
-        '| garbage | streams | within 10 % | median ratio | worst ratio | worst where lost |',
-        '|---|---|---|---|---|---|',
-        *(
-            f'| {name} | {x["streams"]} | {x["within_10_percent"]} | {x["median"]:.3g} | '
-            f'{x["worst"]:.3g} | {x["worst_lost"]:.3g} |'
-            for name, x in rows.items()
-        ),
-    ]  # fmt: skip
-    return (
-        '\n'.join(lines)
-        if rows
-        else 'Not run yet: `python -m sgp_proof.robustness.gates garbage`.'
-    )
+        '| garbage | streams | within 10 % | median ratio | worst ratio | lost: within 10 % | lost: worst |',
+        '|---|---|---|---|---|---|---|',
+    ]
+    for kind in dict.fromkeys(row['kind'] for row in rows):
+        ratio, lost = (
+            np.array([row[name] for row in rows if row['kind'] == kind])
+            for name in ('ratio', 'ratio_lost')
+        )
+        lines.append(
+            f'| {kind} | {len(ratio)} | {(ratio <= WITHIN).sum()} | {np.median(ratio):.3g} | '
+            f'{ratio.max():.3g} | {(lost <= WITHIN).sum()} | {lost.max():.3g} |'
+        )
+    return '\n'.join(lines)
+
+
+def _still(rows):
+    """Say which robots the streams beyond the target are of."""
+    found = []
+    for robot in dict.fromkeys(row['robot'] for row in rows):
+        of = [row for row in rows if row['robot'] == robot]
+        beyond, lost = (sum(row[name] > WITHIN for row in of) for name in ('ratio', 'ratio_lost'))
+        found.append(f'`{robot}`: {beyond} of {len(of)} with garbage, {lost} with losses')
+    return 'Beyond 10 %: ' + '; '.join(found) + '.'
+
+
+def _many(result):
+    lines = [
+        '| rate [Hz] | processor per second of data [s] | in the second half [s] | longest step [s] | median nMSE |',
+        '|---|---|---|---|---|',
+    ]
+    for name, x in result['runs'].items():
+        lines.append(
+            f'| {name.removesuffix("Hz")} | {x["load"]:.2f} | {x["load_later"]:.2f} | '
+            f'{x["longest_step_s"]:.2f} | {x["nmse_median"]:.1e} |'
+        )
+    return '\n'.join(lines)
 
 
 def _kills(result):
@@ -83,6 +111,9 @@ def text() -> str:
     gate_time, summary = _load('robust_gate_time'), gates['summary']
     rate = summary['falsely_refused'] / summary['equations']
     machine = events['environment']
+    period = next(x.default for x in fields(EngineConfig) if x.name == 'refit_period')
+    many = _load('many_joints')
+    evaluation = max(x['evaluation_s'] for x in many['runs'].values())
     return TEMPLATE.read_text(encoding='utf-8').format(
         EVENTS=events['events'], EVENT_RUNS=len(events['runs']), EVENT_FAULTS=_faults(events),
         EVENT_MB=events['peak_megabytes'], EVENT_COUNTS=_table('event', events['counts']),
@@ -90,7 +121,10 @@ def text() -> str:
         FILE_COUNTS=_table('format and outcome', files['outcomes']),
         EQUATIONS=summary['equations'], REFUSED=summary['falsely_refused'], RATE=f'{1e2 * rate:.2g}',
         LARGEST=f'{LARGEST:g}', BOUND=f'{1e2 / LARGEST**2:.2g}', STREAMS=len(gates['clean']),
-        GARBAGE=_garbage(summary), MESSAGES=messages['messages'],
+        GARBAGE=_garbage(gates['garbage']), STILL=_still(gates['garbage']),
+        MANY=_many(many), MANY_JOINTS=many['joints'], MANY_COEFFICIENTS=many['coefficients'],
+        MANY_S=many['data_s'], EVALUATION=f'{evaluation:.1f}', PERIOD=period,
+        MESSAGES=messages['messages'],
         MESSAGE_FAULTS=_faults(messages), MESSAGE_MB=messages['peak_megabytes'],
         GATE_TIME=_gate_time(gate_time), KILLS=kills['number'], KILL_FAULTS=_faults(kills), KILL_COUNTS=_kills(kills),
         KEPT='; '.join(f'{n} {kept}' for kept, n in kills['kept'].items()),
