@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit
 
 from sgp_ros.physics.motion import RecordedCommands
+from sgp_ros.physics.ripple import Ripple
 
 _SHARPEN = (1.0, -1 / 12, 1 / 90)
 
@@ -149,6 +150,7 @@ class Servo:
         position, velocity: (n, k) on the grids.
         feedforward: (n, k) [N m or N].
         is_recorded: whether the gains come with the targets.
+        ripple: that the samples show of targets held between them; None for none.
     """
 
     targets: RecordedCommands
@@ -160,6 +162,7 @@ class Servo:
     velocity: np.ndarray
     feedforward: np.ndarray
     is_recorded: bool = False
+    ripple: Ripple | None = None
 
     @property
     def values(self) -> np.ndarray:
@@ -190,11 +193,20 @@ class Servo:
         k = len(self.kp)
         error = self.targets.effort(joint, delay=delay) - self.position[:, joint]
         rate = self.targets.effort(k + joint, delay=delay) - self.velocity[:, joint]
+        if self.ripple is not None:
+            shown = self.ripple.at(joint, delay)
+            error, rate = error + shown, rate + self._slope(shown)
         kp, kd = self.kp[joint], self.kd[joint]
         if self.is_recorded:
             kp = kp * self.targets.effort(2 * k + joint, delay=delay)
             kd = kd * self.targets.effort(3 * k + joint, delay=delay)
         return servo_parts(kp, kd, error, rate)
+
+    def _slope(self, x: np.ndarray) -> np.ndarray:
+        """Return the derivative of x (n,) on the grids."""
+        parts = [np.gradient(part, self.step) if len(part) > 1 else np.zeros(len(part))
+                 for part in np.split(x, self.starts[1:])]  # fmt: skip
+        return np.concatenate(parts)
 
 
 def servo_parts(

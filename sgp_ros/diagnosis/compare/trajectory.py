@@ -25,6 +25,8 @@ from sgp_ros.errors import RecordingError
 from sgp_ros.physics.drive import Drive, Servo
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.motion import RecordedCommands
+from sgp_ros.physics.ripple import Ripple
+from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -247,9 +249,19 @@ def observe(raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth) -> ObservedMot
 def _servo(targets: RecordedCommands, gains: Gains, motion: ObservedMotion) -> Servo:
     still = np.zeros_like(motion.position)
     held = motion.effort_for(motion.position, still, still) if gains.holds_gravity else still
+    ripple = None
+    if (
+        isinstance(targets, Drive)
+        and not gains.is_recorded
+        and motion.tree.is_actuated[: motion.tree.size].all()
+    ):
+        tree, k = motion.tree, motion.tree.size
+        mass = mass_matrix(tree, tree.parameters, motion.position)
+        wanted, pair = targets.values[:, :k], (gains.kp, gains.kd)
+        ripple = Ripple.of(targets.times, wanted, motion.time, motion.step, pair, mass)
     return Servo(
         targets, motion.step, motion.starts, gains.kp, gains.kd, motion.position,
-        motion.velocity, held, gains.is_recorded,
+        motion.velocity, held, gains.is_recorded, ripple,
     )  # fmt: skip
 
 
