@@ -215,6 +215,7 @@ def _scan(stream: IO[bytes], path: Path, number: int) -> _FileIndex:
         )
         if latest_ns:
             index.remark += f', up to {latest_ns // 10**9}.{latest_ns % 10**9:09d} s'
+        index.remark += f'; the rest is damaged, from byte {walk.offset} on'
     return index
 
 
@@ -224,12 +225,17 @@ class _Walk:
     def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream
         self._size = stream.seek(0, 2)
+        self.offset = len(MAGIC)
         self.is_complete = False
 
     def segments(self) -> Iterator[tuple[int, bytes]]:
-        """Yield offset and bytes; `is_complete` tells afterwards whether the data had an end."""
+        """Yield offset and bytes.
+
+        Afterwards `is_complete` tells whether the data had an end, `offset` where they break off.
+        """
         offset = start = len(MAGIC)
         while True:
+            self.offset = offset
             self._stream.seek(offset)
             head = self._stream.read(_RECORD_HEAD.size)
             opcode, length = (

@@ -98,7 +98,8 @@ class Recording:
             changes: topic of the changes of settings that a node recorded; empty for none.
 
         Raises:
-            RecordingError: a topic is missing, of a wrong type, or ambiguous.
+            RecordingError: a topic is missing, of a wrong type, or ambiguous; or, at the end, not
+                one message could be read.
         """
         states = choose_joint_states(self.topics, joint_states)
         chosen: dict[str, tuple[Topic, Callable[[Message, int], Event]]] = {}
@@ -156,6 +157,11 @@ class Recording:
             for topic in topics
             if topic.count is not None and found[topic.name] != topic.count
         }
+        if self._missing and not found.total():
+            raise RecordingError(
+                f'{self.path}: {"; ".join((*self._missing.values(), *self._source.remarks))}',
+                'an intact recording',
+            )
 
 
 def open_recording(path: str | Path) -> Recording:
@@ -174,7 +180,8 @@ def open_recording(path: str | Path) -> Recording:
     with readable(path, RecordingError, _KINDS):
         source, remarks = _directory_source(path) if path.is_dir() else (_file_source(path), ())
     if not any(topic.count for topic in source.topics):
-        raise RecordingError(f'{path} contains no messages', 'a recording with joint states')
+        why = ''.join(f' ({remark})' for remark in (*remarks, *source.remarks))
+        raise RecordingError(f'{path} contains no messages{why}', 'a recording with joint states')
     return Recording(path, source, remarks)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import sqlite3
 
@@ -161,6 +162,7 @@ def test_truncated_file_gives_all_complete_chunks(tmp_path_factory, keep):
         last = EVENTS[len(found) - 1].stamp_ns
         text = f'recovered {len(found)} messages, up to {last // 10**9}.{last % 10**9:09d} s'
         assert text in recording.remarks[0]
+        assert re.search(r'the rest is damaged, from byte \d+ on$', recording.remarks[0])
 
 
 def test_file_that_lacks_only_its_index_is_whole(tmp_path):
@@ -238,13 +240,15 @@ def test_recorded_changes_can_be_left_out(tmp_path):
 
 def test_damaged_chunk_of_an_indexed_file_is_left_out_and_said(tmp_path):
     """What is intact is used; how much of it there is, and where the damage is, is said."""
-    path = worlds.write(tmp_path / 'x.mcap', worlds.swing(500))
+    events = worlds.swing(500)
+    path = worlds.write_chunks(tmp_path / 'x.mcap', [events[:400], events[400:]])
     content = bytearray(path.read_bytes())
     content[600:700] = bytes(100)
     path.write_bytes(content)
     recording = open_recording(path)
     assert recording.remarks == ()
     states = sum(isinstance(event, JointSample) for event in recording.events())
+    assert states == 300
     assert any('damaged from byte' in remark for remark in recording.remarks)
     assert any(f'{states} of 500 messages read' in remark for remark in recording.remarks)
 
@@ -267,7 +271,10 @@ def _file(path, content):
         (lambda p: _file(p / 'x.mcap', b''), 'is empty'),
         (lambda p: _file(p / 'x.mcap', b'hello, world'), 'is not a recording'),
         (lambda p: worlds.write(p / 'x.mcap', []), 'contains no messages'),
-        (lambda p: _cut(worlds.write(p / 'x.mcap', EVENTS), 60), 'contains no messages'),
+        (
+            lambda p: _cut(worlds.write(p / 'x.mcap', EVENTS), 60),
+            r'contains no messages \(x.mcap is incomplete.*damaged, from byte \d+ on\)',
+        ),
         (lambda p: _file(p / 'x.db3', b'SQLite format 3\0' + bytes(200)), 'cannot be read'),
         (lambda p: _cut(_ros1(p / 'x.bag'), 4500), 'cannot be read'),
         (lambda p: worlds.write(p / 'x.mcap', EVENTS[:1]), 'no sensor_msgs/JointState topic'),
@@ -278,6 +285,16 @@ def test_what_is_no_recording_says_so_in_one_line(make, reason, tmp_path):
         open_recording(make(tmp_path)).events()
     assert '\n' not in str(caught.value)
     assert caught.value.expected
+
+
+def test_a_recording_of_which_nothing_can_be_read_says_where_it_is_damaged(tmp_path):
+    path = worlds.write(tmp_path / 'x.mcap', worlds.swing(500))
+    content = bytearray(path.read_bytes())
+    content[650] ^= 0xFF  # in its only chunk, whose checksum tells
+    path.write_bytes(content)
+    recording = open_recording(path)
+    with pytest.raises(RecordingError, match=r'only 0 of \d+ messages read.*damaged from byte'):
+        list(recording.events())
 
 
 @pytest.mark.parametrize('case', ['case_01', 'case_15', 'case_69'])
