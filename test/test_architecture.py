@@ -42,7 +42,9 @@ LAYERS = {
         'numpy', 'scipy', 'yaml', 'rosbags', 'mcap', 'lz4', 'zstandard', 'engine.samples',
         'engine.results', 'optional', 'strangers', 'errors',
     },
-    'diagnosis': NUMERIC | {'gp', 'physics', 'rigid', 'robots', 'engine', 'batch', 'errors'},
+    'diagnosis': NUMERIC | {
+        'numba', 'gp', 'physics', 'rigid', 'robots', 'engine', 'batch', 'errors',
+    },
     'campaign': NUMERIC | {'gp.scores', 'recordings.table_files', 'optional', 'errors'},
     'report': {
         'numpy', 'matplotlib', 'jinja2', 'markupsafe', 'gp', 'physics', 'rigid', 'robots',

@@ -10,7 +10,7 @@ place of the hat.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,8 @@ from sgp_ros.physics.motion import RecordedCommands
 from sgp_ros.physics.ripple import Ripple
 
 _SHARPEN = (1.0, -1 / 12, 1 / 90)
+LEAD_S = 1.0
+"""Time around a stretch of which the commands count: longer than delays and lags of drives."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,11 +59,30 @@ class Drive:
         u = self.values[:, joint]
         if characteristic is not None:
             u = characteristic(u)
-        times = self.times + delay
-        parts = [
-            _averaged(times, u, time_constant, start, self.step, n) for start, n in self.grids
-        ]
-        return np.concatenate(parts)
+        return _averaged(self.times + delay, u, time_constant, self.grids, self.step)
+
+    @property
+    def rows(self) -> int:
+        """Number n of points of all grids."""
+        return sum(n for _, n in self.grids)
+
+    def on(self, stretches: Sequence[slice]) -> Drive:
+        """Return the commands of some stretches of the rows, each within one grid.
+
+        Those of `LEAD_S` before each are kept, for delays and lags.
+        """
+        ends = np.cumsum([n for _, n in self.grids])
+        grids, needed = [], np.zeros(len(self.times), dtype=bool)
+        for s in stretches:
+            i = int(np.searchsorted(ends, s.start, side='right'))
+            first, count = self.grids[i]
+            start = first + self.step * (s.start - (int(ends[i]) - count))
+            grids.append((start, s.stop - s.start))
+            stop = start + self.step * (s.stop - s.start) + LEAD_S
+            a, b = np.searchsorted(self.times, (start - LEAD_S, stop), side='right')
+            needed[max(a - 1, 0) : b] = True
+        times, values = self.times[needed], self.values[needed]
+        return replace(self, times=times, values=values, grids=tuple(grids))
 
     def changed(self, change: Callable[[np.ndarray], np.ndarray], later: float) -> Drive:
         """Return other commands (c, k), some time later [s]."""
@@ -188,6 +209,21 @@ class Servo:
         """Return the drive with other targets, some time later [s]."""
         return replace(self, targets=self.targets.changed(change, later))
 
+    @property
+    def rows(self) -> int:
+        """Number n of points of all grids."""
+        return len(self.position)
+
+    def on(self, stretches: Sequence[slice]) -> Servo:
+        """Return the drive on some stretches of the rows, see `Drive.on`."""
+        pick = np.concatenate([np.arange(s.start, s.stop) for s in stretches])
+        ends = np.cumsum([s.stop - s.start for s in stretches])
+        return replace(
+            self, targets=self.targets.on(stretches), starts=(0, *map(int, ends[:-1])),
+            position=self.position[pick], velocity=self.velocity[pick],
+            feedforward=self.feedforward[pick],
+        )  # fmt: skip
+
     def parts(self, joint: int, delay: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return what kp and kd make of one joint, (n,) each [N m or N]."""
         k = len(self.kp)
@@ -217,11 +253,15 @@ def servo_parts(
 
 
 def _averaged(
-    knots: np.ndarray, u: np.ndarray, time_constant: float, start: float, step: float, n: int
-) -> np.ndarray:
+    knots: np.ndarray, u: np.ndarray, time_constant: float,
+    grids: tuple[tuple[float, int], ...], step: float,
+) -> np.ndarray:  # fmt: skip
+    """Return the averages on all grids, which have points beyond both ends while they are made."""
     reach = len(_SHARPEN)
-    t = start + step * np.arange(-reach, n + reach)
-    origin = t[0]
+    parts = [start + step * np.arange(-reach, n + reach) for start, n in grids]
+    t = np.concatenate(parts)
+    ends = np.cumsum([len(part) for part in parts])
+    origin = np.repeat([part[0] for part in parts], [len(part) for part in parts])
     lengths = np.diff(knots)
     U = np.concatenate([[0.0], np.cumsum(u[:-1] * lengths)])
     V = np.concatenate([[0.0], np.cumsum(U[:-1] * lengths + 0.5 * u[:-1] * lengths**2)])
@@ -236,11 +276,13 @@ def _averaged(
             single - time_constant * (now - y[0]) - y[0] * (t - origin)
         )
     mean = (double[2:] - 2.0 * double[1:-1] + double[:-2]) / step**2
-    result = np.zeros(n)
+    inside = np.concatenate(
+        [np.arange(e - len(part) + reach, e - reach) for e, part in zip(ends, parts, strict=True)]
+    )
+    result = np.zeros(len(inside))
     term = mean
     for power, factor in enumerate(_SHARPEN):
-        margin = reach - 1 - power
-        result += factor * term[margin : margin + n]
+        result += factor * term[inside - 1 - power]
         term = np.diff(term, 2)
     return result
 

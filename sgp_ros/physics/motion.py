@@ -8,7 +8,7 @@ library; the laws do not, so they name here what they take.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -95,6 +95,7 @@ class Commands(Protocol):
         """Return the effort of a joint behind delay, characteristic and lag, (n,) [N m or N]."""
 
 
+@runtime_checkable
 class RecordedCommands(Commands, Protocol):
     """Commands of whole recordings, which can be exchanged for others."""
 
@@ -102,6 +103,13 @@ class RecordedCommands(Commands, Protocol):
         self, change: Callable[[np.ndarray], np.ndarray], later: float
     ) -> RecordedCommands:
         """Return other commands (c, k), some time later [s]."""
+
+    @property
+    def rows(self) -> int:
+        """Number n of rows on which their efforts are wanted."""
+
+    def on(self, stretches: Sequence[slice]) -> RecordedCommands:
+        """Return the commands of some stretches of the rows, in the order of the rows."""
 
 
 class SeenMotion(Protocol):

@@ -6,7 +6,7 @@ grid, so that a reversal between two samples counts at its time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -15,7 +15,7 @@ import numpy as np
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.motion import Commands
+from sgp_ros.physics.motion import Commands, RecordedCommands
 from sgp_ros.rigid.rigid_body import inverse_dynamics, mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
 
@@ -212,6 +212,21 @@ class ObservedMotion:
             states = self.position[rows], self.velocity[rows], self.acceleration[rows]
             found[rows] = torque_regressor(self.tree, *states)[:, :, 10 * last : 10 * last + 10]
         return found
+
+    def on(self, stretches: Sequence[slice]) -> ObservedMotion:
+        """Return some stretches of the rows, after each of which the grid begins anew."""
+        pick = np.concatenate([np.arange(s.start, s.stop) for s in stretches])
+        ends, drive = np.cumsum([s.stop - s.start for s in stretches]), self.drive
+        if drive is not None:
+            assert isinstance(drive, RecordedCommands)  # of a node there are no stretches
+            drive = drive.on(stretches)
+        return replace(
+            self, time=self.time[pick], position=self.position[pick],
+            velocity=self.velocity[pick], acceleration=self.acceleration[pick],
+            effort=self.effort[pick], drive=drive,
+            starts=(0, *map(int, ends[:-1])),
+            recording=None if self.recording is None else self.recording[pick],
+        )  # fmt: skip
 
     def sliding(self, direction: float) -> ObservedMotion:
         """Return the same motion with every joint about to slide in one direction."""

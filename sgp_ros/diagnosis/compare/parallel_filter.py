@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 from scipy import signal
 
 
@@ -49,10 +50,15 @@ class ParallelFilter:
     @cached_property
     def kept(self) -> tuple[np.ndarray, ...]:
         """Rows in the middle of the filter for each row out, a part per segment."""
-        half = len(self.taps) // 2 + 4
         return tuple(
-            np.arange(s.start + half, s.stop - half, self.decimation) for s in self.segments
+            np.arange(s.start + self.margin, s.stop - self.margin, self.decimation)
+            for s in self.segments
         )
+
+    @property
+    def margin(self) -> int:
+        """Rows in that are lost at either end of a stretch."""
+        return len(self.taps) // 2 + 4
 
     @property
     def rows(self) -> np.ndarray:
@@ -61,10 +67,7 @@ class ParallelFilter:
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         """Return x (n, ...) filtered and thinned out, (N, ...)."""
-        flat = x.reshape(len(x), -1)
-        found = np.empty((sum(map(len, self.kept)), flat.shape[1]))
-        for inside, out in self.blocks(len(found) or 1):
-            found[out] = self.piece(flat[inside], out)
+        found = _weighed(self.taps, x.reshape(len(x), -1), self.rows - len(self.taps) // 2)
         return found.reshape(len(found), *x.shape[1:])
 
     def blocks(self, most: int) -> Iterator[tuple[slice, slice]]:
@@ -78,10 +81,28 @@ class ParallelFilter:
 
     def piece(self, x: np.ndarray, out: slice) -> np.ndarray:
         """Return the rows out of one of the blocks with the rows in x (m, c)."""
-        return _decimated(self.taps, x, self.decimation, out.stop - out.start)
+        return _weighed(self.taps, x, self.decimation * np.arange(out.stop - out.start))
 
 
-def _decimated(taps: np.ndarray, x: np.ndarray, step: int, count: int) -> np.ndarray:
-    """Return the weighted sums of every `step`-th window of x, (count, m)."""
-    windows = np.lib.stride_tricks.sliding_window_view(x, len(taps), axis=0)[::step][:count]
-    return windows @ taps
+def _weighed(taps: np.ndarray, x: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Return the weighted sums of the windows of x (n, c) that begin at `first`, (N, c)."""
+    found = np.empty((len(first), x.shape[1]))
+    _weigh(taps, np.array(x, dtype=np.float64, order='C', ndmin=2), first, found)
+    return found
+
+
+@njit(cache=True, fastmath={'reassoc'})
+def _weigh(taps: np.ndarray, x: np.ndarray, first: np.ndarray, out: np.ndarray) -> None:
+    for i in range(len(first)):
+        a = first[i]
+        if x.shape[1] == 1:
+            total = 0.0
+            for t in range(len(taps)):
+                total += taps[t] * x[a + t, 0]
+            out[i, 0] = total
+            continue
+        for c in range(x.shape[1]):
+            out[i, c] = 0.0
+        for t in range(len(taps)):
+            for c in range(x.shape[1]):
+                out[i, c] += taps[t] * x[a + t, c]

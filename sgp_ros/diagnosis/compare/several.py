@@ -54,6 +54,23 @@ class SeveralDrives:
         """Return other commands, some time later [s]."""
         return SeveralDrives(tuple(part.changed(change, later) for part in self.parts))
 
+    @property
+    def rows(self) -> int:
+        """Number n of rows of all recordings."""
+        return sum(part.rows for part in self.parts)
+
+    def on(self, stretches: Sequence[slice]) -> SeveralDrives:
+        """Return the commands of some stretches of the rows, each of one recording."""
+        found, first = [], 0
+        for part in self.parts:
+            end = first + part.rows
+            own = [
+                slice(s.start - first, s.stop - first) for s in stretches if first <= s.start < end
+            ]
+            found += [part.on(own)] * bool(own)
+            first = end
+        return SeveralDrives(tuple(found))
+
 
 def join(raws: Sequence[RawTrajectory]) -> RawTrajectory:
     """Return recordings as one trajectory; of one recording, that.

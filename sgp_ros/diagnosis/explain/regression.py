@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.compare.sample import sampled
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place, SmallEffect
@@ -35,6 +36,18 @@ class Columns:
         if dry not in self._equations:
             self._equations[dry] = self._equations[frozenset()].with_dry_friction(dry)
         return self._equations[dry]
+
+    @property
+    def rows(self) -> int:
+        """Number N of equations."""
+        return len(self._equations[frozenset()].d)
+
+    @cached_property
+    def sample(self) -> Columns:
+        """Columns on a few rows, see `sampled`; these, where they are few."""
+        equations = self._equations[frozenset()]
+        few = sampled(equations)
+        return self if few is equations else Columns(few)
 
     def corrected(self, w: np.ndarray | None) -> ObservedMotion:
         """Return the motion of a robot with changed bodies."""

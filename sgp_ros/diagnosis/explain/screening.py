@@ -32,12 +32,15 @@ def screen(
 ) -> list[Trial]:
     """Return candidates with the gain in score they promise, best first.
 
+    Of a long recording a few rows are looked at, see `sampled`.
+
     Args:
         columns: of the recording.
         model: so far.
         effects: that could be added.
         joints: indices of the places that are looked at; None for all.
     """
+    rows, columns = columns.rows, columns.sample
     held = dry_joints(model.effects)
     rests = {held: Rest.of(columns, model, held)}
     before = rests[held].left
@@ -54,7 +57,7 @@ def screen(
             if dry not in rests:
                 rests[dry] = Rest.of(columns, model, dry)
             motion = columns.corrected(model.w if effect.uses_bodies else None)
-            trials = _trials(_Look(columns, rests[dry], before), effect, place, motion)
+            trials = _trials(_Look(columns, rests[dry], before, rows), effect, place, motion)
             if place.number:
                 trials = (t for t in trials if are_apart((*model.effects, t[1]), motion))
             found += sorted(trials, key=lambda t: -t[0])[:TRIALS]
@@ -89,11 +92,19 @@ def are_apart(effects: Sequence[EffectAt], motion: ObservedMotion) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """Trials beside a model that leaves the mean squares `before` (k,)."""
+    """Trials beside a model.
+
+    Attributes:
+        columns: of the rows that are looked at.
+        rest: what the model leaves there.
+        before: (k,) mean squares that it leaves.
+        rows: number of all rows, which those stand for.
+    """
 
     columns: Columns
     rest: Rest
     before: np.ndarray
+    rows: int
 
     def products(self, candidate: EffectAt, motion: ObservedMotion) -> Products | None:
         """Return those of a candidate's columns; None where it has none."""
@@ -103,9 +114,9 @@ class _Look:
     def gain(self, found: Products, c: np.ndarray, size: int) -> float:
         """Return how much better columns with coefficients c (m,) leave it [nats]."""
         rest = self.rest
-        N, floor = len(rest.r), rest.floor
+        N, floor = self.rows, rest.floor
         change = found.own @ c @ c - 2.0 * found.cross @ c
-        after = np.maximum(rest.left + change / N * rest.frame.sigma**2, 0.0)
+        after = np.maximum(rest.left + change / len(rest.r) * rest.frame.sigma**2, 0.0)
         ratio = (self.before + floor) / (after + floor)
         return 0.5 * N * float(np.log(ratio).sum()) - 0.5 * size * float(np.log(N))
 
