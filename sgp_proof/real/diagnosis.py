@@ -241,7 +241,7 @@ def read(out: Path, printed: str) -> dict:
     found = json.loads((out / 'diagnosis.json').read_text(encoding='utf-8'))
     kept = (
         'verdict', 'certainty', 'findings', 'equivalents', 'parameter_errors', 'dependence',
-        'settings',
+        'settings', 'visibility',
     )  # fmt: skip
     return {
         'sentence': printed.splitlines()[0],

@@ -73,10 +73,20 @@ def _miss(item: Mapping[str, Any], found: Mapping[str, Any]) -> str:
     named = [f for f in found['findings'] if _matches(f, item)]
     if not named:
         effects = ' or '.join(map(_plain, item['effects']))
-        return f'{" or ".join(item["joint"])}: {effects} {_NOT_FOUND}'
+        return f'{" or ".join(item["joint"])}: {effects}{_unseen(item, found)} {_NOT_FOUND}'
     problems = [_problems(f, item['effects'][f['effect']]) for f in named]
     best = min(problems, key=len)
     return '; '.join(best)
+
+
+def _unseen(item: Mapping[str, Any], found: Mapping[str, Any]) -> str:
+    """Say from what size on the recording shows what is expected, where that is too much."""
+    for seen in found.get('visibility', ()):
+        limits = item['effects'].get(seen['effect'], {}).get(seen['parameter'])
+        if limits and seen['joint'] in item['joint'] and seen['value'] > limits[1]:
+            least, most = f'{seen["value"]:.2g} {seen["unit"]}', f'{limits[1]:g}'
+            return f', which this recording shows from {least} on (expected: at most {most}),'
+    return ''
 
 
 def _matches(finding: Mapping[str, Any], item: Mapping[str, Any]) -> bool:

@@ -66,3 +66,21 @@ def test_each_recording_has_expectations_in_the_words_of_the_product():
         for item in entry['expected']:
             for ranges in item['effects'].values():
                 assert all(low < high for low, high in ranges.values())
+
+
+@pytest.mark.parametrize(('shown', 'is_said'), [(0.41, True), (0.05, False)])
+def test_what_the_recording_cannot_show_is_said_beside_a_miss(shown, is_said):
+    seen = {'joint': 'elbow', 'effect': 'coulomb_friction', 'parameter': 'level', 'value': shown,
+            'unit': 'N m'}  # fmt: skip
+    expected = {
+        'verdict': ['missing_physics'],
+        'expected': [{'joint': ['elbow'], 'effects': {'coulomb_friction': {'level': [0.1, 0.3]}}}],
+    }
+    found = {'verdict': 'no_mismatch', 'findings': [], 'parameter_errors': [], 'fit': {},
+             'visibility': [seen]}  # fmt: skip
+    reasons = judge(expected, found)['reasons']
+    assert (
+        'elbow: coulomb friction, which this recording shows from 0.41 N m on '
+        '(expected: at most 0.3), not found' in reasons
+    ) == is_said
+    assert reasons[-1].endswith('not found')
