@@ -33,6 +33,8 @@ _FEW = 16
 """Positions below which no spectrum is taken."""
 _ROUNDING = 1e-9
 """Steps that are smaller, relative to the range, are no counts of an encoder."""
+_LOWEST = 0.2
+"""Part of what is near zero that a fold is in for at least half of this share of the time."""
 
 
 def motion_to_noise(position: np.ndarray) -> float:
@@ -111,7 +113,8 @@ def require_signed(raw: RawTrajectory, names: Sequence[str]) -> None:
     """Refuse measured efforts that have lost their sign, |tau| in place of tau.
 
     It is never negative while the joint moves to and fro, and yet comes down to zero again and
-    again: a load that is always positive keeps away from it, a fold does not.
+    again: a load that is always positive keeps away from it. A fold does not, for efforts pass
+    zero as they pass any other value near it.
 
     Args:
         raw: the recording.
@@ -127,8 +130,9 @@ def require_signed(raw: RawTrajectory, names: Sequence[str]) -> None:
         effort, steps = raw.effort[:, j], np.diff(raw.position[:, j])
         size = float(np.sqrt((effort**2).mean()))
         turns = min(float((steps > 0.0).mean()), float((steps < 0.0).mean()))
-        low = float((effort < UNSIGNED_ZERO * size).mean())
-        if effort.min() >= 0.0 and turns >= UNSIGNED_SHARE and low >= UNSIGNED_LOW:
+        low, lowest = ((effort < x * UNSIGNED_ZERO * size).mean() for x in (1.0, _LOWEST))
+        is_fold = low >= UNSIGNED_LOW and lowest >= 0.5 * _LOWEST * low
+        if effort.min() >= 0.0 and turns >= UNSIGNED_SHARE and is_fold:
             found.append(name)
     if found:
         raise RecordingError(

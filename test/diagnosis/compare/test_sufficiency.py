@@ -135,3 +135,6 @@ def test_efforts_without_their_sign_are_refused_and_a_positive_load_is_not(robot
     lifted = world.command - world.command.min() + 1.0
     raw = collect(events_of(world, effort=lifted, commands=False), robot)
     require_signed(raw, tree.moving_names)
+    lowered = world.command**2 / np.mean(world.command**2) + 0.05
+    raw = collect(events_of(world, effort=lowered, commands=False), robot)
+    require_signed(raw, tree.moving_names)
