@@ -90,6 +90,12 @@ class Connected:
         """Shares of the discrepancy from the nominal robot, (k,)."""
         return Scale.of(self.equations, self.several.comparison).nominal
 
+    @property
+    def left(self) -> tuple[np.ndarray, np.ndarray]:
+        """Those shares, and how much less of them corrected bodies leave."""
+        bodies = self.several.comparison.parameters.mean_square / self.equations.power
+        return self.nominal, self.nominal - bodies
+
     def worth(self, nominal: np.ndarray, recorded: np.ndarray) -> float:
         """Return the worth of what is decided, as the density of the recorded motion [nats].
 

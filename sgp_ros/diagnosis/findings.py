@@ -15,6 +15,7 @@ from sgp_ros.diagnosis.criteria import (
     INTERVAL,
     NUMBER_ERROR,
     REGION_ENERGY,
+    SLIGHT_REST,
 )
 from sgp_ros.diagnosis.decide.certainty import Probabilities
 from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision
@@ -214,11 +215,9 @@ def _unknown(
     names = equations.motion.tree.joint_names
     seen = [r for r in remainders if r.joint == joint]
     own = depends[joint]
-    on = (
-        f'it depends on {", ".join(seen[0].inputs)}'
-        if seen
-        else 'it is not a function of the motion'
-    )
+    on = 'it is not a function of the motion'
+    if seen:
+        on = f'it depends on {", ".join(seen[0].inputs)}'
     if seen and not any(own.is_significant(name) for name in own.scores):
         on = f'Z follows {", ".join(seen[0].inputs)}, but no single variable significantly'
     share = float(decision.model.mean_square[joint] / equations.power[joint])
@@ -276,17 +275,19 @@ def verdict_of(
     wrong: Sequence[ParameterError],
     setup: Sequence[Finding],
     nominal: np.ndarray,
+    gained: np.ndarray,
     beside: Sequence[object],
 ) -> str:
     """Return the verdict of a diagnosis.
 
-    Bodies are wrong where one of them differs, or all of them together by what counts as physics.
+    Bodies are wrong where it helps to correct one of them, or what they leave counts as physics.
 
     Args:
         decision: on the models.
         wrong: bodies that differ.
         setup: errors of the connection.
         nominal: (k,) shares of the discrepancy from the nominal robot.
+        gained: (k,) how much less of it corrected bodies leave.
         beside: missing physics beside the models.
     """
     if decision.verdict not in {'no_mismatch', 'parameters_only'}:
@@ -295,5 +296,5 @@ def verdict_of(
         return 'missing_physics'
     if setup:
         return 'setup_error'
-    is_calm = not wrong and nominal.max() < COUNTED_SHARE
-    return 'no_mismatch' if is_calm else decision.verdict
+    is_slight = nominal.max() < COUNTED_SHARE and (not wrong or gained.max() < SLIGHT_REST)
+    return 'no_mismatch' if is_slight else decision.verdict

@@ -155,7 +155,7 @@ def _diagnosed(
         robot=robot,
         joints=tree.moving_names,
         units=tuple('N' if p else 'N m' for p in tree.is_prismatic[: tree.size]),
-        verdict=verdict_of(decision, wrong, connected.findings, connected.nominal, lags or differ),
+        verdict=verdict_of(decision, wrong, connected.findings, *connected.left, lags or differ),
         certainty=_certainty(certainty, connected, is_doubted=bool(doubts)),
         findings=findings,
         alternatives=alternatives(decision, chances),

@@ -7,28 +7,30 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.criteria import COUNTED_SHARE
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, SLIGHT_REST
 from sgp_ros.diagnosis.findings import verdict_of
 
-LITTLE, MUCH = 0.5 * COUNTED_SHARE, 2.0 * COUNTED_SHARE
+LITTLE, MUCH, SLIGHT = 0.5 * COUNTED_SHARE, 2.0 * COUNTED_SHARE, 0.5 * SLIGHT_REST
 
 
 @pytest.mark.parametrize(
-    ('said', 'wrong', 'nominal', 'setup', 'beside', 'verdict'),
+    ('said', 'wrong', 'nominal', 'gained', 'setup', 'beside', 'verdict'),
     [
-        ('parameters_only', (), LITTLE, (), (), 'no_mismatch'),
-        ('parameters_only', (), MUCH, (), (), 'parameters_only'),
-        ('parameters_only', ('mass',), LITTLE, (), (), 'parameters_only'),
-        ('no_mismatch', (), LITTLE, (), (), 'no_mismatch'),
-        ('no_mismatch', (), LITTLE, (), ('lag',), 'missing_physics'),
-        ('parameters_only', ('mass',), MUCH, ('sign',), (), 'setup_error'),
-        ('parameters_only', ('mass',), MUCH, ('sign',), ('lag',), 'missing_physics'),
-        ('unexplained', (), LITTLE, ('sign',), ('lag',), 'unexplained'),
+        ('parameters_only', (), LITTLE, LITTLE, (), (), 'no_mismatch'),
+        ('parameters_only', (), MUCH, MUCH, (), (), 'parameters_only'),
+        ('parameters_only', ('mass',), LITTLE, LITTLE, (), (), 'parameters_only'),
+        ('parameters_only', ('mass',), LITTLE, SLIGHT, (), (), 'no_mismatch'),
+        ('parameters_only', (), MUCH, SLIGHT, (), (), 'parameters_only'),
+        ('no_mismatch', (), LITTLE, LITTLE, (), (), 'no_mismatch'),
+        ('no_mismatch', (), LITTLE, LITTLE, (), ('lag',), 'missing_physics'),
+        ('parameters_only', ('mass',), MUCH, MUCH, ('sign',), (), 'setup_error'),
+        ('parameters_only', ('mass',), MUCH, MUCH, ('sign',), ('lag',), 'missing_physics'),
+        ('unexplained', (), LITTLE, LITTLE, ('sign',), ('lag',), 'unexplained'),
     ],
 )
 def test_bodies_are_wrong_where_one_is_or_where_all_together_count(
-    said, wrong, nominal, setup, beside, verdict
+    said, wrong, nominal, gained, setup, beside, verdict
 ):
     decision = SimpleNamespace(verdict=said)
-    shares = np.array([0.0, nominal])
-    assert verdict_of(decision, wrong, setup, shares, beside) == verdict
+    shares = (np.array([0.0, nominal]), np.array([0.0, gained]))
+    assert verdict_of(decision, wrong, setup, *shares, beside) == verdict
