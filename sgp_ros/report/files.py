@@ -11,6 +11,7 @@ first, in `.sgp_<command>.moves`, so that the next run completes what a kill cut
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import json
 import os
@@ -72,25 +73,39 @@ def replacing_results(out: Path, command: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
-    handle = os.open(path, flags, 0o644)
+    while (handle := _lock(path)) is None:
+        pass
     try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            who = os.pread(handle, 200, 0).decode(errors='replace').strip() or 'unknown'
-            raise ConfigError(
-                f'{path.parent} is being written to by another run ({who})',
-                'a folder of its own for each', 'choose another one with --out, or wait',
-            ) from error  # fmt: skip
-        try:
-            os.ftruncate(handle, 0)
-            os.pwrite(handle, f'process {os.getpid()}\n'.encode(), 0)
-            yield
-        finally:
-            path.unlink(missing_ok=True)
+        os.ftruncate(handle, 0)
+        os.pwrite(handle, f'process {os.getpid()}\n'.encode(), 0)
+        yield
     finally:
+        path.unlink(missing_ok=True)
         os.close(handle)
+
+
+def _lock(path: Path) -> int | None:
+    """Return the open lock file; None where the run before removed it in between."""
+    try:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o644)
+    except OSError as error:
+        if error.errno != errno.ELOOP:
+            raise
+        raise ConfigError(f'{path} is a link', 'no link there', 'remove it') from error
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        who = os.pread(handle, 200, 0).decode(errors='replace').strip() or 'unknown'
+        os.close(handle)
+        raise ConfigError(
+            f'{path.parent} is being written to by another run ({who})',
+            'a folder of its own for each', 'choose another one with --out, or wait',
+        ) from error  # fmt: skip
+    with contextlib.suppress(FileNotFoundError):
+        if os.path.samestat(os.fstat(handle), path.lstat()):
+            return handle
+    os.close(handle)
+    return None
 
 
 @contextlib.contextmanager

@@ -33,6 +33,21 @@ def test_two_runs_into_one_folder_are_not_mixed(tmp_path):
     assert not list(tmp_path.glob('*.lock'))
 
 
+def test_a_lock_that_its_run_removes_in_between_is_none(tmp_path, monkeypatch):
+    """A file that was opened before it was removed keeps nobody else out."""
+    calls = []
+
+    def flock(handle, operation):
+        calls.append(operation)
+        if len(calls) == 1:  # the run before ends here
+            (tmp_path / '.sgp_replay.lock').unlink()
+
+    monkeypatch.setattr(files.fcntl, 'flock', flock)
+    with replacing_results(tmp_path, 'replay'):
+        assert (tmp_path / '.sgp_replay.lock').read_text() == f'process {os.getpid()}\n'
+    assert len(calls) == 2
+
+
 def test_the_next_run_removes_what_a_killed_one_left(tmp_path):
     program = (
         'import os, signal; from pathlib import Path\n'
@@ -57,7 +72,7 @@ def test_nothing_is_written_through_a_link(tmp_path):
     assert victim.read_text() == 'mine'
     assert (tmp_path / 'x.json').read_text() == 'result'
     (tmp_path / '.sgp_replay.lock').symlink_to(victim)
-    with pytest.raises(OSError, match='symbolic links'), replacing_results(tmp_path, 'replay'):
+    with pytest.raises(ConfigError, match='is a link'), replacing_results(tmp_path, 'replay'):
         pass
     assert victim.read_text() == 'mine'
 
