@@ -125,13 +125,11 @@ def _predicting(
     """
     data = before.data
     after, known = (
-        np.nanmean(posterior.left_out_errors() ** 2, axis=0)
+        _mean_square(posterior.left_out_errors())
         for posterior in (Posterior(found, data, before.prior), before)
     )
-    n = len(data.U)
-    constant = (
-        data.y.var(axis=0) * (n / (n - 1)) ** 2
-    )  # what their mean misses left-out samples by
+    constant = _mean_square(data.y - data.y.mean(axis=0))
+    constant *= (1.0 + 1.0 / max(len(data.U) - 1, 1)) ** 2  # which a left-out sample does not know
     is_worse = after > WORSE * np.minimum(known, constant)
     if not is_worse.any() or is_worse.all():
         return found, log_evidence, bool(is_worse.all())
@@ -144,3 +142,10 @@ def _predicting(
         return model, Posterior(model, data, before.prior).log_evidence, False
     except NumericalError:
         return None, -math.inf, False
+
+
+def _mean_square(errors: np.ndarray) -> np.ndarray:
+    """Return the mean squares of the columns of errors (n, k), NaN for none, (k,)."""
+    is_known = np.isfinite(errors)
+    total = (np.where(is_known, errors, 0.0) ** 2).sum(axis=0)
+    return np.asarray(total / np.where(is_known.any(axis=0), is_known.sum(axis=0), np.nan))

@@ -124,8 +124,7 @@ class Posterior:
     @property
     def is_identifiable(self) -> np.ndarray:
         """Whether the data or the prior determine each coefficient, (p,) of bool."""
-        norms = np.linalg.norm(self._solution.null, axis=1)
-        return norms < NULL_TOLERANCE
+        return np.linalg.norm(self._solution.null, axis=1) < NULL_TOLERANCE
 
     @property
     def log_evidence(self) -> float:
@@ -180,7 +179,8 @@ class Posterior:
             alpha = block.unwhiten(residual)
             rest = alpha**2 - _curvature(block, residual, left).diagonal()
             taken = (block.unwhiten(left) ** 2).sum(axis=1)
-            errors.append(np.where(rest > NULL_TOLERANCE * taken, alpha / rest, np.nan))
+            is_told = rest > NULL_TOLERANCE * taken
+            errors.append(np.where(is_told, alpha, np.nan) / np.where(is_told, rest, 1.0))
         return np.concatenate(errors).reshape(len(self._blocks), -1).T
 
     def predict(self, U: np.ndarray, F: np.ndarray) -> Prediction:
