@@ -3,7 +3,8 @@
 The evidence trusts the model. Samples that repeat each other, as those of a robot at rest, raise
 it without bound where the noise falls to nothing and Z to a length at which nothing is alike: such
 a model knows them by heart and nothing else. So a fit has to predict too, each sample from the
-others: an output keeps its hyper-parameters where new ones do it worse, or worse than a constant.
+others: an output keeps its hyper-parameters where new ones do it worse, or worse than a constant,
+and yet claim less noise. Where they claim more, the model before was too sure of itself.
 """
 
 from __future__ import annotations
@@ -130,7 +131,8 @@ def _predicting(
     )
     constant = _mean_square(data.y - data.y.mean(axis=0))
     constant *= (1.0 + 1.0 / max(len(data.U) - 1, 1)) ** 2  # which a left-out sample does not know
-    is_worse = after > WORSE * np.minimum(known, constant)
+    is_surer = np.array(found.noise) < np.array(before.model.noise)
+    is_worse = is_surer & (after > WORSE * np.minimum(known, constant))
     if not is_worse.any() or is_worse.all():
         return found, log_evidence, bool(is_worse.all())
     old = before.model
