@@ -21,7 +21,7 @@ from sgp_ros.errors import ConfigError, SgpError
 from sgp_ros.report.check import KINDS, render_check
 from sgp_ros.report.diagnosis_text import phrase, plain_name
 from sgp_ros.report.files import replacing_results, write_text
-from sgp_ros.report.next_steps import after_check, ending
+from sgp_ros.report.next_steps import Given, after_check, ending
 from sgp_ros.robots.nominal import Nominal, nominal_model
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
@@ -45,7 +45,7 @@ def run_check(
         gains: YAML file of the gains of drives whose commands are positions.
 
     Raises:
-        ConfigError: a robot without nominal bodies.
+        ConfigError: a robot without nominal bodies, or given gains that are not its own.
         RecordingError: the recording cannot be read, or its base moves.
     """
     model = load_robot(robot)
@@ -80,7 +80,7 @@ def run_check(
         content['remarks'] += connected.remarks
         setup = connected.findings
         _print_setup(connected)
-    steps = after_check(bag, robot, is_fit=content['is_fit'] and not setup)
+    steps = after_check(Given(bag, robot, gains), is_fit=content['is_fit'] and not setup)
     with replacing_results(out, 'check'):
         write_text(out / 'check.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
         write_text(out / 'report.html', render_check(content, events, model, setup, steps))
@@ -93,10 +93,13 @@ def _known(
     model: Robot, gains: str | None, events: Sequence[Event], effort: str, remarks: list[str]
 ) -> tuple[Nominal | None, Knowledge | None, str]:
     """Return what is known of the machine; None and why where it is not enough."""
+    nominal = None
     try:
         nominal = nominal_model(model)
         stated = gains_of(gains, nominal, events, remarks)
     except SgpError as error:
+        if nominal is not None and gains is not None:  # what was given is refused
+            raise
         return None, None, str(error)
     config = EngineConfig(effort_source=EFFORT_SOURCES[effort])
     return nominal, Knowledge(nominal.robot, nominal.stated, config, stated), ''

@@ -36,7 +36,7 @@ from sgp_ros.report.diagnosis_text import (
     why_it_lost,
 )
 from sgp_ros.report.files import replacing_results, write_text
-from sgp_ros.report.next_steps import after_diagnosis, ending
+from sgp_ros.report.next_steps import Given, after_diagnosis, ending
 from sgp_ros.report.overlay import write_overlay
 from sgp_ros.report.verdict import simulated, verdict_sentence
 from sgp_ros.robots.bare import simulated_model
@@ -84,8 +84,7 @@ class Examined:
         nominal: the robot that was taken for known.
         found: the diagnosis.
         events: of a motion that a node could meet; empty for settled points and position targets.
-        bag: the first recording.
-        robot: as it was given.
+        given: the first recording, the robot and the gains.
         effort_source: setting `effort.source`.
         gains: of drives that hold position targets; None where commands are efforts.
         start_ns: stamp of its first state [ns].
@@ -95,8 +94,7 @@ class Examined:
     nominal: Nominal
     found: Diagnosis
     events: Sequence[Event]
-    bag: str
-    robot: str
+    given: Given
     effort_source: str
     gains: Gains | None
     start_ns: int
@@ -125,7 +123,7 @@ def run_diagnose(
     examined = examine(bag, robot, progress=progress, **options)
     content, found = write_examined(out, examined, rerun=rerun)
     print_diagnosis(found)
-    print(ending(out, after_diagnosis(found, examined.bag, robot, out)))
+    print(ending(out, after_diagnosis(found, examined.given, out)))
     return content
 
 
@@ -179,7 +177,8 @@ def examine(
     first = next(iter(events.values())) if is_met else []
     known, _, _ = on_one_clock(next(iter(events.values())), USUAL)
     start_ns = min(e.stamp_ns for e in known if isinstance(e, JointSample))
-    return Examined(nominal, found, first, bags[0], robot, source, gains, start_ns, checks)
+    given = Given(bags[0], robot, chosen.gains)
+    return Examined(nominal, found, first, given, source, gains, start_ns, checks)
 
 
 def _nominal(robot: str, options: DiagnoseOptions) -> Nominal:
@@ -233,7 +232,7 @@ def write_examined(
             content['online'] = online.content()
         write_text(out / 'diagnosis.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
         write_overlay(out, found.joints, found.units, found.overlays)
-        steps = after_diagnosis(found, examined.bag, examined.robot, out)
+        steps = after_diagnosis(found, examined.given, out)
         write_diagnosis(out, found, nominal.tree, steps)
     return content, found
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
 
@@ -14,21 +15,34 @@ _OTHER = 'OTHER.mcap'
 """Stands for a recording of the reader."""
 
 
-def after_diagnosis(found: Diagnosis, bag: str, robot: str, out: Path) -> Steps:
-    """Return what to do with a diagnosis.
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What a command was given.
 
-    Args:
-        found: the diagnosis.
-        bag: as it was given.
-        robot: likewise.
-        out: folder of the results.
+    Attributes:
+        bag: the recording.
+        robot: built-in name or file.
+        gains: file of gains; None without.
     """
-    diagnosed = _path(out / 'robot_diagnosed.yaml')
-    again = f'sgp diagnose {quote(bag)} --robot {quote(robot)} --out {_path(out)}'
+
+    bag: str
+    robot: str
+    gains: str | None = None
+
+    def words(self, bag: str) -> str:
+        """Return the words for a recording of the same machine."""
+        gains = '' if self.gains is None else f' --gains {quote(self.gains)}'
+        return f'{quote(bag)} --robot {quote(self.robot)}{gains}'
+
+
+def after_diagnosis(found: Diagnosis, given: Given, out: Path) -> Steps:
+    """Return what to do with a diagnosis, the results of which are in `out`."""
+    bag, diagnosed = given.bag, _path(out / 'robot_diagnosed.yaml')
+    again = f'sgp diagnose {given.words(bag)} --out {_path(out)}'
     if found.setup:
         return [('Correct the set-up or the robot file, record, and diagnose again:', again)]
     if found.verdict == 'no_mismatch':
-        other = f'sgp diagnose {_OTHER} --robot {quote(robot)}'
+        other = f'sgp diagnose {given.words(_OTHER)}'
         return [('Nothing to correct. A larger or faster motion may show more:', other)]
     if found.verdict == 'unexplained':
         learn = f'sgp replay {quote(bag)} --robot {diagnosed}'
@@ -81,7 +95,7 @@ def after_import(path: Path, robot: str | None, gains: Path | None = None) -> St
     return [('Find what physics the model lacks:', command)]
 
 
-def after_check(bag: str, robot: str, *, is_fit: bool) -> Steps:
+def after_check(given: Given, *, is_fit: bool) -> Steps:
     """Return what to do with a recording that was checked."""
     verb = 'diagnose' if is_fit else 'check'
     said = (
@@ -89,7 +103,7 @@ def after_check(bag: str, robot: str, *, is_fit: bool) -> Steps:
         if is_fit
         else 'Correct the problem, then check again:'
     )
-    return [(said, f'sgp {verb} {quote(bag)} --robot {quote(robot)}')]
+    return [(said, f'sgp {verb} {given.words(given.bag)}')]
 
 
 def after_simulation(path: Path, robot: str) -> Steps:

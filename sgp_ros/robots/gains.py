@@ -136,7 +136,11 @@ def checked_gains(
 def _column(
     place: str, found: Any, key: str, joints: Sequence[str], actuated: Sequence[str]
 ) -> np.ndarray:
-    table = found if isinstance(found, Mapping) else {}
+    if found is not None and not isinstance(found, Mapping):
+        told = f'{len(found)} numbers' if isinstance(found, list) else repr(found)
+        raise ConfigError(f'{place}: {key} is {told} without names',
+                          f'one number for each of {sorted(actuated)}, by name')  # fmt: skip
+    table = found or {}
     if set(table) != set(actuated):
         raise ConfigError(f'{place}: {key} of {sorted(map(str, table))}',
                           f'one number for each of {sorted(actuated)}')  # fmt: skip

@@ -166,6 +166,24 @@ def test_gains_of_the_model_are_used_where_positions_are_commanded(tmp_path, cap
     assert said.count('\n') == 1
 
 
+def test_given_gains_are_refused_where_wrong_and_kept_for_the_next_command(tmp_path, capsys):
+    """The next command has them too; without, it would refuse the targets."""
+    t = np.arange(0.0, 4.0, 0.01)
+    target = 0.8 * np.sin(2.0 * t)
+    bag, robot, gains = tmp_path / 'a.mcap', _robot(tmp_path), tmp_path / 'gains.yaml'
+    with RecordingWriter(bag, command_type=JOINT_STATE) as writer:
+        for event in (*_states(t, target), *_commands(t, target, POSITION)):
+            writer.write_event(event)
+    words = ['check', str(bag), '--robot', robot, '--gains', str(gains)]
+    words += ['--out', str(tmp_path / 'out')]
+    gains.write_text('kp: [9, 9]\nkd: [1, 1]\n')
+    assert main(words) == 2
+    assert 'kp is 2 numbers without names' in capsys.readouterr().err
+    gains.write_text('kp: {hinge: 9}\nkd: {hinge: 1}\n')
+    assert main(words) == 0
+    assert f'--gains {gains}' in capsys.readouterr().out.splitlines()[-1]
+
+
 def test_a_robot_without_any_inertia_is_checked(tmp_path):
     """Laws that need one are left out; nothing else is known of an axis on a bench."""
     robot = str(ROOT / 'config' / 'robots' / 'revolute_axis.urdf')

@@ -21,7 +21,7 @@ from pathlib import Path
 import pytest
 
 from sgp_ros.report.diagnosis import write_diagnosis
-from sgp_ros.report.next_steps import after_diagnosis
+from sgp_ros.report.next_steps import Given, after_diagnosis
 from sgp_ros.rigid.tree import read_urdf
 from test.report.diagnoses import ASYMMETRIC, COULOMB, MASS, diagnosis, search
 from test.report.test_charts import ARM
@@ -67,7 +67,9 @@ def page_path(tmp_path_factory):
     tree = replace(read_urdf(ARM), joint_names=('shoulder', 'elbow'))
     found = diagnosis('missing_physics', [COULOMB], alternatives=[ASYMMETRIC], errors=[MASS])
     found = replace(found, law_searches=(search(),))
-    write_diagnosis(out, found, tree, after_diagnosis(found, 'a.mcap', 'arm.urdf', Path('out')))
+    write_diagnosis(
+        out, found, tree, after_diagnosis(found, Given('a.mcap', 'arm.urdf'), Path('out'))
+    )
     return out / 'report.html'
 
 

@@ -28,6 +28,7 @@ def test_joints_without_a_drive_have_no_gain(tmp_path):
 @pytest.mark.parametrize(
     ('text', 'said'),
     [
+        ('kp: [1, 2, 3]\nkd: [1, 2]\n', 'kp is 3 numbers without names'),
         ('kp: {a: 1}\nkd: {a: 1, b: 1}\n', "kp of \\['a'\\]"),
         ('kp: {a: 1, b: x}\nkd: {a: 1, b: 1}\n', "kp of b is 'x'"),
         ('kp: {a: 1, b: -1}\nkd: {a: 1, b: 1}\n', 'kp of b is -1'),
