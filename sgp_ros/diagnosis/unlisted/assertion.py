@@ -77,10 +77,12 @@ def _is_slight(equations: Equations, listed: Model, searched: Searched) -> bool:
     """Return whether the smooth force differs from plain laws by less than counts as physics.
 
     Friction that creeps a little near rest is friction, a spring that hardens a little a spring.
-    A law with a shape of its own could be bent to stand for another one.
+    A law with a shape of its own could be bent to stand for another one, and so could several.
     """
     joint = searched.joint
-    if any(len(s.shape) for s in own_effects(listed, joint)):
+    own = own_effects(listed, joint)
+    rare = [s for s in own if not (s.effect.is_usual or s.effect in _PLAIN)]
+    if rare and (len(own) > 1 or len(rare[0].shape)):
         return False
     apart = listed.residual[:, joint] - searched.smooth.residual[:, joint]
     return bool((apart**2).mean() < COUNTED_SHARE * equations.power[joint])
