@@ -66,7 +66,7 @@ _VERDICTS = {
 def write_diagnosis(
     out: Path, found: Diagnosis, tree: Tree | None = None, steps: Steps = ()
 ) -> None:
-    """Write `report.html` and its figures as PNG into `out`.
+    """Write `report.html` and its figures as PNG and SVG into `out`.
 
     Args:
         out: folder.

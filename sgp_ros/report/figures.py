@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -51,11 +52,22 @@ def png(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
+def svg(figure: Figure) -> bytes:
+    """Return a figure as SVG, its letters as text; the same figure gives the same bytes."""
+    buffer = io.BytesIO()
+    with rc_context({'svg.fonttype': 'none', 'svg.hashsalt': 'sgp'}):
+        figure.savefig(buffer, format='svg', dpi=_DPI, metadata={'Date': None})
+    return buffer.getvalue()
+
+
 def write_figures(out: Path, figures: Mapping[str, Figure]) -> dict[str, bytes]:
-    """Write figures as PNG into a folder by their stems, and return them."""
-    drawn = {stem: png(figure) for stem, figure in figures.items()}
-    for stem, content in drawn.items():
-        write_bytes(out / f'{stem}.png', content)
+    """Write figures as PNG and SVG into a folder by their stems; return the PNG."""
+    drawn = {}
+    for stem, figure in figures.items():
+        drawn[stem] = png(figure)
+        write_bytes(out / f'{stem}.png', drawn[stem])
+        figure.set_layout_engine('none')  # it is laid out; once more would only cost time
+        write_bytes(out / f'{stem}.svg', svg(figure))
     return drawn
 
 

@@ -44,7 +44,7 @@ def write_report(
     checks: Sequence[str] = (),
     steps: Steps = (),
 ) -> list[Path]:
-    """Write `report.html` and the figures as PNG into `out`; return all paths.
+    """Write `report.html` and the figures as PNG and SVG into `out`; return the page and the PNG.
 
     Args:
         out: folder.

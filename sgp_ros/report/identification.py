@@ -43,7 +43,7 @@ def write_identification(
     steps: Steps = (),
     tree: Tree | None = None,
 ) -> None:
-    """Write `report.html` and the figures as PNG into `out`.
+    """Write `report.html` and the figures as PNG and SVG into `out`.
 
     Args:
         out: folder.

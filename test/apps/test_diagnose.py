@@ -134,7 +134,7 @@ def test_no_half_written_file_is_left(finished):
     """Pictures, numbers, page, and the diagnosed robot with its URDF."""
     _, out, _ = finished
     suffixes = {path.suffix for path in out.iterdir()}
-    shown = {'.html', '.png', '.mcap', '.xml'}  # page, pictures, a recording with layout
+    shown = {'.html', '.png', '.svg', '.mcap', '.xml'}  # page, pictures, a recording with layout
     assert suffixes == {'.json', '.csv', '.npz', '.yaml', '.urdf'} | shown
 
 

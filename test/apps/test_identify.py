@@ -35,7 +35,7 @@ KP, KD, STEP_NS = 40.0, 3.0, 5_000_000
 STILL = frozen_array([0.2, 0.3])
 FILES = {
     'identification.json', 'robot_identified.yaml', 'robot_identified.urdf', 'report.html',
-    'filter.png', 'prediction_held_out.png',
+    'filter.png', 'filter.svg', 'prediction_held_out.png', 'prediction_held_out.svg',
 }  # fmt: skip
 
 

@@ -198,6 +198,7 @@ def test_the_page_opens_with_the_sentence_and_needs_no_other_file(tmp_path):
     assert at == sorted(at)
     content_of(page)
     stems = {path.stem for path in tmp_path.glob('*.png')}
+    assert stems == {path.stem for path in tmp_path.glob('*.svg')}
     assert stems == {
         'location', 'others', 'time', 'bands', 'law', 'dependence', 'proof', 'motion'
     }  # fmt: skip
