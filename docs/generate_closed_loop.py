@@ -59,7 +59,8 @@ _TAIL = """
   targets meet this ripple at one phase always, where it looks like a later or earlier target: by some hundredths of h. The
   ripple follows from gains and bodies, and is taken off (`physics/ripple.py`) where one recording has targets and states at one
   rate, and a motor at every joint. Two worlds at 50 Hz with nothing concealed (500 and 503) said `unexplained` and
-  `missing_physics` before, and say `no_mismatch` now; the table above was measured before. Targets that the drive interpolates
+  `missing_physics` before, and say `no_mismatch` now; the table above was measured before
+  this, and before physics was compared from a delay of the targets too. Targets that the drive interpolates
   have no such ripple, and are not known as such.
 * **Drives with a slow clock.** A drive that computes once a step of h, and not continuously, acts h/2 late: viscous friction comes
   out too small by about kp h/2 and a rotor by kd h. With stiff gains and h of 0.25 ms, that was a sixth of a rotor in earlier worlds.
