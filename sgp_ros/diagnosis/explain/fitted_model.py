@@ -72,11 +72,12 @@ class Model:
     def law_price(self) -> float:
         """What laws must be worth, the more where few joints have them [nats].
 
-        Those of which the prior says how unlikely their numbers are have paid by that.
+        Those of which the prior says how unlikely their numbers are have paid by that, and further
+        waves of one law with the first.
         """
         unusual = sum(
             type(e).surprise is Effect.surprise and not (e.is_usual or e.plain or e.is_open)
-            for e in (s.effect for s in self.effects)
+            for e in (s.effect for s in self.effects if not s.place.number)
         )
         return PER_EFFECT * self.laws + PER_UNUSUAL * unusual
 
