@@ -33,6 +33,8 @@ TITLES = {
 }
 CAPTIONS = {
     'location': 'The discrepancy from the nominal robot over the state, before and after.',
+    'motion': 'Recorded motion, and that of the nominal and the diagnosed robot under the same efforts.',
+    'search': 'What a law would have to follow, with its band, and the formulas that were tried.',
     'others': 'The other joints on one scale, relative to their own effort.',
     'time': 'The discrepancy over time (grey), what was found of it, and the residual (orange).',
     'bands': 'The process Z over each variable, with its band of 95 %.',
