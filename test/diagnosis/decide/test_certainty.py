@@ -18,6 +18,7 @@ from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 from test.diagnosis.fitted_models import fitted
+from test.diagnosis.worlds import CHAINS, simulate
 
 
 def _comparison(equations, *models):
@@ -69,6 +70,26 @@ def test_what_is_improbable_is_not_asserted_beside_others(equations_for, viscous
     assert max(chances.by_key.values()) < LEAST_ASSERTED
     assert [s.key for s in kept.model.effects] == names[:1]
     assert kept.rivals[0] is pair
+
+
+def test_a_plain_law_takes_the_place_of_a_richer_one_that_is_not_probable(
+    equations_for, monkeypatch
+):
+    """Friction that may differ with direction, or not, is friction."""
+    world = simulate(
+        CHAINS[1], 4, 10.0, dry=lambda t, q, s: 0.5, force=lambda t, q, v: (-0.3 * v[0],)
+    )
+    _, equations = equations_for(world)
+    pair = fitted(equations, 'viscous_friction', 'asymmetric_coulomb')
+    comparison = _comparison(equations, fitted(equations, 'spring'))
+    scale = Scale.of(equations, comparison)
+    decision = replace(decide(equations, comparison), verdict='missing_physics', model=pair)
+    p = {'viscous_friction': 0.9, 'coulomb_friction': 0.8, 'asymmetric_coulomb': 0.3}
+    chances = Probabilities({(n, Place(0)): x for n, x in p.items()}, np.zeros(1), pair, scale)
+    monkeypatch.setattr(certainty, 'probabilities', lambda *_: chances)
+    kept, _, _ = settled(equations, comparison, decision)
+    numbers = {s.name: s.coefficients[0] for s in kept.model.effects}
+    assert numbers == pytest.approx({'viscous_friction': 0.3, 'coulomb_friction': 0.5}, rel=0.05)
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.criteria import COUNTED_SHARE
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, EVIDENCE, INDEPENDENT_ROWS, PER_UNUSUAL
+from sgp_ros.diagnosis.decide.cross_validation import support
 from sgp_ros.diagnosis.explain.candidates import fit, residual_of
 from sgp_ros.diagnosis.explain.credibility import is_credible
-from sgp_ros.diagnosis.explain.fitted_model import floors
+from sgp_ros.diagnosis.explain.fitted_model import beyond_plain, floors
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.joint_search import by_joint, coupled, gain, uncoupled, usual
 from sgp_ros.diagnosis.explain.regression import Columns
@@ -204,3 +205,54 @@ def test_a_coupling_law_takes_the_place_of_all_that_stands_for_it(equations_for)
     assert all('joint_coupling' not in {name for name, _ in _keys(t)} for t in trials)
     found, *_ = by_joint(columns, imitation)
     assert _keys(found) in ({('coupled_friction', j), ('viscous_friction', 0)} for j in (0, 1))
+
+
+def test_a_rotor_is_found_where_bodies_could_stand_for_it(equations_for):
+    """A link of ten times its inertia leaves as little, and is unlikely."""
+    first, second = CHAINS[2]
+    world = simulate(
+        (replace(first, inertia=10.0 * first.inertia), second), 7, 10.0,
+        force=lambda t, q, v: (-1.5 * v[0], -0.8 * v[1]),
+    )  # fmt: skip
+    equations = equations_for(world)[1]
+    columns, base = _start(equations)
+    friction = tuple(EffectAt(EFFECTS['viscous_friction'], Place(j)) for j in (0, 1))
+    bodies = fit(columns, friction, base.sigma, is_free=True)
+    assert (bodies.mean_square / equations.power).max() < COUNTED_SHARE
+    found = by_joint(columns, bodies)[0]
+    assert _keys(found) == {('viscous_friction', 0), ('viscous_friction', 1), ('armature', 0)}
+    assert found.w @ found.w < 0.1 * (bodies.w @ bodies.w)
+    assert min(support(columns, found, floors(equations), INDEPENDENT_ROWS)) > EVIDENCE
+
+
+def test_laws_that_few_joints_have_cost_more_once(equations):
+    _, base = _start(equations)
+
+    def price(*effects):
+        return replace(base, effects=effects).law_price
+
+    usual_one, rare = (
+        EffectAt(EFFECTS[n], Place(0)) for n in ('viscous_friction', 'quadratic_drag')
+    )
+    waves = [EffectAt(EFFECTS['cogging'], Place(0, number=i), np.array([5.0 + i])) for i in (0, 1)]
+    assert price(rare) - price(usual_one) == pytest.approx(PER_UNUSUAL)
+    assert price(*waves) == price(waves[0]) == price(rare)
+    assert price(EffectAt(EFFECTS['stribeck_friction'], Place(0))) == price(usual_one)
+    assert price(EffectAt(EFFECTS['torque_gain'], Place(0))) == price(usual_one)
+
+
+def test_joints_that_move_in_turn_show_no_motor_that_turns_with_both(equations):
+    """What plain friction does not say of the other joint is said while that one rests."""
+    moving = np.ones(equations.motion.position.shape)
+    moving[: len(moving) // 2, 0] = moving[len(moving) // 2 :, 1] = 0.0
+    motion = replace(equations.motion, velocity=moving * equations.motion.velocity)
+    law = EffectAt(
+        EFFECTS['coupled_friction'], Place(1, source=0), np.array([1.5]), np.array([1.0, 0.5])
+    )
+    for known, is_shown in (
+        (replace(equations, motion=motion, moving=moving), False),
+        (equations, True),
+    ):
+        force = law.columns(known.motion) @ law.coefficients
+        left = beyond_plain(law, force, known)
+        assert ((left**2).mean() > 1e-3 * (force**2).mean()) == is_shown
