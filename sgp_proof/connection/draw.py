@@ -10,14 +10,13 @@ import json
 import math
 from dataclasses import replace
 
-import numpy as np
-
 from sgp_proof.concealed import sizes
 from sgp_proof.concealed import world as worlds
 from sgp_proof.concealed.draw import TOPIC, draw_transport, observed
 from sgp_proof.concealed.kinds import draw_effect
 from sgp_proof.concealed.robots import urdf
 from sgp_proof.connection.miswired import corrupted, standing
+from sgp_proof.connection.seeds import draw_suitable
 from sgp_ros.apps.simulation import write_simulated
 from sgp_ros.physics.catalogue import COULOMB_FRICTION, VISCOUS_FRICTION
 from sgp_ros.physics.drawing import UnsuitableError
@@ -30,21 +29,13 @@ KINDS = (
 )  # fmt: skip
 NOTHING, PAIR = 'none', 'pair'
 PLAN = (*KINDS, NOTHING, PAIR, *KINDS, NOTHING, NOTHING)
-TRIES = 60
 _LEAST_SHARE = 0.01
 _PHYSICS = (COULOMB_FRICTION.name, VISCOUS_FRICTION.name)
 
 
 def draw_case(seed, sealed, answer_file):
     """Write recordings, robot and answer of a world; return whether there is one."""
-    for attempt in range(TRIES):
-        rng = np.random.default_rng([seed, ord('S'), attempt])
-        try:
-            _attempt(seed, rng, sealed, answer_file)
-        except UnsuitableError:
-            continue
-        return True
-    return False
+    return draw_suitable(seed, 'S', lambda rng: _attempt(seed, rng, sealed, answer_file))
 
 
 def _attempt(seed, rng, sealed, answer_file):

@@ -10,56 +10,27 @@ wrong. Without an error of the connection, right is to assert none. Results go t
 
 from __future__ import annotations
 
-import argparse
-import json
-import sys
-import tempfile
-from pathlib import Path
-
-from sgp_proof.concealed.run import OUTCOME, diagnose_case
-from sgp_proof.connection.draw import TRIES, draw_case
-from sgp_proof.result_files import RESULTS, seed_range, write_result
+from sgp_proof.connection.draw import draw_case
+from sgp_proof.connection.seeds import diagnosed, score_seeds
 
 _TOLERANCE = 0.1
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
-    parser.add_argument('--seeds', default='0:20', help='FIRST:LAST+1[,...]')
-    parser.add_argument('--outputs', type=Path, help='where worlds and diagnoses are kept')
-    parser.add_argument('--out', type=Path, default=RESULTS, help='folder of the result')
-    arguments = parser.parse_args()
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = arguments.outputs or Path(scratch)
-        rows = [
-            row
-            for seeds in arguments.seeds.split(',')
-            for seed in seed_range(seeds)
-            if (row := scored(folder, seed)) is not None
-        ]
-    report = {'seeds': arguments.seeds, 'summary': summary(rows), 'cases': rows}
-    write_result(arguments.out / 'connection.json', report)
-    print(json.dumps(report['summary'], indent=1))
+    score_seeds(__doc__, 'connection', scored, summary)
 
 
 def scored(folder, seed):
     """Draw, diagnose and score one world, unless that was done before; None without a world."""
-    sealed, out = folder / 'cases' / f'case_{seed:03d}', folder / 'diagnoses' / f'case_{seed:03d}'
-    answer_file = folder / 'answers' / f'case_{seed:03d}.json'
-    if not answer_file.exists() and not draw_case(seed, sealed, answer_file):
-        print(f'seed {seed}: no suitable world in {TRIES}', file=sys.stderr)
+    found = diagnosed(folder, seed, draw_case)
+    if found is None:
         return None
-    answer = json.loads(answer_file.read_text(encoding='utf-8'))
-    if not (out / OUTCOME).exists():
-        diagnose_case(sealed, out)
-    outcome = json.loads((out / OUTCOME).read_text(encoding='utf-8'))
-    row = {'case': sealed.name, **answer, 'seconds': outcome['seconds']}
-    if outcome['status']:
-        row |= {'said': 'refused', 'why': outcome['why'], 'outcome': 'equivalent'}
+    row, diagnosis = found
+    if 'refused' in diagnosis:
+        row |= {'said': 'refused', 'why': diagnosis['refused'], 'outcome': 'equivalent'}
     else:
-        diagnosis = json.loads((out / 'diagnosis.json').read_text(encoding='utf-8'))
-        row |= {'said': said(diagnosis), 'outcome': judged(answer, diagnosis)}
-    print(row['case'], answer['robot'], answer['setup'], answer['physics'], '->', row['said'],
+        row |= {'said': said(diagnosis), 'outcome': judged(row, diagnosis)}
+    print(row['case'], row['robot'], row['setup'], row['physics'], '->', row['said'],
           row['outcome'], f'{row["seconds"]:.0f} s', flush=True)  # fmt: skip
     return row
 

@@ -11,23 +11,16 @@ nothing differs, where the verdict says so. Results go to `sgp_proof/results/sim
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
-import sys
-import tempfile
 from dataclasses import replace
-from pathlib import Path
-
-import numpy as np
 
 from sgp_proof.concealed import sizes
 from sgp_proof.concealed import world as worlds
 from sgp_proof.concealed.draw import TOPIC, draw_transport, observed
 from sgp_proof.concealed.kinds import draw_effect
 from sgp_proof.concealed.robots import urdf
-from sgp_proof.concealed.run import OUTCOME, diagnose_case
-from sgp_proof.result_files import RESULTS, seed_range, write_result
+from sgp_proof.connection.seeds import diagnosed, draw_suitable, score_seeds
 from sgp_ros.apps.simulation import write_simulated
 from sgp_ros.physics.catalogue import (
     ARMATURE,
@@ -41,7 +34,6 @@ from sgp_ros.physics.drawing import UnsuitableError
 
 SIZE, MACHINE, SIMULATION, NOTHING = 'size', 'machine', 'simulation', 'nothing'
 PLAN = (SIZE, MACHINE, SIMULATION, NOTHING, SIZE)
-TRIES = 60
 _FRICTION = (COULOMB_FRICTION.name, VISCOUS_FRICTION.name)
 _OTHER = (*_FRICTION, ARMATURE.name, SPRING.name, COMMAND_DELAY.name, CONSTANT_LOAD.name)
 _SIZES = {
@@ -53,34 +45,12 @@ _CLOSE, _STD = 0.1, 3.0
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
-    parser.add_argument('--seeds', default='0:20', help='FIRST:LAST+1[,...]')
-    parser.add_argument('--outputs', type=Path, help='where worlds and diagnoses are kept')
-    parser.add_argument('--out', type=Path, default=RESULTS, help='folder of the result')
-    arguments = parser.parse_args()
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = arguments.outputs or Path(scratch)
-        rows = [
-            row
-            for seeds in arguments.seeds.split(',')
-            for seed in seed_range(seeds)
-            if (row := scored(folder, seed)) is not None
-        ]
-    report = {'seeds': arguments.seeds, 'summary': summary(rows), 'cases': rows}
-    write_result(arguments.out / 'simulated.json', report)
-    print(json.dumps(report['summary'], indent=1))
+    score_seeds(__doc__, 'simulated', scored, summary)
 
 
 def draw_case(seed, sealed, answer_file):
     """Write recordings, robot and answer of a world; return whether there is one."""
-    for attempt in range(TRIES):
-        rng = np.random.default_rng([seed, ord('R'), attempt])
-        try:
-            _attempt(seed, rng, sealed, answer_file)
-        except UnsuitableError:
-            continue
-        return True
-    return False
+    return draw_suitable(seed, 'R', lambda rng: _attempt(seed, rng, sealed, answer_file))
 
 
 def _attempt(seed, rng, sealed, answer_file):
@@ -132,22 +102,17 @@ def _difference(machine, simulation):
 
 def scored(folder, seed):
     """Draw, diagnose and score one world, unless that was done before; None without a world."""
-    sealed, out = folder / 'cases' / f'case_{seed:03d}', folder / 'diagnoses' / f'case_{seed:03d}'
-    answer_file = folder / 'answers' / f'case_{seed:03d}.json'
-    if not answer_file.exists() and not draw_case(seed, sealed, answer_file):
-        print(f'seed {seed}: no suitable world in {TRIES}', file=sys.stderr)
+    found = diagnosed(folder, seed, draw_case)
+    if found is None:
         return None
-    answer = json.loads(answer_file.read_text(encoding='utf-8'))
-    if not (out / OUTCOME).exists():
-        diagnose_case(sealed, out)
-    outcome = json.loads((out / OUTCOME).read_text(encoding='utf-8'))
-    row = {'case': sealed.name, **answer, 'seconds': outcome['seconds']}
-    if outcome['status']:
-        row |= {'said': 'refused', 'why': outcome['why'], 'outcome': 'missed', 'shared_named': 0}
+    row, diagnosis = found
+    if 'refused' in diagnosis:
+        row |= {'said': 'refused', 'why': diagnosis['refused'], 'outcome': 'missed'}
+        row['shared_named'] = 0
     else:
-        row |= judged(answer, json.loads((out / 'diagnosis.json').read_text(encoding='utf-8')))
-    print(row['case'], answer['robot'], answer['differs'], '->', row['said'], row['outcome'],
-          f'shared {row["shared_named"]} of {len(answer["shared"])}, {row["seconds"]:.0f} s',
+        row |= judged(row, diagnosis)
+    print(row['case'], row['robot'], row['differs'], '->', row['said'], row['outcome'],
+          f'shared {row["shared_named"]} of {len(row["shared"])}, {row["seconds"]:.0f} s',
           flush=True)  # fmt: skip
     return row
 
