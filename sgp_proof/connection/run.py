@@ -11,21 +11,17 @@ wrong. Without an error of the connection, right is to assert none. Results go t
 from __future__ import annotations
 
 from sgp_proof.connection.draw import draw_case
-from sgp_proof.connection.seeds import diagnosed, score_seeds
+from sgp_proof.connection.seeds import score_seeds
 
 _TOLERANCE = 0.1
 
 
 def main():
-    score_seeds(__doc__, 'connection', scored, summary)
+    score_seeds(__doc__, 'connection', draw_case, scored, summary)
 
 
-def scored(folder, seed):
-    """Draw, diagnose and score one world, unless that was done before; None without a world."""
-    found = diagnosed(folder, seed, draw_case)
-    if found is None:
-        return None
-    row, diagnosis = found
+def scored(row, diagnosis):
+    """Return the answer of one world with its score."""
     if 'refused' in diagnosis:
         row |= {'said': 'refused', 'why': diagnosis['refused'], 'outcome': 'equivalent'}
     else:

@@ -17,12 +17,14 @@ from sgp_proof.result_files import RESULTS, seed_range, write_result
 from sgp_ros.physics.drawing import UnsuitableError
 
 TRIES = 60
+DrawCase = Callable[[int, Path, Path], bool]
 
 
 def score_seeds(
     text: str,
     name: str,
-    scored: Callable[[Path, int], dict[str, Any] | None],
+    draw_case: DrawCase,
+    scored: Callable[[dict[str, Any], dict[str, Any]], dict[str, Any]],
     summary: Callable[[list[dict[str, Any]]], dict[str, Any]],
 ) -> None:
     """Run the command of a proof.
@@ -30,7 +32,8 @@ def score_seeds(
     Args:
         text: its docstring.
         name: of the file of the result.
-        scored: of a folder and a seed, a row; None without a world.
+        draw_case: see `_diagnosed`.
+        scored: of an answer and a diagnosis as `_diagnosed` returns them, a row.
         summary: of all rows.
     """
     parser = argparse.ArgumentParser(description=text.split('\n', maxsplit=1)[0])
@@ -41,7 +44,8 @@ def score_seeds(
     with tempfile.TemporaryDirectory() as scratch:
         folder = arguments.outputs or Path(scratch)
         seeds: Iterable[int] = (s for part in arguments.seeds.split(',') for s in seed_range(part))
-        rows = [row for seed in seeds if (row := scored(folder, seed)) is not None]
+        found = (_diagnosed(folder, seed, draw_case) for seed in seeds)
+        rows = [scored(*world) for world in found if world is not None]
     report = {'seeds': arguments.seeds, 'summary': summary(rows), 'cases': rows}
     write_result(arguments.out / f'{name}.json', report)
     print(json.dumps(report['summary'], indent=1))
@@ -58,8 +62,8 @@ def draw_suitable(seed: int, letter: str, attempt: Callable[[np.random.Generator
     return False
 
 
-def diagnosed(
-    folder: Path, seed: int, draw_case: Callable[[int, Path, Path], bool]
+def _diagnosed(
+    folder: Path, seed: int, draw_case: DrawCase
 ) -> tuple[dict[str, Any], dict[str, Any]] | None:
     """Draw and diagnose one world, unless that was done before.
 

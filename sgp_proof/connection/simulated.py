@@ -20,7 +20,7 @@ from sgp_proof.concealed import world as worlds
 from sgp_proof.concealed.draw import TOPIC, draw_transport, observed
 from sgp_proof.concealed.kinds import draw_effect
 from sgp_proof.concealed.robots import urdf
-from sgp_proof.connection.seeds import diagnosed, draw_suitable, score_seeds
+from sgp_proof.connection.seeds import draw_suitable, score_seeds
 from sgp_ros.apps.simulation import write_simulated
 from sgp_ros.physics.catalogue import (
     ARMATURE,
@@ -45,7 +45,7 @@ _CLOSE, _STD = 0.1, 3.0
 
 
 def main():
-    score_seeds(__doc__, 'simulated', scored, summary)
+    score_seeds(__doc__, 'simulated', draw_case, scored, summary)
 
 
 def draw_case(seed, sealed, answer_file):
@@ -100,12 +100,8 @@ def _difference(machine, simulation):
     return {'effect': effect.name, 'joint': effect.joint, name: size}
 
 
-def scored(folder, seed):
-    """Draw, diagnose and score one world, unless that was done before; None without a world."""
-    found = diagnosed(folder, seed, draw_case)
-    if found is None:
-        return None
-    row, diagnosis = found
+def scored(row, diagnosis):
+    """Return the answer of one world with its score."""
     if 'refused' in diagnosis:
         row |= {'said': 'refused', 'why': diagnosis['refused'], 'outcome': 'missed'}
         row['shared_named'] = 0
