@@ -8,38 +8,30 @@ one segment however long the recording is.
 
 from __future__ import annotations
 
-import struct
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from io import BytesIO
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from operator import itemgetter
 from pathlib import Path
 from typing import IO, NamedTuple
 
-import zstandard
-from lz4.frame import LZ4FrameDecompressor
-from mcap.exceptions import EndOfFile, McapError
-from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.records import Channel, Chunk, McapRecord, Message, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.records import Channel, Message, Schema
+from mcap.summary import Summary
 
 from sgp_ros.errors import RecordingError
+from sgp_ros.recordings.mcap_records import (
+    DAMAGE,
+    DAMAGED,
+    MAGIC,
+    SOUND,
+    Walk,
+    read_records,
+    state_of_summary,
+)
 from sgp_ros.recordings.topics import RawMessage, Topic
 from sgp_ros.recordings.typestore import short_type
-from sgp_ros.strangers import bound, require_within
-
-MAGIC = b'\x89MCAP0\r\n'
-_DAMAGE = (
-    McapError, struct.error, ValueError, RuntimeError, KeyError, TypeError, AttributeError,
-    IndexError, OverflowError, MemoryError, EOFError, zstandard.ZstdError,
-)  # fmt: skip
-"""What reading damaged records raises."""
-
-_LOOSE_BYTES = 1 << 20
-_RECORD_HEAD = struct.Struct('<BQ')
 
 
 class McapSource:
@@ -104,10 +96,10 @@ class McapSource:
             stream.seek(segment.offset)
             data = stream.read(segment.length)
         try:
-            for record in _read_records(data):
+            for record in read_records(data):
                 if isinstance(record, Message) and record.channel_id in names:
                     yield RawMessage(record.log_time, names[record.channel_id], record.data)
-        except _DAMAGE as error:
+        except DAMAGE as error:
             place = path.name, segment.offset
             self._damage[segment.file, segment.offset] = (
                 f'{place[0]}: damaged from byte {place[1]} to byte '
@@ -162,17 +154,34 @@ def _index_file(path: Path, number: int) -> _FileIndex:
                 f'{path} starts with {magic!r}', f'an MCAP file ({MAGIC!r})', 'check the file'
             )
         try:
-            index = _read_index(stream, number)
-        except (*_DAMAGE, OSError):
-            index = None
-        return index or _scan(stream, path, number)
+            state = state_of_summary(stream)
+            summary = _read_summary(stream) if state == SOUND else None
+        except (*DAMAGE, OSError):
+            state, summary = DAMAGED, None
+        index = _indexed(summary, number) if summary else None
+        if index is None:
+            index = _scan(stream, path, number)
+            if summary is not None and summary.statistics is not None:
+                index.counts.update(_missing(summary.statistics.channel_message_counts, index))
+        if state == DAMAGED and not index.remark:
+            index.remark = f'{path.name}: its index is damaged; the whole file was read without it'
+        return index
 
 
-def _read_index(stream: IO[bytes], number: int) -> _FileIndex | None:
-    """Return the index at the end of the file, None where it is incomplete."""
+def _read_summary(stream: IO[bytes]) -> Summary | None:
     stream.seek(0)
-    summary = make_reader(stream).get_summary()
-    if summary is None or summary.statistics is None:
+    return make_reader(stream).get_summary()
+
+
+def _missing(stated: Mapping[int, int], index: _FileIndex) -> Counter[int]:
+    """Return how many messages of each channel fewer were found than the statistics count."""
+    known = {channel: n for channel, n in stated.items() if channel in index.channels}
+    return Counter(known) - index.counts
+
+
+def _indexed(summary: Summary, number: int) -> _FileIndex | None:
+    """Return the index at the end of a file, None where it is incomplete."""
+    if summary.statistics is None:
         return None
     counts = Counter(summary.statistics.channel_message_counts)
     chunks = summary.chunk_indexes
@@ -191,11 +200,11 @@ def _scan(stream: IO[bytes], path: Path, number: int) -> _FileIndex:
     index = _FileIndex()
     schemas: dict[int, Schema] = {}
     latest_ns = 0
-    walk = _Walk(stream)
+    walk = Walk(stream)
     try:
         for offset, data in walk.segments():
             times = []
-            for record in list(_read_records(data)):
+            for record in list(read_records(data)):
                 if isinstance(record, Schema):
                     schemas[record.id] = record
                 elif isinstance(record, Channel):
@@ -206,87 +215,22 @@ def _scan(stream: IO[bytes], path: Path, number: int) -> _FileIndex:
             if times:
                 index.segments.append(_Segment(min(times), number, offset, len(data)))
                 latest_ns = max(latest_ns, *times)
-    except _DAMAGE:
+    except DAMAGE:
         walk.is_complete = False
-    if not walk.is_complete:
-        index.remark = (
-            f'{path.name} is incomplete, as after a crash of the recorder: recovered '
-            f'{index.counts.total()} messages'
-        )
-        if latest_ns:
-            index.remark += f', up to {latest_ns // 10**9}.{latest_ns % 10**9:09d} s'
-        index.remark += f'; the rest is damaged, from byte {walk.offset} on'
+    index.remark = _state_of(walk, path.name, index.counts.total(), latest_ns)
     return index
 
 
-class _Walk:
-    """The data records of a file, one chunk or about 1 MiB of loose records at a time."""
-
-    def __init__(self, stream: IO[bytes]) -> None:
-        self._stream = stream
-        self._size = stream.seek(0, 2)
-        self.offset = len(MAGIC)
-        self.is_complete = False
-
-    def segments(self) -> Iterator[tuple[int, bytes]]:
-        """Yield offset and bytes.
-
-        Afterwards `is_complete` tells whether the data had an end, `offset` where they break off.
-        """
-        offset = start = len(MAGIC)
-        while True:
-            self.offset = offset
-            self._stream.seek(offset)
-            head = self._stream.read(_RECORD_HEAD.size)
-            opcode, length = (
-                _RECORD_HEAD.unpack(head) if len(head) == _RECORD_HEAD.size else (0, 0)
-            )
-            end = offset + len(head) + length
-            is_end = opcode in {0, Opcode.DATA_END, Opcode.FOOTER} or end > self._size
-            if start < offset and (is_end or opcode == Opcode.CHUNK or end - start > _LOOSE_BYTES):
-                yield start, self._read(start, offset)
-                start = offset
-            if is_end:
-                self.is_complete = opcode in {Opcode.DATA_END, Opcode.FOOTER}
-                return
-            if opcode == Opcode.CHUNK:
-                yield start, self._read(start, end)
-                start = end
-            offset = end
-
-    def _read(self, start: int, end: int) -> bytes:
-        self._stream.seek(start)
-        return self._stream.read(end - start)
-
-
-def _read_records(data: bytes) -> Iterator[McapRecord]:
-    """Yield the records in `data`, those of chunks included; a wrong checksum raises."""
-    reader = StreamReader(BytesIO(data), skip_magic=True, validate_crcs=True, emit_chunks=True)
-    try:
-        for record in reader.records:
-            if isinstance(record, Chunk):
-                yield from breakup_chunk(_unpacked(record), validate_crc=True)
-            else:
-                yield record
-    except EndOfFile:
-        return
-
-
-def _unpacked(chunk: Chunk) -> Chunk:
-    """Return a chunk whose data are plain, or can be unpacked to what it says itself.
-
-    Raises:
-        TooMuchError: it unpacks to more than `CHUNK_MB`, whatever it says.
-    """
-    most = bound('CHUNK_MB') << 20
-    size = chunk.uncompressed_size
-    if chunk.compression == 'zstd':
-        size = max(size, zstandard.frame_content_size(chunk.data))
-    elif chunk.compression == 'lz4' and size <= most:
-        data = LZ4FrameDecompressor().decompress(chunk.data, max_length=most + 1)
-        chunk, size = replace(chunk, compression='', data=data), len(data)
-    require_within(size / (1 << 20), 'CHUNK_MB', 'chunk size in MB')
-    return chunk
+def _state_of(walk: Walk, name: str, found: int, latest_ns: int) -> str:
+    """Return what the user should know of a file that was walked through; may be empty."""
+    if walk.is_complete:
+        if walk.is_sound:
+            return ''
+        return f'{name}: the checksum of its data is wrong, so some of its messages may be too'
+    remark = f'{name} is incomplete, as after a crash of the recorder: recovered {found} messages'
+    if latest_ns:
+        remark += f', up to {latest_ns // 10**9}.{latest_ns % 10**9:09d} s'
+    return f'{remark}; the rest is damaged, from byte {walk.offset} on'
 
 
 def _describe(channel: Channel, schemas: dict[int, Schema]) -> tuple[str, str, str]:

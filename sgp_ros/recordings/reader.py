@@ -19,7 +19,8 @@ from sgp_ros.engine.samples import Event, Reset, SettingsChange
 from sgp_ros.errors import MessageError, RecordingError
 from sgp_ros.recordings.bag_source import RosbagsSource, SqliteSource
 from sgp_ros.recordings.command_types import COMMAND_TYPES
-from sgp_ros.recordings.mcap_source import MAGIC, McapSource
+from sgp_ros.recordings.mcap_records import MAGIC
+from sgp_ros.recordings.mcap_source import McapSource
 from sgp_ros.recordings.messages import TEXT, Message, change_from_text, joint_sample
 from sgp_ros.recordings.topics import (
     CHANGES_TOPIC,

@@ -9,6 +9,7 @@ import sqlite3
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap.opcode import Opcode
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
@@ -16,7 +17,7 @@ from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
 from sgp_ros.engine.samples import CommandSample, JointSample
-from sgp_ros.errors import RecordingError
+from sgp_ros.errors import RecordingError, SgpError
 from sgp_ros.recordings.reader import open_recording
 from test.recordings import worlds
 
@@ -195,6 +196,15 @@ def test_split_recording_survives_a_truncated_last_file(tmp_path, keep):
     assert 'bag_9.mcap' in recording.remarks[0]
 
 
+@pytest.mark.parametrize('plugin', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+def test_counts_of_metadata_are_compared_with_the_files(plugin, tmp_path):
+    directory = _directory(tmp_path / 'x', plugin)
+    metadata = directory / 'metadata.yaml'
+    metadata.write_text(metadata.read_text().replace('message_count: 30', 'message_count: 400'))
+    remarks = ' '.join(open_recording(directory).remarks)
+    assert 'metadata.yaml counts 400 messages on /joint_states, the files contain 30' in remarks
+
+
 def test_missing_part_of_a_split_recording_is_remarked(tmp_path):
     directory = _directory(tmp_path / 'x', StoragePlugin.MCAP)
     metadata = directory / 'metadata.yaml'
@@ -251,6 +261,62 @@ def test_damaged_chunk_of_an_indexed_file_is_left_out_and_said(tmp_path):
     assert states == 300
     assert any('damaged from byte' in remark for remark in recording.remarks)
     assert any(f'{states} of 500 messages read' in remark for remark in recording.remarks)
+
+
+def _mcap(path, *, unchunked):
+    """A file with every checksum that the format has."""
+    worlds.write_chunks(path, [EVENTS[:20], EVENTS[20:]], unchunked=unchunked, crcs=True)
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize('unchunked', [False, True])
+def test_no_flipped_byte_of_an_mcap_is_read_without_a_word(unchunked, tmp_path):
+    """Of every seventh byte: what was read is whole, or what is wrong is said."""
+    path = tmp_path / 'x.mcap'
+    whole = _mcap(path, unchunked=unchunked)
+    said = 0
+    for place in range(8, len(whole), 7):
+        content = bytearray(whole)
+        content[place] ^= 1 << place % 8
+        path.write_bytes(content)
+        try:
+            recording = open_recording(path)
+            found = worlds.everything(recording)
+        except SgpError:
+            continue
+        said += bool(recording.remarks)
+        assert found == EXPECTED or recording.remarks, place
+    assert said > 10
+
+
+def test_a_damaged_index_is_not_believed(tmp_path):
+    """Its checksum is wrong, as its statistics are: the file is read without it, and that said."""
+    path = tmp_path / 'x.mcap'
+    whole = _mcap(path, unchunked=False)
+    summary = int.from_bytes(whole[-28:-20], 'little')
+    for place in range(summary, len(whole) - 37, 5):
+        content = bytearray(whole)
+        content[place] ^= 1
+        path.write_bytes(content)
+        recording = open_recording(path)
+        assert worlds.everything(recording) == EXPECTED
+        assert recording.remarks == (
+            'x.mcap: its index is damaged; the whole file was read without it',
+        )
+
+
+def test_messages_that_the_statistics_count_and_the_file_lacks_are_said(tmp_path):
+    """Without chunks the messages are found by walking; what no walk can find is counted."""
+    path = worlds.write_chunks(tmp_path / 'x.mcap', [EVENTS], unchunked=True)
+    content = bytearray(path.read_bytes())
+    place = 8
+    while content[place] != Opcode.MESSAGE:
+        place += 9 + int.from_bytes(content[place + 1 : place + 9], 'little')
+    content[place] = 0x7F  # a record of a kind that nobody knows
+    path.write_bytes(content)
+    recording = open_recording(path)
+    assert len(worlds.everything(recording)) == len(EXPECTED) - 1
+    assert re.search('only 29 of 30 messages read', ' '.join(recording.remarks))
 
 
 def _cut(path, size):

@@ -109,10 +109,17 @@ def message_of(event: JointSample | CommandSample) -> tuple[str, str, bytes]:
     return '/command', kind, serialize(kind, message)
 
 
-def write_chunks(path: Path, chunks: list[list[Event]], *, unchunked: bool = False) -> Path:
-    """Write one MCAP chunk per list of events, or none."""
+def write_chunks(
+    path: Path, chunks: list[list[Event]], *, unchunked: bool = False, crcs: bool = False
+) -> Path:
+    """Write one MCAP chunk per list of events, or none; `crcs` with a checksum of all data."""
     with path.open('wb') as stream:
-        writer = Writer(stream, compression=CompressionType.LZ4, use_chunking=not unchunked)
+        writer = Writer(
+            stream,
+            compression=CompressionType.LZ4,
+            use_chunking=not unchunked,
+            enable_data_crcs=crcs,
+        )
         writer.start(profile='ros2')
         channels: dict[str, int] = {}
         for chunk in chunks:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import os
+import re
 import sqlite3
 import struct
 import subprocess
 import sys
+from pathlib import Path
 
+import lz4.frame
 import numpy as np
 import pytest
 import zstandard
 
 from sgp_proof.robustness import files
 from sgp_proof.robustness.events import Faults
+from sgp_ros import strangers
 from sgp_ros.errors import SgpError
 from sgp_ros.recordings.model_files import load_model, load_parameters
 from sgp_ros.recordings.reader import open_recording
@@ -59,10 +63,10 @@ def _view(path):
     base.close()
 
 
-def _bomb(path):
+def _bomb(path, kind=b'zstd', pack=zstandard.compress):
     """A chunk that says little of what it unpacks to."""
-    packed = zstandard.ZstdCompressor().compress(bytes(1 << 21))
-    body = struct.pack('<QQQII', 0, 1, 100, 0, 4) + b'zstd' + struct.pack('<Q', len(packed))
+    packed = pack(bytes(1 << 21))
+    body = struct.pack('<QQQII', 0, 1, 100, 0, len(kind)) + kind + struct.pack('<Q', len(packed))
     chunk = b'\x06' + struct.pack('<Q', len(body) + len(packed)) + body + packed
     path.write_bytes(b'\x89MCAP0\r\n' + chunk)
 
@@ -82,6 +86,8 @@ def _zip(path):
          load_parameters, 'SGP_MOST_ALIASES'),
         ('x.db3', _view, open_recording, 'no plain tables'),
         ('x.mcap', _bomb, open_recording, 'SGP_MOST_CHUNK_MB'),
+        ('lz4.mcap', lambda p: _bomb(p, b'lz4', lz4.frame.compress), open_recording,
+         'SGP_MOST_CHUNK_MB'),
         ('x.npz', _zip, lambda p: load_columns(p, []), 'SGP_MOST_UNPACKED_MB'),
         ('pipe.mcap', os.mkfifo, open_recording, 'not a regular file'),
         ('pipe.npz', os.mkfifo, load_model, 'not a regular file'),
@@ -99,6 +105,12 @@ def test_files_made_to_harm_are_refused(tmp_path, monkeypatch, name, make, read,
     make(path)
     with pytest.raises(SgpError, match=says):
         read(path)
+
+
+def test_every_bound_is_documented_with_its_default():
+    page = (Path(__file__).parents[3] / 'docs' / 'security.md').read_text(encoding='utf-8')
+    told = re.findall(r'`SGP_MOST_(\w+)` \| (\d+) \|', page)
+    assert {name: int(default) for name, default in told} == strangers.DEFAULTS
 
 
 def test_a_bound_may_be_raised(tmp_path, monkeypatch):
