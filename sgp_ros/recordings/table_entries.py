@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from sgp_ros.errors import RecordingError
-from sgp_ros.recordings.column_names import OTHER, Meaning, meaning
+from sgp_ros.recordings.column_names import (
+    EFFORT,
+    OTHER,
+    POSITION,
+    VELOCITY,
+    Meaning,
+    meaning,
+)
 from sgp_ros.recordings.table_units import as_numbers
 
 Columns = dict[str, np.ndarray]
 _NAMES = ('names', 'joint_names', 'joints', 'name')
 _DIGITS = '0123456789'
+_ROLES = {
+    'rad': POSITION, 'deg': POSITION, 'rad/s': VELOCITY, 'deg/s': VELOCITY, 'rpm': VELOCITY,
+    'N m': EFFORT, 'mN m': EFFORT,
+}  # fmt: skip
+"""Units that only one quantity of a joint has."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +94,17 @@ def entries_of(columns: Columns, rows: int, features: Mapping[str, Sequence[str]
                 label = inner.joint or parts[i]
             index = i if array.ndim == 2 else None
             found.append(Entry(name, index, said, label, numbers))
-    return _labelled(found)
+    return _labelled(_named_by_units(found))
+
+
+def _named_by_units(entries: list[Entry]) -> list[Entry]:
+    """Let a unit say the quantity where no name does: `elbow_deg` is a position."""
+    named = {e.said.role for e in entries if not e.said.is_target}
+    roles = {unit: role for unit, role in _ROLES.items() if role not in named}
+    return [
+        e if e.said.role else replace(e, said=replace(e.said, role=roles.get(e.said.unit, '')))
+        for e in entries
+    ]
 
 
 def _labelled(entries: list[Entry]) -> list[Entry]:
@@ -104,6 +126,26 @@ def _labelled(entries: list[Entry]) -> list[Entry]:
             if not e.label and len(plain) > 1 and common:
                 label = '_'.join(e.said.rest[common:]) or label
             found.append(Entry(e.column, e.index, e.said, label, e.numbers))
+    return found
+
+
+def of_one_joint(
+    entries: Sequence[Entry], positions: Mapping[str, Entry], guess: Guess
+) -> list[Entry]:
+    """Give what stands alone of its quantity to the only joint, whatever it is called.
+
+    A table of one pendulum may say `Angle` and `Motor torque cmd`.
+    """
+    if len(positions) != 1:
+        return list(entries)
+    (label,) = positions
+    groups = [(e.said.role, e.said.is_target) for e in entries]
+    found = []
+    for e, group in zip(entries, groups, strict=True):
+        is_alone = e.said.role not in {'', OTHER} and groups.count(group) == 1 and e.label != label
+        if is_alone and e.said.joint and label:
+            guess.unsure.append(f'{e.column} is taken as that of {label}, the only position.')
+        found.append(replace(e, label=label) if is_alone else e)
     return found
 
 

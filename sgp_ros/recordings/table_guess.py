@@ -31,6 +31,7 @@ from sgp_ros.recordings.table_entries import (
     chosen,
     entries_of,
     joint_names,
+    of_one_joint,
 )
 from sgp_ros.recordings.table_gains import add_gains
 from sgp_ros.recordings.table_map import UNITS
@@ -75,6 +76,7 @@ def guess_map(
             'a name such as q, position, joint1_pos',
             'rename a column, or write a map (docs/import.md)',
         )  # fmt: skip
+    entries = of_one_joint(entries, positions, guess)
     joints = joint_names(positions, columns, hints, guess)
     hinted = {h.name: h for h in hints}
     units = _position_units(positions, joints, hinted, guess)
@@ -86,6 +88,13 @@ def guess_map(
     guess.content['joints'] = found
     _add_commands(entries, joints, positions, units, guess)
     add_gains(columns, entries, joints, rows, guess)
+    if not (
+        {'commands', 'targets'} & set(guess.content) or any('effort' in x for x in found.values())
+    ):
+        guess.unsure.append(
+            f'No torque, current or command was recognised among {", ".join(sorted(columns))}: '
+            'enter it in the map, as nothing can be diagnosed without one.'
+        )
     return guess
 
 
@@ -217,17 +226,27 @@ def _add_efforts(
         )
 
 
+def _asked(
+    entries: Sequence[Entry], joints: Mapping[str, str], guess: Guess
+) -> dict[str, dict[str, Entry]]:
+    """Return the targets and commands of joints with a position, by kind; tell the others."""
+    asked = {
+        kind: chosen(entries, kind, guess, is_target=True)
+        for kind in (POSITION, VELOCITY, EFFORT, COMMAND)
+    }
+    guess.unsure += [
+        f'The command {e.column} belongs to no position column: ignored.'
+        for found in asked.values() for x, e in found.items() if x not in joints
+    ]  # fmt: skip
+    return {kind: {x: e for x, e in found.items() if x in joints} for kind, found in asked.items()}
+
+
 def _add_commands(
     entries: Sequence[Entry], joints: Mapping[str, str], positions: Mapping[str, Entry],
     units: Mapping[str, str], guess: Guess,
 ) -> None:  # fmt: skip
     """Enter targets of position or velocity, or commanded efforts, whichever the log has."""
-    named = {
-        kind: {
-            x: e for x, e in chosen(entries, kind, guess, is_target=True).items() if x in joints
-        }
-        for kind in (POSITION, VELOCITY, EFFORT, COMMAND)
-    }
+    named = _asked(entries, joints, guess)
     open_ones = named.pop(COMMAND)
     if open_ones and not any(named.values()):
         alike = [follows(e.numbers, positions[x].numbers) for x, e in open_ones.items()]

@@ -102,6 +102,30 @@ def test_columns_of_each_joint_are_gathered(tmp_path):
     assert 'ms' in ' '.join(summary.unsure) or summary.quality['rate_hz'] == pytest.approx(200.0)
 
 
+@pytest.mark.parametrize(
+    ('header', 'said'),
+    [
+        ('Time [ms],Angle [deg],Motor torque cmd [Nm]', ''),
+        ('time_ms,elbow_deg,motor_torque_cmd', ''),
+        ('time_ms,elbow_deg,drive_torque_cmd', 'drive_torque_cmd is taken as that of elbow'),
+    ],
+)
+def test_the_torque_of_a_single_joint_is_its_own_whatever_it_is_called(tmp_path, header, said):
+    """As a user names the columns of one pendulum; a name of something else is told."""
+    table = np.column_stack([1e3 * T, np.degrees(Q[:, 0]), TAU[:, 0]])
+    np.savetxt(tmp_path / 'log.csv', table, delimiter=',', header=header, comments='')
+    summary, _, commands = _read(tmp_path / 'log.csv', tmp_path, (JointHint('elbow'),))
+    np.testing.assert_allclose([c.effort[0] for c in commands], TAU[:, 0])
+    assert ('is taken as' in ' '.join(summary.unsure)) == bool(said)
+    assert said in ' '.join(summary.unsure)
+
+
+def test_a_table_in_which_no_torque_is_seen_says_so(tmp_path):
+    """At the import, not when a diagnosis is refused."""
+    path = _npz(tmp_path, time=T, q=Q, bus_voltage_42=TAU)
+    assert 'No torque' in ' '.join(_read(path, tmp_path)[0].unsure)
+
+
 def test_an_action_is_what_the_positions_say(tmp_path):
     """Near them it is their target; else nothing says what it is, and it is left out."""
     summary, _, commands = _read(_npz(tmp_path, t=T, q=Q, action=LATE), tmp_path)
