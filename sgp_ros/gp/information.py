@@ -8,7 +8,7 @@ what is determined beyond doubt, and an orthogonal decomposition with scaled col
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -220,8 +220,8 @@ class _Solved:
 class _Decomposition:
     """Shortest solution of `A x = z` for A (p, p) with columns of norm one, or zero.
 
-    Complete orthogonal decomposition `A P = Q [L^T; 0] Z^T`: a QR with column pivoting tells
-    the rank, one of what it leaves the null space (Golub and Van Loan, section 5.4.7).
+    Complete orthogonal decomposition `A P = Q [T 0; 0 0] Z`: a QR with column pivoting tells
+    the rank, an RZ of what it leaves the null space (Golub and Van Loan, section 5.4.7).
     """
 
     def __init__(self, A: np.ndarray, z: np.ndarray, scale: np.ndarray) -> None:
@@ -232,13 +232,36 @@ class _Decomposition:
         if not rank:
             self.spread, self.null, self.w = np.zeros((p, 0)), np.eye(p), np.zeros(p)
             return
-        Z, L = np.linalg.qr(np.triu(factored[:rank]).T, mode='complete')  # (p, p), (p, rank)
-        Z = Z[np.argsort(order)]
-        roots = linalg.solve_triangular(L[:rank], Z[:, :rank].T, check_finite=False)
-        self.spread = roots.T / scale[:, None]
-        self.null = Z[:, rank:]
+        folded, folds, _ = linalg.lapack.dtzrzf(np.triu(factored[:rank]))  # [T 0] Z
+        roots = np.eye(p)
+        roots[:rank, :rank] = linalg.lapack.dtrtri(folded[:, :rank])[0]  # T^-1
+        found = np.empty((p, p))
+        found[order - 1] = linalg.lapack.dormrz(folded, folds, roots, trans='T', lwork=64 * p)[0]
+        self.spread = found[:, :rank] / scale[:, None]
+        self.null = found[:, rank:]
         turned = linalg.lapack.dormqr('L', 'T', factored, tau, z[:, None], 64 * p)[0][:rank, 0]
         self.w = self.spread @ turned
+
+
+def marginal_equations(rows: np.ndarray, kept: Sequence[int]) -> np.ndarray:
+    """Return what equations of unit noise tell of some unknowns, whatever the others, (r, c).
+
+    What is orthogonal to all columns of the others is free of them, which a QR with pivoting finds
+    also where they depend on each other (Golub and Van Loan, section 5.4.2). O(m p^2).
+
+    Args:
+        rows: (m, p); their values are a column too.
+        kept: (c,) columns.
+    """
+    rows = np.asarray(np.linalg.qr(rows, mode='r'))
+    A = np.delete(rows, kept, axis=1)
+    if not A.size:
+        return rows[:, kept]
+    size = np.linalg.norm(A, axis=0)
+    factored, _, tau, _, _ = linalg.lapack.dgeqp3(A / np.where(size > 0.0, size, 1.0))
+    rank = int((np.abs(factored.diagonal()) > RANK_TOLERANCE).sum())
+    turned = linalg.lapack.dormqr('L', 'T', factored, tau, rows[:, kept], 64 * len(kept))[0]
+    return np.asarray(np.linalg.qr(turned[rank:], mode='r'))
 
 
 class Forgetting:

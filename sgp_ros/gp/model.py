@@ -76,6 +76,16 @@ class Model:
             start = stop
         return Model(tuple(kernels), tuple(float(x) for x in np.exp(theta[start:])))
 
+    def output(self, j: int) -> Model:
+        """Return the model of component j alone."""
+        return Model(self.kernels[j : j + 1], self.noise[j : j + 1])
+
+    def with_output(self, j: int, other: Model) -> Model:
+        """Return this model with component j of the one that `other` has."""
+        kernels, noise = list(self.kernels), list(self.noise)
+        (kernels[j],), (noise[j],) = other.kernels, other.noise
+        return Model(tuple(kernels), tuple(noise))
+
 
 _SAME = 1e-12
 """Relative difference of signal-to-noise ratios up to which they are one ratio: rounding."""

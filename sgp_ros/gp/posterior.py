@@ -167,22 +167,6 @@ class Posterior:
         gradients = [part for part in parts if part is not None]
         return np.concatenate([*gradients, noise * np.array(self.model.noise)])
 
-    def left_out_errors(self) -> np.ndarray:
-        """Return y (n, k) less what all other rows predict, `alpha_i / (C^-1)_ii`. O(n^3).
-
-        NaN where the others leave it undetermined. Rasmussen and Williams 2006, equation 5.12.
-        """
-        errors, start = [], 0
-        for block in self._blocks:
-            part = slice(start, start := start + len(block.b))
-            residual, left = self._solution.residual[part], self._solution.left[part]
-            alpha = block.unwhiten(residual)
-            rest = alpha**2 - _curvature(block, residual, left).diagonal()
-            taken = (block.unwhiten(left) ** 2).sum(axis=1)
-            is_told = rest > NULL_TOLERANCE * taken
-            errors.append(np.where(is_told, alpha, np.nan) / np.where(is_told, rest, 1.0))
-        return np.concatenate(errors).reshape(len(self._blocks), -1).T
-
     def predict(self, U: np.ndarray, F: np.ndarray) -> Prediction:
         """Predict X at inputs U (q, d) with regressors F (q, k, p).
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
 from sgp_ros.engine.samples import JointSample, frozen_array
@@ -34,3 +35,6 @@ def test_scaled_efforts_give_the_scaled_answer(scale):
     assert engine.counts.refits > 0
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-4 * np.nanstd(expected[0]))
     np.testing.assert_allclose(scaled, values, rtol=1e-4)
+    learned = other.hyper_settings()
+    taken = EngineConfig.from_mapping(learned, INVERSE_PENDULUM).to_mapping()
+    assert {name: taken[name] for name in learned} == learned

@@ -250,34 +250,3 @@ def test_a_column_of_rounding_errors_determines_nothing(kind):
     assert found.coefficients == pytest.approx([1.0, 0.0, 2.0], abs=0.01)
     if kind == 'batch':
         assert np.isfinite(found.predict(data.U, data.F).variance).all()
-
-
-@pytest.mark.parametrize('shape', [{'k': 1, 'p': 2}, {'k': 3, 'p': 7}])
-@pytest.mark.parametrize('flat', [False, True])
-def test_left_out_errors_are_those_of_fits_without_a_row(shape, flat):
-    """A row does not enter its own prediction; of one output it is that of a fit without it."""
-    model, data = random_problem(3, **shape)
-    p = data.F.shape[2]
-    root = np.zeros((0, p)) if flat else np.eye(p)
-    prior = CoefficientPrior(root, np.zeros(len(root)), 0.0)
-    found = Posterior(model, data, prior).left_out_errors()
-    for i in (0, 5):
-        for j in range(data.y.shape[1]):
-            y = data.y.copy()
-            y[i, j] += 1.0  # the error is affine in it, with slope 1: the others do not know it
-            moved = Posterior(model, Observations(data.U, data.F, y), prior).left_out_errors()
-            assert moved[i, j] - found[i, j] == pytest.approx(1.0, rel=1e-9)
-    if shape['k'] == 1:
-        rest = Observations(data.U[1:], data.F[1:], data.y[1:])
-        mean = Posterior(model, rest, prior).predict(data.U[:1], data.F[:1]).mean
-        assert found[0, 0] == pytest.approx(data.y[0, 0] - mean[0, 0], rel=1e-8)
-
-
-def test_a_row_that_alone_determines_a_coefficient_has_no_left_out_error():
-    model, data = random_problem(3, k=1, p=2)
-    F = data.F.copy()
-    F[:, :, 1] = 0.0
-    F[4, :, 1] = 1.0
-    flat = CoefficientPrior(np.zeros((0, 2)), np.zeros(0), 0.0)
-    found = Posterior(model, Observations(data.U, F, data.y), flat).left_out_errors()
-    assert np.flatnonzero(np.isnan(found[:, 0])).tolist() == [4]
