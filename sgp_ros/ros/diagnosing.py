@@ -149,7 +149,7 @@ def _outcome(
         require_motion(events, nominal.robot.name, nominal.tree.moving_names)
         found = diagnose(
             events, nominal.robot, nominal.tree, {}, stated=nominal.stated, config=config,
-            progress=lambda share: connection.send(float(share)),
+            is_thinned=True, progress=lambda share: connection.send(float(share)),
         )  # fmt: skip
         return DiagnosisDone(diagnosis_mapping(found))
     except SgpError as error:

@@ -123,7 +123,7 @@ class FitHealth:
                 message += (
                     f'; Z errs more than the physics alone, its weight is {weight.value:.2f}'
                 )
-        if not (drift.is_drifting and recent > LEAST_SHARE):
+        if not (drift.is_drifting and recent - target.nmse > LEAST_SHARE):
             return OK, message, values
         message = (
             f'{joint}: errors have grown significantly, recent nMSE {recent:.2g} (before '

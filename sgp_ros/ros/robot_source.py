@@ -102,6 +102,8 @@ class RobotSource:
         self._entities = []
 
     def _report(self) -> None:
+        if not self._entities:
+            return  # the turn of a timer may have come when the description destroyed it
         level, message = ERROR, f'{_TOPIC} cannot be used: {self.problem}'
         if not self.problem:
             count = self._node.count_publishers(self._topic)

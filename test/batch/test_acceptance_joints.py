@@ -31,3 +31,11 @@ def test_joints_that_come_apart_are_refused_and_further_ones_are_not():
         require_joints([_state('shoulder'), _state('elbow')], ROBOT, 'x')
     require_joints([_state('gripper'), _state('elbow', 'gripper', 'shoulder')], ROBOT)
     require_joints([], ROBOT)
+
+
+def test_joints_that_a_recording_lacks_are_left_out_as_the_message_says():
+    """Such as a gripper that is in the URDF and not in the bag."""
+    with pytest.raises(RecordingError) as caught:
+        require_joints([_state('shoulder')], ROBOT, 'a.mcap')
+    assert 'a.mcap lacks elbow of double_pendulum' in str(caught.value)
+    assert '"joints: [shoulder]"' in str(caught.value)

@@ -17,7 +17,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import QoSProfile
 
-DEADLINE_S = 30.0
+DEADLINE_S = 300.0
+"""Only ends a test that hangs: on a computer that is busy, a node may take a minute to start."""
 _TURN_S = 0.02
 
 
@@ -49,11 +50,11 @@ class NodeProcess:
         return [pid for pid in found if containing in command_line(pid)]
 
     def stop(self, number: int = signal.SIGINT, *, whole_group: bool = False) -> int:
-        """Send a signal and return the exit status, within 10 s."""
+        """Send a signal and return the exit status."""
         send = os.killpg if whole_group else os.kill
         started = time.monotonic()
         send(self.process.pid, number)
-        status = self.process.wait(timeout=10.0)
+        status = self.process.wait(timeout=DEADLINE_S)
         print(f'ended {time.monotonic() - started:.2f} s after {signal.Signals(number).name}')
         return status
 

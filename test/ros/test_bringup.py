@@ -19,7 +19,7 @@ from std_msgs.msg import String
 from sgp_ros.errors import ConfigError
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.ros.nodes import SgpNode
-from sgp_ros.ros.robot_source import refuse_foreign_files
+from sgp_ros.ros.robot_source import RobotSource, refuse_foreign_files
 from test.ros.graph import Graph
 from test.ros.stream import Stream
 from test.ros.test_node import QUICK
@@ -85,6 +85,16 @@ def test_a_useless_description_is_told_and_a_better_one_taken(graph: Graph) -> N
     assert node.is_running
     publisher.publish(String(data=URDF))
     graph.wait_until(lambda: graph.message(f'fit {JOINT}'), 'its joint')
+
+
+@pytest.mark.ros
+def test_a_report_that_comes_after_the_robot_says_nothing(graph: Graph) -> None:
+    """An executor may hold the turn of a timer that the description has just destroyed."""
+    source = RobotSource(graph.client)
+    source.listen()
+    source._report()
+    source.close()
+    source._report()
 
 
 @pytest.mark.ros

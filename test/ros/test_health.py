@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -53,6 +54,25 @@ def test_a_robot_that_changed_is_told():
     assert float(status.values['drift']) > 1.0
 
 
+@pytest.mark.parametrize(('grown', 'level'), [(0.9, OK), (1.003, OK), (1.006, WARN)])
+def test_errors_that_drift_are_told_once_they_have_grown(monkeypatch, grown, level):
+    """By more than counts as physics: of a joint whose errors are all noise that is none."""
+    engine = Engine(PENDULUM, config(buffer__budget=60))
+    health = FitHealth(1, 0.3, 1.0)
+    for event in pendulum_events(1500, noise=1e-4):
+        health.take(engine.push(event).estimates, PENDULUM)
+    running = engine.estimator.scoring.scores[PENDULUM.target][0]
+    before = engine.scores()['hinge'][PENDULUM.target]
+    noisy = dataclasses.replace(before, nmse=1.0)
+    monkeypatch.setattr(engine, 'scores', lambda: {'hinge': {PENDULUM.target: noisy}})
+    health._square[0] = grown * running.target_squares / running.n
+    monkeypatch.setattr(
+        Engine, 'drift', [SimpleNamespace(level=2.0, is_drifting=True)], raising=True
+    )
+    status = next(s for s in health.statuses(engine, 'node') if s.name == 'node: fit hinge')
+    assert status.level == level
+
+
 @pytest.mark.parametrize(
     ('model', 'evidence', 'refusal', 'said'),
     [
@@ -86,3 +106,42 @@ def test_refused_fits_are_counted_by_reason():
     values = next(status for status in statuses if status.name == 'node: model').values
     assert values['refits_refused'] == values['refits_refused.diverged'] == '1'
     assert values['refits_refused.no_better'] == values['refits_refused.no_factor'] == '0'
+
+
+def test_a_parameter_that_is_not_determined_is_told_once(monkeypatch):
+    """A warning with its name, then information; one more that gets lost is a new warning."""
+    engine = Engine(PENDULUM, config(buffer__budget=60))
+    for event in pendulum_events(1200):
+        engine.push(event)
+    known, lost = SimpleNamespace(name='b', std=0.1), SimpleNamespace(name='J', std=None)
+    shown = [known, lost]
+    monkeypatch.setattr(engine, 'parameters', lambda: shown)
+    health = FitHealth(1, 0.3, 1.0)
+
+    def told():
+        status = health.statuses(engine, 'arm/node')[-1]
+        assert status.name == 'arm/node: parameters'
+        return status.level, status.message
+
+    level, message = told()
+    assert level == WARN
+    assert '1 of 2 parameters not determined so far: J; move' in message
+    assert told()[0] == OK
+    shown[0] = SimpleNamespace(name='b', std=None)
+    assert told()[0] == WARN
+
+
+@pytest.mark.parametrize(('window', 'wait'), [(0.1, 0.02), (0.2, 0.05)])
+def test_the_delay_is_what_the_settings_choose_and_what_was_measured(window, wait):
+    """From the stamp to the publication: the wait for the order of stamps and half a window."""
+    engine = Engine(PENDULUM, config(filter__window=window, reorder_window=wait))
+    for event in pendulum_events(100):
+        engine.push(event)
+    health = Health(MERGER)
+    for delay_s in (0.1, 0.2, 0.3, 1e6):  # the last is of another clock
+        health.note_delay(delay_s)
+    status = health.statuses(engine, 'node', 1.0, SOURCES)[1]
+    assert status.name == 'node: timing'
+    assert float(status.values['delay_s_chosen']) == pytest.approx(wait + 0.5 * window, abs=0.02)
+    assert float(status.values['delay_s_p50']) == pytest.approx(0.2)
+    assert float(status.values['delay_s_max']) == pytest.approx(0.3)

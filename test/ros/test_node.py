@@ -25,7 +25,7 @@ from trajectory_msgs.msg import JointTrajectory
 from sgp_ros.engine.samples import JointSample
 from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.reader import open_recording
-from test.ros.graph import Graph, NodeProcess
+from test.ros.graph import DEADLINE_S, Graph, NodeProcess
 from test.ros.replayed import recorded_predictions, replayed_predictions
 from test.ros.stream import START_NS, Stream, shuffled, stamp_ns
 
@@ -56,7 +56,7 @@ def _ready(graph: Graph, stream: Stream) -> None:
 def test_help_is_printed_and_no_node_started(name: str, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, '-m', f'sgp_ros.ros.{name}', '--help'],
-        capture_output=True, text=True, check=False, timeout=60.0,
+        capture_output=True, text=True, check=False, timeout=DEADLINE_S,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert f'usage: {name}' in done.stdout

@@ -37,6 +37,13 @@ def test_every_parameter_is_described(setting: Setting) -> None:
         assert len(found) == (setting.kind == kind)
 
 
+def test_no_path_can_change_while_a_node_runs() -> None:
+    """Whoever may set parameters would else choose which file `~/save` replaces."""
+    paths = [setting for setting in SETTINGS if setting.name.endswith('.path')]
+    assert {'save.path', 'record.path', 'model.path'} <= {setting.name for setting in paths}
+    assert all(descriptor(setting).read_only for setting in paths)
+
+
 def test_a_range_allows_every_value_in_it() -> None:
     described = descriptor(Setting('a', 'float', 1.0, 'b', low=0.0))
     (limits,) = described.floating_point_range

@@ -33,10 +33,10 @@ from sgp_ros.ros.fit_process import FitProcess, WorkerLost
 from sgp_ros.ros.record import Record, Topics
 from sgp_ros.ros.session import Session
 from sgp_ros.simulation.assembly import make_simulation
+from test.ros.graph import DEADLINE_S
 
 ROOT = Path(__file__).parents[2]
 START_NS = 1_700_000_000_000_000_000
-DEADLINE_S = 30.0
 SETTINGS = {
     'filter.hop': 0.0, 'learning.initial': 20, 'reorder_window': 0.0, 'refit.enabled': False,
     'buffer.budget': 40,

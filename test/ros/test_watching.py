@@ -15,7 +15,7 @@ from rich.console import Console
 from sgp_ros.recordings.messages import Status, diagnostics_message
 from sgp_ros.ros.messages import new_message
 from sgp_ros.ros.watching import Picture, dashboard
-from test.ros.graph import Graph
+from test.ros.graph import DEADLINE_S, Graph
 from test.ros.test_node import QUICK
 
 ROOT = Path(__file__).parents[2]
@@ -67,7 +67,7 @@ def test_a_running_node_is_shown(graph: Graph) -> None:
     done = subprocess.run(
         [sys.executable, '-m', 'sgp_ros.cli', 'watch', '--once', '--wait', '30',
          '--layouts', str(graph.folder / 'l')],
-        capture_output=True, text=True, check=False, timeout=90.0, env=os.environ, cwd=ROOT,
+        capture_output=True, text=True, check=False, timeout=DEADLINE_S, env=os.environ, cwd=ROOT,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert 'reaction_wheel' in done.stdout
@@ -80,7 +80,7 @@ def test_a_running_node_is_shown(graph: Graph) -> None:
 def test_a_node_that_is_not_there_is_one_line() -> None:
     done = subprocess.run(
         [sys.executable, '-m', 'sgp_ros.cli', 'watch', '--node', '/nobody', '--wait', '0.5'],
-        capture_output=True, text=True, check=False, timeout=90.0, env=os.environ, cwd=ROOT,
+        capture_output=True, text=True, check=False, timeout=DEADLINE_S, env=os.environ, cwd=ROOT,
     )  # fmt: skip
     assert done.returncode == 2
     assert 'nothing from /nobody' in done.stderr
