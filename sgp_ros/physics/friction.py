@@ -1,4 +1,4 @@
-"""Friction that is the same everywhere in the range, of speeds, directions, loads and times."""
+"""Friction that is the same everywhere in the range, at all times."""
 
 from __future__ import annotations
 
@@ -23,7 +23,16 @@ from sgp_ros.physics.parts import (
 KINDS = ('coulomb', 'viscous')
 SELF_LOCKING = 0.5
 """A drive that loses more than half of its torque to friction cannot be driven back."""
+RATIO_SPREAD = 0.5
+"""Spread of the logarithm of the ratio of two levels of one friction [1]. Convention."""
+USUAL_STATIC = 2.0
+"""Static friction of so many times that of fast motion is not unlikely [1]. Convention."""
 _ARMSTRONG = 'Armstrong-Helouvry, Dupont, Canudas de Wit 1994'
+
+
+def _ratio(large: float, small: float) -> float:
+    """Return the ratio of two levels, of which an estimate may be next to nothing."""
+    return large / max(small, 0.01 * abs(large), 1e-300)
 
 
 def rubbing(motion: SeenMotion, place: Place) -> np.ndarray:
@@ -118,6 +127,12 @@ class StribeckFriction(Effect):
         coulomb, added = at.coefficients
         return bool(added > 0.0 and coulomb > -0.05 * added)
 
+    def surprise(self, at: Placed) -> float:
+        """Return the price of static friction that is many times that of fast motion."""
+        coulomb, added = map(float, at.coefficients)
+        far = max(math.log(max(_ratio(coulomb + added, coulomb), 1.0) / USUAL_STATIC), 0.0)
+        return 0.5 * (far / RATIO_SPREAD) ** 2
+
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         fall = np.exp(-((x.v / shape[0]) ** 2))
         return -x.s, -(fall * x.s)
@@ -186,6 +201,11 @@ class AsymmetricCoulomb(Effect):
         """Return whether neither direction is driven."""
         return bool(np.all(at.coefficients > -0.02 * np.max(np.abs(at.coefficients))))
 
+    def surprise(self, at: Placed) -> float:
+        """Return the price of levels that are far apart: a load that is constant does that."""
+        low, high = sorted(map(float, at.coefficients))
+        return 0.5 * (math.log(max(_ratio(high, low), 1.0)) / RATIO_SPREAD) ** 2
+
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return -0.5 * (1.0 + x.s), 0.5 * (1.0 - x.s)
 
@@ -234,64 +254,3 @@ class LoadFriction(Effect):
 
     def sized(self, x: JointScene) -> Drawn:
         return Drawn(0.2, lambda s: {'level': 0.05 * s * x.force, 'mu': s})
-
-
-WARM_S, WARM_SPREAD = 10.0, 0.7
-"""Time constant below which a warm-up is unlikely [s], spread of its logarithm [1]. Convention."""
-
-
-class FrictionDrift(Effect):
-    """Friction that changes from the beginning of a recording on, as it warms up."""
-
-    name = 'friction_drift'
-    words = 'friction that drifts with time'
-    formula = 'level(t) = end + (start - end) exp(-t / time_constant)'
-    source = 'Simoni, Beschi, Legnani, Visioli 2015'
-    appearance = 'friction differs between the start and the end of a recording'
-    quantities = (
-        Quantity('start', 'N m', low=0.0),
-        Quantity('end', 'N m', low=0.0),
-        Quantity('time_constant', 's', low=1e-3, is_positive=True),
-    )
-    plain = ('coulomb_friction', 'viscous_friction')
-    linear = ('end', 'start')
-    kinds = KINDS
-    drawn_over = 'time'
-    is_dry = True
-    is_online = False
-
-    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
-        """Return friction that comes, and friction that goes."""
-        fade = np.exp(-motion.time / shape[0])
-        x = rubbing(motion, place)
-        return -np.column_stack([(1.0 - fade) * x, fade * x])
-
-    def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
-        """Return whether it never drives."""
-        c = at.coefficients
-        return bool(np.all(c > -0.1 * np.max(np.abs(c))) and np.max(c) > 0.0)
-
-    def surprise(self, at: Placed) -> float:
-        """Return the price of a fast drift: grease and seals warm up in tens of seconds."""
-        return 0.5 * (min(math.log(float(at.shape[0]) / WARM_S), 0.0) / WARM_SPREAD) ** 2
-
-    def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
-        """Return shares of the duration."""
-        return np.asarray(motion.time.max() * np.array([0.01, 0.04, 0.1, 0.25, 0.6])[:, None])
-
-    def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        """Return a hundredth of the duration, and twice all of it.
-
-        A faster one is a transient at the start, a slower one a straight line over time.
-        """
-        return self.starts(motion, place)[0], np.array([2.0 * float(motion.time.max())])
-
-    def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
-        return relative_scales(*self.bounds(motion, place), shape)
-
-    def sized(self, x: JointScene) -> Drawn:
-        def values(s: float) -> dict[str, Value]:
-            start, end = x.levels(s)
-            return {'start': start, 'end': end, 'time_constant': x.seconds, 'kind': x.kind}
-
-        return Drawn(x.small / x.unit, values)

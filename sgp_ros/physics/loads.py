@@ -41,6 +41,7 @@ class Spring(Effect):
     appearance = 'the residual effort is a straight line over the position'
     quantities = (Quantity('stiffness', 'N m/rad', low=0.0), Quantity('rest', 'rad'))
     linear = ('stiffness', 'rest')
+    plain = ('constant_load',)
     term = TermForm('spring', ('stiffness',))
 
     def coefficient_quantities(self, kind: str = '') -> tuple[Quantity, ...]:
