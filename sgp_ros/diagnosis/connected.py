@@ -18,10 +18,10 @@ from sgp_ros.diagnosis.compare.sufficiency import require_rows
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth
 from sgp_ros.diagnosis.criteria import (
     ALIKE,
-    INDEPENDENT_ROWS,
     MOST_CERTAIN,
     PER_EFFECT,
     PER_PARAMETER,
+    PER_UNUSUAL,
     TEMPER,
 )
 from sgp_ros.diagnosis.decide.decision import Scale
@@ -33,7 +33,6 @@ from sgp_ros.diagnosis.setup.evidence import Probe
 from sgp_ros.diagnosis.setup.search import Connection, search
 from sgp_ros.diagnosis.shown import Predictions
 from sgp_ros.physics.catalogue import COMMAND_DELAY, TORQUE_GAIN
-from sgp_ros.physics.parts import MOTOR
 from sgp_ros.rigid.tree import Tree
 
 _CORRECTED = 'All results below are for the recording corrected in this way.'
@@ -99,32 +98,22 @@ class Connected:
     def worth(self, nominal: np.ndarray, recorded: np.ndarray) -> float:
         """Return the worth of what is decided, as the density of the recorded motion [nats].
 
-        Errors are relative to what the motors deliver, be their gain a law of the motor or an
-        error of the connection. Of position targets nothing that is delivered is known, and errors
-        are absolute.
+        Errors are relative to the recorded efforts, in whatever unit these are, so that what a
+        perfect model leaves is the same motion with a correction and without.
 
         Args:
             nominal: (k,) shares of the discrepancy whose shape is only nearly right; the same
                 for all that are compared.
             recorded: (k,) mean squared efforts of the recording [N^2 m^2 or N^2].
         """
-        model, equations = self.several.decision.model, self.equations
-        delivered = equations.filter(equations.motion.effort)
-        for s, force in zip(model.effects, model.forces, strict=True):
-            if s.effect.site is MOTOR:
-                delivered = delivered + force
-        driven = equations.motion.tree.is_actuated[: delivered.shape[1]]
-        power = np.maximum((delivered**2).mean(axis=0), 1e-12 * equations.power)
-        power = np.where(driven, power, equations.power)
-        order = range(len(power)) if self.correction is None else self.correction.effort_order
-        if self.recordings.learned.gains is not None:
-            power = recorded[list(order)]
-        scale = Scale.of(equations, self.several.comparison)
-        worth = replace(scale, nominal=nominal, power=power).worth(model)
-        volume = 0.5 * float(np.log(recorded[list(order)] / power)[driven].sum())
+        model, scale = (
+            self.several.decision.model,
+            Scale.of(self.equations, self.several.comparison),
+        )
         if self.correction is not None:
-            volume -= float(np.log(np.abs(self.correction.scale)).sum())
-        return worth + min(INDEPENDENT_ROWS, len(equations.d)) * volume
+            recorded = recorded[list(self.correction.effort_order)]
+            model = replace(model, inertia=model.inertia - np.log(np.abs(self.correction.scale)))
+        return replace(scale, nominal=nominal, power=recorded).worth(model)
 
     def recorded(self, found: Predictions) -> Predictions:
         """Return accelerations as the recording shows them."""
@@ -190,15 +179,18 @@ def _connected(
         is_explained = plain.several.decision.verdict != 'unexplained'
         return plain if is_explained else _suspected(plain, found)
     numbers = sum(len(e.numbers) for e in found.errors)
-    price = PER_EFFECT * len(found.errors) + PER_PARAMETER * numbers
+    rare = PER_UNUSUAL * sum(not e.hypothesis.is_of_gains for e in found.errors)
+    price = PER_EFFECT * len(found.errors) + PER_PARAMETER * numbers + rare
     gain = _gain(plain, corrected) - price
     if gain >= PER_EFFECT and plain.several.decision.verdict != 'unexplained':
         # on the same band: what is slower has less noise
         cutoff = corrected.equations.filter.cutoff
-        gain = _gain(compared(recordings, tree, next(each), cutoff), corrected) - price
+        if plain.equations.filter.cutoff > cutoff:
+            on_band = compared(recordings, tree, next(each), cutoff)
+            gain = _gain(on_band, corrected) - price
     least = -ALIKE if _stands_for_gains(plain, found) else PER_EFFECT
     if gain < least:
-        return plain if gain < -ALIKE else _beside(plain, found, gain)
+        return plain if gain + rare < -ALIKE else _beside(plain, found, gain)
     return replace(
         corrected,
         findings=tuple(_finding(found, i, gain) for i in range(len(found.errors))),

@@ -124,6 +124,14 @@ DOUBTED = 0.4
 
 So too of a finding whose size may be none.
 """
+CARRIED_REST = 0.1
+"""What a model may leave of the discrepancy where it was not fitted [1]. Convention.
+
+Friction that is a third larger or smaller than it was leaves that.
+"""
+CARRIED_ERROR = 4.0
+"""Ratio of mean squared errors from which held-out ones are not those of the fit [1]. Convention.
+"""
 INTERVAL = 1.96
 """Half the width of an interval of 95 %, in standard deviations [1]. Convention."""
 

@@ -112,21 +112,20 @@ def differences(several: Several, names: Sequence[str]) -> tuple[Difference, ...
 
 
 def doubted_if_none(finding: Finding, effect: EffectAt) -> Finding:
-    """Return a finding that is doubted where the 95 % interval of its size includes none at all.
+    """Return a finding that is doubted where it may be none, or is too small to count as physics.
 
-    Of several numbers that say how large it is one is enough; none where a bound hides them all.
+    The 95 % interval of its size includes none at all; of several numbers that say how large it is
+    one is enough, and none where a bound hides them all.
     """
+    chance = min(finding.probability, DOUBTED)
+    if finding.share <= COUNTED_SHARE:
+        return replace(finding, probability=chance, why='its share is too small to count')
     known = [(finding.parameters[q.name], q.neutral) for q in effect.sizes]
-    away = [
-        abs(float(p.value) - neutral) > INTERVAL * p.std
-        for p, neutral in known if p.std is not None
-    ]  # fmt: skip
+    away = [abs(float(p.value) - neutral) > INTERVAL * p.std
+            for p, neutral in known if p.std is not None]  # fmt: skip
     if any(away) or not away:
         return finding
-    return replace(
-        finding, probability=min(finding.probability, DOUBTED),
-        why='the 95 % interval of its size includes zero',
-    )  # fmt: skip
+    return replace(finding, probability=chance, why='the 95 % interval of its size includes zero')
 
 
 def alternatives(decision: Decision, chances: Probabilities) -> tuple[Finding, ...]:
@@ -245,7 +244,7 @@ def parameter_errors(
     tree = equations.motion.tree
     if not model.is_free:
         return ()
-    C = np.linalg.inv(model.frame.R.T @ model.frame.R)
+    C = model.frame.covariance
     change = (model.w @ equations.directions).reshape(-1, 10)
     D = equations.directions.reshape(len(model.w), -1, 10)
     found = []

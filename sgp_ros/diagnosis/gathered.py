@@ -10,6 +10,7 @@ import numpy as np
 from sgp_ros.diagnosis.compare.settled import collect_settled
 from sgp_ros.diagnosis.compare.several import join
 from sgp_ros.diagnosis.compare.sufficiency import at_rest, require_motion
+from sgp_ros.diagnosis.compare.thinning import thinned
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
     RawTrajectory,
@@ -79,6 +80,11 @@ class Recordings:
     still: tuple[str, ...]
     remarks: tuple[str, ...]
     unstated: tuple[int, ...] = ()
+
+    def thinned(self) -> Recordings:
+        """Return the recordings to learn from, and their kept blocks, on the rows they need."""
+        kept = {name: thinned(raw) for name, raw in self.kept.items()}
+        return replace(self, learned=thinned(self.learned), kept=kept)
 
     def corrected(self, correction: Correction) -> Recordings:
         """Return the recordings as they were."""

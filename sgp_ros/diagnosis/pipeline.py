@@ -14,10 +14,9 @@ from sgp_ros.diagnosis.compare.sufficiency import require_signed
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.diagnosis.compare.velocity_sensor import sensor_lags
 from sgp_ros.diagnosis.connected import Connected, compared, connect
-from sgp_ros.diagnosis.criteria import DOUBTED, REMAINDER_SHARE
+from sgp_ros.diagnosis.criteria import DOUBTED
 from sgp_ros.diagnosis.decide.certainty import Probabilities, certainty_of, probabilities, settled
-from sgp_ros.diagnosis.decide.decision import Decision
-from sgp_ros.diagnosis.decide.differences import Several
+from sgp_ros.diagnosis.decide.differences import Several, without_laws_of
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, equivalents
 from sgp_ros.diagnosis.decide.visibility import visibility
 from sgp_ros.diagnosis.explain.comparison import Comparison
@@ -33,11 +32,12 @@ from sgp_ros.diagnosis.findings import (
 from sgp_ros.diagnosis.gathered import Knowledge, Recordings, gather
 from sgp_ros.diagnosis.locate.bands import bands
 from sgp_ros.diagnosis.locate.dependence import dependences
-from sgp_ros.diagnosis.locate.remainder import Remainder, learn_remainder
+from sgp_ros.diagnosis.locate.remainder import Remainder
+from sgp_ros.diagnosis.prove.held_out import HELD_OUT
 from sgp_ros.diagnosis.prove.overlay import overlays
 from sgp_ros.diagnosis.prove.prediction import FinalModel, diagnosed_bodies
-from sgp_ros.diagnosis.prove.processes import harm, kept_processes
-from sgp_ros.diagnosis.prove.proof import prove, reasons_to_doubt
+from sgp_ros.diagnosis.prove.processes import harm, kept_processes, learned_processes
+from sgp_ros.diagnosis.prove.proof import not_carried_over, prove, reasons_to_doubt
 from sgp_ros.diagnosis.reference import (
     Reference,
     against_model,
@@ -75,6 +75,7 @@ def diagnose(
     simulation: Iterable[Event] | None = None,
     simulated: Sequence[EffectAt] | None = None,
     has_overlays: bool = False,
+    is_thinned: bool = False,
     progress: Progress = lambda _share: None,
 ) -> Diagnosis:
     """Say what a recording has that the nominal robot lacks.
@@ -93,6 +94,8 @@ def diagnose(
         simulation: events of the simulation to compare with; None for the robot alone.
         simulated: physics of a simulation that is known by its model, whose bodies `tree` has.
         has_overlays: whether motions of both models are replayed over the measured ones.
+        is_thinned: whether rows are left out that the band of the equations does not need: at
+            high rates that is faster.
         progress: called with the share that is done.
 
     Raises:
@@ -105,6 +108,7 @@ def diagnose(
     known = Knowledge(robot, stated, config, gains, is_static=is_static)
     recordings = gather(several, tests, tree, known, holds_out=holds_out)
     require_signed(recordings.learned, tree.moving_names)
+    recordings = recordings.thinned() if is_thinned else recordings
     tree = with_open_bodies(recordings.learned, tree, unstated)
     recordings = replace(
         recordings, unstated=unstated,
@@ -134,14 +138,12 @@ def _diagnosed(
     recordings, whole = connected.recordings, connected.equations
     several, laws = extended(connected.several)
     raw, tree, names = recordings.learned, whole.motion.tree, recordings.names
-    several, sides, chances = _settled(several)
+    parts = {'train': raw, **recordings.kept, **recordings.held}
+    several, sides, chances, final, learned, on_z, proofs = _proven(connected, several, parts)
     equations, model = several.equations, several.model
     comparison, decision = several.comparison, several.decision
     depends = dependences(equations, comparison.base.residual)
     lags = [lag for lag in sensor_lags(raw, equations) if lag.is_physics]
-    final, learned, on_z = _final(several, whole)
-    parts = {'train': raw, **recordings.kept, **recordings.held}
-    proofs = {stem: prove(final, part, tree, stem) for stem, part in parts.items()}
     on_z += _harm(final, {k: x for k, x in parts.items() if k != 'train'}, proofs)
     doubts, on_all = reasons_to_doubt(proofs, recordings.still), replace(decision, model=model)
     wrong = parameter_errors(whole, model, recordings.unstated)
@@ -179,6 +181,24 @@ def _diagnosed(
         overlays=overlays(final, parts if replays else {}, tree),
         law_searches=laws,
     )
+
+
+_Proven = tuple[Several, Contrasts, Probabilities, FinalModel, tuple[Remainder, ...],
+                tuple[str, ...], dict[str, Proof]]  # fmt: skip
+
+
+def _proven(connected: Connected, several: Several, parts: Mapping[str, RawTrajectory]) -> _Proven:
+    """Return what is asserted with its proofs; a law that fails on another recording is none."""
+    while True:
+        several, sides, chances = _settled(several)
+        final, learned, on_z = _final(several, connected.equations)
+        tree = connected.equations.motion.tree
+        proofs = {stem: prove(final, part, tree, stem) for stem, part in parts.items()}
+        others = {stem: proof for stem, proof in proofs.items() if stem != HELD_OUT}
+        fewer = without_laws_of(several, not_carried_over(others, connected.recordings.still))
+        if fewer is several:
+            return several, sides, chances, final, learned, on_z, proofs
+        several = fewer
 
 
 def _against(
@@ -234,20 +254,10 @@ def _final(
     several: Several, equations: Equations
 ) -> tuple[FinalModel, tuple[Remainder, ...], tuple[str, ...]]:
     """Return the final model, all processes that were learned, and what is to be said of them."""
-    learned = _remainders(several.equations, several.decision)
+    learned = learned_processes(several.equations, several.decision)
     final = FinalModel(several.model, several.comparison.nominal, equations, learned)
     kept, remarks = kept_processes(final)
     return replace(final, remainders=kept), learned, remarks
-
-
-def _remainders(equations: Equations, decision: Decision) -> tuple[Remainder, ...]:
-    """Return Z of the joints that no effect describes and that leave most, at most two."""
-    left = (decision.model.mean_square / equations.power)[list(decision.unknown)]
-    joints = [
-        decision.unknown[i] for i in np.argsort(-left) if left[i] > REMAINDER_SHARE * left.max()
-    ]
-    found = [learn_remainder(equations, decision.model.residual, j) for j in joints[:2]]
-    return tuple(r for r in found if r is not None)
 
 
 def _predictions(final: FinalModel, connected: Connected, tree: Tree) -> dict[str, Predictions]:

@@ -10,7 +10,8 @@ from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.explain import candidates
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.rigid import rigid_body
-from test.diagnosis.worlds import CHAINS, events_of, simulate
+from test.diagnosis import worlds
+from test.diagnosis.worlds import CHAINS, FINE, events_of, simulate
 
 LOOPS = {'fill_mass': 1, 'fill_torque': 2, 'fill_regressor': 2}
 """Compiled loops over bodies, and which of their arguments has a row for each state."""
@@ -45,10 +46,15 @@ def counted(monkeypatch):
     return counts
 
 
-def test_a_diagnosis_does_no_more_work_than_it_did(robots, counted):
-    """Dry friction: screening, fits, roll-outs, and the search for errors of the connection."""
+@pytest.mark.parametrize('period_s', [0.005, FINE])
+def test_a_diagnosis_does_no_more_work_than_it_did(robots, counted, monkeypatch, period_s):
+    """Dry friction: screening, fits, roll-outs, and the search for errors of the connection.
+
+    Five times the rate is no more work where rows may be left out.
+    """
+    monkeypatch.setattr(worlds, 'PERIOD', period_s)
     world = simulate(CHAINS[1], 11, 8.0, dry=lambda t, q, s: 0.4)
     robot, tree = robots[1]
-    found = diagnose(events_of(world), robot, tree, {}, holds_out=True)
+    found = diagnose(events_of(world), robot, tree, {}, holds_out=True, is_thinned=True)
     assert [f.effect for f in found.findings] == ['coulomb_friction']
     assert {name: n for name, n in counted.items() if n > MOST[name]} == {}

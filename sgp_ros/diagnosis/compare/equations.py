@@ -151,25 +151,31 @@ class Equations:
         pushed = (replace(still, acceleration=np.tile(unit, (len(q), 1))) for unit in units)
         return still, *pushed
 
-    def log_inertia(self, w: np.ndarray, added: np.ndarray) -> float:
-        """Return the mean of log det(M / M nominal) for changed bodies and what is added to M.
+    def inertia(self, w: np.ndarray, added: np.ndarray) -> np.ndarray:
+        """Return the log of the inertia at each joint, relative to the nominal one, (k,).
 
-        What is measured is the motion: a model of other inertia must not gain from residuals in
-        smaller units of effort. Minus infinity where the mass matrix is not positive.
+        Their sum is the mean of log det(M / M nominal) for changed bodies and what is added to M;
+        joints differ by the diagonal of M. What is measured is the motion: a model of other
+        inertia must not gain from residuals in smaller units of effort. Minus infinity where the
+        mass matrix is not positive, infinity where the nominal one has none.
 
         Args:
             w: (p,) change of the bodies.
             added: (k, k), or (`POSES`, k, k) for the poses [kg m^2 or kg].
         """
         if self.motion.is_static:  # efforts are measured there, no motion is predicted
-            return 0.0
+            return np.zeros(self.motion.tree.size)
         tree, q = self.motion.tree, self.poses[0].position
         nominal = mass_matrix(tree, tree.parameters, q)
         changed = tree.parameters + (w @ self.directions).reshape(tree.parameters.shape)
         M = mass_matrix(tree, changed, q) + added
         if np.linalg.eigvalsh(M)[:, 0].min() <= 0.0:
-            return -np.inf
-        return float((np.linalg.slogdet(M)[1] - np.linalg.slogdet(nominal)[1]).mean())
+            return np.full(M.shape[1], -np.inf)
+        if (np.diagonal(nominal, 0, 1, 2) <= 0.0).any():
+            return np.full(M.shape[1], np.inf)
+        whole = (np.linalg.slogdet(M)[1] - np.linalg.slogdet(nominal)[1]).mean()
+        own = np.log(np.diagonal(M, 0, 1, 2) / np.diagonal(nominal, 0, 1, 2)).mean(axis=0)
+        return np.asarray(own + (whole - own.sum()) / len(own))
 
 
 def resting(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) -> np.ndarray:

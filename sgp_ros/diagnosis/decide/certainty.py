@@ -15,16 +15,18 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import (
+    ALIKE,
     CALM_SHARE,
     COUNTED_SHARE,
     LEAST_ASSERTED,
     LEAST_ODDS,
+    LEAST_SHARE,
     MOST_CERTAIN,
     PER_PARAMETER,
     TEMPER,
 )
 from sgp_ros.diagnosis.decide.cross_validation import without
-from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision, Scale
+from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision, Scale, calm
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
@@ -65,7 +67,7 @@ class Probabilities:
     def _objection(self, model: Model) -> str:
         """Return what is wrong with a rival that leaves no more than the asserted model."""
         scale, asserted = self.scale, self.asserted
-        if min(model.shares) <= COUNTED_SHARE:
+        if not scale.is_large(model):
             return 'one of its effects is too small to count'
         if not is_sound(model):
             return 'its effects cancel each other or inertial parameters'
@@ -81,7 +83,8 @@ class Probabilities:
         worst = max(losses, key=lambda name: losses[name])
         if scale.worth(model) < scale.worth(asserted) and losses[worst] > 0.0:
             return f'it needs {worst} (cost: {losses[worst]:.2g} nats)'
-        return 'it does not predict held-out parts, or leaves another joint unexplained'
+        others = ', or leaves another joint unexplained' if len(scale.power) > 1 else ''
+        return f'it does not predict held-out parts{others}'
 
 
 def settled(
@@ -89,23 +92,38 @@ def settled(
 ) -> tuple[Decision, Contrasts, Probabilities]:
     """Return the decision without findings that are improbable, with probabilities of the rest.
 
-    What is asserted beside others is at least `LEAST_ASSERTED` probable. What is not gives way to
-    the plain law that it adds to, of which others are rivals that add to it too, or is left out;
-    unless a model that was compared, of which all is probable, is worth more than what is left.
-    The most probable one stays: something is missing there.
+    What is asserted beside others is at least `LEAST_ASSERTED` probable, and a law that few joints
+    have is worth `ALIKE` more than none, or than its plain one. What is not gives way to the plain
+    law that it adds to, of which others are rivals that add to it too, or is left out; unless a
+    model that was compared, of which all is probable, is worth more than what is left. The most
+    probable one stays: something is missing there, unless bodies alone leave less than counts as
+    physics.
     """
     dropped: set[object] = set()
     while True:
         contrasts = Contrasts(equations, decision.model)
         chances = probabilities(equations, comparison, decision, contrasts)
+        if decision.verdict != 'missing_physics':
+            return decision, contrasts, chances
+        rivals = (decision.model, *decision.rivals)
+        plainer = _plainer(equations, decision.model, chances.scale)
+        if plainer is not None:
+            dropped |= decision.model.key - plainer.key
+            decision = replace(decision, model=plainer, rivals=rivals)
+            continue
         effects = decision.model.effects
         p = [chances.of(decision.model, i) for i in range(len(effects))]
-        if decision.verdict != 'missing_physics' or len(p) < 2 or min(p) >= LEAST_ASSERTED:
+        if min(p) >= LEAST_ASSERTED:
+            return decision, contrasts, chances
+        if len(p) < 2:
+            if chances.scale.base.max() < LEAST_SHARE:
+                decision = calm(comparison.base, rivals, chances.scale)
+                contrasts = Contrasts(equations, decision.model)
+                chances = probabilities(equations, comparison, decision, contrasts)
             return decision, contrasts, chances
         weakest = effects[int(np.argmin(p))]
         dropped.add(weakest.key)
         kept = _without(equations, decision.model, weakest)
-        rivals = (decision.model, *decision.rivals)
         known = [m for m in rivals if _is_probable(m, chances) and not dropped & m.key]
         best = max([kept, *filter(chances.scale.counts, known)], key=chances.scale.worth)
         if not is_credible(best):
@@ -117,6 +135,20 @@ def _is_probable(model: Model, chances: Probabilities) -> bool:
     """Return whether a model has effects, each of which is probable enough to be asserted."""
     p = [chances.of(model, i) for i in range(len(model.effects))]
     return min(p, default=0.0) >= LEAST_ASSERTED
+
+
+def _plainer(equations: Equations, model: Model, scale: Scale) -> Model | None:
+    """Return a model without a law that few joints have and that is hardly worth more.
+
+    With its plain law in its place, where there is one.
+    """
+    for s in model.effects:
+        if not s.effect.is_usual:
+            plainer = _without(equations, model, s)
+            is_alike = scale.worth(plainer) > scale.worth(model) - ALIKE
+            if plainer.effects and is_credible(plainer) and is_alike:
+                return plainer
+    return None
 
 
 def _without(equations: Equations, model: Model, effect: EffectAt) -> Model:
@@ -178,9 +210,9 @@ def certainty_of(
 ) -> float:
     """Return the probability that the verdict is right: the least of what it rests on.
 
-    That is all findings; of unknowns alone the most certain one.
+    That is all findings that count as physics; of unknowns alone the most certain one.
     """
-    named = [f.probability for f in findings if f.effect != UNKNOWN]
+    named = [f.probability for f in findings if f.effect != UNKNOWN and f.share > COUNTED_SHARE]
     if named:
         return min(named)
     if findings:

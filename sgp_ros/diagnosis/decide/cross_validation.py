@@ -143,7 +143,7 @@ def left_out(
     part = parts_of(N)
     grams = [np.tensordot(A[part == i], A[part == i], ((0, 1), (0, 1))) for i in range(PARTS)]
     sides = [np.tensordot(A[part == i], y[part == i], ((0, 1), (0, 1))) for i in range(PARTS)]
-    prior = np.diag(np.concatenate([np.ones(p), np.zeros(A.shape[2] - p)]))
+    prior = model.frame.weight * np.diag(np.repeat([1.0, 0.0], [p, A.shape[2] - p]))
     found, unlikely = np.empty((PARTS, k)), 0.0
     for i in range(PARTS):
         G = sum(grams[:i] + grams[i + 1 :], prior)

@@ -28,6 +28,7 @@ from sgp_ros.diagnosis.criteria import (
     INDEPENDENT_ROWS,
     LEAST_SHARE,
     NOTHING_EXPLAINED,
+    PER_EFFECT,
     PER_PARAMETER,
     SHAPE_ERROR,
     SLIGHT_REST,
@@ -148,7 +149,14 @@ class Scale:
 
     def counts(self, model: Model) -> bool:
         """Return whether effects are large enough, credible, and do not cancel each other."""
-        return min(model.shares) > COUNTED_SHARE and is_credible(model)
+        return self.is_large(model) and is_credible(model)
+
+    @staticmethod
+    def is_large(model: Model) -> bool:
+        """Return whether effects count as physics, those that few joints have each by itself."""
+        sized = zip(model.effects, model.shares, strict=True)
+        small = [s.effect for s, share in sized if share <= COUNTED_SHARE]
+        return len(small) < len(model.effects) and all(e.is_usual for e in small)
 
     def fit(self, model: Model) -> float:
         """Return the tempered log likelihood, with the prior of the bodies' change [nats].
@@ -160,7 +168,7 @@ class Scale:
 
     def likelihood(self, model: Model) -> float:
         """Return the fit without that prior [nats]."""
-        floor = self.floor * np.exp(2.0 * max(model.log_inertia, -50.0) / len(self.power))
+        floor = self.floor * np.exp(2.0 * np.maximum(model.inertia, -50.0))
         share = model.mean_square / self.power + floor
         return self.rows * (model.log_inertia - 0.5 * float(np.log(share).sum()))
 
@@ -187,15 +195,16 @@ def _ranked(comparison: Comparison, scale: Scale) -> list[Model]:
 
 
 def decide(equations: Equations, comparison: Comparison) -> Decision:
-    """Return the verdict on a recording."""
+    """Return the verdict on a recording.
+
+    Nothing is missing where likely bodies leave no more than is adequate in any case.
+    """
     scale, base = Scale.of(equations, comparison), comparison.base
     ranked = _ranked(comparison, scale)
-    best = supported(
-        equations,
-        scale.rows,
-        scale.floor * scale.power,
-        [m for m in ranked if scale.worth(m) > scale.worth(base)],
-    )
+    likely = [m for m in ranked if scale.worth(m) > scale.worth(base)]
+    if scale.base.max() < SLIGHT_REST and 0.5 * float(base.w @ base.w) < PER_EFFECT:
+        likely = []
+    best = supported(equations, scale.rows, scale.floor * scale.power, likely)
     rivals = tuple(m for m in ranked if m is not best)
     left = scale.shares(comparison.parameters)
     if best is not None:
@@ -207,10 +216,11 @@ def decide(equations: Equations, comparison: Comparison) -> Decision:
         worst = int(np.argmax(scale.base))
         unknown = _ordered(np.where(left > LEAST_SHARE, scale.base, 0.0), worst)
         return Decision('unexplained', base, rivals, nothing, worst, unknown, None, base.score)
-    return _calm(base, rivals, scale)
+    return calm(base, rivals, scale)
 
 
-def _calm(base: Model, rivals: tuple[Model, ...], scale: Scale) -> Decision:
+def calm(base: Model, rivals: tuple[Model, ...], scale: Scale) -> Decision:
+    """Return the decision that no physics is missing."""
     verdict = 'parameters_only' if base.is_free else 'no_mismatch'
     excess = np.full(len(scale.base), NOTHING_EXPLAINED)
     return Decision(verdict, base, rivals, excess, int(np.argmax(scale.base)), against=base.score)
@@ -273,7 +283,7 @@ def _opened(
         unknown = _ordered(np.where(is_open, excess, 0.0), worst)
         return Decision('unexplained', base, (best, *rivals), excess, worst, unknown, best,
                         base.score)  # fmt: skip
-    return _calm(base, rivals, scale)
+    return calm(base, rivals, scale)
 
 
 def _ordered(size: np.ndarray, first: int) -> tuple[int, ...]:

@@ -15,7 +15,7 @@ common models are compared anew, and differences are looked for again beside the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +23,7 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, DOUBTED, EVIDENCE, MOST_CERTAIN, TEMPER
 from sgp_ros.diagnosis.decide.cross_validation import support
-from sgp_ros.diagnosis.decide.decision import Decision, Scale, decide
+from sgp_ros.diagnosis.decide.decision import Decision, Scale, decide, refused
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison, compare_models
@@ -34,7 +34,7 @@ from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.parts import JOINT, MOTOR, Place
 
 TRIED = 3
 """Laws that are fitted on a recording, each time one is added."""
@@ -117,6 +117,28 @@ def _force(model: Model, some: tuple[EffectAt, ...]) -> np.ndarray:
     """Return the filtered force of some effects of a model, (N, k) [N m or N]."""
     parts = zip(model.effects, model.forces, strict=True)
     return np.asarray(sum(force for s, force in parts if s in some))
+
+
+def without_laws_of(several: Several, joints: Collection[str]) -> Several:
+    """Return what is left where the laws of some joints are refused; the same where none is.
+
+    Of several recordings what differs stands with what is common, and nothing is refused.
+
+    Args:
+        several: decided.
+        joints: names.
+    """
+    decision, names = several.decision, several.equations.motion.tree.joint_names
+    own = {
+        s.place.joint for s in decision.model.effects
+        if s.effect.site in {JOINT, MOTOR} and s.place.joint >= 0
+        and names[s.place.joint] in joints
+    }  # fmt: skip
+    if several.chances or decision.verdict != 'missing_physics' or not own - {*decision.unknown}:
+        return several
+    for joint in own:
+        decision = refused(several.equations, several.comparison, decision, joint)
+    return replace(several, decision=decision, model=decision.model)
 
 
 @dataclass(frozen=True, eq=False)

@@ -78,10 +78,14 @@ class Contrasts:
 
         On any motion they differ by less than what an adequate model leaves of what it explains,
         as dry friction and a hysteresis whose presliding nobody can resolve; or it is a richer law
-        that on the recorded motion is mostly the asserted one, as friction that drifts a little.
+        that on the recorded motion is mostly the asserted one, as friction that drifts a little;
+        or it says what several asserted ones do, as friction that differs with direction says what
+        Coulomb friction and a constant load do.
         """
         return any(
-            self._is_richer(effect, other) or self._is_same_force(effect, other)
+            self._is_richer(effect, other)
+            or self._is_same_force(effect, other)
+            or self._is_part(effect, other)
             for other in rival.effects
         )
 
@@ -98,6 +102,26 @@ class Contrasts:
             force = effect.force(motion)
             apart = ((force - other.force(motion)) ** 2).sum()
             if not apart < ADEQUATE_REST * (force**2).sum():
+                return False
+        return True
+
+    def _is_part(self, effect: EffectAt, other: EffectAt) -> bool:
+        """Return whether asserted laws add up to another one, this one with much the same size."""
+        joint, motion = effect.place.joint, self._equations.motion
+        own = [s for s in self._asserted.effects if s.place == effect.place]
+        if joint < 0 or other.place != effect.place or len(own) < 2:
+            return False
+        x = np.concatenate([s.columns(motion) for s in own], axis=1)
+        c = np.linalg.lstsq(x, other.force(motion)[:, joint], rcond=1e-9)[0]
+        ends = np.cumsum([len(s.coefficients) for s in own])[:-1]
+        parts = [replace(s, coefficients=a) for s, a in zip(own, np.split(c, ends), strict=True)]
+        part, force = (s.force(motion) for s in (parts[own.index(effect)], effect))
+        if not ((part - force) ** 2).sum() < 0.5 * (force**2).sum():
+            return False
+        for there, _, _ in self._motions.values():
+            whole = other.force(there)
+            apart = ((whole - sum(s.force(there) for s in parts)) ** 2).sum()
+            if not apart < ADEQUATE_REST * (whole**2).sum():
                 return False
         return True
 
@@ -166,9 +190,9 @@ def _without_prior(equations: Equations, parameters: Model) -> Model:
     w = np.linalg.lstsq(
         base.reshape(N * k, p), (equations.d / parameters.sigma).ravel(), rcond=1e-6
     )[0]
-    log_inertia = equations.log_inertia(w, np.zeros((k, k)))
+    inertia = equations.inertia(w, np.zeros((k, k)))
     return replace(
-        parameters, w=w, log_inertia=log_inertia,
+        parameters, w=w, inertia=inertia,
         residual=equations.d - equations.force_of_bodies(w),
     )  # fmt: skip
 

@@ -60,14 +60,44 @@ def fit(
     return _solved(frame, columns, candidates, w)
 
 
+class _Projected:
+    """Projected columns of candidates in one frame; of several shapes the others stay as they are.
+
+    Args:
+        frame: that projects.
+        columns: of the recording.
+        w: (p,) change of the bodies; None for none.
+    """
+
+    def __init__(self, frame: Frame, columns: Columns, w: np.ndarray | None) -> None:
+        self.frame, self._columns, self._w = frame, columns, w
+        self._known: dict[tuple[object, bytes], np.ndarray] = {}
+
+    def of(self, candidate: EffectAt, among: int) -> np.ndarray:
+        """Return those of one of so many candidates, (N k + p, m)."""
+        key = candidate.key, candidate.shape.tobytes()
+        if key not in self._known:
+            if len(self._known) > 4 * among:
+                self._known.clear()
+            x = self._columns.of(candidate, self.frame.equations, self._w)
+            self._known[key] = self.frame.projected(x)
+        return self._known[key]
+
+
 def split(
     frame: Frame, columns: Columns, candidates: tuple[EffectAt, ...], w: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, list[int]]:
     """Return target less given effects, free columns (projected), and their widths."""
-    y = frame.y
+    return _split(_Projected(frame, columns, w), candidates)
+
+
+def _split(
+    projected: _Projected, candidates: tuple[EffectAt, ...]
+) -> tuple[np.ndarray, np.ndarray, list[int]]:
+    y = projected.frame.y
     free, widths = [], []
     for candidate in candidates:
-        x = frame.projected(columns.of(candidate, frame.equations, w))
+        x = projected.of(candidate, len(candidates))
         if candidate.effect.is_given:
             y = y - x[:, 0]
             widths.append(0)
@@ -87,11 +117,9 @@ def _least(A: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.asarray(c / scale)
 
 
-def residual_of(
-    frame: Frame, columns: Columns, candidates: tuple[EffectAt, ...], w: np.ndarray | None = None
-) -> np.ndarray:
+def _residual(projected: _Projected, candidates: tuple[EffectAt, ...]) -> np.ndarray:
     """Return the scaled residual, (N k + p,)."""
-    y, A, _ = split(frame, columns, candidates, w)
+    y, A, _ = _split(projected, candidates)
     return y - A @ _least(A, y)
 
 
@@ -112,7 +140,8 @@ def _searched(
         frame = frame.beyond(*split(frame, columns, fixed, w)[:2])
     x = np.clip(np.concatenate([s.shape for s in candidates]), low, high)
     span = np.maximum(shape_scales(frame.equations, candidates), 1e-12)
-    r = residual_of(frame, columns, with_shapes(candidates, x), w)
+    projected = _Projected(frame, columns, w)
+    r = _residual(projected, with_shapes(candidates, x))
     cost, damping = float(r @ r), 1e-2
     for _ in range(steps):
         J = np.empty((len(r), len(x)))
@@ -120,9 +149,7 @@ def _searched(
             h = 2e-4 * span[i] if x[i] + 2e-4 * span[i] <= high[i] else -2e-4 * span[i]
             moved = x.copy()
             moved[i] += h
-            J[:, i] = (residual_of(frame, columns, with_shapes(candidates, moved), w) - r) / (
-                h / span[i]
-            )
+            J[:, i] = (_residual(projected, with_shapes(candidates, moved)) - r) / (h / span[i])
         H, g = J.T @ J, J.T @ r
         improved = False
         for _ in range(6):
@@ -130,7 +157,7 @@ def _searched(
                 H + damping * (np.diag(np.diag(H)) + 1e-12 * np.eye(len(x))), g
             )
             trial = np.clip(x + np.clip(step, -0.2, 0.2) * span, low, high)
-            r1 = residual_of(frame, columns, with_shapes(candidates, trial), w)
+            r1 = _residual(projected, with_shapes(candidates, trial))
             c1 = float(r1 @ r1)
             if c1 < cost:
                 gain = (cost - c1) / cost
@@ -174,18 +201,18 @@ def _solved(
     w = frame.parameters(left)
     residual = left - equations.force_of_bodies(w)
     mean = (residual**2).mean(axis=0)
-    log_inertia = equations.log_inertia(w, added_inertia(placed, equations))
+    inertia = equations.inertia(w, added_inertia(placed, equations))
     # what is measured is the motion: the floor is one of accelerations
-    variance = mean + floors(equations) * np.exp(2.0 * max(log_inertia, -50.0) / len(mean))
+    variance = mean + floors(equations) * np.exp(2.0 * np.maximum(inertia, -50.0))
     N = len(residual)
     size = sum(len(s.shape) for s in candidates) + len(c)
     score = (
         -0.5 * N * float(np.log(variance).sum())
-        + N * log_inertia
-        - 0.5 * float(w @ w)
+        + N * float(inertia.sum())
+        - 0.5 * frame.weight * float(w @ w)
         - price_of(frame, size)
     )
     return Model(
-        tuple(placed), w, np.sqrt(variance), log_inertia, score, residual,
+        tuple(placed), w, np.sqrt(variance), inertia, score, residual,
         tuple(forces), frame,
     )  # fmt: skip

@@ -26,7 +26,7 @@ class Model:
         effects: with their places, shapes and coefficients.
         w: (p,) inertial parameters' changes in standard deviations.
         sigma: (k,) root mean square of the residual with its floor.
-        log_inertia: mean of log det(M / M nominal) of its bodies and rotors.
+        inertia: (k,) log of that of its bodies and rotors, see `Equations.inertia`.
         score: log likelihood less penalties [nats].
         residual: (N, k) [N m or N].
         forces: filtered force of each effect, (N, k).
@@ -35,11 +35,16 @@ class Model:
     effects: tuple[EffectAt, ...]
     w: np.ndarray
     sigma: np.ndarray
-    log_inertia: float
+    inertia: np.ndarray
     score: float
     residual: np.ndarray
     forces: tuple[np.ndarray, ...]
     frame: Frame = field(repr=False)
+
+    @property
+    def log_inertia(self) -> float:
+        """Mean of log det(M / M nominal)."""
+        return float(self.inertia.sum())
 
     @property
     def key(self) -> frozenset[tuple[str, Place]]:
@@ -76,7 +81,7 @@ class Model:
         waves of one law with the first.
         """
         unusual = sum(
-            type(e).surprise is Effect.surprise and not (e.is_usual or e.plain or e.is_open)
+            type(e).surprise is Effect.surprise and not (e.is_open or adds_to_usual(e))
             for e in (s.effect for s in self.effects if not s.place.number)
         )
         return PER_EFFECT * self.laws + PER_UNUSUAL * unusual
@@ -133,6 +138,11 @@ class Model:
             power = equations.power if force.ndim == 2 else equations.power[s.place.joint]
             found.append(float(((force**2).mean(axis=0) / power).max()))
         return found
+
+
+def adds_to_usual(law: Effect) -> bool:
+    """Return whether nearly every joint with a motor has a law, or the plain one of it."""
+    return law.is_usual or any(EFFECTS[name].is_usual for name in law.plain)
 
 
 def _extra_laws(s: EffectAt) -> int:

@@ -1,19 +1,23 @@
 """Least squares with the inertial parameters projected out.
 
 Rows are scaled by the standard deviation of their joint. The change w of the inertial parameters
-has the prior N(0, I); with the prior as p more rows, `Q` spans what it can explain, and columns
-are compared by what is left of them. Source: Golub and Pereyra 1973 for the projection of linear
-coefficients while the shapes are searched.
+has the prior N(0, I). N rows tell no more than `INDEPENDENT_ROWS` independent ones, for what is
+wrong with the columns repeats in every row: beside them the prior weighs N over that number. With
+the prior as p more rows, `Q` spans what it can explain, and columns are compared by what is left
+of them. Source: Golub and Pereyra 1973 for the projection of linear coefficients while the shapes
+are searched.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.criteria import INDEPENDENT_ROWS
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,8 +28,9 @@ class Frame:
         sigma: (k,) scale of the rows [N m or N].
         S: orthonormal coefficients of the bases of the joints, (r_j, p) each, and of the prior,
             (p, p): `Q = diag(Q_1, ..., Q_k, I) S`, see `Factor`.
-        R: (p, p) upper triangular, `Q R = [B / sigma; I]`.
+        R: (p, p) upper triangular, `Q R = [B / sigma; sqrt(weight) I]`.
         is_free: whether inertial parameters may differ; else p is 0 here.
+        weight: of the prior, in rows.
         own: (N k + p, m) more orthonormal columns that are projected out.
         given: (N k + p,) what is left of the target, where it is known.
     """
@@ -35,18 +40,22 @@ class Frame:
     S: tuple[np.ndarray, ...]
     R: np.ndarray
     is_free: bool
+    weight: float
     own: np.ndarray | None = None
     given: np.ndarray | None = None
 
     @classmethod
-    def of(cls, equations: Equations, sigma: np.ndarray, *, is_free: bool) -> Frame:
-        """Return the frame for rows of these standard deviations."""
+    def of(
+        cls, equations: Equations, sigma: np.ndarray, *, is_free: bool, weight: float | None = None
+    ) -> Frame:
+        """Return the frame for rows of these standard deviations; N rows give the usual weight."""
         factors = equations.factors
         p = equations.size if is_free else 0
         parts = [f.R[:, :p] / s for f, s in zip(factors, sigma, strict=True)]
-        S, R = np.linalg.qr(np.concatenate([*parts, np.eye(p)]))
+        weight = weight or max(1.0, len(equations.d) / INDEPENDENT_ROWS)
+        S, R = np.linalg.qr(np.concatenate([*parts, math.sqrt(weight) * np.eye(p)]))
         ends = np.cumsum([len(part) for part in parts])
-        return cls(equations, sigma, tuple(np.split(S, ends)), R, is_free)
+        return cls(equations, sigma, tuple(np.split(S, ends)), R, is_free, weight)
 
     @property
     def Q(self) -> np.ndarray:  # noqa: N802  # as in the equations
@@ -69,13 +78,12 @@ class Frame:
         """Return what inertial parameters leave of filtered columns (N, k, m), (N k + p, m)."""
         N, k, m = columns.shape
         x = np.zeros((N * k + len(self.S[-1]), m))
-        scaled = columns / self.sigma[:, None]
+        scaled = np.divide(columns, self.sigma[:, None], out=x[: N * k].reshape(N, k, m))
         if self.is_free:
             u = self._explained(scaled)
             for j, factor in enumerate(self.equations.factors):
                 scaled[:, j] -= factor.Q @ (self.S[j] @ u)
             x[N * k :] = -self.S[-1] @ u
-        x[: N * k] = scaled.reshape(N * k, m)
         return x if self.own is None else x - self.own @ (self.own.T @ x)
 
     def _explained(self, scaled: np.ndarray) -> np.ndarray:
@@ -114,13 +122,22 @@ class Frame:
 
     @property
     def occam(self) -> float:
-        """What free inertial parameters cost in evidence, `log det R` [nats]."""
-        return float(np.log(np.abs(np.diag(self.R))).sum())
+        """What free inertial parameters cost in evidence, `log det R / sqrt(weight)` [nats]."""
+        return float(np.log(np.abs(np.diag(self.R)) / math.sqrt(self.weight)).sum())
 
     @property
     def determined(self) -> int:
         """Number of combinations of inertial parameters that the data tell more of than the prior.
 
-        Their singular values of `[B / sigma; I]` are above the square root of two.
+        Their singular values of R are above `sqrt(2 weight)`.
         """
-        return int((np.linalg.svd(self.R, compute_uv=False) > np.sqrt(2.0)).sum())
+        return int((np.linalg.svd(self.R, compute_uv=False) > math.sqrt(2.0 * self.weight)).sum())
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Expected square errors of w, (p, p): of the rows, and of what the prior takes off.
+
+        `A^-1 (D + weight^2 I) A^-1` with the information D of the rows and `A = D + weight I`.
+        """
+        inverse = np.linalg.inv(self.R.T @ self.R)
+        return np.asarray(inverse + self.weight * (self.weight - 1.0) * inverse @ inverse)

@@ -22,6 +22,7 @@ from sgp_ros.diagnosis.criteria import (
     INDEPENDENT_ROWS,
     PER_EFFECT,
     PER_PARAMETER,
+    SLIGHT_REST,
 )
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import is_credible
@@ -172,14 +173,23 @@ def _best(model: Model, trials: Iterable[Model], *, is_whole: bool = True) -> Mo
 def _grown(columns: Columns, model: Model, block: _Block) -> Model:
     """Add the effects of a block that are worth their price, as long as something is left.
 
-    That is a residual, or bodies so unlikely that they may stand for what is missing.
+    That is a residual, or bodies so unlikely that they may stand for what is missing. What nearly
+    every joint has may be small, and is looked for in all that is more than slight.
     """
-    while block.left(model) > COUNTED_SHARE or 0.5 * float(model.w @ model.w) > PER_EFFECT:
-        found = _distinct(screen(columns, model, block.effects, block.joints), TRIALS)
+    while True:
+        left, strain = block.left(model), 0.5 * float(model.w @ model.w)
+        laws = block.effects
+        if left < COUNTED_SHARE and strain < PER_EFFECT:
+            laws = tuple(e for e in laws if e.is_usual)
+        if not laws or (left < SLIGHT_REST and strain < PER_EFFECT):
+            break
+        found = _distinct(screen(columns, model, laws, block.joints), TRIALS)
         arranged = _arranged(model, block)
         trials = [_fitted(columns, model, arranged, s) for s in found]
-        large = [t for t in trials if t.shares[-1] > COUNTED_SHARE]
-        better = _best(model, large, is_whole=False)
+        counted = [
+            t for t in trials if t.shares[-1] > COUNTED_SHARE or t.effects[-1].effect.is_usual
+        ]
+        better = _best(model, counted, is_whole=False)
         if better is None:
             break
         model = better

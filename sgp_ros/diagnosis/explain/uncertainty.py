@@ -37,7 +37,7 @@ def covariance(model: Model, columns: Columns) -> np.ndarray:
 
     A shape that nothing depends on may lie anywhere within its bounds.
     """
-    frame = Frame.of(model.frame.equations, model.sigma, is_free=model.is_free)
+    frame = Frame.of(model.frame.equations, model.sigma, is_free=model.is_free, weight=1.0)
     free = [
         frame.projected(columns.of(s, frame.equations, model.w))
         for s in model.effects if not s.effect.is_given

@@ -13,10 +13,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from sgp_ros.diagnosis.locate.remainder import PARTS, Remainder, parts_of
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.criteria import REMAINDER_SHARE
+from sgp_ros.diagnosis.decide.decision import Decision
+from sgp_ros.diagnosis.locate.remainder import PARTS, Remainder, learn_remainder, parts_of
 from sgp_ros.diagnosis.prove.prediction import FinalModel
 from sgp_ros.diagnosis.prove.rollouts import RolloutWindows, cut, roll_out
 from sgp_ros.diagnosis.result import Proof
+
+
+def learned_processes(equations: Equations, decision: Decision) -> tuple[Remainder, ...]:
+    """Return Z of the joints that no effect describes and that leave most, at most two."""
+    left = (decision.model.mean_square / equations.power)[list(decision.unknown)]
+    joints = [
+        decision.unknown[i] for i in np.argsort(-left) if left[i] > REMAINDER_SHARE * left.max()
+    ]
+    found = [learn_remainder(equations, decision.model.residual, j) for j in joints[:2]]
+    return tuple(r for r in found if r is not None)
 
 
 def kept_processes(final: FinalModel) -> tuple[tuple[Remainder, ...], tuple[str, ...]]:

@@ -26,6 +26,7 @@ from sgp_ros.diagnosis.compare.trajectory import (
     observe,
     parallel_filter,
 )
+from sgp_ros.diagnosis.criteria import CARRIED_ERROR, CARRIED_REST, LEAST_SHARE
 from sgp_ros.diagnosis.prove.prediction import FinalModel, accelerations
 from sgp_ros.diagnosis.prove.rollouts import cut, roll_out
 from sgp_ros.diagnosis.result import Proof
@@ -140,7 +141,39 @@ def reasons_to_doubt(proofs: Mapping[str, Proof], still: Collection[str]) -> tup
                     f'The effort of {joint} in {stem} is constant, so no model explains more than '
                     'a constant does: no verdict is certain.'
                 )
-    return tuple(found)
+    return (*found, *not_carried_over(proofs, still).values())
+
+
+def not_carried_over(proofs: Mapping[str, Proof], still: Collection[str]) -> dict[str, str]:
+    """Return the joints at which the final model fails on what was held out, and a sentence each.
+
+    It leaves more than `CARRIED_REST` of what the nominal robot does, more than counts as physics,
+    and `CARRIED_ERROR` times what it leaves where it was fitted; by the lower end of the interval.
+
+    Args:
+        proofs: by stem of the recording; `train` is what was learned from.
+        still: joints that do not move, of which nothing is claimed.
+    """
+    train, found = proofs['train'], {}
+    for stem, proof in proofs.items():
+        for joint, (low, _) in proof.intervals.get('nmse_after', {}).items():
+            before = proof.nmse_before[joint]
+            unit = proof.yardsticks['nmse'][joint] / max(train.yardsticks['nmse'][joint], 1e-300)
+            is_large = low > max(CARRIED_REST * before, LEAST_SHARE)
+            if stem == 'train' or joint in still or not is_large:
+                continue
+            if low * unit**2 > CARRIED_ERROR * train.nmse_after[joint]:
+                found[joint] = (
+                    f'What explains {joint} does not carry over: in {stem} it leaves '
+                    f'{100 * proof.nmse_after[joint] / before:.2g} % of the discrepancy, in the '
+                    f'training recording {_of_train(train, joint)}.'
+                )
+    return found
+
+
+def _of_train(train: Proof, joint: str) -> str:
+    before = train.nmse_before[joint]
+    return f'{100 * train.nmse_after[joint] / before:.2g} %' if before > 0.0 else 'none'
 
 
 def prove(final: FinalModel, raw: RawTrajectory, tree: Tree, name: str) -> Proof:

@@ -81,11 +81,16 @@ def _is_slight(equations: Equations, listed: Model, searched: Searched) -> bool:
     """
     joint = searched.joint
     own = own_effects(listed, joint)
-    rare = [s for s in own if not (s.effect.is_usual or s.effect in _PLAIN)]
+    rare = [s for s in own if not (s.effect.is_usual or s.effect in _PLAIN or _is_plain_sum(s))]
     if rare and (len(own) > 1 or len(rare[0].shape)):
         return False
     apart = listed.residual[:, joint] - searched.smooth.residual[:, joint]
     return bool((apart**2).mean() < COUNTED_SHARE * equations.power[joint])
+
+
+def _is_plain_sum(s: EffectAt) -> bool:
+    """Return whether a law is plain ones added up: it adds to one, and has no shape to bend."""
+    return bool(s.effect.plain) and not len(s.shape)
 
 
 def _joints(equations: Equations, comparison: Comparison, decision: Decision) -> list[int]:

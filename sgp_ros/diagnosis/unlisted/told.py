@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sgp_ros.batch.least_squares import correlation_factor
-from sgp_ros.diagnosis.criteria import INTERVAL
+from sgp_ros.diagnosis.criteria import INTERVAL, LEAST_SHARE
 from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.shown import LawSearch, TriedFormula
@@ -159,15 +159,21 @@ def _search(found: Explained, searched: Searched) -> LawSearch:
         variable=smooth.variable.text, factor=smooth.factor, unit=unit, force_unit=per,
         x=shape.x, mean=shape.mean, half=INTERVAL * shape.std,
         left=left(searched.smooth), left_listed=left(searched.listed),
-        formulas=tuple(tried), why_not=_why_not(found, searched.joint),
+        formulas=tuple(tried), why_not=_why_not(
+            found, searched.joint, left(searched.listed) - left(searched.smooth)
+        ),
         words=sentence(smooth, shape, unit, per), seen_x=seen.x, seen=seen.y,
     )  # fmt: skip
 
 
-def _why_not(found: Explained, joint: int) -> str:
+def _why_not(found: Explained, joint: int, more: float) -> str:
+    """Return why no formula is asserted; `more` is what the listed effects leave beyond it [1]."""
     if law_of(found.decision.model, joint) is not None:
         return ''
-    return found.why_not.get(joint, 'a listed effect explains the same with fewer parameters')
+    listed = 'the listed effects explain the same with fewer parameters'
+    if more < LEAST_SHARE:
+        listed = 'what the listed effects leave beyond it is too little to be missing physics'
+    return found.why_not.get(joint, listed)
 
 
 def sentence(smooth: SmoothForce, shape: Shape, unit: str, per: str) -> str:

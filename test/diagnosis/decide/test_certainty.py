@@ -7,7 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.criteria import LEAST_ASSERTED
+from sgp_ros.diagnosis.criteria import (
+    ALIKE,
+    COUNTED_SHARE,
+    DOUBTED,
+    LEAST_ASSERTED,
+    LEAST_SHARE,
+)
 from sgp_ros.diagnosis.decide import certainty
 from sgp_ros.diagnosis.decide.certainty import Probabilities, certainty_of, settled
 from sgp_ros.diagnosis.decide.decision import UNKNOWN, Scale, decide
@@ -50,7 +56,7 @@ def test_a_rival_that_leaves_less_is_told_what_is_wrong_with_it(equations_for, v
     assert 'too small' in said.why(more)
     more.__dict__['shares'] = [1.0, 1.0]
     assert 'more parameters' in said.why(more)
-    heavy = replace(more, w=np.full_like(more.w, 30.0), log_inertia=0.0)
+    heavy = replace(more, w=np.full_like(more.w, 30.0), inertia=np.zeros(1))
     heavy.__dict__['shares'] = [1.0, 1.0]
     assert 'further from the nominal' in said.why(heavy)
     assert ';' not in said.why(fitted(equations, 'spring'))
@@ -90,6 +96,51 @@ def test_a_plain_law_takes_the_place_of_a_richer_one_that_is_not_probable(
     kept, _, _ = settled(equations, comparison, decision)
     numbers = {s.name: s.coefficients[0] for s in kept.model.effects}
     assert numbers == pytest.approx({'viscous_friction': 0.3, 'coulomb_friction': 0.5}, rel=0.05)
+
+
+def test_of_two_models_worth_the_same_the_plainer_is_named(equations_for, monkeypatch):
+    """However probable friction that differs with direction is, its second number is none."""
+    world = simulate(CHAINS[1], 4, 10.0, dry=lambda t, q, s: 0.5)
+    _, equations = equations_for(world)
+    richer, other = (fitted(equations, n) for n in ('asymmetric_coulomb', 'coulomb_friction'))
+    comparison = _comparison(equations, richer, other)
+    scale = Scale.of(equations, comparison)
+    assert abs(scale.worth(richer) - scale.worth(other)) < ALIKE
+    decision = replace(decide(equations, comparison), verdict='missing_physics', model=richer)
+    chances = Probabilities({richer.effects[0].key: 0.99}, np.zeros(1), richer, scale)
+    monkeypatch.setattr(certainty, 'probabilities', lambda *_: chances)
+    kept, _, _ = settled(equations, comparison, decision)
+    assert [s.name for s in kept.model.effects] == ['coulomb_friction']
+    assert kept.rivals[0] is richer
+
+
+def test_an_improbable_law_is_none_where_bodies_leave_no_physics(
+    equations_for, viscous, monkeypatch
+):
+    """Alone it stays only where something counts that it may stand for."""
+    _, equations = equations_for(viscous)
+    model = fitted(equations, 'viscous_friction')
+    comparison = _comparison(equations, model)
+    decision = decide(equations, comparison)
+    for left, verdict in ((0.9 * LEAST_SHARE, 'parameters_only'), (0.1, 'missing_physics')):
+        scale = replace(Scale.of(equations, comparison), base=np.array([left]))
+        chances = Probabilities({model.effects[0].key: 0.45}, np.zeros(1), model, scale)
+        monkeypatch.setattr(certainty, 'probabilities', lambda *_, now=chances: now)
+        assert settled(equations, comparison, decision)[0].verdict == verdict
+
+
+def test_a_finding_too_small_to_count_is_doubted(equations_for, viscous):
+    """A rotor that keeps bodies where they are is in the model, and makes no verdict unsure."""
+    _, equations = equations_for(viscous)
+    finding = Finding(
+        'joint0', 'armature', {'inertia': Parameter(0.1, 0.001, 'kg m2')}, Location(), 1.0, 0.99,
+        0.5 * COUNTED_SHARE,
+    )  # fmt: skip
+    told = doubted_if_none(finding, EffectAt(EFFECTS['armature'], Place(0)))
+    assert told.probability <= DOUBTED
+    assert 'too small' in told.why
+    sure = replace(finding, effect='spring', share=0.1, probability=0.97)
+    assert certainty_of([told, sure], equations, _comparison(equations)) == 0.97
 
 
 @pytest.mark.parametrize(

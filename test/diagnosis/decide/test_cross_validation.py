@@ -118,7 +118,7 @@ def test_parts_are_predicted_by_a_fit_to_the_others(damped, is_free):
     p = damped.base.shape[2] if is_free else 0
     A = np.concatenate([damped.base[:, 0, :p], *x], axis=1) / model.sigma[0]
     y, part = damped.d[:, 0] / model.sigma[0], parts_of(len(damped.d))
-    prior, priors = np.eye(p, A.shape[1]), []
+    prior, priors = np.sqrt(model.frame.weight) * np.eye(p, A.shape[1]), []
     for i in range(PARTS):
         rows = part != i
         c = np.linalg.lstsq(

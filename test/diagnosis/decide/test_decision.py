@@ -10,7 +10,7 @@ import pytest
 
 from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
-from sgp_ros.diagnosis.criteria import EVIDENCE, LEAST_SHARE, SHARE_TOLERANCE
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, EVIDENCE, LEAST_SHARE, SHARE_TOLERANCE
 from sgp_ros.diagnosis.decide.decision import Scale, decide
 from sgp_ros.diagnosis.explain.candidates import added_inertia, fit
 from sgp_ros.diagnosis.explain.comparison import Comparison, compare_models
@@ -207,3 +207,28 @@ def test_a_load_and_a_heavier_body_have_the_same_inertia(equations_for):
     heavier[1] += 0.4 * np.array([1.0, 0.0, 0.0, -0.2, 0.04, 0.0, 0.04, 0.0, 0.0, 0.0])
     wanted = mass_matrix(tree, heavier, q) - mass_matrix(tree, tree.parameters, q)
     np.testing.assert_allclose(added, wanted + np.diag([0.03, 0.0]), atol=1e-12)
+
+
+def test_what_nearly_every_joint_has_may_be_small_beside_others(damped):
+    """Another law that is too small to be physics may not."""
+
+    def large(*sized):
+        model = fitted(damped, *(name for name, _ in sized))
+        model.__dict__['shares'] = [share for _, share in sized]
+        return Scale.is_large(model)
+
+    little, much = 0.1 * COUNTED_SHARE, 10.0 * COUNTED_SHARE
+    assert large(('viscous_friction', much), ('armature', little))
+    assert not large(('viscous_friction', much), ('quadratic_drag', little))
+    assert not large(('viscous_friction', little), ('armature', little))
+
+
+def test_bodies_that_leave_next_to_nothing_leave_no_law(damped):
+    """Unless they are so unlikely that they stand for one."""
+    law = fitted(damped, 'viscous_friction')
+    nominal, bodies = (fitted(damped, is_free=f) for f in (False, True))
+    slight = replace(bodies, residual=1e-3 * bodies.residual, score=law.score - 2.0 * EVIDENCE)
+    calm = decide(damped, Comparison(nominal, slight, (law,), ()))
+    assert calm.verdict == 'parameters_only'
+    strained = replace(slight, w=np.full_like(bodies.w, 30.0))
+    assert decide(damped, Comparison(nominal, strained, (law,), ())).verdict == 'missing_physics'

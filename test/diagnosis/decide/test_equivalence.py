@@ -123,3 +123,15 @@ def test_noise_does_not_hide_that_bodies_may_be_heavier(tmp_path):
     found = diagnose(events_of(world, quantum=0.1), *robot_of(tmp_path, chain), {})
     assert 'torque_gain' in {f.effect for f in found.findings}
     assert () in [e.effects for e in found.equivalents]
+
+
+def test_a_law_that_says_what_two_say_counts_for_both(equations_for):
+    """Friction that differs with direction is Coulomb friction under a constant load."""
+    world = simulate(CHAINS[1], 4, 10.0, dry=lambda t, q, s: 0.5, force=lambda t, q, v: (0.2,))
+    equations = equations_for(world)[1]
+    asserted = fitted(equations, 'coulomb_friction', 'constant_load')
+    contrasts = Contrasts(equations, asserted)
+    richer = fitted(equations, 'asymmetric_coulomb')
+    assert all(contrasts.stands_for(richer, s) for s in asserted.effects)
+    load = next(s for s in asserted.effects if s.name == 'constant_load')
+    assert not contrasts.stands_for(fitted(equations, 'coulomb_friction'), load)

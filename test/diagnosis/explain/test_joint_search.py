@@ -7,9 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.criteria import COUNTED_SHARE, EVIDENCE, INDEPENDENT_ROWS, PER_UNUSUAL
+from sgp_ros.diagnosis.criteria import (
+    COUNTED_SHARE,
+    EVIDENCE,
+    INDEPENDENT_ROWS,
+    PER_UNUSUAL,
+    SLIGHT_REST,
+)
 from sgp_ros.diagnosis.decide.cross_validation import support
-from sgp_ros.diagnosis.explain.candidates import fit, residual_of
+from sgp_ros.diagnosis.explain.candidates import _Projected, _residual, fit
 from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import beyond_plain, floors
 from sgp_ros.diagnosis.explain.frame import Frame
@@ -93,7 +99,7 @@ def test_a_screened_gain_is_that_of_the_fit(equations):
         frame = Frame.of(equations, base.sigma, is_free=True)
         before, after = (
             frame.by_joint(r) + floors(equations)
-            for r in (frame.y, residual_of(frame, columns, (candidate,), base.w))
+            for r in (frame.y, _residual(_Projected(frame, columns, base.w), (candidate,)))
         )
         expected = 0.5 * len(equations.d) * np.log(before / after).sum()
         size = columns.of(candidate, equations).shape[-1]
@@ -208,7 +214,7 @@ def test_a_coupling_law_takes_the_place_of_all_that_stands_for_it(equations_for)
 
 
 def test_a_rotor_is_found_where_bodies_could_stand_for_it(equations_for):
-    """A link of ten times its inertia leaves as little, and is unlikely."""
+    """A link of ten times its inertia would leave as little, but is unlikely."""
     first, second = CHAINS[2]
     world = simulate(
         (replace(first, inertia=10.0 * first.inertia), second), 7, 10.0,
@@ -218,11 +224,32 @@ def test_a_rotor_is_found_where_bodies_could_stand_for_it(equations_for):
     columns, base = _start(equations)
     friction = tuple(EffectAt(EFFECTS['viscous_friction'], Place(j)) for j in (0, 1))
     bodies = fit(columns, friction, base.sigma, is_free=True)
-    assert (bodies.mean_square / equations.power).max() < COUNTED_SHARE
+    frame = Frame.of(equations, base.sigma * 1e-3, is_free=True, weight=1.0)
+    unexplained = equations.d - sum(bodies.forces)
+    imitation = frame.parameters(unexplained)
+    rest = ((unexplained - equations.force_of_bodies(imitation)) ** 2).mean(axis=0)
+    left = bodies.mean_square / equations.power
+    assert (rest / equations.power).max() < COUNTED_SHARE < left.max()
     found = by_joint(columns, bodies)[0]
     assert _keys(found) == {('viscous_friction', 0), ('viscous_friction', 1), ('armature', 0)}
-    assert found.w @ found.w < 0.1 * (bodies.w @ bodies.w)
+    assert found.w @ found.w < 0.1 * (imitation @ imitation)
     assert min(support(columns, found, floors(equations), INDEPENDENT_ROWS)) > EVIDENCE
+
+
+def test_friction_too_small_to_count_is_found_beside_what_counts(equations_for):
+    """Left out, it would make any smooth force say more than what is named."""
+    world = simulate(
+        CHAINS[1], 7, 10.0, force=lambda t, q, v: (2.0 * np.sin(5.0 * q[0]) - 0.03 * v[0],)
+    )
+    equations = equations_for(world)[1]
+    columns, base = _start(equations)
+    place = Place(0)
+    start = fit(columns, (EffectAt(EFFECTS['cogging'], place, np.array([5.0])),), base.sigma)
+    left = (start.mean_square / equations.power).max()
+    assert SLIGHT_REST < left < COUNTED_SHARE
+    found = by_joint(columns, start)[0]
+    assert _keys(found) == {('cogging', 0), ('viscous_friction', 0)}
+    assert min(found.shares) < COUNTED_SHARE
 
 
 def test_laws_that_few_joints_have_cost_more_once(equations):

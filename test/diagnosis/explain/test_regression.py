@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis.criteria import INDEPENDENT_ROWS
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.frame import Frame
@@ -39,16 +40,20 @@ def test_projection_equals_dense_ridge_regression(equations_for, heavy, k):
     X = np.concatenate([x, equations.base], axis=2) / sigma[:, None]
     X = X.reshape(N * k, 1 + p)
     y = (equations.d / sigma).ravel()
-    ridge = np.diag([0.0, *np.ones(p)])
+    ridge = frame.weight * np.diag([0.0, *np.ones(p)])
     dense = np.linalg.solve(X.T @ X + ridge, X.T @ y)
     projected = frame.projected(x)
     c = np.linalg.lstsq(projected, frame.y, rcond=None)[0]
     np.testing.assert_allclose(c, dense[:1], rtol=1e-6, atol=1e-9)
     w = frame.parameters(equations.d - x @ c)
     np.testing.assert_allclose(w, dense[1:], rtol=1e-5, atol=1e-7)
-    np.testing.assert_allclose(
-        np.linalg.slogdet(X[:, 1:].T @ X[:, 1:] + np.eye(p))[1], 2.0 * frame.occam, rtol=1e-9
-    )
+    D, one = X[:, 1:].T @ X[:, 1:], np.eye(p)
+    determinant = np.linalg.slogdet(D / frame.weight + one)[1]
+    np.testing.assert_allclose(determinant, 2.0 * frame.occam, rtol=1e-9)
+    inverse = np.linalg.inv(D + frame.weight * one)
+    errors = inverse @ (D + frame.weight**2 * one) @ inverse
+    np.testing.assert_allclose(frame.covariance, errors, rtol=1e-6, atol=1e-12)
+    assert frame.weight == max(1.0, N / INDEPENDENT_ROWS)
 
 
 def test_frames_of_any_scale_share_the_factors_of_the_joints(equations_for, heavy):
@@ -57,7 +62,8 @@ def test_frames_of_any_scale_share_the_factors_of_the_joints(equations_for, heav
     N, k, p = equations.base.shape
     for sigma in (_start(equations), np.array([1e-3, 10.0])):
         frame = Frame.of(equations, sigma, is_free=True)
-        rows = np.concatenate([(equations.base / sigma[:, None]).reshape(N * k, p), np.eye(p)])
+        prior = np.sqrt(frame.weight) * np.eye(p)
+        rows = np.concatenate([(equations.base / sigma[:, None]).reshape(N * k, p), prior])
         np.testing.assert_allclose(frame.Q.T @ frame.Q, np.eye(p), atol=1e-12)
         np.testing.assert_allclose(frame.Q @ frame.R, rows, atol=1e-11 * np.abs(rows).max())
     bases = equations.bases[0], 2.0 * equations.bases[1]

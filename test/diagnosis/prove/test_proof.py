@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from sgp_ros.diagnosis.prove.proof import correlation_time, mean_interval, ratio_interval
+from sgp_ros.diagnosis.prove.proof import (
+    correlation_time,
+    mean_interval,
+    not_carried_over,
+    ratio_interval,
+    reasons_to_doubt,
+)
+from sgp_ros.diagnosis.result import Proof
 
 SEEDS = 200
 
@@ -85,3 +92,33 @@ def test_nothing_over_nothing_has_no_interval():
     """A joint that does not move has no error relative to its motion."""
     assert ratio_interval(np.zeros(100), np.ones(100)) is None
     assert ratio_interval(np.ones(100), np.zeros(100)) is None
+
+
+def _proof(before, after, interval):
+    return Proof(
+        {'elbow': before}, {'elbow': after}, {}, {}, 0.0, 0.0, {}, {},
+        {'nmse_after': {'elbow': interval}}, (None, None), 0, 0, 0.0, {'nmse': {'elbow': 2.0}},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ('before', 'after', 'interval', 'still', 'is_told'),
+    [
+        (0.4, 0.15, (0.08, 0.3), (), True),  # a fifth and more is left where it was 1 %
+        (0.4, 0.03, (0.02, 0.05), (), False),  # friction that is a sixth larger
+        (0.4, 0.15, (0.03, 0.5), (), False),  # too short to know
+        (0.4, 0.15, (0.08, 0.3), ('elbow',), False),
+        (0.003, 0.003, (0.002, 0.004), (), False),  # nothing there counts as physics
+    ],
+)
+def test_what_does_not_carry_over_is_told(before, after, interval, still, is_told):
+    proofs = {'train': _proof(0.4, 0.004, (0.003, 0.005)), 'test': _proof(before, after, interval)}
+    found = not_carried_over(proofs, still)
+    assert set(found) == ({'elbow'} if is_told else set())
+    assert set(reasons_to_doubt(proofs, still)) == set(found.values())
+
+
+def test_noise_that_was_there_before_is_no_failure():
+    """What is left is as large where the model was fitted."""
+    noisy = _proof(0.4, 0.1, (0.08, 0.12))
+    assert not not_carried_over({'train': noisy, 'test': noisy}, ())

@@ -1,0 +1,44 @@
+"""What is compared before an error of the connection is asserted."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from sgp_ros.diagnosis import connected
+from sgp_ros.diagnosis.connected import Connected
+
+
+def _of(cutoff):
+    """Return what a comparison up to a cut-off [Hz] returns, as far as it is asked."""
+    several = SimpleNamespace(decision=SimpleNamespace(verdict='missing_physics'))
+    recordings = SimpleNamespace(
+        remarks=(), corrected=lambda _c: None, learned=SimpleNamespace(gains=None)
+    )
+    return Connected(recordings, SimpleNamespace(filter=SimpleNamespace(cutoff=cutoff)), several)
+
+
+@pytest.mark.parametrize(('plain', 'corrected', 'times'), [(25.0, 25.0, 1), (25.0, 9.0, 2)])
+def test_a_band_is_compared_once(monkeypatch, plain, corrected, times):
+    """As it is the recording is compared anew only where its correction has a lower cut-off."""
+    compared = []
+
+    def compare(_recordings, _tree, _progress, most_hz=corrected):
+        compared.append(most_hz)
+        return _of(most_hz)
+
+    for name, stub in {
+        'compared': compare, '_gain': lambda *_: 100.0, '_finding': lambda *_: None,
+        '_equal': lambda _: (), '_stands_for_gains': lambda *_: False,
+    }.items():  # fmt: skip
+        monkeypatch.setattr(connected, name, stub)
+    correction = SimpleNamespace(tree=lambda tree: tree)
+    error = SimpleNamespace(
+        correction=correction, numbers=(), remedy='', hypothesis=SimpleNamespace(names=(), is_of_gains=False)
+    )
+    found = SimpleNamespace(errors=(error,), delay_std=0.0)
+    each = connected.in_halves(lambda _: None)
+    assert connected._connected(_of(plain), found, None, each).correction is correction
+    assert len(compared) == times
+    assert compared[-1] == corrected
