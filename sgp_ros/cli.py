@@ -35,7 +35,12 @@ from sgp_ros.apps.arguments import (  # noqa: E402 - as above
     GROUPS,
     AddCommand,
 )
-from sgp_ros.apps.terminal import mark_folder, require_own_folder, strong  # noqa: E402 - as above
+from sgp_ros.apps.terminal import (  # noqa: E402 - as above
+    BESIDE_INPUT,
+    mark_folder,
+    require_own_folder,
+    strong,
+)
 from sgp_ros.errors import ConfigError, SgpError  # noqa: E402 - the environment above comes first
 
 GROUP = 'sgp_ros.commands'
@@ -75,8 +80,8 @@ def _run(arguments: dict[str, Any]) -> int:
     warnings.filterwarnings('ignore', category=RuntimeWarning, module=r'scipy\.')
     try:
         out = arguments['out']
-        if not is_forced:
-            require_own_folder(out, name)
+        if not is_forced and name not in BESIDE_INPUT:
+            require_own_folder(out)
         with _text_to(is_quiet=is_quiet, prints_json=prints_json):
             result = _load(function)(progress=Progress(name, is_quiet=is_quiet), **arguments)
         mark_folder(out, name)

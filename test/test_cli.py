@@ -191,7 +191,9 @@ def test_a_truncated_recording_is_used_as_far_as_it_goes(wheel, tmp_path):
     assert main([str(a) for a in _replay(tmp_path / 'cut.mcap', tmp_path)]) == 0
     metrics = json.loads((tmp_path / 'out' / 'metrics.json').read_text())
     assert 500 <= metrics['samples']['used'] < 3000
-    assert 'recovered' in ' '.join(metrics['remarks'])
+    (said,) = (remark for remark in metrics['remarks'] if 'recovered' in remark)
+    assert 'the rest is damaged, from byte' in said
+    assert said in (tmp_path / 'out' / 'report.html').read_text(encoding='utf-8')
 
 
 def test_strange_states_are_counted_and_survived(tmp_path):
@@ -296,6 +298,7 @@ def test_the_robots_that_come_with_the_package_are_listed(capsys):
     listed = {entry['name']: entry['joints'] for entry in json.loads(captured.out)['robots']}
     assert listed['reaction_wheel'] == ['pole', 'wheel']
     assert 'reaction_wheel' in captured.err
+    assert 'next: ' in captured.err
     assert main(['robots', '--quiet']) == 0
     assert capsys.readouterr().out == ''
 
@@ -315,7 +318,8 @@ def test_files_of_somebody_else_are_not_mixed_with_results(wheel, tmp_path, caps
     out.mkdir()
     (out / 'thesis.tex').write_text('mine')
     arguments = _replay(wheel / 'reaction_wheel.mcap', tmp_path)
-    assert 'thesis.tex' in _refused(arguments, capsys)
+    for command in (arguments, ['effects', '--out', out], ['simulate', 'pole', '--out', out]):
+        assert 'thesis.tex' in _refused(command, capsys)
     assert main([str(a) for a in [*arguments, '--force']]) == 0
     assert main([str(a) for a in arguments]) == 0
     assert (out / 'thesis.tex').read_text() == 'mine'

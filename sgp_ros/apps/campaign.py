@@ -29,6 +29,7 @@ from sgp_ros.campaign.trends import find_trends
 from sgp_ros.errors import ConfigError
 from sgp_ros.report.campaign import render_campaign, trend_sentences
 from sgp_ros.report.files import replacing_results, write_bytes, write_text
+from sgp_ros.report.next_steps import after_campaign, next_lines
 from sgp_ros.robots.models.door import is_model
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import urdf_text
@@ -229,3 +230,4 @@ def _print_summary(content: Mapping[str, Any], out: Path) -> None:
         print(warned(f'  remark    {remark}'))
     print(f'table: {out / "results.parquet"}')
     print(f'report: {out / "report.html"}')
+    print(next_lines(after_campaign(out)))

@@ -62,6 +62,7 @@ def run_compile(out: Path, progress: Callable[[float], None]) -> dict[str, Any]:
           f'{seconds:.1f} s')  # fmt: skip
     for folder in folders:
         print(f'cache: {folder}')
+    print('next: See the package at work:\n  sgp demo')
     return {
         'compiled': compiled, 'cached': sorted(set(called) - set(compiled)), 'seconds': seconds,
         'folders': folders,

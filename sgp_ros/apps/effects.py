@@ -11,6 +11,7 @@ from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.report.files import replacing_results, write_text
+from sgp_ros.report.next_steps import after_effects, next_lines
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.registry import load_robot
 
@@ -43,6 +44,7 @@ def run_effects(
         numbers = ', '.join(f'{name} {x:g}' for name, x in entry['values'].items())
         sought = 'estimated, starting from ' if entry['is_open'] else ''
         print(f'{_line(entry)}\n{"":24s}of {entry["joint"]}: {sought}{numbers or "no parameters"}')
+    print(next_lines(after_effects(robot)))
     progress(1.0)
     return found
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.report.files import write_text
+from sgp_ros.report.next_steps import after_export, next_lines
 from sgp_ros.robots.exports.handover import Handover, hand_over
 from sgp_ros.robots.exports.mjcf import write_mjcf
 from sgp_ros.robots.exports.sdf import write_sdf
@@ -43,7 +44,7 @@ def run_export(
     """
     nominal = nominal_model(load_robot(robot))
     handed = hand_over(nominal)
-    text, left = _written(handed, to, _origin(handed, model))
+    text, left = _written(handed, to, _origin(handed, model), out)
     path = out / f'{nominal.robot.name}{FORMATS[to]}'
     out.mkdir(parents=True, exist_ok=True)
     write_text(path, text)
@@ -58,6 +59,7 @@ def run_export(
         print(f'  not in {to}: {said}')
     for said in nominal.remarks:
         print(f'  remark: {said}')
+    print(next_lines(after_export(path)))
     progress(1.0)
     return result
 
@@ -75,9 +77,9 @@ def _origin(handed: Handover, model: str | None) -> Path | None:
     return path
 
 
-def _written(handed: Handover, to: str, origin: Path | None) -> tuple[str, list[str]]:
+def _written(handed: Handover, to: str, origin: Path | None, out: Path) -> tuple[str, list[str]]:
     if to == 'mjcf':
-        return write_mjcf(handed, origin)
+        return write_mjcf(handed, origin, out)
     if to == 'urdf':
         return handed.urdf, handed.left_out(URDF_HELD)
     writers = {

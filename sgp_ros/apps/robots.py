@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from sgp_ros.report.next_steps import after_robots, next_lines
 from sgp_ros.robots.registry import load_robot, robot_names
 
 
@@ -31,4 +32,5 @@ def run_robots(out: Path, progress: Callable[[float], None]) -> dict[str, Any]: 
         print(f'{entry["name"]:{width}s}  {entry["description"]}')
         print(f'{"":{width}s}  joints: {", ".join(entry["joints"])}')
     print('Any URDF, MJCF, SDF or robot YAML can be given instead of a name.')
+    print(next_lines(after_robots(names[0])))
     return {'robots': entries}

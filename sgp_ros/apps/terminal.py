@@ -13,8 +13,6 @@ from sgp_ros.errors import ConfigError
 
 _LISTING = '.sgp_'
 """Beginning of the names of the files that list the results of a command, see `report.files`."""
-_LISTED = ('campaign', 'check', 'diagnose', 'identify', 'replay')
-"""Commands that keep such a list, and take the results of their last run away."""
 
 
 def strong(text: str) -> str:
@@ -27,19 +25,22 @@ def warned(text: str) -> str:
     return _coloured(text, '33')
 
 
-def require_own_folder(out: Path, command: str) -> None:
-    """Refuse a folder with files of somebody else, where a command would mix its own with them.
+BESIDE_INPUT = ('import',)
+"""Commands that add a recording to what is there: it may lie beside the log that it was."""
+
+
+def require_own_folder(out: Path) -> None:
+    """Refuse a folder with files of somebody else, which a command could mix with or replace.
 
     Results of `sgp` in it are replaced by the next run of the same command.
 
     Args:
         out: folder of the results.
-        command: that writes there.
 
     Raises:
         ConfigError: it holds files, and no command of ours wrote there.
     """
-    if command not in _LISTED or not out.is_dir():
+    if not out.is_dir():
         return
     names = sorted(path.name for path in out.iterdir())
     if names and not any(name.startswith(_LISTING) for name in names):

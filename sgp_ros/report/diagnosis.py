@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -54,6 +55,8 @@ from sgp_ros.rigid.tree import Tree
 _NAMED = ('kind', 'source_joint', 'encoder')
 """Parameters that are part of the name of an effect."""
 _SHOWN_RIVALS, _SHOWN_VARIABLES = 4, 5
+_FAR_ABOVE = 1.5
+"""Ratio of the share of an effect to what was left, from which the page says why."""
 _VERDICTS = {
     'missing_physics': 'Physics is missing',
     'parameters_only': 'Only parameters are wrong',
@@ -110,7 +113,9 @@ def render(
         dependences=_dependences(found, large) if found.findings else [],
         is_calm=is_calm(found),
         setup=[_finding(f) | {'share': ''} for f in found.setup],
-        findings=[_finding(f, _chart_of(found, f, charts)) for f in found.findings],
+        findings=[
+            _finding(f, _chart_of(found, f, charts)) | _cancelled(found, f) for f in found.findings
+        ],
         shared=[_finding(f) for f in found.shared],
         rivals=[_rival(f, best) for f in found.alternatives[:_SHOWN_RIVALS]],
         more_rivals=[_rival(f, best) for f in found.alternatives[_SHOWN_RIVALS:]],
@@ -157,6 +162,21 @@ def _chart_of(found: Diagnosis, finding: Finding, charts: Mapping[str, Chart]) -
     """Return the name of the chart of a finding's law; empty where there is none."""
     name = f'law {found.findings.index(finding)}'
     return name if name in charts else ''
+
+
+def _cancelled(found: Diagnosis, f: Finding) -> dict[str, str]:
+    """Return the share of an effect in words where it is far above all that was left at its joint.
+
+    The share is of the mean square, and what was left of the variance, which is no larger.
+    """
+    left = found.proofs['train'].nmse_before.get(f.joint, math.inf)
+    is_force = f.effect not in EFFECTS or EFFECTS[f.effect].is_force
+    if not is_force or f.share <= _FAR_ABOVE * left:
+        return {}
+    return {
+        'share': f'it makes {percent(f.share)} of the mean squared effort, more than the nominal '
+        'robot leaves: other effects or bodies cancel part of it'
+    }
 
 
 def _finding(f: Finding, chart: str = '') -> dict[str, Any]:

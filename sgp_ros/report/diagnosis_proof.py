@@ -118,8 +118,8 @@ def rollouts_sentences(found: Diagnosis) -> str:
     return (
         f'Roll-outs start from measured states and last {HORIZON_S:g} s under the recorded '
         'commands; 1 is the error of staying at the start position, and a model that is '
-        f'worse exceeds it. {on}, the rms error of {joint} is {misses[0]} of its travel for the '
-        f'nominal robot and {misses[1]} for the final model. '
+        f'worse exceeds it. {on}, the rms error of {joint} is {misses[0]} its travel for the '
+        f'nominal robot and {misses[1]} it for the final model. '
         f'Number of roll-outs: {", ".join(parts)}.'
     )
 
@@ -127,7 +127,7 @@ def rollouts_sentences(found: Diagnosis) -> str:
 def _way(nmse: float) -> str:
     """Return the root of an error as a share of the way, or as a multiple of it."""
     share = math.sqrt(nmse)
-    return f'{100.0 * share:.2g} %' if share < 0.995 else f'{share:.3g} times'
+    return f'{100.0 * share:.2g} % of' if share < 0.995 else f'{share:.3g} times'
 
 
 def _nats(value: float, interval: tuple[float, float] | None) -> str:

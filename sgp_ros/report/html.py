@@ -149,18 +149,26 @@ def _cards(metrics: Mapping[str, Any]) -> list[dict[str, str]]:
 
 
 def verdict(metrics: Mapping[str, Any]) -> str:
-    """Say in a sentence or two how well the model predicts."""
-    parts = []
+    """Say in a sentence how well the model predicts; of several joints, from best to worst."""
+    scores: dict[str, list[tuple[float, float, str]]] = {}
     for joint, channels in metrics['joints'].items():
         for channel, score in channels.items():
-            parts.append(
-                f'{channel} of {joint} to {100 * score["nmse"] ** 0.5:.2g} % of its spread '
-                f'(nMSE {score["nmse"]:.2g}), with {100 * score["coverage95"]:.1f} % of the '
-                'measurements inside the 95 % interval'
-            )
-    if not parts:
+            spread = 100 * score['nmse'] ** 0.5
+            scores.setdefault(channel, []).append((spread, 100 * score['coverage95'], joint))
+    if not scores:
         return 'Nothing could be predicted from this recording.'
-    return 'The model predicts ' + '; '.join(parts) + '.'
+    parts = []
+    for channel, found in scores.items():
+        best, worst = min(found), max(found)
+        reach = '' if len(found) == 1 else f'{best[0]:.2g} % ({best[2]}) to '
+        inside = [round(share, 1) for _, share, _ in found]
+        least, most = min(inside), max(inside)
+        shares = f'{least:.1f}' if least == most else f'{least:.1f} to {most:.1f}'
+        parts.append(
+            f'the {channel} to {reach}{worst[0]:.2g} % ({worst[2]}) of its spread, with '
+            f'{shares} % of the measurements inside the 95 % interval'
+        )
+    return f'The model predicts {"; ".join(parts)}.'
 
 
 def _scores(metrics: Mapping[str, Any]) -> list[dict[str, str]]:
@@ -193,9 +201,9 @@ def _parameter_row(
         'joint': parameter['joint'] or '',
         'unit': parameter['unit'],
         'known': parameter['identifiable'],
-        'value': f'{value:.5g}' if parameter['identifiable'] else '',
+        'value': f'{value + 0.0:.5g}' if parameter['identifiable'] else '',
         'interval': 'not determined by this motion',
-        'physics': f'{alone[name]:.5g}' if name in alone else '',
+        'physics': f'{alone[name] + 0.0:.5g}' if name in alone else '',
         'truth': f'{truth[name]:.5g}' if name in truth else '',
         'inside': '',
         'missed': False,

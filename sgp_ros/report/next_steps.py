@@ -13,6 +13,8 @@ Steps = Sequence[tuple[str, str]]
 PLUS_MINUS = '+- is half the width of a 95 % interval'
 _OTHER = 'OTHER.mcap'
 """Stands for a recording of the reader."""
+_HANDED_BACK = {'.xml': 'mjcf', '.mjcf': 'mjcf', '.sdf': 'sdf'}
+"""Ending of a robot's file to the format of `sgp export`; the URDF is among the results."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +49,15 @@ def after_diagnosis(found: Diagnosis, given: Given, out: Path) -> Steps:
     if found.verdict == 'unexplained':
         learn = f'sgp replay {quote(bag)} --robot {diagnosed}'
         return [('Learn the unexplained part with a Gaussian process:', learn)]
-    return [
+    steps = [
         ('Check the corrected robot on another recording:',
          f'sgp replay {_OTHER} --robot {diagnosed}'),
         ('Simulate the corrected robot:', f'sgp simulate {diagnosed}'),
     ]  # fmt: skip
+    if (to := _HANDED_BACK.get(Path(given.robot).suffix.lower())) is not None:
+        steps.append(('Write the corrected robot in the format of its file:',
+                      f'sgp export {diagnosed} --to {to} --ranges'))  # fmt: skip
+    return steps
 
 
 def after_identification(robot: str, out: Path, *, has_bodies: bool) -> Steps:
@@ -110,6 +116,32 @@ def after_simulation(path: Path, robot: str) -> Steps:
     """Return what to do with a simulated recording of a robot."""
     return [('Find the effects that were put in:',
              f'sgp diagnose {_path(path)} --robot {quote(robot)}')]  # fmt: skip
+
+
+def after_robots(name: str) -> Steps:
+    """Return what to do with a built-in robot."""
+    return [('Simulate one of them:', f'sgp simulate {name}')]
+
+
+def after_effects(robot: str | None) -> Steps:
+    """Return what to do with a list of effects."""
+    place = 'double_pendulum --effect coulomb_friction:joint=elbow,level=0.05'
+    return [
+        ('Simulate a robot with an effect:', f'sgp simulate {quote(robot) if robot else place}')
+    ]
+
+
+def after_export(path: Path) -> Steps:
+    """Return what to do with an exported robot that can be read again; nothing with another."""
+    readable = path.suffix in {'.xml', '.urdf', '.sdf'}
+    step = ('Read it again and simulate it:', f'sgp simulate {_path(path)}')
+    return [step] if readable else [('Load it in the program that it was written for:', str(path))]
+
+
+def after_campaign(out: Path) -> Steps:
+    """Return what to do with the results of many recordings."""
+    return [('With more recordings, repeat it; what is finished is kept:',
+             f'sgp campaign RECORDINGS --robot ROBOT.urdf --out {_path(out)}')]  # fmt: skip
 
 
 def ending(out: Path, steps: Steps) -> str:

@@ -7,6 +7,7 @@ figures stand there as pictures.
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any
@@ -42,7 +43,7 @@ def render_page(
             name: 'data:image/png;base64,' + base64.b64encode(content).decode()
             for name, content in figures.items()
         },
-        thinned=THINNED,
+        thinned=THINNED if charts else '',
         styles=Markup(_asset('uPlot.min.css') + _asset('robot.css') + _asset('report.css')),  # noqa: S704 - our own
         scripts=Markup(_asset('uPlot.iife.min.js') + _asset('report.js')),  # noqa: S704 - as above
         **values,
@@ -55,11 +56,15 @@ _SIGNS = {
 }  # fmt: skip
 
 
+_POWER = re.compile(r'((?:(?<=kg )|(?<=m )|(?<=m\u00a0)|(?<=N )|(?<=/))(?:m|s|rad))([23])\b')
+"""A unit with a power, behind another unit; a joint may be called m2."""
+
+
 def typeset(text: str) -> str:
     """Return text with the signs that a terminal may lack."""
     for plain, sign in _SIGNS.items():
         text = text.replace(plain, sign)
-    return text
+    return _POWER.sub(lambda found: found[1] + '²³'[int(found[2]) - 2], text)
 
 
 def robot_styles() -> str:

@@ -129,7 +129,9 @@ def _unexplained(found: Diagnosis) -> str:
     top = listed[0]
     nearest = [f for f in listed if f.log_bayes_factor == top.log_bayes_factor]
     names = ' with '.join(dict.fromkeys(plain_name(f.effect) for f in nearest))
-    return f'{text}; no listed effect fits: the nearest, {names}, {top.why.split(", ")[0]}.'
+    left, _, but = top.why.partition('; ')
+    left = left.split(', ')[0] + (f', but {but}' if but else '')
+    return f'{text}; no listed effect fits: the nearest, {names}, {left}.'
 
 
 def _is_compared(found: Diagnosis) -> bool:

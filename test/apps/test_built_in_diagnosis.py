@@ -9,6 +9,7 @@ import pytest
 
 from sgp_ros.apps.simulated_robot import find_robot
 from sgp_ros.cli import main
+from sgp_ros.diagnosis.criteria import DOUBTED
 from sgp_ros.engine.samples import CommandSample
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
@@ -67,7 +68,9 @@ def test_friction_that_is_added_to_the_wheel_is_found_with_its_number(tmp_path):
 def test_the_friction_that_equation_28_leaves_out_is_found(tmp_path):
     """Bearing and back-EMF of the wheel; the pole's is too small to count as physics."""
     found = _diagnosed(tmp_path, 'reaction_wheel', 'reaction_wheel_6')
-    (finding,) = found['findings']
+    finding, slight = found['findings']
+    assert (slight['joint'], slight['effect']) == ('pole', 'viscous_friction')
+    assert slight['probability'] <= DOUBTED
     assert (finding['effect'], finding['joint']) == ('viscous_friction', 'wheel')
     assert _values(finding) == pytest.approx({'b': 0.002}, rel=0.05)
 

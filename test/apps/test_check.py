@@ -130,7 +130,8 @@ def test_a_moving_base_is_refused(tmp_path, way):
 def test_the_command_writes_json_with_the_set_up(tmp_path, capsys):
     """A pendulum whose encoder is turned by 0.2 rad cannot be told from one on a tilted base."""
     robot = _robot(tmp_path)
-    assert main(['simulate', robot, '--duration', '8', '--out', str(tmp_path)]) == 0
+    words = ['simulate', robot, '--duration', '8', '--out', str(tmp_path), '--force']
+    assert main(words) == 0
     with RecordingWriter(tmp_path / 'turned.mcap') as writer:
         for event in open_recording(tmp_path / 'swing.mcap').events():
             is_state = isinstance(event, JointSample)

@@ -28,7 +28,17 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp('commanded')
     for name, damping in (('machine', 0.2), ('model', 0.1)):
         (folder / f'{name}.xml').write_text(MJCF.format(damping=damping))
-    words = ['simulate', folder / 'machine.xml', '--duration', 6, '--rate', 100, '--out', folder]
+    words = [
+        'simulate',
+        folder / 'machine.xml',
+        '--duration',
+        6,
+        '--rate',
+        100,
+        '--out',
+        folder,
+        '--force',
+    ]
     assert main([str(x) for x in words]) == 0
     return folder
 

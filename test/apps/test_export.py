@@ -52,10 +52,40 @@ def _exported(robot, folder, to, *more):
     return next(p for p in (folder / 'out').glob('[!.]*') if 'ranges' not in p.name)
 
 
+def test_exported_mjcf_finds_its_meshes_when_both_are_moved(tmp_path):
+    """The place of meshes is said from the new file on: results are shared with their folder."""
+    here = tmp_path / 'here'
+    (here / 'meshes').mkdir(parents=True)
+    corners = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
+    faces = ((1, 3, 2), (1, 2, 4), (1, 4, 3), (2, 3, 4))
+    lines = [*(f'v {x} {y} {z}' for x, y, z in corners), *(f'f {a} {b} {c}' for a, b, c in faces)]
+    (here / 'meshes' / 'link.obj').write_text('\n'.join(lines))
+    (here / 'arm.xml').write_text(
+        '<mujoco><compiler meshdir="meshes"/><asset><mesh name="link" file="link.obj"/></asset>'
+        '<worldbody><body name="link"><joint name="hinge" axis="0 1 0"/>'
+        '<geom type="mesh" mesh="link"/></body></worldbody></mujoco>'
+    )
+    written = _exported(str(here / 'arm.xml'), here, 'mjcf')
+    assert str(tmp_path) not in written.read_text()
+    here.rename(tmp_path / 'there')
+    moved = tmp_path / 'there' / written.relative_to(here)
+    assert mujoco.MjModel.from_xml_path(str(moved)).nmesh == 1
+
+
 def test_exported_mjcf_moves_in_mujoco_as_our_simulation(tmp_path):
     """Under the recorded commands, within 1 % of the motion, over the whole recording."""
     robot = _robot(tmp_path)
-    words = ['simulate', robot, '--duration', '4', '--out', str(tmp_path), '--seed', '3']
+    words = [
+        'simulate',
+        robot,
+        '--duration',
+        '4',
+        '--out',
+        str(tmp_path),
+        '--seed',
+        '3',
+        '--force',
+    ]
     assert main(words) == 0
     model = mujoco.MjModel.from_xml_path(str(_exported(robot, tmp_path, 'mjcf')))
     events = list(open_recording(tmp_path / 'arm.mcap').events())

@@ -315,7 +315,17 @@ def swing(tmp_path_factory):
     """Return a folder with a recording of efforts, and the same motion as one of targets."""
     folder = tmp_path_factory.mktemp('swing')
     (folder / 'swing.xml').write_text(SWING)
-    words = ['simulate', folder / 'swing.xml', '--duration', 8, '--rate', 200, '--out', folder]
+    words = [
+        'simulate',
+        folder / 'swing.xml',
+        '--duration',
+        8,
+        '--rate',
+        200,
+        '--out',
+        folder,
+        '--force',
+    ]
     assert main([str(x) for x in words]) == 0
     events = list(open_recording(folder / 'swing.mcap').events())
     states = {e.stamp_ns: e for e in events if isinstance(e, JointSample)}

@@ -36,7 +36,7 @@ def robot(tmp_path_factory):
 def _imported(folder, robot, **columns):
     np.savez(folder / 'log.npz', t=T, q=Q[:, None], q_des=TARGET[:, None], **columns)
     words = ['import', str(folder / 'log.npz'), '--robot', robot, '--out', str(folder)]
-    return main(words), folder / 'log.mcap'
+    return main([*words, '--force']), folder / 'log.mcap'
 
 
 @pytest.fixture(scope='module')

@@ -27,7 +27,7 @@ def machine(tmp_path_factory):
         MJCF.replace('frictionloss="0.3"', 'frictionloss="0.5"').format(armature=0)
     )
     words = ['simulate', str(folder / 'machine.xml'), '--duration', '10', '--out', str(folder)]
-    assert main(words) == 0
+    assert main([*words, '--force']) == 0
     return folder / 'machine.mcap'
 
 

@@ -402,9 +402,17 @@ def test_the_proof_tells_near_from_far_with_intervals_and_roll_outs():
         'On real_test, the rms error of shoulder is 30 % of its travel for the nominal robot'
         in text
     )
-    assert 'and 2 % for the final model' in text
+    assert 'and 2 % of it for the final model' in text
     assert 'learned from 40, real_test 40 (3 left out' in text
     assert 'real_test 1 (0.9 to 1.1) and -2 nat' in text
+
+
+def test_an_effect_far_above_the_mismatch_says_that_others_cancel_it():
+    """A share of 15 % where 1.5 % was left would look like an error of the page."""
+    said = 'more than the nominal robot leaves: other effects or bodies cancel part of it'
+    for share, is_said in ((50.0, True), (1e-3, False)):
+        found = diagnosis('missing_physics', [replace(COULOMB, share=share)])
+        assert (said in _text(render(found, {}))) == is_said
 
 
 def test_a_proof_without_roll_outs_has_no_column_for_them():

@@ -14,6 +14,7 @@ from sgp_ros.report.figures import History
 from sgp_ros.report.files import replacing_results, write_bytes, write_text
 from sgp_ros.report.html import verdict, write_report
 from sgp_ros.report.metrics import Timing, collect_metrics
+from sgp_ros.report.page import typeset
 from test.engine.worlds import PENDULUM, START_NS, TRUTH, config, pendulum_events
 from test.report.pages import content_of
 
@@ -151,3 +152,9 @@ def test_a_run_that_fails_removes_nothing(tmp_path):
     assert (tmp_path / 'friction.png').exists()
     _write_results(tmp_path, 'report.html')
     assert not (tmp_path / 'friction.png').exists()
+
+
+def test_units_are_written_with_their_signs_and_joints_keep_their_names():
+    """`m2` behind another unit is a unit, alone it may be a joint."""
+    said = typeset('m2: inertia 0.02 +- 0.01 kg m2, drag 1 N m s2/rad2')
+    assert said == 'm2: inertia 0.02 ± 0.01 kg m², drag 1\u00a0N\u00a0m s²/rad²'

@@ -31,12 +31,13 @@ _MARGIN = 1e-4
 _SMALLEST = '1e-9'
 
 
-def write_mjcf(handed: Handover, origin: Path | None) -> tuple[str, list[str]]:
+def write_mjcf(handed: Handover, origin: Path | None, out: Path) -> tuple[str, list[str]]:
     """Return the text of an MJCF file, and what it cannot say.
 
     Args:
         handed: the robot.
         origin: MJCF file that it came from; None for one made from the URDF.
+        out: folder that the text is written to, from which it finds its meshes.
 
     Raises:
         ConfigError: MuJoCo is missing, or the file is no longer that of the robot.
@@ -45,8 +46,6 @@ def write_mjcf(handed: Handover, origin: Path | None) -> tuple[str, list[str]]:
     try:
         if origin is not None:
             spec = library.MjSpec.from_file(str(origin))
-            for key in ('meshdir', 'texturedir'):  # found from wherever the new file is
-                setattr(spec, key, str((origin.parent / getattr(spec, key)).resolve()))
         else:
             spec = library.MjSpec.from_string(_compiled_urdf(handed))
             spec.option.timestep = _STEP_S
@@ -59,6 +58,11 @@ def write_mjcf(handed: Handover, origin: Path | None) -> tuple[str, list[str]]:
             _add_followers(library, spec, handed)
         spec.option.gravity = _gravity(handed, spec, is_original=origin is not None)
         spec.compile()
+        if origin is not None and (spec.meshes or spec.textures or spec.hfields or spec.skins):
+            spec.modelfiledir = str(out.resolve())
+            for key in ('meshdir', 'texturedir'):
+                place = (origin.parent / getattr(spec, key)).resolve()
+                setattr(spec, key, _seen_from(out.resolve(), place))
         text: str = spec.to_xml()
     except (ValueError, KeyError) as error:
         where = 'the URDF' if origin is None else origin.name
@@ -69,6 +73,13 @@ def write_mjcf(handed: Handover, origin: Path | None) -> tuple[str, list[str]]:
     held = [x for x in HELD if x != 'gain' or not handed.has_targets]
     lag = [] if handed.has_targets else ['lag']
     return text, [*left, *handed.left_out([*held, *lag])]
+
+
+def _seen_from(folder: Path, place: Path) -> str:
+    """Return a path that leads from one place to another; both are absolute."""
+    above = [folder, *folder.parents]
+    steps = next(i for i, x in enumerate(above) if place.is_relative_to(x))
+    return str(Path(*('..',) * steps, place.relative_to(above[steps])))
 
 
 def _compiled_urdf(handed: Handover) -> str:
