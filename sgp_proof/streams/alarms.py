@@ -6,6 +6,10 @@ Simulated reaction wheels with encoders, through the whole engine in the setting
 undisturbed stretch counts false alarms, for several rates that are asked for; an alarm of any
 joint counts. Then the motor loses a third of its gain for two seconds, again and again: the engine
 is told more than the wheel gets.
+
+A rate of one an hour takes many hours to see. These are of linear axes whose motion and measured
+effort are written down, so that an hour takes a minute: with cogging that the model lacks and Z
+has to learn, noise and an encoder, each on a motion of its own, through the whole engine too.
 """
 
 from __future__ import annotations
@@ -13,10 +17,12 @@ from __future__ import annotations
 import json
 import math
 
+import numpy as np
+
 from sgp_proof.result_files import ROOT, make_parser, write_result
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
-from sgp_ros.engine.samples import CommandSample, JointSample
+from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.recordings.model_files import load_parameters
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.ros.fit_health import FitHealth
@@ -27,6 +33,8 @@ ASKED = (1.0, 10.0, 100.0)
 LEAST_S, WARM_UP_S = 0.3, 60.0
 EVERY_S, LASTING_S, GAIN = 30.0, 2.0, 1.5
 ROBOT = 'reaction_wheel'
+AXIS, RATE_HZ, AXIS_H = 'linear_axis', 50.0, 2.0
+"""Robot of the long streams, states a second, and hours of each."""
 
 
 class Run:
@@ -59,7 +67,63 @@ class Run:
 
     def alarms(self, asked):
         """Return the number of alarms so far, of all joints."""
-        return sum(monitor.alarms for monitor in self.health[asked].monitors)
+        return alarms_of(self.health[asked])
+
+
+def alarms_of(health):
+    """Return the number of alarms of all joints."""
+    return sum(monitor.alarms for monitor in health.monitors)
+
+
+def axis_motion(rng, t):
+    """Return position [m] and effort [N] of an axis on a sum of sines, at times t (n,) [s]."""
+    rate, phase = 2.0 * np.pi * rng.uniform(0.1, 0.7, 3), rng.uniform(0.0, 2.0 * np.pi, 3)
+    angle = t[:, None] * rate + phase
+    q = 0.05 * np.sin(angle).sum(axis=1)
+    v, a = 0.05 * np.cos(angle) @ rate, -0.05 * np.sin(angle) @ rate**2
+    effort = 95.0 * a + 200.0 * v + 20.0 * np.tanh(v / 1e-3) + 5.0 * np.sin(60.0 * q)
+    return np.round(q / 1e-6) * 1e-6, effort + 0.5 * rng.standard_normal(len(t))
+
+
+def undisturbed(seed, hours):
+    """Return false alarms of one axis by the rate asked for, after the warm-up."""
+    robot, rng = load_robot(AXIS), np.random.default_rng(seed)
+    values = {
+        **load_parameters(ROOT / 'config' / f'{AXIS}.yaml'), 'refit.enabled': False,
+        'filter.window': 0.2, 'filter.hop': 0.1, 'buffer.budget': 60,
+    }  # fmt: skip
+    engine = Engine(robot, EngineConfig.from_mapping(values, robot))
+    health = {x: FitHealth(len(robot.joints), LEAST_S, x) for x in ASKED}
+    t = np.arange(round((WARM_UP_S + 3600.0 * hours) * RATE_HZ)) / RATE_HZ
+    before = dict.fromkeys(ASKED, 0)
+    for now, q, effort in zip(t, *axis_motion(rng, t), strict=True):
+        sample = JointSample(
+            round(now * 1e9), robot.joint_names, frozen_array([q]), None, frozen_array([effort])
+        )
+        estimates = engine.push(sample).estimates
+        for asked in ASKED:
+            health[asked].take(estimates, robot)
+            if now < WARM_UP_S:
+                before[asked] = alarms_of(health[asked])
+    return {asked: alarms_of(health[asked]) - before[asked] for asked in ASKED}
+
+
+def long_streams(axes, hours):
+    """Return false alarms by the rate asked for, of each axis and of all."""
+    found = []
+    for seed in range(axes):
+        found.append(undisturbed(seed, hours))
+        print(AXIS, seed, json.dumps(found[-1]), flush=True)
+    return {
+        'robot': AXIS, 'axes': axes, 'hours': axes * hours,
+        'rates': {
+            str(asked): {
+                'false_alarms': [each[asked] for each in found],
+                'false_an_hour': sum(each[asked] for each in found) / (axes * hours),
+            }
+            for asked in ASKED
+        },
+    }  # fmt: skip
 
 
 def measure(seed, undisturbed_s, disturbed_s):
@@ -91,6 +155,7 @@ def main():
     parser = make_parser(__doc__, 'alarms')
     parser.add_argument('--seeds', type=int, default=12)
     parser.add_argument('--minutes', type=float, default=10.0)
+    parser.add_argument('--axes', type=int, default=12, help=f'long streams of {AXIS_H:g} h each')
     arguments = parser.parse_args()
     false, delays = dict.fromkeys(ASKED, 0), {asked: [] for asked in ASKED}
     for seed in range(arguments.seeds):
@@ -111,6 +176,7 @@ def main():
             for asked in ASKED
         },
     }  # fmt: skip
+    result['long'] = long_streams(arguments.axes, AXIS_H)
     write_result(arguments.out, result, schema=1)
 
 
