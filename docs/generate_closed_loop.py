@@ -27,9 +27,9 @@ joint are right and every number is to 15 % or within three standard deviations.
 
 Of {count} components in {with_hidden} worlds, **{named} are named**; everything is right in {all_named} of these worlds;
 {spurious} of {worlds} worlds have something asserted that is not there. The number of worlds is small: the page says what was
-measured, and no more. The aim, nine of ten components, is {aim}; an interval of 95 % (Clopper and Pearson) reaches from {low} %
-to {high} %. Worlds 0 to 11, 19 and 21 are those on which misses of earlier states were looked at and mended, so what is said of
-them flatters: of the {fresh} components in the other worlds, {fresh_named} are named.
+measured, and no more. The target, nine of ten components, is {aim}; an interval of 95 % (Clopper and Pearson) reaches from {low} %
+to {high} %. Worlds 0 to 11, 19 and 21 were used to find and correct misses of earlier versions, so their scores are
+optimistic: of the {fresh} components in the other worlds, {fresh_named} are named.
 
 | component | named |
 |---|---|
@@ -41,27 +41,27 @@ _TAIL = """
 |---|---|---|---|---|
 {rows}
 
-## What to know
-* **Gains and a delay.** As long as a delay of the targets is there, the gains of every drive look wrong. So a search for errors
-  of the connection begins with the delay where that is worth its price; the delay stays and is named as physics. The comparison of
-  physics begins once more from the delay with what every joint has: a late target looks like viscous friction and rotors everywhere.
-* **Gains and bodies.** Where no effort is measured, gains and bodies of twice the size move alike. Gains are therefore looked for
-  with the bodies of the robot's file first, beside rotors and dry friction.
+## Limits, and how such logs are treated
+* **Gains and a delay.** As long as the targets are delayed, the gains of every drive look wrong. So the search for set-up errors
+  begins with the delay where that is worth its price; the delay is kept and named as physics. The comparison of physics also starts
+  from the delay together with what every joint has, because a late target looks like viscous friction and rotors at all joints.
+* **Gains and bodies.** Where no effort is measured, doubling both gains and bodies does not change the motion. Gains are therefore
+  first searched with the bodies of the robot file, together with rotors and dry friction.
 * **Gains beside a delay in slow motion.** A delay that is shorter by d, with `kd'/kp' = kd/kp + d` and
-  `kp' = M/(M/kp + d kd/kp + d^2/2)`, moves alike to second order, so that motion much slower than the loop hardly tells the two
-  apart. All numbers are searched at once, with and without each error, and the intervals are those with all others free: in such
-  motion they are wide. Of gains it is expected that they are stated rightly to a factor of e^0.5.
-  Where a single joint has both, they are still missed (worlds 21 and 405; in 21 a rotor is named that is not there, and the gains
-  have wrong numbers).
-* **kd and viscous friction** are one law where the log has no target of the velocity. Where `kp` is as stated, the answer is viscous
-  friction; where it is not, the drive. A motor that multiplies all it is asked for is named as gains.
-* **Held targets at 50 Hz.** A target that jumps every h shakes a stiff drive between the samples, and samples at the rate of the
-  targets meet this ripple at one phase always, where it looks like a later or earlier target: by some hundredths of h. The
-  ripple follows from gains and bodies, and is taken off (`physics/ripple.py`) where one recording has targets and states at one
-  rate, and a motor at every joint. Two worlds at 50 Hz with nothing concealed (500 and 503) said `unexplained` and
+  `kp' = M/(M/kp + d kd/kp + d^2/2)`, gives the same motion to second order, so motion much slower than the loop hardly tells the
+  two apart. All numbers are searched at once, with and without each error, and each interval allows for the uncertainty of all
+  others: in such motion they are wide. The prior for stated gains is a factor of e^0.5.
+  **It still fails** where a single joint has both (worlds 21 and 405; in 21 a rotor is named that does not exist, and the gains
+  are wrong).
+* **kd and viscous friction** are the same law where the log has no velocity target. If `kp` is as stated, the answer is viscous
+  friction; if not, the gains of the drive. A motor with a wrong torque constant is named as wrong gains.
+* **Held targets at 50 Hz.** A target that jumps every h excites a stiff drive between the samples. Samples at the rate of the
+  targets always see this ripple at the same phase, where it looks like a target that is later or earlier by some hundredths of h.
+  The ripple follows from gains and bodies, and is subtracted (`physics/ripple.py`) where one recording has targets and states at the
+  same rate, and a motor at every joint. Two worlds at 50 Hz with nothing concealed (500 and 503) said `unexplained` and
   `missing_physics` before, and say `no_mismatch` now; the table above was measured before
-  this, and before physics was compared from a delay of the targets too. Targets that the drive interpolates
-  have no such ripple, and are not known as such.
+  this, and before physics was also compared starting from a delay of the targets. Targets that the drive interpolates
+  have no such ripple; this is not recognised.
 * **Drives with a slow clock.** A drive that computes once a step of h, and not continuously, acts h/2 late: viscous friction comes
   out too small by about kp h/2 and a rotor by kd h. With stiff gains and h of 0.25 ms, that was a sixth of a rotor in earlier worlds.
 """

@@ -16,7 +16,7 @@ PICTURES = Path(__file__).parent / 'images' / 'effects'
 _HEAD = """# Effects
 
 The {count} effects that a robot may have beside its rigid bodies. `sgp diagnose` names them, a robot YAML
-states them under `effects`, `sgp simulate` has them. This page is written by `docs/generate_effects.py` from
+states them under `effects`, `sgp simulate` can add them. This page is written by `docs/generate_effects.py` from
 the catalogue in `sgp_ros/physics`.
 
 Signs are those of a generalised force: `M a + h = tau + tau_x`, so friction has positive numbers. `q`, `v` and
@@ -27,7 +27,7 @@ Each picture shows the force along one swing of an arm of two joints, over the v
 over; its numbers are an example.
 
 ## Laws of your own
-What no effect says is written down as a formula, in the robot YAML:
+A force that no effect describes is stated as a formula in the robot YAML:
 
 ```yaml
 effects:
@@ -42,12 +42,12 @@ effects:
 
 - `formula` is the force `tau_x` on the joint, of `q[J]`, `dq[J]`, `ddq[J]`, `tau[J]` of any joint, the time `t`,
   numbers and parameters, with `+ - * / **`, {functions}.
-  `lag(x, T)`, `play(x, width)` and `delay(x, T)` remember. A name that is no plain word stands in quotes:
+  `lag(x, T)`, `play(x, width)` and `delay(x, T)` have a memory. Names with other signs than letters, digits and _ are quoted:
   `q["arm-1"]`.
-- A parameter with `start` is sought: `sgp diagnose` tries the law beside all effects, within `range`, and names it
-  only where it earns its price. With `value` for all parameters, and perhaps `std`, the law is a part of the robot. A
-  `value` among starts is a constant.
-- Units are checked: angles have none, and what has one needs a name (`tanh(dq[elbow]/v0)`, not `/0.05`). `sgp effects
+- A parameter with `start` is estimated: `sgp diagnose` tries the law beside all effects, within `range`, and names it
+  only where it earns its price. With `value` for all parameters, and optionally `std`, the law is part of the robot. A
+  `value` beside parameters with `start` is a constant.
+- Units are checked: angles have none, and a constant that has one needs a name (`tanh(dq[elbow]/v0)`, not `/0.05`). `sgp effects
   --robot ROBOT` lists what a robot states.
 - A found law stands in `diagnosis.json` with `"effect": "law"` and its formula, and in `robot_diagnosed.yaml` with its
   values, for replay, node and simulation.

@@ -20,12 +20,12 @@ installed, then beside and above the folder of the file that names it. Meshes of
 MuJoCo wants those of an MJCF where the file says they are.
 
 What a file states becomes a robot YAML: bodies, damping and dry friction stand in its URDF, other physics under
-`effects`, gains of drives under `gains`. Nothing is left out silently: each thing without a place here is named in
-a remark, with the joints or bodies that it is about. A xacro file is a program, expanded with its default
+`effects`, gains of drives under `gains`. Nothing is left out silently: everything that cannot be represented is named in
+a remark, with its joints or bodies. A xacro file is a program, expanded with its default
 arguments by the package `xacro`, as ROS does.
 
-With `--sim FILE` the machine is compared with what the file states: bodies are those of the file, and all else,
-damping and dry friction included, counts from these alone on both sides, so that the numbers stand side by side.
+With `--sim FILE` the machine is compared with the model in the file: the bodies are those of the file, and all other effects,
+damping and dry friction included, are counted from these bodies on both sides, so that the numbers can be compared.
 
 This page is written by `docs/generate_model_files.py` from
 the readers in `sgp_ros/robots/models`.
@@ -43,7 +43,7 @@ def text() -> str:
     for name, read, left, refused in _FORMATS:
         parts += [f'## {name}', '', '| in the file | becomes |', '|---|---|']
         parts += [f'| {what} | {becomes} |' for what, becomes in read]
-        parts += ['', 'Remarks on what has no place:', '']
+        parts += ['', 'Remarks on what cannot be represented:', '']
         parts += [f'* {said.rstrip(".")}.' for said in left.values()]
         parts += ['', f'Refused: {"; ".join(refused)}.', '']
     return '\n'.join(parts)

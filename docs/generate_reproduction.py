@@ -33,13 +33,13 @@ a squared exponential of the paper's inputs with one length scale each.
 
 {tables}
 
-![toy pendulum, figure 2](images/reproduction_fig2.png)
-![reaction wheel, figure 4](images/reproduction_fig4.png)
-![reaction wheel, figure 5](images/reproduction_fig5.png)
-![ten coefficients, figure 7](images/reproduction_fig7.png)
-![arm, figure 8](images/reproduction_fig8.png)
-![arm, figure 9](images/reproduction_fig9.png)
-![calibration on the reaction wheel](images/reproduction_calibration.png)
+![Figure 2, toy pendulum: acceleration over position. PRGP and SGP follow the truth where data are dense, with both jumps near 2 and 2.5 rad, and stay near it where six samples are all there is](images/reproduction_fig2.png)
+![Figure 4, reaction wheel: nMSE by method on a logarithmic scale. With the pole down all methods with a process are far below PR; with the pole up GP and PRGP are worse than a constant, SGP is lowest by far](images/reproduction_fig4.png)
+![Figure 5, reaction wheel, pole up: acceleration of the wheel over 3 s. PR and SGP lie on the truth, GP is far below it](images/reproduction_fig5.png)
+![Figure 7, ten coefficients: acceleration of the pole over 3 s by PR, GP and SGP. All three follow the truth; PR and GP deviate slightly near the extremes](images/reproduction_fig7.png)
+![Figure 8, arm: figure-of-eight paths of the tool, horizontal and vertical, and how often joint 3 is at each position, with its dry friction, which rises towards both limits](images/reproduction_fig8.png)
+![Figure 9, arm: nMSE by method and joint. At joint 3 SGP is lowest for the horizontal and the vertical path, PR is far higher, GP fails at all joints](images/reproduction_fig9.png)
+![Share of measurements inside an interval over its stated level. With the pole down all methods are on the diagonal; with the pole up only SGP is, PR is far above, GP and PRGP are far below](images/reproduction_calibration.png)
 
 ## Claim by claim
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from sgp_ros.engine.config import EngineConfig
+from sgp_ros.engine.fitting import ROWS, TOGETHER
 from sgp_ros.engine.gate import LARGEST
 
 ROOT = Path(__file__).parents[1]
@@ -62,13 +63,13 @@ def _still(rows):
 
 def _many(result):
     lines = [
-        '| rate [Hz] | processor per second of data [s] | in the second half [s] | longest step [s] | median nMSE |',
-        '|---|---|---|---|---|',
+        '| rate [Hz] | processor per second of data [s] | of it for fits [s] | in the second half [s] | longest step, fit [s] | median nMSE |',
+        '|---|---|---|---|---|---|',
     ]
     for name, x in result['runs'].items():
         lines.append(
-            f'| {name.removesuffix("Hz")} | {x["load"]:.2f} | {x["load_later"]:.2f} | '
-            f'{x["longest_step_s"]:.2f} | {x["nmse_median"]:.1e} |'
+            f'| {name.removesuffix("Hz")} | {x["load"]:.2f} | {x["load_of_fits"]:.2f} | '
+            f'{x["load_later"]:.2f} | {x["longest_step_s"]:.2f}, {x["longest_fit_s"]:.1f} | {x["nmse_median"]:.1e} |'
         )
     return '\n'.join(lines)
 
@@ -111,9 +112,9 @@ def text() -> str:
     gate_time, summary = _load('robust_gate_time'), gates['summary']
     rate = summary['falsely_refused'] / summary['equations']
     machine = events['environment']
-    period = next(x.default for x in fields(EngineConfig) if x.name == 'refit_period')
+    known = {x.name: x.default for x in fields(EngineConfig)}
+    period, budget = known['refit_period'], known['buffer_budget']
     many = _load('many_joints')
-    evaluation = max(x['evaluation_s'] for x in many['runs'].values())
     return TEMPLATE.read_text(encoding='utf-8').format(
         EVENTS=events['events'], EVENT_RUNS=len(events['runs']), EVENT_FAULTS=_faults(events),
         EVENT_MB=events['peak_megabytes'], EVENT_COUNTS=_table('event', events['counts']),
@@ -123,7 +124,8 @@ def text() -> str:
         LARGEST=f'{LARGEST:g}', BOUND=f'{1e2 / LARGEST**2:.2g}', STREAMS=len(gates['clean']),
         GARBAGE=_garbage(gates['garbage']), STILL=_still(gates['garbage']),
         MANY=_many(many), MANY_JOINTS=many['joints'], MANY_COEFFICIENTS=many['coefficients'],
-        MANY_S=many['data_s'], EVALUATION=f'{evaluation:.1f}', PERIOD=period,
+        MANY_S=many['data_s'], PERIOD=period, FITTED=ROWS // budget, TOGETHER=TOGETHER,
+        ELAPSED=f'{max(x["elapsed_per_s"] for x in many["runs"].values()):.1f}',
         MESSAGES=messages['messages'],
         MESSAGE_FAULTS=_faults(messages), MESSAGE_MB=messages['peak_megabytes'],
         GATE_TIME=_gate_time(gate_time), KILLS=kills['number'], KILL_FAULTS=_faults(kills), KILL_COUNTS=_kills(kills),

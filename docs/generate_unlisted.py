@@ -14,10 +14,10 @@ RESULTS = ROOT / 'sgp_proof/results/unlisted.json'
 WITHHELD = ROOT / 'sgp_proof/results/withheld.json'
 NO_LAW = ROOT / 'sgp_proof/results/no_law.json'
 ELASTIC = ROOT / 'sgp_proof/results/elastic.json'
-_HEAD = """# Laws that no list has
+_HEAD = """# Unlisted laws
 
-Where the effects of [effects.md](effects.md) leave something, or say only nearly what is there, `sgp diagnose`
-looks for a law: first a force without form, then a formula for it, or it says why there is none.
+If the effects of [effects.md](effects.md) leave something unexplained, or describe it only approximately, `sgp diagnose`
+searches for a law: first the shape of the force without a formula, then a formula for it. If none is asserted, it says why.
 
 ## Where it fails
 
@@ -26,14 +26,14 @@ looks for a law: first a force without form, then a formula for it, or it says w
 ## Measured
 
 {worlds} worlds of {families} families, drawn from `sgp_proof/concealed`,
-tier A (little noise), of {sealed} that were sealed; in {lawless} of them the disturbance is no function of the motion. Their answers were sealed by
-their hashes (`sgp_proof/results/unlisted_hashes.json`) before the first score. Those without a score were not diagnosed
-for want of time, in the order of their numbers. The scores are from before listed effects beside a formula had to earn
-their price again.
+tier A (little noise), of {sealed} that were sealed; in {lawless} of them the disturbance is not a function of the motion. The hashes of the answers
+(`sgp_proof/results/unlisted_hashes.json`) were committed before the first score. Worlds without a score were not diagnosed
+for lack of time; they were taken in the order of their numbers. The scores are older than the rule that listed effects beside a
+formula must earn their price again.
 
 How blind this is: the search was developed on the ten families of `sgp_proof/concealed/unknown.py`, and the families
-here are others. But whoever wrote the search wrote these too: the magnetic brake is also the example of a test, and that
-an exponential may have a constant beside it was added once the families were written down, before any was scored.
+here are different ones. But both were written by the authors of the search: the magnetic brake is also the example of a test, and
+the exponential with a constant was added to the formulas after the families were written down, before any was scored.
 
 | | share |
 |---|---|
@@ -43,17 +43,17 @@ an exponential may have a constant beside it was added once the families were wr
 
 {table}
 
-These are few worlds: of {worlds} a rate of zero still admits {upper:.0f} % at 95 %.
+These are few worlds: even if none of {worlds} had failed, a rate of {upper:.0f} % would still be possible at 95 %.
 
 ```bash
 python -m sgp_proof.concealed.draw --seeds {seeds} --tier A --only unlisted --out out/unlisted
 python -m sgp_proof.concealed.unlisted out/unlisted
 ```
-A tool of another kind enters by the same files: it writes `out/CASE/diagnosis.json` with the verdict and findings of
+Another tool can be scored with the same files: it writes `out/CASE/diagnosis.json` with the verdict and findings of
 effect `law`, formula and parameters, and `out/CASE/outcome.json` to say that it has run.
 
-A second set waits: {second} worlds of {second_families} families, of which {second_known} are a shape that the search tries, and two
-remember. They were written down and sealed before anything of them was diagnosed; none is scored yet.
+A second set is prepared and not scored yet: {second} worlds of {second_families} families, of which {second_known} have a shape that the search
+tries, and two have a memory. They were written down and sealed before any of them was diagnosed.
 
 ```bash
 python -m sgp_proof.concealed.draw --seeds 20800:20826 --tier A --only unlisted --out out/second
@@ -62,8 +62,8 @@ python -m sgp_proof.concealed.unlisted out/second --name unlisted_second
 
 ## Where there is no law
 
-{lawless_worlds} worlds of tier {lawless_tier} whose robot is as the file says behind noisy sensors, has wrong bodies, or feels a force that
-wanders in time. Asserted in them:
+{lawless_worlds} worlds of tier {lawless_tier} in which the robot matches its file behind noisy sensors, has wrong bodies, or is disturbed by a force
+that drifts in time. What was asserted in them:
 
 | | worlds | a law | any name | at 95 % at most |
 |---|---|---|---|---|
@@ -75,7 +75,7 @@ python -m sgp_proof.concealed.no_law --tier {lawless_tier} --numbers {lawless_nu
 
 ## Elastic joints
 
-A spring between motor and link hides a state, and has a name: [`joint_elasticity`](effects.md#joint_elasticity). {elastic_worlds} worlds of
+A spring between motor and link adds a hidden state. It is a listed effect, [`joint_elasticity`](effects.md#joint_elasticity). {elastic_worlds} worlds of
 tier A, with the encoder on either side:
 
 | | worlds | named | side of the encoder right, of those named | something else asserted | error of the stiffness, median |
@@ -84,8 +84,8 @@ tier A, with the encoder on either side:
 
 {elastic_missed}
 
-The first four were looked at while the law was written. A diagnosis states no least elasticity that a recording would
-show, and a node does not take the law over: it says so.
+The first four were used while the law was written. A diagnosis does not state the smallest elasticity that a recording would
+have shown, and a node does not model the law; it says so.
 
 ```bash
 python -m sgp_proof.concealed.elastic --seeds {elastic_seeds} --worlds out/elastic
@@ -102,19 +102,19 @@ python -m sgp_proof.real.withheld out/learn.mcap --test out/test.mcap --name tfl
 The recordings are made as [its page](real_machines/tflex.md) says.
 
 ## How it is found
-- **A rival without form.** At each joint that is unexplained or has named effects, a cubic spline of one variable (the
+- **A rival without a formula.** At each joint that is unexplained or has named effects, a cubic spline of one variable (the
   position or velocity of any joint) times a factor (1, the sign of the velocity, the velocity, its square, the
-  motor's torque) is fitted jointly with bodies and other joints, in place of effects and beside them. It pays
-  for each of its coefficients. Where it is worth more than the named effects, and leaves less than a third of what
-  they leave, these are not asserted.
+  motor's torque) is fitted jointly with bodies and other joints, in place of effects and beside them. Each of its
+  coefficients has a price. Where it is worth more than the named effects, and leaves less than a third of what
+  they leave, these effects are not asserted.
 - **Formulas.** The shapes of `diagnosis/unlisted/formulas.py` in that variable, times that factor, are fitted as every
   model is. Each piece of a formula has a price.
-- **Listed effects beside a formula** were chosen before it was known: in the best models each of them has to earn its
-  price again, or goes.
+- **Listed effects beside a formula** were chosen before the formula was known: in the best models each of them must earn its
+  price again, or is removed.
 - **Asserted** is a formula that is worth more than the spline and all listed effects, leaves no more than a
-  finer spline does (F test), predicts parts left out, has no number at the end of its range, is finite over the range
-  of the joints, and holds at least {least:.0f} % of the odds against formulas that would say something else in a motion
-  wider, faster or elsewhere.
+  finer spline does (F test), predicts parts left out, has no parameter at a bound of its range, is finite over the range
+  of the joints, and has at least {least:.0f} % of the probability against formulas that would predict something else in a wider or
+  faster motion, or elsewhere.
 - Otherwise the verdict is `unexplained`. `law_search` in `diagnosis.json` then has the shape with its band, the best
   formulas with what they leave, one sentence in words, and why none is asserted.
 
