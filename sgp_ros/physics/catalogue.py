@@ -18,6 +18,7 @@ from sgp_ros.physics import (
     friction_drift,
     loads,
     memory,
+    mount,
     sensing,
 )
 from sgp_ros.physics.effect import Effect
@@ -76,6 +77,7 @@ EFFECTS: dict[str, Effect] = {
         coupled.CoupledFriction(),
         actuation.MotorSpeedLimit(),
         elasticity.JointElasticity(),
+        mount.MountElasticity(),
     )
 }
 

@@ -82,15 +82,23 @@ def _behind(x: np.ndarray, time_constant: complex, step: float) -> np.ndarray:
     return y
 
 
-def _resonator(u: np.ndarray, a: float, b: float, step: float) -> np.ndarray:
-    """Return y of `a y'' + b y' + y = b u' + u` by partial fractions; it starts settled."""
+def resonator(
+    u: np.ndarray, a: float, b: float, step: float, *, is_settled: bool = True
+) -> np.ndarray:
+    """Return y of `a y'' + b y' + y = b u' + u` by partial fractions.
+
+    It starts settled under the first u, or else at rest at 0.
+    """
     root = np.sqrt(complex(b * b - 4.0 * a))
     root = root if abs(root) > 1e-6 * abs(b) else complex(1e-6 * b)
     y = np.zeros(len(u), dtype=np.complex128)
     for sign in (1.0, -1.0):
         pole = (sign * root - b) / (2.0 * a)
         residue = (b * pole + 1.0) / (sign * root)
-        y += -residue / pole * _behind(u.astype(np.complex128), -1.0 / pole, step)
+        part = _behind(u.astype(np.complex128), -1.0 / pole, step)
+        if not is_settled:
+            part -= u[0] * np.exp(pole * step * np.arange(len(u)))
+        y += -residue / pole * part
     return y.real
 
 
@@ -190,7 +198,7 @@ class JointElasticity(Effect):
         if at.place.kind == 'motor':
             c *= (float(motion.mass_diagonal[:, j].mean()) - J) / J
         u = motion.effort[:, j]
-        parts = [x - _resonator(x, a, settling, motion.step)
+        parts = [x - resonator(x, a, settling, motion.step)
                  for x in np.split(u, motion.starts[1:])]  # fmt: skip
         return c / a * np.concatenate(parts)
 

@@ -16,7 +16,7 @@ import numpy as np
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.parts import SIDES, Quantity, Value
-from sgp_ros.simulation.mechanism import SimulatedJoint
+from sgp_ros.simulation.mechanism import Mechanism, SimulatedJoint
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,17 +154,20 @@ Build = Callable[[tuple['SimulatedJoint', ...], int, 'Mapping[str, Value]'], tup
 class Law:
     """What the simulation does for an effect of the catalogue.
 
-    It either acts by what `build` returns or changes physical parameters of the mechanism.
+    It either acts by what `build` returns or changes the mechanism.
 
     Attributes:
         build: the actions; None for an effect that changes physical parameters.
         physical: physical parameter of the mechanism by parameter of the effect, to be added to.
+        changed: from mechanism and values to a mechanism with coordinates that no controller
+            knows of; None for no change.
         ordered: two parameters of which the first must be the smaller; empty for none.
         own: parameters that only the simulation has.
     """
 
     build: Build | None = None
     physical: Mapping[str, str] = field(default_factory=dict)
+    changed: Callable[[Mechanism, Mapping[str, Value]], Mechanism] | None = None
     ordered: tuple[str, ...] = ()
     own: tuple[EffectParameter, ...] = ()
 

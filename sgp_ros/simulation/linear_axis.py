@@ -41,6 +41,11 @@ class LinearAxis:
         force = np.array([-self.viscosity * velocity[0] - self.offset])
         return np.array([[1.0 / self.mass]]), force
 
+    @property
+    def hidden(self) -> tuple[float, ...]:
+        """Nothing moves that no encoder shows."""
+        return ()
+
     def drive(self, command: np.ndarray, velocity: np.ndarray) -> np.ndarray:  # noqa: ARG002 - a force source
         """Return the force `command` (1,) itself, (1,) [N]."""
         return command

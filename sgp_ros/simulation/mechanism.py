@@ -72,6 +72,10 @@ class Mechanism(Protocol):
         The first is (k, k) [1/(kg m^2) or 1/kg], the second (k,) [N m or N].
         """
 
+    @property
+    def hidden(self) -> tuple[float, ...]:
+        """Where coordinates rest that follow the k joints and that no encoder shows."""
+
     def drive(self, command: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return the forces of the motors under `command` (m,), (k,) [N m or N]."""
 

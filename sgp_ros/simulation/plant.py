@@ -28,7 +28,7 @@ class Inputs:
 
     Attributes:
         command: (m,) in force [unit of the command].
-        noise: (k,) force of the surroundings [N m or N].
+        noise: force of the surroundings on the joints, (k,) [N m or N].
     """
 
     command: np.ndarray
@@ -59,13 +59,14 @@ class Plant:
 
     Args:
         mechanism: the equation of motion.
-        k: number of joints.
+        k: number of joints with encoders; hidden coordinates of the mechanism follow them.
         actions: the effects; those on the current, then those behind it act in this order.
     """
 
     def __init__(self, mechanism: Mechanism, k: int, actions: Iterable[Action]) -> None:
         self.mechanism = mechanism
-        self.k = k
+        self._shown = k
+        self.k = k = k + len(mechanism.hidden)
         ends = 2 * k
         pairs: list[tuple[Action, slice]] = []
         for action in sorted(actions, key=_place):
@@ -98,7 +99,9 @@ class Plant:
             if action.start
             for x in action.start(position[action.joint], velocity[action.joint])
         ]
-        return np.array([*position, *velocity, *memories], dtype=np.float64)
+        hidden = self.mechanism.hidden
+        states = [*position, *hidden, *velocity, *np.zeros(len(hidden)), *memories]
+        return np.array(states, dtype=np.float64)
 
     def derivative(
         self,
@@ -192,7 +195,7 @@ class Plant:
 
     def shown(self, time_s: float, y: np.ndarray, command: np.ndarray) -> Shown:
         """Return what sensors without noise show from now on under `command` (m,)."""
-        inputs = Inputs(command, np.zeros(self.k))
+        inputs = Inputs(command, np.zeros(self._shown))
         rate = self.derivative(time_s, y, inputs, self.directions(time_s, y, inputs))
         effort = self.mechanism.drive(command, y[self.k : 2 * self.k])
         effort = self._through(self._currents, time_s, y, effort, None)
@@ -206,7 +209,7 @@ class Plant:
                 acceleration[joint] = (later[joint] - earlier[joint]) / (2.0 * _SHORT_S)
             if action.sense_velocity is not None:
                 measured[joint] = action.sense_velocity(self._moment(time_s, y, effort, part))
-        return Shown(q, v, acceleration, measured, effort)
+        return Shown(*(x[: self._shown] for x in (q, v, acceleration, measured, effort)))
 
     def _encoders(
         self, time_s: float, y: np.ndarray, drive: np.ndarray
@@ -237,7 +240,8 @@ class Plant:
         drive = self.mechanism.drive(inputs.command, v)
         drive = self._through(self._currents, time_s, y, drive, rate)
         drive = self._through(self._behind, time_s, y, drive, rate)
-        force = force + drive + inputs.noise
+        force = force + drive
+        force[: self._shown] += inputs.noise
         for action, part in self._behind:
             if action.force is not None:
                 force[action.joint] += action.force(self._moment(time_s, y, drive, part))

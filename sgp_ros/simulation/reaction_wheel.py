@@ -119,6 +119,11 @@ class ReactionWheel:
         inverse_mass = np.array([[x, -x], [-x, x + 1.0 / self.wheel_inertia]])
         return inverse_mass, np.array([torque, -self.wheel_viscosity * velocity[1]])
 
+    @property
+    def hidden(self) -> tuple[float, ...]:
+        """Nothing moves that no encoder shows."""
+        return ()
+
     def drive(self, command: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return the motor torque under the voltage `command` (1,), (2,) [N m]."""
         voltage = command[0] - self.back_emf_constant * velocity[1]

@@ -12,6 +12,7 @@ from sgp_ros.simulation.linear_axis import LINEAR_AXIS
 from sgp_ros.simulation.reaction_wheel import REACTION_WHEEL
 from sgp_ros.simulation.simulator import Simulator
 from sgp_ros.simulation.toy_pendulum import TOY_PENDULUM
+from sgp_ros.simulation.tree import mounted
 
 SIMULATORS: dict[str, Simulator] = {
     simulator.name: simulator for simulator in (REACTION_WHEEL, TOY_PENDULUM, LINEAR_AXIS)
@@ -53,5 +54,6 @@ LAWS: dict[str, Law] = {
     'coupled_friction': Law(friction.coupled),
     'motor_speed_limit': Law(actuation.speed_limit),
     'joint_elasticity': Law(actuation.elasticity),
+    'mount_elasticity': Law(changed=mounted),
 }
 """Several effects in a motor act in this order, from the command to the joint."""

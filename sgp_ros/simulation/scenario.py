@@ -50,6 +50,15 @@ class Scenario:
     velocity: tuple[float, ...]
     unlisted: tuple[Action, ...] = ()
 
+    def moving(self) -> Mechanism:
+        """Return the mechanism with coordinates that no controller knows of."""
+        mechanism = self.mechanism
+        for effect in self.effects:
+            changed = checked_law(effect)[1].changed
+            if changed is not None:
+                mechanism = changed(mechanism, effect.parameters)
+        return mechanism
+
     def actions(self) -> tuple[Action, ...]:
         """Return what the built-in and the added effects do."""
         chosen = (*self.mechanism.built_in(), *self.effects)

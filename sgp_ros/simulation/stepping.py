@@ -103,7 +103,7 @@ class Simulation:
         seeds = np.random.SeedSequence(scenario.seed).spawn(4)
         self._process, self._sensing, controlling, self._timing = map(np.random.default_rng, seeds)
         actions = scenario.actions()
-        self._plant = Plant(scenario.mechanism, len(simulator.joints), actions)
+        self._plant = Plant(scenario.moving(), len(simulator.joints), actions)
         delays = [
             sum(round(1e9 * a.delay_s) for a in actions if simulator.joint_names[a.joint] == joint)
             for joint in simulator.command_joints
@@ -238,14 +238,18 @@ class Simulation:
     def _sample(
         self, shown: Shown, position: np.ndarray, velocity: np.ndarray | None
     ) -> SimulatedSample:
-        k, now_ns = len(self.joint_names), self.scenario.start_ns + self._time_ns
+        k, moving, now_ns = (
+            len(self.joint_names),
+            self._plant.k,
+            self.scenario.start_ns + self._time_ns,
+        )
         sample = SimulatedSample(
             now_ns,
             position,
             velocity,
             self._commands.latest,
             self._y[:k].copy(),
-            self._y[k : 2 * k].copy(),
+            self._y[moving : moving + k].copy(),
             shown.acceleration,
             shown.position,
             shown.velocity,

@@ -39,6 +39,11 @@ class ToyPendulum:
         torque = self.mass * self.gravity * self.length * math.sin(position[0])
         return np.array([[1.0 / (self.mass * self.length**2)]]), np.array([torque])
 
+    @property
+    def hidden(self) -> tuple[float, ...]:
+        """Nothing moves that no encoder shows."""
+        return ()
+
     def drive(self, command: np.ndarray, velocity: np.ndarray) -> np.ndarray:  # noqa: ARG002 - no motor
         """Return no torque, (1,) [N m]."""
         return np.zeros(1)

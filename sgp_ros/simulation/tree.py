@@ -8,8 +8,8 @@ off. The package's own model of a tree shares nothing with it but the reading of
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,9 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.optional import optional_package
 from sgp_ros.physics.catalogue import COULOMB_FRICTION
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.simulation.mechanism import TrueCoefficient, quantity
+from sgp_ros.physics.parts import Value
+from sgp_ros.simulation.mechanism import Mechanism, TrueCoefficient, quantity
+from sgp_ros.simulation.mount import MOUNT, Mount
 from sgp_ros.simulation.tree_text import TreePart, TreeText, read_tree
 from sgp_ros.simulation.tree_xml import plain_tree, tree_link
 
@@ -35,6 +37,7 @@ class Tree:
     Attributes:
         urdf: text of the file.
         part: what of it is simulated; None for all.
+        mount: what its base stands on; None for the ground.
         base_roll: of the base in the world, whose orientation is `Ry(pitch) Rx(roll)` [rad].
         base_pitch: likewise [rad].
         payload_mass: point mass on the last link [kg].
@@ -46,6 +49,7 @@ class Tree:
 
     urdf: str
     part: TreePart | None = None
+    mount: Mount | None = None
     base_roll: float = quantity(0.0, 'rad', 'roll of the base')
     base_pitch: float = quantity(0.0, 'rad', 'pitch of the base')
     payload_mass: float = quantity(0.0, 'kg', 'point mass on the last link')
@@ -75,7 +79,7 @@ class Tree:
         text = read_tree(self.urdf, self.part)
         payload = (self.payload_mass, self.payload_x, self.payload_y, self.payload_z)
         try:
-            model = library.MjModel.from_xml_string(plain_tree(text, payload))
+            model = library.MjModel.from_xml_string(plain_tree(text, payload, self.mount))
         except ValueError as error:
             raise _impossible(text.name, ' '.join(str(error).split())) from error
         off = library.mjtDisableBit
@@ -83,11 +87,14 @@ class Tree:
             model.opt.disableflags |= int(bit)
         model.opt.gravity[:] = _gravity(self.base_roll, self.base_pitch)
         names = [joint.name for joint in text.joints]
+        if self.mount is not None:
+            model.joint(MOUNT).stiffness[0] = self.mount.stiffness
+            names.append(MOUNT)
         motors = np.zeros((len(names), len(text.command_joints)))
         gains = self.gains(text.command_joints)
         for column, name in enumerate(text.command_joints):
             motors[names.index(name), column] = gains[column]
-        geared, offset = _gear(text, lambda name: int(model.joint(name).dofadr[0]))
+        geared, offset = _gear(text, names, lambda name: int(model.joint(name).dofadr[0]))
         built = {
             'text': text,
             '_library': library,
@@ -104,6 +111,14 @@ class Tree:
         still = np.zeros(len(names))
         if np.diag(self.dynamics(still, still)[0]).max() > 1.0 / LEAST_INERTIA:
             raise _impossible(text.name, 'a joint moves nothing that has mass and inertia')
+
+    @property
+    def hidden(self) -> tuple[float, ...]:
+        """Where a base on a mount rests: where the spring carries all that it moves [m]."""
+        if self.mount is None:
+            return ()
+        weight = self.mount.moved_mass * self._model.opt.gravity[self.mount.axis]
+        return (float(weight / self.mount.stiffness),)
 
     def gains(self, joints: tuple[str, ...]) -> np.ndarray:
         """Return the force per unit of commanded and measured effort of joints, (n,)."""
@@ -174,9 +189,15 @@ class Tree:
         return ()
 
 
-def _gear(text: TreeText, place: Callable[[str], int]) -> tuple[np.ndarray, np.ndarray]:
+def mounted(tree: Mechanism, values: Mapping[str, Value]) -> Mechanism:
+    """Return the tree on a flexible mount."""
+    return replace(tree, mount=Mount.of(values))
+
+
+def _gear(
+    text: TreeText, names: list[str], place: Callable[[str], int]
+) -> tuple[np.ndarray, np.ndarray]:
     """Return G (b, k) and the offset (b,) of all joints, in the library's order."""
-    names = [joint.name for joint in text.joints]
     G = np.zeros((len(names) + len(text.followers), len(names)))
     offset = np.zeros(len(G))
     for column, name in enumerate(names):

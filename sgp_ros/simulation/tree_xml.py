@@ -11,8 +11,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from sgp_ros.errors import ConfigError
 from sgp_ros.rigid.rotations import rpy_of
 from sgp_ros.rigid.urdf_model import Urdf
+from sgp_ros.simulation.mount import MOUNT, Mount
 from sgp_ros.simulation.tree_text import TreePart, TreeText
 
 _PREFIX = 'link:'
@@ -24,8 +26,12 @@ _SMALLEST = 1e-14
 _ENTRIES = ('ixx', 'ixy', 'iyy', 'ixz', 'iyz', 'izz')
 
 
-def plain_tree(tree: TreeText, payload: tuple[float, float, float, float]) -> str:
+def plain_tree(
+    tree: TreeText, payload: tuple[float, float, float, float], mount: Mount | None = None
+) -> str:
     """Return links, inertias and joints alone, with a payload `(mass, x, y, z)` on the last link.
+
+    On a mount the whole slides, and the last joint is that of the base.
 
     Links are renamed `link:NAME`: a name such as `world` means something to the library.
     """
@@ -56,6 +62,8 @@ def plain_tree(tree: TreeText, payload: tuple[float, float, float, float]) -> st
     if payload[0] > 0.0:
         _add_fixed(plain, _PAYLOAD, _PREFIX + tree.last_link, payload[1:])
         _add_body(ET.SubElement(plain, 'link', name=_PAYLOAD), payload[0], (0.0, 0.0, 0.0))
+    if mount is not None:
+        _add_mount(plain, mount)
     return ET.tostring(plain, encoding='unicode')
 
 
@@ -74,6 +82,28 @@ def _add_joint(plain: ET.Element, joint: ET.Element, urdf: Urdf) -> None:
     ET.SubElement(copy, 'dynamics', damping=repr(urdf.joints[name].damping))
     if kind == 'prismatic':
         ET.SubElement(copy, 'limit', lower='-1e9', upper='1e9', effort='0', velocity='0')
+
+
+def _add_mount(plain: ET.Element, mount: Mount) -> None:
+    """Let the root slide along an axis, with the mass that moves beside the arm."""
+    children = {x.get('link') for x in plain.iter('child')}
+    links = plain.findall('link')
+    root = next(x.get('name', '') for x in links if x.get('name') not in children)
+    arm = sum(float(x.get('value', '0')) for x in plain.iter('mass'))
+    if not mount.moved_mass > arm:
+        raise ConfigError(
+            f'moved_mass = {mount.moved_mass:g} kg on the mount',
+            f'more than the {arm:g} kg of the robot',
+        )
+    ET.SubElement(plain, 'link', name='mount:ground')
+    _add_body(ET.SubElement(plain, 'link', name='mount:base'), mount.moved_mass - arm, (0.0,) * 3)
+    slide = ET.SubElement(plain, 'joint', name=MOUNT, type='prismatic')
+    ET.SubElement(slide, 'parent', link='mount:ground')
+    ET.SubElement(slide, 'child', link='mount:base')
+    ET.SubElement(slide, 'axis', xyz=_words(mount.direction))
+    ET.SubElement(slide, 'dynamics', damping=repr(mount.damping))
+    ET.SubElement(slide, 'limit', lower='-1e9', upper='1e9', effort='0', velocity='0')
+    _add_fixed(plain, root, 'mount:base', (0.0, 0.0, 0.0))
 
 
 def _add_fixed(plain: ET.Element, name: str, parent: str, place: tuple[float, ...]) -> None:

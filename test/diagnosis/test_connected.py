@@ -35,7 +35,10 @@ def test_a_band_is_compared_once(monkeypatch, plain, corrected, times):
         monkeypatch.setattr(connected, name, stub)
     correction = SimpleNamespace(tree=lambda tree: tree)
     error = SimpleNamespace(
-        correction=correction, numbers=(), remedy='', hypothesis=SimpleNamespace(names=(), is_of_gains=False)
+        correction=correction,
+        numbers=(),
+        remedy='',
+        hypothesis=SimpleNamespace(names=(), is_of_gains=False),
     )
     found = SimpleNamespace(errors=(error,), delay_std=0.0)
     each = connected.in_halves(lambda _: None)

@@ -17,7 +17,7 @@ from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import ARMATURE, EFFECTS, VISCOUS_FRICTION
 from sgp_ros.physics.drive import Drive
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.elasticity import _behind, _resonator
+from sgp_ros.physics.elasticity import _behind, resonator
 from sgp_ros.physics.parts import Place
 from sgp_ros.rigid.tree import read_urdf
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -42,6 +42,11 @@ def recorded(encoder, *, has_friction=False):
     text = ','.join(f'{name}={x}' for name, x in SPRING.items())
     effects = [f'joint_elasticity:joint=elbow,{text},encoder={encoder}']
     effects += [f'viscous_friction:joint=elbow,b={FRICTION}'] * has_friction
+    return moved(effects)
+
+
+def moved(effects):
+    """A motion of the arm with effects."""
     return simulate(
         make_simulation(
             tree_simulator(URDF), effects=effects, seed=5, rate_hz=RATE,
@@ -51,8 +56,12 @@ def recorded(encoder, *, has_friction=False):
 
 
 def equations(encoder, *, has_friction=False):
-    """The equations of that motion, as a diagnosis forms them, without bodies."""
-    recording = recorded(encoder, has_friction=has_friction)
+    """The equations of that motion."""
+    return equations_of(recorded(encoder, has_friction=has_friction))
+
+
+def equations_of(recording):
+    """The equations of a motion, as a diagnosis forms them, without bodies."""
     t = 1e-9 * (recording.stamps_ns - recording.stamps_ns[0])
     n = len(t)
     states = ZeroPhase(RATE, 2.5 * CUTOFF).states(recording.shown_position)
@@ -122,8 +131,8 @@ def test_hidden_states_follow_their_filters():
     t, a, b = 0.002 * np.arange(500), 1.0 / (2.0 * np.pi * 30.0) ** 2, 1e-4
     for numerator, denominator, found in (
         ([1.0], [0.01, 1.0], _behind(u, 0.01, 0.002)),
-        ([b, 1.0], [a, b, 1.0], _resonator(u, a, b, 0.002)),
-        ([0.1, 1.0], [a, 0.1, 1.0], _resonator(u, a, 0.1, 0.002)),
+        ([b, 1.0], [a, b, 1.0], resonator(u, a, b, 0.002)),
+        ([0.1, 1.0], [a, 0.1, 1.0], resonator(u, a, 0.1, 0.002)),
     ):
         np.testing.assert_allclose(found, signal.lsim((numerator, denominator), u, t)[1],
                                    atol=1e-9)  # fmt: skip

@@ -1,0 +1,148 @@
+"""A base on a flexible mount: a mode of the base that no encoder sees.
+
+The base moves by s along a root axis. With the momentum `p(q) dq` that the arm has along it, and
+the mass m of all that moves on the mount, `m (s'' + 2 ratio w s' + w^2 s) = -d(p dq)/dt`, and the
+joints feel `p s''`. What the arm does is known, so `s'' = -H (d(p dq)/dt) / m`, where H is the
+high-pass of the mode, and the force is linear in 1/m. Source: Siciliano and Khatib 2016, Springer
+Handbook of Robotics, chapter 11.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sgp_ros.physics.drawing import Drawn, Scene, UnsuitableError
+from sgp_ros.physics.effect import Effect, Numbers
+from sgp_ros.physics.elasticity import derivatives, resonator, smooth
+from sgp_ros.physics.motion import SeenMotion
+from sgp_ros.physics.parts import BASE, Place, Placed, Quantity, Value, relative_scales
+
+AXES = ('x', 'y', 'z')
+_SOFTEST_HZ = 0.3
+_PERIODS = 5.0
+"""Periods of the softest mount in the recording: fewer are no resonance."""
+_STIFFEST = 3.0
+"""Stiffest mount over the bandwidth."""
+_DAMPING, _USUAL_RATIO = (1e-3, 1.0), 0.1
+_AT_REST = 0.1
+"""Speed over the greatest one below which an arm is at rest."""
+_LIGHTEST = 0.75
+"""Least mass on the mount over the nominal one of the arm, whose prior is 25 %."""
+
+
+class MountElasticity(Effect):
+    """A base that gives way along one of its axes; the shape is frequency and damping ratio."""
+
+    name = 'mount_elasticity'
+    words = 'a flexible mount of the base'
+    formula = (
+        "tau_x = -p s'', moved_mass (s'' + 2 damping_ratio w s' + w^2 s) = -d(p dq)/dt, "
+        'w = 2 pi frequency, p dq: momentum of the arm along the axis'
+    )
+    source = 'Siciliano and Khatib 2016, Springer Handbook of Robotics, chapter 11'
+    appearance = 'all joints ring together at one frequency after the arm starts or stops'
+    quantities = (
+        Quantity('frequency', 'Hz', low=0.0, is_positive=True),
+        Quantity('damping_ratio', '1', low=0.0),
+        Quantity('moved_mass', 'kg', low=0.0, is_positive=True, is_scored=False),
+    )  # fmt: skip
+    linear = ('moved_mass',)
+    kinds = AXES
+    kind_word = 'axis'
+    site = BASE
+    drawn_over = 'seconds'
+    is_online = False
+    uses_bodies = True
+    sees_acceleration = True
+    has_memory = True
+
+    def coefficient_quantities(self, kind: str = '') -> tuple[Quantity, ...]:
+        return (Quantity('mobility', '1/kg'),)
+
+    def shape_names(self, kind: str = '') -> tuple[str, ...]:
+        return 'frequency', 'damping_ratio'
+
+    def model(self, numbers: Numbers, kind: str = '') -> tuple[np.ndarray, np.ndarray]:
+        shape = [numbers['frequency'], numbers['damping_ratio']]
+        return np.array(shape), np.array([1.0 / numbers.get('moved_mass', math.nan)])
+
+    def report(self, at: Placed, motion: SeenMotion) -> dict[str, Value]:
+        frequency, ratio = map(float, at.shape)
+        mass = 1.0 / float(at.coefficients[0])
+        return {
+            'frequency': frequency, 'damping_ratio': ratio, 'moved_mass': mass,
+            self.kind_word: at.place.kind,
+        }  # fmt: skip
+
+    def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
+        """Return whether the mount moves at least the arm."""
+        arm = float(motion.tree.parameters[:, 0].sum())
+        return bool(0.0 < at.coefficients[0] * _LIGHTEST * arm <= 1.0)
+
+    def is_inside(self, at: Placed, motion: SeenMotion) -> bool:
+        """Return whether it rings in the band; a fit at its ends is a mass or nothing."""
+        low, high = (x[0] for x in self.bounds(motion, at.place))
+        return bool(1.02 * low < at.shape[0] < 0.98 * high)
+
+    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        """Return the force per 1/m, (n, k, 1); each stretch begins at rest, or carried along."""
+        per_speed = -motion.gravity_columns[:, :, AXES.index(place.kind)]
+        momentum = smooth(motion, (per_speed * motion.velocity).sum(axis=1))
+        speed = np.abs(motion.velocity).max(axis=1)
+        moves = speed > _AT_REST * speed.max()
+        slope, ends = derivatives(motion, momentum)[0], (*motion.starts[1:], len(momentum))
+        swung = [
+            self._swung(momentum[i:j] - moves[i] * momentum[i], moves[i] * slope[i],
+                        motion.step, shape)
+            for i, j in zip((0, *ends[:-1]), ends, strict=True)
+        ]  # fmt: skip
+        thrust = derivatives(motion, np.concatenate(swung))[0]
+        return np.asarray((per_speed * thrust[:, None])[:, :, None])
+
+    @staticmethod
+    def _swung(momentum: np.ndarray, slope: float, step: float, shape: np.ndarray) -> np.ndarray:
+        """Return a momentum (n,) behind the high-pass, the base having followed its slope."""
+        rate, ratio = 2.0 * math.pi * shape[0], shape[1]
+        t, swing = step * np.arange(len(momentum)), math.sqrt(max(1.0 - ratio**2, 0.0))
+        carried = slope * t * np.sinc(rate * swing / math.pi * t) * np.exp(-ratio * rate * t)
+        a, b = 1.0 / rate**2, 2.0 * ratio / rate
+        return np.asarray(momentum - carried - resonator(momentum, a, b, step, is_settled=False))
+
+    def places(self, motion: SeenMotion) -> list[Place]:
+        """Return the axes along which the arm pushes the base."""
+        pushes = np.abs(motion.gravity_columns).max(axis=(0, 1))
+        return [Place(-1, kind) for kind, push in zip(AXES, pushes, strict=True) if push > 0.0]
+
+    def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
+        """Return frequencies a third of an octave apart, with some damping."""
+        low, high = (float(x[0]) for x in self.bounds(motion, place))
+        count = max(2, round(3.0 * math.log2(high / low)))
+        return np.array([[f, _USUAL_RATIO] for f in np.geomspace(1.1 * low, 0.9 * high, count)])
+
+    def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
+        seconds = len(motion.time) * motion.step
+        low = max(_SOFTEST_HZ, _PERIODS / seconds)
+        return np.array([low, _DAMPING[0]]), np.array(
+            [max(_STIFFEST * motion.bandwidth, 2.0 * low), _DAMPING[1]]
+        )
+
+    def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        return relative_scales(*self.bounds(motion, place), shape)
+
+    def draw(self, scene: Scene) -> Drawn:
+        """Return a mount that carries a little more than the arm, by its softness."""
+        if len(scene.bodies) < 2:
+            raise UnsuitableError(self.name)
+        arm = sum(body.mass for body in scene.bodies)
+        mass, ratio = arm * scene.rng.uniform(1.3, 2.5), scene.rng.uniform(0.02, 0.1)
+        kind = str(scene.rng.choice(AXES))
+
+        def values(size: float) -> dict[str, Value]:
+            return {
+                'frequency': 8.0 / math.sqrt(size), 'damping_ratio': ratio, 'moved_mass': mass,
+                self.kind_word: kind,
+            }  # fmt: skip
+
+        return Drawn(0.5, values, 25.0, 2.0, index=-1, place=self.site.value)
