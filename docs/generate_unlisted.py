@@ -14,6 +14,7 @@ RESULTS = ROOT / 'sgp_proof/results/unlisted.json'
 WITHHELD = ROOT / 'sgp_proof/results/withheld.json'
 NO_LAW = ROOT / 'sgp_proof/results/no_law.json'
 ELASTIC = ROOT / 'sgp_proof/results/elastic.json'
+MOUNT = ROOT / 'sgp_proof/results/mount.json'
 _HEAD = """# Unlisted laws
 
 If the effects of [effects.md](effects.md) leave something unexplained, or describe it only approximately, `sgp diagnose`
@@ -91,6 +92,24 @@ have shown, and a node does not model the law; it says so.
 python -m sgp_proof.concealed.elastic --seeds {elastic_seeds} --worlds out/elastic
 ```
 
+## Flexible mounts
+
+A base that gives way along one axis, [`mount_elasticity`](effects.md#mount_elasticity), is seen by all joints as what the arm's own
+momentum does to it. {mount_worlds} worlds of tier A:
+
+| | worlds | named | axis right, of those named | something else asserted | error of the frequency, median |
+|---|---|---|---|---|---|
+{mount}
+
+{mount_missed}
+
+A base that rocks has no name, and a recording that begins while the base swings is taken to begin with one that follows the
+arm: its first swings are then explained badly. A node does not model the law; it says so.
+
+```bash
+python -m sgp_proof.concealed.elastic --effect mount_elasticity --seeds {mount_seeds} --worlds out/mount
+```
+
 ## Real machines with the listed answer withheld
 
 {machines}
@@ -125,8 +144,7 @@ one that you know, write its formula into the robot YAML: [effects.md](effects.m
 ## What it does not do
 - Only one factor and one variable: a force of three variables, or one that remembers (a lag, play), has no formula here.
 - Several recordings at once, and settled points, are not searched.
-- Of resonances only that of an elastic joint has a name, [effects.md](effects.md#joint_elasticity); a robot on a soft
-  mount has none yet.
+- Of resonances, elastic joints and mounts that give way along one axis have names; a mount that rocks has none.
 - A law with a listed effect of the same variable at the same joint (dry friction with an eddy-current brake) is one
   smooth force to the search, and has a formula only if one of the shapes has both.
 """
@@ -142,7 +160,8 @@ def text():
     numbers = sorted(int(r['case'].rpartition('_')[2]) for r in rows)
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers))), 'scored in order'
     return _HEAD.format(
-        **_no_law(), **_elastic(), second=_second(), second_families=len(second.FAMILIES),
+        **_no_law(), **_resonance('elastic', ELASTIC), **_resonance('mount', MOUNT),
+        second=_second(), second_families=len(second.FAMILIES),
         second_known=len(second.KNOWN_SHAPES),
         failures=_failures(rows), worlds=summary['worlds'], lawless=lawless,
         families=len({r['kind'] for r in rows}), found=_share(summary['found']),
@@ -176,27 +195,31 @@ def _count(found):
     return round(found['share'] * found['n'])
 
 
-def _elastic():
-    result = json.loads(ELASTIC.read_text(encoding='utf-8'))
+def _resonance(name, path):
+    """Return the numbers of worlds with a resonance."""
+    result = json.loads(path.read_text(encoding='utf-8'))
     words = {'all': 'all', 'below_half_the_rate': 'resonance below half the sampling rate'}
     lines = []
-    for name, found in result['summary'].items():
+    for which, found in result['summary'].items():
         named, side = found['named'], found['right_side']
+        error = next(x for key, x in found.items() if key.endswith('_error_median'))
         lines.append(
-            f'| {words[name]} | {named["n"]} | {_share(named["share"])} ({_share(named["low"])} '
+            f'| {words[which]} | {named["n"]} | {_share(named["share"])} ({_share(named["low"])} '
             f'to {_share(named["high"])}) | {_share(side["share"])} | '
             f'{_share(found["something_else"]["share"])} | '
-            f'{_small(found["stiffness_error_median"])} |'
+            f'{_small(error)} |'
         )
     missed = [
         f'- {r["case"]}: `{r["verdict"]}`, resonance at {r["resonance_hz"]:.0f} Hz of '
         f'{r["rate_hz"]:.0f} Hz{_beside(r)}'
         for r in result['worlds'] if not r['is_named'] or r['others']
     ]  # fmt: skip
-    return {'elastic': '\n'.join(lines), 'elastic_worlds': len(result['worlds']),
-            'elastic_seeds': result['seeds'],
-            'elastic_missed': '\n'.join(['Missed, or with something else beside it:', '', *missed])
-            if missed else 'None was missed.'}  # fmt: skip
+    return {
+        name: '\n'.join(lines), f'{name}_worlds': len(result['worlds']),
+        f'{name}_seeds': result['seeds'],
+        f'{name}_missed': '\n'.join(['Missed, or with something else beside it:', '', *missed])
+        if missed else 'None was missed.',
+    }  # fmt: skip
 
 
 def _beside(row):

@@ -55,7 +55,6 @@ class MountElasticity(Effect):
     drawn_over = 'seconds'
     is_online = False
     uses_bodies = True
-    sees_acceleration = True
     has_memory = True
 
     def coefficient_quantities(self, kind: str = '') -> tuple[Quantity, ...]:
@@ -124,9 +123,8 @@ class MountElasticity(Effect):
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
         seconds = len(motion.time) * motion.step
         low = max(_SOFTEST_HZ, _PERIODS / seconds)
-        return np.array([low, _DAMPING[0]]), np.array(
-            [max(_STIFFEST * motion.bandwidth, 2.0 * low), _DAMPING[1]]
-        )
+        high = max(min(_STIFFEST * motion.bandwidth, 0.4 / motion.step), 2.0 * low)
+        return np.array([low, _DAMPING[0]]), np.array([high, _DAMPING[1]])
 
     def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         return relative_scales(*self.bounds(motion, place), shape)

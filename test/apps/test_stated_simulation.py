@@ -77,6 +77,8 @@ EFFECT_VALUES = {
     'load_friction': {'level': 0.05, 'mu': 0.1},
     'motor_speed_limit': {'stall_torque': 0.6, 'no_load_speed': 3.0},
     'joint_elasticity': {'stiffness': 2000.0, 'damping': 0.5, 'encoder': 'link'},
+    'mount_elasticity': {'frequency': 6.0, 'damping_ratio': 0.05, 'moved_mass': 500.0,
+                         'axis': 'x'},
     'end_stop': {'position': 0.1, 'stiffness': 30.0, 'damping': 0.0, 'side': 'lower'},
 }  # fmt: skip
 """For an arm with forces of a newton metre. The model of a stop is linear: a damped one would pull
@@ -138,7 +140,9 @@ def stated(folder, name, effect):
     }.get(effect, bool(joints))  # fmt: skip
     if not is_possible:
         return None
-    place = {'gravity_tilt': 'base', 'tip_force': 'tool'}.get(effect, joints[-1:] and joints[-1])
+    place = {'gravity_tilt': 'base', 'mount_elasticity': 'base', 'tip_force': 'tool'}.get(
+        effect, joints[-1:] and joints[-1]
+    )
     known = nominal.robot.source.get('effects') or []
     document = {
         'schema': 1,
@@ -187,9 +191,9 @@ class Simulated:
         )
 
 
-APPLICABLE = {'arm': 30, 'turned': 30, 'underactuated': 30, 'forearm': 28, 'reaction_wheel': 28,
-              'reaction_wheel_6': 28, 'toy_pendulum': 17, 'linear_axis': 26, 'simple_pendulum': 26,
-              'double_pendulum': 28}  # fmt: skip
+APPLICABLE = {'arm': 31, 'turned': 31, 'underactuated': 31, 'forearm': 29, 'reaction_wheel': 29,
+              'reaction_wheel_6': 29, 'toy_pendulum': 18, 'linear_axis': 27, 'simple_pendulum': 27,
+              'double_pendulum': 29}  # fmt: skip
 """Robot to how many effects it can have."""
 
 

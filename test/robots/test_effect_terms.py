@@ -29,7 +29,8 @@ OF_EFFORT = ('torque_gain', 'dead_zone', 'saturation', 'load_friction', 'joint_c
              'motor_speed_limit')  # fmt: skip
 ON_TREE = ('gravity_tilt', 'payload')
 JOINTS = {
-    'gravity_tilt': 'base', 'tip_force': 'tool', 'payload': 'grip', 'limit_friction': 'shoulder'
+    'gravity_tilt': 'base', 'tip_force': 'tool', 'payload': 'grip', 'limit_friction': 'shoulder',
+    'mount_elasticity': 'base',
 }  # fmt: skip
 KINDS = {'joint_coupling': ('spring', 'torque'), 'position_friction': ('coulomb', 'viscous')}
 ONLINE = [
@@ -52,7 +53,10 @@ def _entry(name, kind, std=0.01):
     numbers = {q.name: 0.3 + 0.1 * i for i, q in enumerate(EFFECTS[name].stated_quantities(kind))}
     if name == 'tip_force':
         numbers['fz'] = -2.0
-    numbers |= {'position_friction': {'hi': 2.5}, 'torque_gain': {'gain': 0.6}}.get(name, {})
+    numbers |= {
+        'position_friction': {'hi': 2.5}, 'torque_gain': {'gain': 0.6},
+        'mount_elasticity': {'moved_mass': 50.0},
+    }.get(name, {})  # fmt: skip
     words = {EFFECTS[name].kind_word: kind} if kind else {}
     words |= {'source_joint': 'shoulder'} if EFFECTS[name].has_source else {}
     parameters = {k: {'value': v, 'std': std} for k, v in numbers.items()}
@@ -160,7 +164,7 @@ def test_every_effect_of_one_time_is_in_the_model(tmp_path):
 )
 def test_effects_with_memory_are_named_but_not_modelled(tmp_path, name):
     robot = _robot(tmp_path, [_entry(name, next(iter(EFFECTS[name].kinds), ''))[0]])
-    assert f'not modelled online: {name} of elbow' in robot.description
+    assert f'not modelled online: {name} of {JOINTS.get(name, "elbow")}' in robot.description
     assert robot.effort_map is None
     assert len(robot.coefficients) == TREE.size
 
