@@ -39,6 +39,7 @@ from sgp_ros.apps.terminal import (  # noqa: E402 - as above
     BESIDE_INPUT,
     mark_folder,
     require_own_folder,
+    require_own_recording,
     strong,
 )
 from sgp_ros.errors import ConfigError, SgpError  # noqa: E402 - the environment above comes first
@@ -80,11 +81,14 @@ def _run(arguments: dict[str, Any]) -> int:
     warnings.filterwarnings('ignore', category=RuntimeWarning, module=r'scipy\.')
     try:
         out = arguments['out']
-        if not is_forced and name not in BESIDE_INPUT:
+        if name == BESIDE_INPUT and not is_forced:
+            require_own_recording(arguments['table'], out)
+        elif not is_forced:
             require_own_folder(out)
         with _text_to(is_quiet=is_quiet, prints_json=prints_json):
             result = _load(function)(progress=Progress(name, is_quiet=is_quiet), **arguments)
-        mark_folder(out, name)
+        if name != BESIDE_INPUT:
+            mark_folder(out, name)
         if prints_json:
             sys.stdout.write(json.dumps(result, allow_nan=False) + '\n')
         sys.stdout.flush()

@@ -325,6 +325,51 @@ def test_files_of_somebody_else_are_not_mixed_with_results(wheel, tmp_path, caps
     assert (out / 'thesis.tex').read_text() == 'mine'
 
 
+@pytest.mark.parametrize(
+    ('first', 'second', 'gone'),
+    [
+        ('simulate toy_pendulum --duration 1', 'simulate double_pendulum --duration 1',
+         'toy_pendulum.mcap'),
+        ('export double_pendulum --to urdf', 'export double_pendulum --to sdf',
+         'double_pendulum.urdf'),
+    ],
+)  # fmt: skip
+def test_a_used_folder_is_replaced_whole(first, second, gone, tmp_path):
+    """What the command wrote before and does not write now would be taken for its result."""
+    for command in (first, second):
+        assert main([*command.split(), '--out', str(tmp_path), '--quiet']) == 0
+        assert (tmp_path / gone).exists() == (command == first)
+    assert not list(tmp_path.glob('.sgp_growing_*'))
+
+
+def test_a_file_is_no_folder_of_results(tmp_path, capsys):
+    """One line, and it stays."""
+    path = tmp_path / 'thesis.tex'
+    path.write_text('mine')
+    assert 'is a file' in _refused(['robots', '--out', path], capsys)
+    assert path.read_text() == 'mine'
+
+
+def test_an_import_replaces_its_own_recording_alone(tmp_path, capsys):
+    """It lies beside the log that it was, and makes the folder nobody's but the user's."""
+    table = tmp_path / 'log.csv'
+    rows = (f'{0.01 * i:.2f},{0.1 * i:.3f},1.0' for i in range(100))
+    table.write_text('\n'.join(['time,arm_position,arm_effort', *rows]))
+    command = ['import', table, '--out', tmp_path]
+    recording = tmp_path / 'log.mcap'
+    recording.write_bytes(b'mine')
+    assert 'log.mcap exists' in _refused(command, capsys)
+    assert recording.read_bytes() == b'mine'
+    recording.unlink()
+    for _ in range(2):
+        assert main([str(a) for a in command]) == 0
+    capsys.readouterr()
+    assert 'log.csv' in _refused(['robots', '--out', tmp_path], capsys)
+    table.unlink()
+    assert main(['robots', '--out', str(tmp_path), '--quiet']) == 0
+    assert recording.exists()
+
+
 def test_a_reader_that_has_seen_enough_is_no_error():
     """As in `sgp effects | head -1`: nothing is complained of."""
     done = subprocess.run(

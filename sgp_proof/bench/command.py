@@ -16,7 +16,7 @@ from sgp_proof.bench.step import bench_step
 from sgp_proof.campaign.overhead import bench_campaign
 from sgp_proof.result_files import machine
 from sgp_ros.errors import ConfigError
-from sgp_ros.report.files import write_text
+from sgp_ros.report.files import replacing_results, write_text
 
 BENCHES = {
     'step': bench_step, 'evidence': bench_evidence, 'replay': bench_replay,
@@ -65,9 +65,10 @@ def run_bench(
             progress((done + part) / len(chosen))
 
         result[name] = BENCHES[name](RIVALS, share, is_quick=is_quick)
-    write_text(out / 'bench.json', json.dumps(result, indent=1, allow_nan=False) + '\n')
     text = bench_tables(result)
-    write_text(out / 'bench.md', text)
+    with replacing_results(out, 'bench'):
+        write_text(out / 'bench.json', json.dumps(result, indent=1, allow_nan=False) + '\n')
+        write_text(out / 'bench.md', text)
     print(text, end='')
     return result
 

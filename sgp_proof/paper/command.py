@@ -26,7 +26,7 @@ from sgp_proof.paper.figures import draw_experiment
 from sgp_proof.paper.protocol import METHOD_NAMES, Outcome
 from sgp_ros.errors import ConfigError
 from sgp_ros.report.figures import png
-from sgp_ros.report.files import write_bytes, write_text
+from sgp_ros.report.files import replacing_results, write_bytes, write_text
 from sgp_ros.report.metrics import versions
 
 Runner = Callable[..., dict[str, Outcome]]
@@ -83,7 +83,8 @@ def run_reproduction(
         'versions': versions(),
         'seconds': round(time.perf_counter() - began, 1),
     }
-    _write(plan, outcomes, results, out)
+    with replacing_results(out, 'reproduce'):
+        _write(plan, outcomes, results, out)
     return results
 
 
@@ -137,7 +138,6 @@ def _write(
     out: Path,
 ) -> None:
     """Write results.json, table.md and the figures."""
-    out.mkdir(parents=True, exist_ok=True)
     write_text(out / 'results.json', json.dumps(results, indent=1, allow_nan=False) + '\n')
     table = '\n'.join(
         [

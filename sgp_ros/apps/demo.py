@@ -22,7 +22,7 @@ from sgp_ros.recordings.messages import Point
 from sgp_ros.recordings.predictions import PredictionTopics, outputs
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.report.figures import History
-from sgp_ros.report.files import write_text
+from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.report.html import write_report
 from sgp_ros.report.metrics import Timing, collect_metrics
 from sgp_ros.report.next_steps import after_demo, ending
@@ -70,11 +70,12 @@ def run_demo(
     truth = _truth(seed)
     metrics = collect_metrics(engine, bag.name, timing=timing, seed=seed)
     metrics['live_equals_replay'] = comparison.to_mapping()
-    write_text(out / 'metrics.json', json.dumps(metrics, indent=1, allow_nan=False) + '\n')
-    write_report(
-        out, engine, history, metrics, truth=truth, checks=[comparison.sentence, _EXPLANATION],
-        steps=after_demo(bag),
-    )  # fmt: skip
+    with replacing_results(out, 'demo'):
+        write_text(out / 'metrics.json', json.dumps(metrics, indent=1, allow_nan=False) + '\n')
+        write_report(
+            out, engine, history, metrics, truth=truth,
+            checks=[comparison.sentence, _EXPLANATION], steps=after_demo(bag),
+        )  # fmt: skip
     print_summary(metrics, truth)
     print(comparison.sentence)
     print(ending(out, after_demo(bag)))

@@ -33,7 +33,6 @@ from sgp_ros.report.diagnosis_text import (
     parameter_errors_text,
     phrase,
     visibility_sentences,
-    why_it_lost,
 )
 from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.report.next_steps import Given, after_diagnosis, ending
@@ -243,12 +242,9 @@ def print_diagnosis(found: Diagnosis) -> None:
     _print_findings('set-up', found.setup)
     _print_findings('found', found.findings)
     _print_findings('both', found.shared)
-    is_missing = found.verdict == 'missing_physics' and bool(found.findings)
-    best = found.findings[0] if is_missing else None
     if found.findings:
         for f in found.alternatives[:_RIVALS]:
-            print(f'  not       p {chance(f.probability)}  {f.joint}: {phrase(f)}: '
-                  f'{why_it_lost(f, best)}')  # fmt: skip
+            print(f'  not       p {chance(f.probability)}  {f.joint}: {phrase(f)}: {f.why}')
     for e in found.equivalents:
         print(f'  or        {equivalence_sentence(e)}')
     for line in differences_text(found):

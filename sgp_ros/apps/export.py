@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.report.files import write_text
+from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.report.next_steps import after_export, next_lines
 from sgp_ros.robots.exports.handover import Handover, hand_over
 from sgp_ros.robots.exports.mjcf import write_mjcf
@@ -46,13 +46,14 @@ def run_export(
     handed = hand_over(nominal)
     text, left = _written(handed, to, _origin(handed, model), out)
     path = out / f'{nominal.robot.name}{FORMATS[to]}'
-    out.mkdir(parents=True, exist_ok=True)
-    write_text(path, text)
+    place = out / f'{nominal.robot.name}_ranges.json'
+    with replacing_results(out, 'export'):
+        write_text(path, text)
+        if ranges:
+            write_text(place, json.dumps(handed.ranges(), indent=1, allow_nan=False) + '\n')
     print(f'{nominal.robot.name} as {to} in {path}')
     result: dict[str, Any] = {'path': str(path), 'left_out': [*left, *nominal.remarks]}
     if ranges:
-        place = out / f'{nominal.robot.name}_ranges.json'
-        write_text(place, json.dumps(handed.ranges(), indent=1, allow_nan=False) + '\n')
         print(f'ranges (value +- 2 std) in {place}')
         result['ranges'] = str(place)
     for said in left:

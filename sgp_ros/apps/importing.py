@@ -6,9 +6,11 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from sgp_ros.apps.terminal import imports_of
 from sgp_ros.batch.contradictions import require_units
 from sgp_ros.recordings.imports import ImportSummary, import_table
 from sgp_ros.recordings.table_entries import JointHint
+from sgp_ros.report.files import replacing_results
 from sgp_ros.report.next_steps import after_import, next_lines
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
@@ -29,10 +31,12 @@ def run_import(
         rate: of the rows of a table without times [Hz].
     """
     model = None if robot is None else load_robot(robot)
-    summary = import_table(
-        table, map_path, out, _hints(model), rate,
-        lambda events: None if model is None else require_units(events, model),
-    )  # fmt: skip
+    path = out if out.suffix == '.mcap' else out / f'{Path(table).stem}.mcap'
+    with replacing_results(path.parent, imports_of(path)):
+        summary = import_table(
+            table, map_path, path, _hints(model), rate,
+            lambda events: None if model is None else require_units(events, model),
+        )  # fmt: skip
     progress(1.0)
     for remark in summary.remarks:
         sys.stderr.write(f'remark: {remark}\n')

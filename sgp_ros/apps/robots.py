@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from sgp_ros.report.files import replacing_results, write_text
 from sgp_ros.report.next_steps import after_robots, next_lines
 from sgp_ros.robots.registry import load_robot, robot_names
 
 
-def run_robots(out: Path, progress: Callable[[float], None]) -> dict[str, Any]:  # noqa: ARG001 - it writes nothing
-    """List the built-in robots.
+def run_robots(out: Path, progress: Callable[[float], None]) -> dict[str, Any]:
+    """List the built-in robots; write them to robots.json.
 
     Args:
-        out: unused.
+        out: folder of the results.
         progress: called with the share that is done.
     """
     names, entries = robot_names(), []
@@ -27,6 +29,8 @@ def run_robots(out: Path, progress: Callable[[float], None]) -> dict[str, Any]: 
             'coefficients': [c.name for c in robot.coefficients],
         })  # fmt: skip
         progress((i + 1) / len(names))
+    with replacing_results(out, 'robots'):
+        write_text(out / 'robots.json', json.dumps(entries, indent=1) + '\n')
     width = max(map(len, names))
     for entry in entries:
         print(f'{entry["name"]:{width}s}  {entry["description"]}')

@@ -17,7 +17,7 @@ from sgp_ros.engine.samples import CommandSample, JointSample
 from sgp_ros.recordings.command_types import FLOAT64_ARRAY
 from sgp_ros.recordings.messages import JOINT_STATE
 from sgp_ros.recordings.writer import RecordingWriter
-from sgp_ros.report.files import write_bytes, write_text
+from sgp_ros.report.files import replacing_results, write_bytes, write_text
 from sgp_ros.report.next_steps import after_simulation, next_lines
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.effect_text import parse_physical
@@ -82,10 +82,10 @@ def run_simulation(
     )
     recording = simulate(simulation, duration, progress)
     recording.truth['transport'] = asdict(transport)
-    out.mkdir(parents=True, exist_ok=True)
     path = out / f'{name}.mcap'
-    write_simulated(recording, path, transport, seed=seed)
-    truth, motion = write_truth(recording, out)
+    with replacing_results(out, 'simulate'):
+        write_simulated(recording, path, transport, seed=seed)
+        truth, motion = write_truth(recording, out)
     n = len(recording.stamps_ns)
     print(simulator.description)
     print(f'{n} samples of {", ".join(recording.joint_names)} in {path}, the truth in {truth}')

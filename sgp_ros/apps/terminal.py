@@ -5,8 +5,10 @@ It is loaded with every command, so it imports nothing that takes time.
 
 from __future__ import annotations
 
+import json
 import os
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 from sgp_ros.errors import ConfigError
@@ -25,24 +27,28 @@ def warned(text: str) -> str:
     return _coloured(text, '33')
 
 
-BESIDE_INPUT = ('import',)
-"""Commands that add a recording to what is there: it may lie beside the log that it was."""
+BESIDE_INPUT = 'import'
+"""The command that adds a recording to what is there: it may lie beside the log that it was."""
+_IMPORTS = f'{_LISTING}{BESIDE_INPUT}_'
 
 
 def require_own_folder(out: Path) -> None:
     """Refuse a folder with files of somebody else, which a command could mix with or replace.
 
-    Results of `sgp` in it are replaced by the next run of the same command.
+    Results of `sgp` in it are replaced by the next run of the same command. Imported recordings
+    make no folder ours: they may lie beside the logs that they were.
 
     Args:
         out: folder of the results.
 
     Raises:
-        ConfigError: it holds files, and no command of ours wrote there.
+        ConfigError: it holds files and no command of ours wrote there, or it is a file.
     """
+    if out.exists() and not out.is_dir():
+        raise ConfigError(f'--out {out} is a file', 'a folder', 'choose another --out')
     if not out.is_dir():
         return
-    names = sorted(path.name for path in out.iterdir())
+    names = sorted({path.name for path in out.iterdir()} - _imported(out))
     if names and not any(name.startswith(_LISTING) for name in names):
         shown = ', '.join(names[:3]) + (', ...' if len(names) > 3 else '')
         raise ConfigError(
@@ -50,6 +56,38 @@ def require_own_folder(out: Path) -> None:
             'a new folder, or one that sgp wrote',
             'choose another --out, or add --force',
         )  # fmt: skip
+
+
+def require_own_recording(table: str, out: Path) -> None:
+    """Refuse to import a table over a recording that no import of it wrote.
+
+    Args:
+        table: that is imported.
+        out: folder, or path of the recording.
+
+    Raises:
+        ConfigError: such a recording is there.
+    """
+    path = out if out.suffix == '.mcap' else out / f'{Path(table).stem}.mcap'
+    if path.exists() and path.name not in _imported(path.parent):
+        raise ConfigError(
+            f'{path} exists and was not written by sgp import', 'a new name',
+            'choose another --out, or add --force',
+        )  # fmt: skip
+
+
+def imports_of(path: Path) -> str:
+    """Return the name under which the files of an imported recording are listed beside it."""
+    return f'{BESIDE_INPUT}_{path.stem}'
+
+
+def _imported(folder: Path) -> set[str]:
+    """Return the names of imported files in a folder, and of their listings."""
+    found = set()
+    for listing in folder.glob(f'{_IMPORTS}*.json'):
+        with suppress(OSError, ValueError):
+            found |= {listing.name, *json.loads(listing.read_text(encoding='utf-8'))}
+    return found
 
 
 def mark_folder(out: Path, command: str) -> None:

@@ -20,6 +20,7 @@ from sgp_ros.diagnosis.criteria import (
 from sgp_ros.diagnosis.decide.certainty import Probabilities
 from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision
 from sgp_ros.diagnosis.decide.differences import Several
+from sgp_ros.diagnosis.decide.reasons import why_not
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.in_recording import InRecording
 from sgp_ros.diagnosis.explain.regression import Columns
@@ -137,7 +138,8 @@ def alternatives(decision: Decision, chances: Probabilities) -> tuple[Finding, .
             if candidate.key in taken or len(found) >= MOST_ALTERNATIVES:
                 continue
             taken.add(candidate.key)
-            rival = _finding(decision, model, i, {}, chances, why=chances.why(model))
+            why = why_not(model, decision, chances.scale)
+            rival = _finding(decision, model, i, {}, chances, why)
             found.append(replace(rival, probability=min(rival.probability, DOUBTED)))
     return tuple(found)
 
@@ -191,14 +193,13 @@ def bound_remarks(decision: Decision) -> tuple[str, ...]:
     motion = decision.model.frame.equations.motion
     remarks = []
     for s in decision.model.effects:
-        names = [
-            name.replace('_', ' ') for name in s.report(motion) if name in s.at_bounds(motion)
-        ]
+        ends = s.at_bounds(motion)
+        names = [name.replace('_', ' ') for name in s.report(motion) if name in ends]
         if names:
-            where = joint_name(motion, s.place.joint)
+            where = f'{s.effect.words} ({joint_name(motion, s.place.joint)})'
             remarks.append(
-                f'{", ".join(names)} of {s.effect.words} ({where}): at the limit of what '
-                'this recording determines, so without an interval; the true value may lie beyond'
+                f'{", ".join(names)} of {where}: at the limit of what this recording '
+                'determines, so without an interval; the true value may lie beyond'
             )
     return tuple(remarks)
 

@@ -38,7 +38,6 @@ from sgp_ros.report.diagnosis_text import (
     place,
     quantity,
     visibility_sentences,
-    why_it_lost,
 )
 from sgp_ros.report.figures import write_figures
 from sgp_ros.report.files import write_text
@@ -94,7 +93,6 @@ def render(
         steps: what to do next.
     """
     charts = diagnosis_charts(found)
-    best = found.findings[0] if found.findings else None
     large = [found.joints[j] for j in important_joints(found)]
     shown = {name: x for name, x in figures.items() if name != 'dependence'}  # bars of the page
     return render_page(
@@ -117,8 +115,8 @@ def render(
             _finding(f, _chart_of(found, f, charts)) | _cancelled(found, f) for f in found.findings
         ],
         shared=[_finding(f) for f in found.shared],
-        rivals=[_rival(f, best) for f in found.alternatives[:_SHOWN_RIVALS]],
-        more_rivals=[_rival(f, best) for f in found.alternatives[_SHOWN_RIVALS:]],
+        rivals=[_rival(f) for f in found.alternatives[:_SHOWN_RIVALS]],
+        more_rivals=[_rival(f) for f in found.alternatives[_SHOWN_RIVALS:]],
         differences=differences_text(found),
         equivalents=[equivalence_sentence(e) for e in found.equivalents],
         hidden=visibility_sentences(found),
@@ -212,14 +210,13 @@ def _finding(f: Finding, chart: str = '') -> dict[str, Any]:
     }
 
 
-def _rival(f: Finding, best: Finding | None) -> dict[str, str]:
-    is_rated = best is not None and best.effect != 'unknown'
+def _rival(f: Finding) -> dict[str, str]:
     return {
         'name': effect_name(f),
         'joint': f.joint,
         'numbers': ', '.join(numbers(f)),
         'probability': chance(f.probability),
-        'why': why_it_lost(f, best if is_rated else None),
+        'why': f.why,
     }
 
 

@@ -20,13 +20,13 @@ def cards(found: Diagnosis) -> list[dict[str, str]]:
     shown = [{'value': f'{found.certainty:.2f}', 'label': 'probability that the verdict is right'}]
     if found.traces.forces or found.verdict in _WITHOUT_FORCES:
         by = {
-            'unexplained': 'a learned correction, not by a law',
+            'unexplained': 'the final model, without a law',
             'parameters_only': 'corrected parameters of bodies',
         }.get(found.verdict, 'the finding')
         label = (
             f'of the residual of the nominal robot, in the data learned from, is explained by {by}'
         )
-        shown.append({'value': percent(explained(found)), 'label': label})
+        shown.append({'value': percent(max(explained(found), 0.0)), 'label': label})
     shown += [_effort_card(found, stem) for stem in found.proofs if stem != 'train']
     motion = motion_card(found)
     if motion:

@@ -26,7 +26,6 @@ _PLACES = {'base': 'at the base', 'tool': 'at the tool', 'all': 'on all joints'}
 _ENTRIES = {f'com_{axis}': f'{axis} of the centre' for axis in 'xyz'}
 _MEANINGLESS = 1e6
 """Error over variance that only a constant effort gives."""
-_SIMILAR_NATS = 20.0
 _MOST_ERRORS = 3
 _LEAST_CHANCE = 0.005
 
@@ -59,6 +58,14 @@ def explained(found: Diagnosis) -> float:
     joints = scored_joints(proof)
     before = sum(proof.nmse_before[name] for name in joints)
     return 1.0 - sum(proof.nmse_after[name] for name in joints) / max(before, 1e-300)
+
+
+def gain_text(subject: str, found: Diagnosis) -> str:
+    """Say how much of what the nominal robot leaves is explained; or that it is none."""
+    share = explained(found)
+    if share <= 0.0:
+        return 'the residual of the nominal robot does not become smaller by it'
+    return f'{subject} {percent(share)} of the residual of the nominal robot'
 
 
 def phrase(finding: Finding | Difference) -> str:
@@ -163,6 +170,8 @@ def percent(share: float) -> str:
         return 'more than 99.9 %'
     if 0.0 < share < 1e-5:
         return 'less than 0.001 %'
+    if share >= 10.0:
+        return f'{100.0 * share:.0f} %'
     return f'{100.0 * share:.2g} %' if share < 0.1 else f'{100.0 * share:.3g} %'
 
 
@@ -181,23 +190,6 @@ def parameter_errors_text(errors: Sequence[ParameterError]) -> str:
 def chance(probability: float) -> str:
     """Return a probability in two digits, without calling anything impossible."""
     return f'{probability:.2f}' if probability >= _LEAST_CHANCE else '< 0.01'
-
-
-def why_it_lost(rival: Finding, best: Finding | None) -> str:
-    """Return why an alternative is not asserted."""
-    if best is None:
-        return rival.why
-    gap = rival.log_bayes_factor - best.log_bayes_factor
-    count, fewer = _count(rival), _count(best)
-    if gap > 0.0 and count > fewer:
-        return f'fits hardly better, with {count} parameters instead of {fewer}'
-    if gap > -_SIMILAR_NATS and count > fewer:
-        return f'fits no better, with {count} parameters instead of {fewer}'
-    return rival.why
-
-
-def _count(finding: Finding) -> int:
-    return sum(not isinstance(p.value, str) for p in finding.parameters.values())
 
 
 def visibility_sentences(found: Diagnosis) -> list[str]:

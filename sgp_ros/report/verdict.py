@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from sgp_ros.diagnosis.criteria import LEAST_SHARE
 from sgp_ros.diagnosis.result import Diagnosis, Finding
 from sgp_ros.physics.catalogue import exerts_force
 from sgp_ros.physics.law import NAME as LAW
@@ -16,6 +17,7 @@ from sgp_ros.report.diagnosis_text import (
     differences_text,
     effect_name,
     explained,
+    gain_text,
     numbers,
     parameter_errors_text,
     percent,
@@ -43,8 +45,7 @@ def verdict_sentence(found: Diagnosis) -> str:
         return (
             'No physics is missing, only inertial parameters are wrong: '
             f'{parameter_errors_text(found.parameter_errors)} (certainty {found.certainty:.2f}); '
-            f'correcting them explains {percent(explained(found))} of the residual of the '
-            'nominal robot.'
+            f'{gain_text("correcting them explains", found)}.'
         )
     if found.verdict == 'no_mismatch':
         return _calm(found)
@@ -87,7 +88,7 @@ def _missing(found: Diagnosis) -> str:
             subject = 'with corrected bodies it explains'
             if len(found.findings) > 1:
                 subject = 'with corrected bodies they explain'
-        text += f'; {subject} {percent(explained(found))} of the residual of the nominal robot'
+        text += f'; {gain_text(subject, found)}'
     return text + '.'
 
 
@@ -104,7 +105,9 @@ def _calm(found: Diagnosis) -> str:
     if left <= 2.0 * noise:
         text += f' and no more than the encoder noise explains ({noise:.2g} {unit})'
     else:
-        text += ', too little to count as missing physics'
+        small = proof.nmse_before[name] < LEAST_SHARE
+        part = '' if small else 'of which the part that is not noise is '
+        text += f', {part}too little to count as missing physics'
     return f'{text} (certainty {found.certainty:.2f}).'
 
 
@@ -121,17 +124,16 @@ def _unexplained(found: Diagnosis) -> str:
     scores = {} if of is None else {n: s for n, s in of.scores.items() if of.is_significant(n)}
     leading = sorted(scores, key=lambda name: -scores[name])[:_MOST_VARIABLES]
     on = [f'{name} ({percent(scores[name])})' for name in leading if scores[name] > 0.05]
-    text += f'; it depends on {" and ".join(on)}' if on else '; no single variable explains it'
+    text += f'; it depends on {" and ".join(on)}' if on else '; no single variable explains much'
     formulas = {f.log_bayes_factor for f in found.alternatives if f.effect == LAW}
     listed = [f for f in found.alternatives if f.log_bayes_factor not in formulas]
     if not listed:
-        return f'{text}; no listed effect fits.'
+        return f'{text}. No listed effect explains it.'
     top = listed[0]
     nearest = [f for f in listed if f.log_bayes_factor == top.log_bayes_factor]
     names = ' with '.join(dict.fromkeys(plain_name(f.effect) for f in nearest))
-    left, _, but = top.why.partition('; ')
-    left = left.split(', ')[0] + (f', but {but}' if but else '')
-    return f'{text}; no listed effect fits: the nearest, {names}, {left}.'
+    why = f' {top.why}' if top.why else ''
+    return f'{text}. No listed effect is asserted; the nearest is {names}:{why}.'
 
 
 def _is_compared(found: Diagnosis) -> bool:
@@ -146,7 +148,7 @@ def _against_simulation(found: Diagnosis) -> str:
     both = f' Both have {both}.' if both else ''
     if found.findings:
         each = [
-            f'{place(f)}: {phrase(f)}, in the simulation {", ".join(simulated(f))} '
+            f'{place(f)}: {phrase(f)}, in the simulation {", ".join(simulated(f)) or "unknown"} '
             f'(probability {f.probability:.2f})'
             for f in found.findings
         ]

@@ -35,7 +35,6 @@ from sgp_ros.report.diagnosis_text import (
     plain_name,
     quantity,
     visibility_sentences,
-    why_it_lost,
 )
 from sgp_ros.report.page import typeset
 from sgp_ros.report.verdict import held_out_sentence, verdict_sentence
@@ -121,7 +120,7 @@ def test_the_unexplained_is_said_with_what_it_depends_on_and_the_nearest_effect(
     assert text.startswith('Unexplained on elbow: 10 % of the mean squared effort')
     assert 'it depends on velocity (90 %) and position (10 %)' in text
     nearest = EFFECTS['asymmetric_coulomb'].words
-    assert f'no listed effect fits: the nearest, {nearest}' in text
+    assert f'No listed effect is asserted; the nearest is {nearest}: {ASYMMETRIC.why}.' in text
     law = replace(ASYMMETRIC, effect='law', log_bayes_factor=1e3)
     beside = verdict_sentence(diagnosis('unexplained', [UNKNOWN], alternatives=[law, ASYMMETRIC]))
     assert beside == text  # a formula is no listed effect
@@ -154,13 +153,6 @@ def test_printed_digits_keep_a_number_well_inside_its_interval(value, std):
 def test_a_share_below_one_is_never_called_all(share):
     """Something is always left."""
     assert percent(share) != '100 %'
-
-
-def test_a_rival_that_fits_as_well_lost_by_its_parameters():
-    """Otherwise by what it leaves, as the diagnosis says."""
-    assert 'with 2 parameters instead of 1' in why_it_lost(ASYMMETRIC, COULOMB)
-    far = replace(ASYMMETRIC, log_bayes_factor=100.0)
-    assert why_it_lost(far, COULOMB) == ASYMMETRIC.why
 
 
 def test_what_cannot_be_told_is_said_with_the_motion_that_would(tmp_path):

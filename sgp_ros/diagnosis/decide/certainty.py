@@ -22,7 +22,6 @@ from sgp_ros.diagnosis.criteria import (
     LEAST_ODDS,
     LEAST_SHARE,
     MOST_CERTAIN,
-    PER_PARAMETER,
     TEMPER,
 )
 from sgp_ros.diagnosis.decide.cross_validation import without
@@ -30,7 +29,7 @@ from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision, Scale, calm
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
-from sgp_ros.diagnosis.explain.credibility import is_credible, is_sound
+from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.result import Difference, Finding
@@ -51,40 +50,6 @@ class Probabilities:
     def of(self, model: Model, index: int) -> float:
         """Return the probability of one effect of a model."""
         return self.by_key.get(model.effects[index].key, 0.0)
-
-    def why(self, model: Model) -> str:
-        """Return why a rival was not asserted."""
-        rest, best = (
-            float((m.mean_square / self.scale.power).max()) for m in (model, self.asserted)
-        )
-        left = f'{100 * rest:.3g} % of the mean squared effort'
-        if self.asserted.key and self.asserted.key < model.key:
-            said = f'added to the asserted model it leaves {left}, without it {100 * best:.3g} %'
-        else:
-            said = f'leaves {left}, the asserted model {100 * best:.3g} %'
-        return said if rest > best else f'{said}; {self._objection(model)}'
-
-    def _objection(self, model: Model) -> str:
-        """Return what is wrong with a rival that leaves no more than the asserted model."""
-        scale, asserted = self.scale, self.asserted
-        if not scale.is_large(model):
-            return 'one of its effects is too small to count'
-        if not is_sound(model):
-            return 'its effects cancel each other or inertial parameters'
-        losses = {
-            'inertial parameters further from the nominal ones': 0.5
-            * float(model.w @ model.w - asserted.w @ asserted.w),
-            'more parameters than the improvement justifies, or rarer effects': model.law_price
-            - asserted.law_price
-            + PER_PARAMETER * (model.freedom - asserted.freedom),
-            'a larger residual at other joints': scale.likelihood(asserted)
-            - scale.likelihood(model),
-        }
-        worst = max(losses, key=lambda name: losses[name])
-        if scale.worth(model) < scale.worth(asserted) and losses[worst] > 0.0:
-            return f'it needs {worst} (cost: {losses[worst]:.2g} nats)'
-        others = ', or leaves another joint unexplained' if len(scale.power) > 1 else ''
-        return f'it does not predict held-out parts{others}'
 
 
 def settled(
@@ -109,7 +74,8 @@ def settled(
         plainer = _plainer(equations, decision.model, chances.scale)
         if plainer is not None:
             dropped |= decision.model.key - plainer.key
-            decision = replace(decision, model=plainer, rivals=rivals)
+            why = 'a plainer model is nearly as good'
+            decision = replace(decision.without(why), model=plainer, rivals=rivals)
             continue
         effects = decision.model.effects
         p = [chances.of(decision.model, i) for i in range(len(effects))]
@@ -117,7 +83,9 @@ def settled(
             return decision, contrasts, chances
         if len(p) < 2:
             if chances.scale.base.max() < LEAST_SHARE:
-                decision = calm(comparison.base, rivals, chances.scale)
+                why = f'its probability is {p[0]:.2g}, and bodies alone leave too little'
+                left = calm(comparison.base, rivals, chances.scale)
+                decision = replace(left, refusals=decision.without(why).refusals)
                 contrasts = Contrasts(equations, decision.model)
                 chances = probabilities(equations, comparison, decision, contrasts)
             return decision, contrasts, chances
@@ -128,7 +96,8 @@ def settled(
         best = max([kept, *filter(chances.scale.counts, known)], key=chances.scale.worth)
         if not is_credible(best):
             return decision, contrasts, chances
-        decision = replace(decision, model=best, rivals=rivals)
+        why = f'{weakest.effect.words} is improbable in it (probability {min(p):.2g})'
+        decision = replace(decision.without(why), model=best, rivals=rivals)
 
 
 def _is_probable(model: Model, chances: Probabilities) -> bool:

@@ -14,7 +14,8 @@ with an unknown beside it, else `unexplained`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -57,6 +58,7 @@ class Decision:
         unknown: indices of joints that the best model does not describe, the worst first.
         tentative: best model where nothing is adequate.
         against: score of the best model without effects [nats].
+        refusals: why models that could be asserted are not, by their keys.
     """
 
     verdict: str
@@ -67,6 +69,12 @@ class Decision:
     unknown: tuple[int, ...] = ()
     tentative: Model | None = None
     against: float = 0.0
+    refusals: Mapping[object, str] = field(default_factory=dict)
+
+    def without(self, why: str) -> Decision:
+        """Return the decision with the reason why its model is not asserted after all."""
+        model = self.tentative or self.model
+        return replace(self, refusals={model.key: why} | dict(self.refusals))
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,12 +122,7 @@ class Scale:
         return max(float(self.base.sum()), effects, 1e-12)
 
     def rest(self, model: Model, structured: np.ndarray | float = 1.0) -> float:
-        """Return the rest of a model relative to what it explains.
-
-        Args:
-            model: fitted.
-            structured: share of each joint's rest that is no noise, (k,).
-        """
+        """Return the rest of a model relative to what it explains; `structured` (k,) of it."""
         return float((structured * self.shares(model)).sum()) / self.explained(model)
 
     def found(self, model: Model) -> np.ndarray:
@@ -153,7 +156,7 @@ class Scale:
 
     @staticmethod
     def is_large(model: Model) -> bool:
-        """Return whether effects count as physics, those that few joints have each by itself."""
+        """Return whether effects count as physics, those few joints have each by itself."""
         sized = zip(model.effects, model.shares, strict=True)
         small = [s.effect for s, share in sized if share <= COUNTED_SHARE]
         return len(small) < len(model.effects) and all(e.is_usual for e in small)
@@ -240,22 +243,25 @@ def _judged(
     if not (excess >= 1.0).any():
         worst = int(np.argmax(scale.base))
         return Decision('missing_physics', best, rivals, excess, worst, against=base.score)
-    return _opened(equations, scale, comparison, best, rivals, excess)
+    opened = _opened(equations, scale, comparison, best, rivals, excess)
+    times = f'{max(excess.max(), 1.01):.3g} times what an adequate model may leave'
+    return replace(opened, refusals={best.key: f'the part that is not noise is {times}'})
 
 
 def refused(
-    equations: Equations, comparison: Comparison, decision: Decision, joint: int
+    equations: Equations, comparison: Comparison, decision: Decision, joint: int, why: str
 ) -> Decision:
     """Return a decision in which the laws of a joint, adequate by themselves, are not asserted.
 
-    Something without a name explains the joint better.
+    Something without a name explains it better, or they fail elsewhere: `why` says which.
     """
-    excess = decision.excess.copy()
+    decision, excess = decision.without(why), decision.excess.copy()
     excess[joint] = max(excess[joint], UNNAMED_EXCESS)
     if decision.verdict != 'missing_physics':
         return replace(decision, excess=excess)
-    scale, model = Scale.of(equations, comparison), decision.model
-    return _opened(equations, scale, comparison, model, decision.rivals, excess)
+    scale, rivals = Scale.of(equations, comparison), decision.rivals
+    opened = _opened(equations, scale, comparison, decision.model, rivals, excess)
+    return replace(opened, refusals=decision.refusals)
 
 
 def _opened(

@@ -15,7 +15,7 @@ common models are compared anew, and differences are looked for again beside the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -119,14 +119,14 @@ def _force(model: Model, some: tuple[EffectAt, ...]) -> np.ndarray:
     return np.asarray(sum(force for s, force in parts if s in some))
 
 
-def without_laws_of(several: Several, joints: Collection[str]) -> Several:
+def without_laws_of(several: Several, joints: Mapping[str, str]) -> Several:
     """Return what is left where the laws of some joints are refused; the same where none is.
 
     Of several recordings what differs stands with what is common, and nothing is refused.
 
     Args:
         several: decided.
-        joints: names.
+        joints: names, and why: a sentence each.
     """
     decision, names = several.decision, several.equations.motion.tree.joint_names
     own = {
@@ -137,7 +137,9 @@ def without_laws_of(several: Several, joints: Collection[str]) -> Several:
     if several.chances or decision.verdict != 'missing_physics' or not own - {*decision.unknown}:
         return several
     for joint in own:
-        decision = refused(several.equations, several.comparison, decision, joint)
+        why = joints[names[joint]].removesuffix('.')
+        why = why[:1].lower() + why[1:]
+        decision = refused(several.equations, several.comparison, decision, joint, why)
     return replace(several, decision=decision, model=decision.model)
 
 

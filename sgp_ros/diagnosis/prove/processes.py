@@ -16,6 +16,7 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import REMAINDER_SHARE
 from sgp_ros.diagnosis.decide.decision import Decision
+from sgp_ros.diagnosis.decide.reasons import apart
 from sgp_ros.diagnosis.locate.remainder import PARTS, Remainder, learn_remainder, parts_of
 from sgp_ros.diagnosis.prove.prediction import FinalModel
 from sgp_ros.diagnosis.prove.rollouts import RolloutWindows, cut, roll_out
@@ -53,7 +54,7 @@ def kept_processes(final: FinalModel) -> tuple[tuple[Remainder, ...], tuple[str,
             continue
         said = (
             f'Z of {names[remainder.joint]} was dropped: on parts that it was not learned from, '
-            f'the roll-out error is {ratio:.3g} times that of the physics alone.'
+            f'roll-outs are worse than by the physics alone (error {max(ratio, 1.001):.4g} times).'
         )
         remarks = (*remarks, said)
     return kept, remarks
@@ -124,8 +125,9 @@ def harm(
                 ('roll-outs', alone.rollout_after, final[stem].rollout_after),
             ):
                 if beside.get(joint, 0.0) > without.get(joint, np.inf):
+                    now, then = apart(beside[joint], without[joint])
                     found.append(
                         f'Z of {joint} makes predictions worse in {stem}: nMSE of its {what} '
-                        f'{beside[joint]:.2g}, {without[joint]:.2g} by physics alone.'
+                        f'{now}, {then} by physics alone.'
                     )
     return tuple(found)

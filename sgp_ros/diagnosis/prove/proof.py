@@ -133,7 +133,7 @@ def reasons_to_doubt(proofs: Mapping[str, Proof], still: Collection[str]) -> tup
                 continue
             if math.isfinite(error):
                 found.append(
-                    f'The final model explains the effort of {joint} in {stem} worse than a '
+                    f'The final model explains the effort of {joint} in {stem} no better than a '
                     f'constant would (nMSE {error:.2g}): no verdict is certain.'
                 )
             elif stem == 'train':

@@ -118,8 +118,14 @@ def _decided(equations: Equations, found: Explained, searched: Searched) -> Expl
         why = _doubt(equations, comparison, decision, searched)
         if not why:
             return replace(found, comparison=comparison, decision=decision)
-    decision = refused(equations, found.comparison, found.decision, searched.joint)
-    decision = replace(decision, rivals=(*searched.laws[:_RIVALS], *decision.rivals))
+    joint = equations.motion.tree.joint_names[searched.joint]
+    named = f'a force without a formula describes {joint} better than listed effects do'
+    decision = refused(equations, found.comparison, found.decision, searched.joint, named)
+    laws = searched.laws[:_RIVALS]
+    refusals = {m.key: f'no formula is asserted: {why}' for m in laws}
+    decision = replace(
+        decision, rivals=(*laws, *decision.rivals), refusals=dict(decision.refusals) | refusals
+    )
     return replace(found, decision=decision, why_not=found.why_not | {searched.joint: why})
 
 

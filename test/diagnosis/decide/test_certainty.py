@@ -17,6 +17,7 @@ from sgp_ros.diagnosis.criteria import (
 from sgp_ros.diagnosis.decide import certainty
 from sgp_ros.diagnosis.decide.certainty import Probabilities, certainty_of, settled
 from sgp_ros.diagnosis.decide.decision import UNKNOWN, Scale, decide
+from sgp_ros.diagnosis.decide.reasons import why_not
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.findings import doubted_if_none
 from sgp_ros.diagnosis.result import Finding, Location, Parameter
@@ -30,36 +31,6 @@ from test.diagnosis.worlds import CHAINS, simulate
 def _comparison(equations, *models):
     bases = (fitted(equations, is_free=f) for f in (False, True))
     return Comparison(*bases, models, ())
-
-
-def _said(equations, asserted):
-    scale = Scale.of(equations, _comparison(equations, asserted))
-    return Probabilities({}, np.zeros(1), asserted, scale)
-
-
-def test_a_rival_beside_what_is_asserted_is_told_from_one_in_its_place(equations_for, viscous):
-    """It leaves less than the asserted model and still lost: what it adds is next to nothing."""
-    _, equations = equations_for(viscous)
-    said = _said(equations, fitted(equations, 'viscous_friction'))
-    more = fitted(equations, 'viscous_friction', 'quadratic_drag')
-    assert 'added to the asserted model' in said.why(more)
-    assert 'added' not in said.why(fitted(equations, 'spring'))
-
-
-def test_a_rival_that_leaves_less_is_told_what_is_wrong_with_it(equations_for, viscous):
-    """Its price, the size of its effects, or bodies that are not likely."""
-    _, equations = equations_for(viscous)
-    said = _said(equations, fitted(equations, 'viscous_friction'))
-    more = fitted(equations, 'viscous_friction', 'quadratic_drag')
-    more = replace(more, residual=0.5 * said.asserted.residual)
-    more.__dict__['shares'] = [1.0, 1e-6]
-    assert 'too small' in said.why(more)
-    more.__dict__['shares'] = [1.0, 1.0]
-    assert 'more parameters' in said.why(more)
-    heavy = replace(more, w=np.full_like(more.w, 30.0), inertia=np.zeros(1))
-    heavy.__dict__['shares'] = [1.0, 1.0]
-    assert 'further from the nominal' in said.why(heavy)
-    assert ';' not in said.why(fitted(equations, 'spring'))
 
 
 def test_what_is_improbable_is_not_asserted_beside_others(equations_for, viscous, monkeypatch):
@@ -76,6 +47,7 @@ def test_what_is_improbable_is_not_asserted_beside_others(equations_for, viscous
     assert max(chances.by_key.values()) < LEAST_ASSERTED
     assert [s.key for s in kept.model.effects] == names[:1]
     assert kept.rivals[0] is pair
+    assert 'a plainer model is nearly as good' in why_not(pair, kept, scale)
 
 
 def test_a_plain_law_takes_the_place_of_a_richer_one_that_is_not_probable(

@@ -1,0 +1,110 @@
+"""Why a model that was compared is not asserted, in words that its numbers bear out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sgp_ros.diagnosis.criteria import EVIDENCE, PER_PARAMETER
+from sgp_ros.diagnosis.decide.cross_validation import support
+from sgp_ros.diagnosis.decide.decision import Decision, Scale
+from sgp_ros.diagnosis.explain.credibility import is_sound
+from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.regression import Columns
+
+_MOST_DIGITS = 4
+_FIT = 'it predicts the acceleration less well'
+
+
+def apart(a: float, b: float, digits: int = 2) -> tuple[str, str]:
+    """Return two numbers with as few digits as tell them apart; alike where four do not.
+
+    Args:
+        a: number.
+        b: another.
+        digits: fewest of each.
+    """
+    for n in range(digits, _MOST_DIGITS + 1):
+        shown = f'{a:.{n}g}', f'{b:.{n}g}'
+        if shown[0] != shown[1]:
+            return shown
+    return f'{a:.{digits}g}', f'{b:.{digits}g}'
+
+
+def why_not(model: Model, decision: Decision, scale: Scale) -> str:
+    """Return why a model is not asserted: what it leaves, beside what it was compared with.
+
+    That is the asserted model; where nothing is asserted, the nearest one, and of the nearest one
+    itself the bodies alone.
+
+    Args:
+        model: that was not asserted.
+        decision: in which it was not.
+        scale: of the recording.
+    """
+    if model is decision.tentative or decision.tentative is None:
+        against, name = decision.model, 'the asserted model'
+        if not against.effects:
+            name = 'corrected bodies alone' if against.is_free else 'the nominal robot'
+    else:
+        against, name = decision.tentative, 'the nearest one'
+    refused = decision.refusals.get(model.key, '')
+    losses = _losses(model, against, scale)
+    reason = max(losses, key=lambda key: losses[key])
+    j = _joint(model, against, decision, scale, is_refused=bool(refused))
+    rest, other = (float(m.mean_square[j] / scale.power[j]) for m in (model, against))
+    shown = apart(100.0 * rest, 100.0 * other, 3)
+    joint = model.frame.equations.motion.tree.joint_names[j]
+    is_more = against.effects and against.key < model.key
+    left = f'leaves {shown[0]} % of the mean squared effort of {joint}'
+    is_alike = shown[0] == shown[1]
+    said = f'added to {name} it {left}, without it {"as much" if is_alike else f"{shown[1]} %"}'
+    if not is_more:
+        said = f'{left}, as much as {name}' if is_alike else f'{left}, {name} {shown[1]} %'
+    if refused:
+        return f'{said}; {refused}'
+    is_worse = scale.worth(model) < scale.worth(against)
+    if is_worse and reason == _FIT and rest > other and not is_alike:
+        return said
+    if not scale.is_large(model):
+        return f'{said}; one of its effects is too small to count'
+    if not is_sound(model):
+        return f'{said}; its effects cancel each other or inertial parameters'
+    if not is_worse:
+        return f'{said}; {_unsupported(model, scale)}'
+    return f'{said}; {reason}'
+
+
+def _losses(model: Model, against: Model, scale: Scale) -> dict[str, float]:
+    """Return by how much a model is worth less than another, by cause [nats]."""
+    unlikely = (sum(s.effect.surprise(s) for s in m.effects) for m in (model, against))
+    return {
+        _FIT: scale.likelihood(against) - scale.likelihood(model),
+        'it needs inertial parameters further from the nominal ones': 0.5
+        * float(model.w @ model.w - against.w @ against.w),
+        'it needs more parameters than the improvement justifies': PER_PARAMETER
+        * (model.freedom - against.freedom),
+        'it needs more, or rarer, effects than the improvement justifies': model.law_price
+        - against.law_price,
+        'it needs effects of an unlikely size': next(unlikely) - next(unlikely),
+    }
+
+
+def _joint(
+    model: Model, against: Model, decision: Decision, scale: Scale, *, is_refused: bool
+) -> int:
+    """Return the joint to speak of: the open one, else where the fits differ most."""
+    if is_refused and decision.unknown:
+        return max(decision.unknown, key=lambda j: float(decision.excess[j]))
+    rests = [m.mean_square / scale.power + scale.floor for m in (model, against)]
+    ratio = np.log(rests[0] / rests[1]) + 2.0 * (against.inertia - model.inertia)
+    is_worse = scale.worth(model) < scale.worth(against) and float(ratio.sum()) > 0.0
+    return int(np.argmax(ratio if is_worse else np.abs(ratio)))
+
+
+def _unsupported(model: Model, scale: Scale) -> str:
+    """Return what is wrong with a model that is worth no less than the asserted one."""
+    columns = Columns(model.frame.equations)
+    told = support(columns, model, scale.floor * scale.power, scale.rows)
+    if told.min() > EVIDENCE:
+        return 'this recording prefers neither of the two clearly'
+    return 'it does not help to predict parts of the recording that were left out'
