@@ -37,6 +37,7 @@ from sgp_ros.apps.arguments import (  # noqa: E402 - as above
 )
 from sgp_ros.apps.terminal import (  # noqa: E402 - as above
     BESIDE_INPUT,
+    WITHOUT_RESULTS,
     mark_folder,
     require_own_folder,
     require_own_recording,
@@ -83,11 +84,11 @@ def _run(arguments: dict[str, Any]) -> int:
         out = arguments['out']
         if name == BESIDE_INPUT and not is_forced:
             require_own_recording(arguments['table'], out)
-        elif not is_forced:
+        elif out is not None and not is_forced:
             require_own_folder(out)
         with _text_to(is_quiet=is_quiet, prints_json=prints_json):
             result = _load(function)(progress=Progress(name, is_quiet=is_quiet), **arguments)
-        if name != BESIDE_INPUT:
+        if out is not None and name != BESIDE_INPUT:
             mark_folder(out, name)
         if prints_json:
             sys.stdout.write(json.dumps(result, allow_nan=False) + '\n')
@@ -214,13 +215,14 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
         found = commands.add_parser(
             name, help=summary, description=summary, epilog=f'example: {example}'
         )
-        found.set_defaults(_function=function)
-        found.add_argument(
-            '--out', metavar='DIR', type=Path, default=Path('out') / name,
-            help='folder of the results (default: %(default)s)',
-        )  # fmt: skip
-        found.add_argument('--force', dest='_force', action='store_true',
-                           help='write into DIR even if it contains other files')  # fmt: skip
+        found.set_defaults(_function=function, out=None, _force=False)
+        if name not in WITHOUT_RESULTS:
+            found.add_argument(
+                '--out', metavar='DIR', type=Path, default=Path('out') / name,
+                help='folder of the results (default: %(default)s)',
+            )  # fmt: skip
+            found.add_argument('--force', dest='_force', action='store_true',
+                               help='write into DIR even if it contains other files')  # fmt: skip
         found.add_argument('--json', dest='_json', action='store_true',
                            help='print the result as JSON; text goes to stderr')  # fmt: skip
         found.add_argument('--quiet', dest='_quiet', action='store_true',
@@ -229,20 +231,34 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
 
     for add_one in COMMANDS:
         add_one(add)
-    if not given or given[0] not in commands.choices:  # looking for others takes its time
+    if not given or given[0] not in {*commands.choices, '--version'}:  # looking takes its time
         _add_installed(add)
     return parser
 
 
 def _add_installed(add: AddCommand) -> None:
     """Add the commands of other packages; one that cannot be loaded costs a remark."""
-    from importlib.metadata import entry_points
-
-    for entry in entry_points(group=GROUP):
+    for place in _entry_points():
         try:
-            entry.load()(add)
+            _load(place)(add)
         except ImportError as error:  # noqa: PERF203 - each entry fails on its own
-            sys.stderr.write(f'sgp: no commands of {entry.value}: {error}\n')
+            sys.stderr.write(f'sgp: no commands of {place}: {error}\n')
+
+
+def _entry_points() -> list[str]:
+    """Return the functions of our group, `module:function`, of all installed packages.
+
+    As `importlib.metadata` does, which takes as long to load as all else that help needs.
+    """
+    found: dict[str, str] = {}
+    for folder in dict.fromkeys(sys.path):
+        for path in sorted(Path(folder).glob('*-info/entry_points.txt')):
+            _, _, ours = f'\n{path.read_text(encoding="utf-8")}'.partition(f'\n[{GROUP}]\n')
+            for line in ours.partition('\n[')[0].splitlines():
+                name, _, place = line.partition('=')
+                if place:
+                    found.setdefault(name.strip(), place.split('[')[0].strip())
+    return list(found.values())
 
 
 if __name__ == '__main__':

@@ -15,6 +15,8 @@ from sgp_ros.cli import Progress, main
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.writer import RecordingWriter
+from sgp_ros.robots.listing import listed_robots
+from sgp_ros.robots.registry import load_robot, robot_names
 
 ROOT = Path(__file__).parents[1]
 
@@ -346,7 +348,7 @@ def test_a_file_is_no_folder_of_results(tmp_path, capsys):
     """One line, and it stays."""
     path = tmp_path / 'thesis.tex'
     path.write_text('mine')
-    assert 'is a file' in _refused(['robots', '--out', path], capsys)
+    assert 'is a file' in _refused(['effects', '--out', path], capsys)
     assert path.read_text() == 'mine'
 
 
@@ -364,9 +366,9 @@ def test_an_import_replaces_its_own_recording_alone(tmp_path, capsys):
     for _ in range(2):
         assert main([str(a) for a in command]) == 0
     capsys.readouterr()
-    assert 'log.csv' in _refused(['robots', '--out', tmp_path], capsys)
+    assert 'log.csv' in _refused(['effects', '--out', tmp_path], capsys)
     table.unlink()
-    assert main(['robots', '--out', str(tmp_path), '--quiet']) == 0
+    assert main(['effects', '--out', str(tmp_path), '--quiet']) == 0
     assert recording.exists()
 
 
@@ -380,19 +382,41 @@ def test_a_reader_that_has_seen_enough_is_no_error():
     assert done.stderr == ''
 
 
-def test_help_comes_without_what_computes():
-    """A user who asks what there is does not wait for NumPy."""
+@pytest.mark.parametrize(
+    ('words', 'yaml', 'said'),
+    [
+        ('--help', False, 'simulate'), ('--version', False, 'sgp'),
+        ('diagnose --help', False, '--robot'), ('robots', True, 'pole, wheel'),
+    ],
+)  # fmt: skip
+def test_help_comes_without_what_computes(words, yaml, said):
+    """A user who asks what there is does not wait for NumPy, nor for a search of packages.
+
+    What Python itself loads at its start, as by `.pth` files, is not counted.
+    """
+    slow = {'numpy', 'scipy', 'rosbags', 'matplotlib', 'jinja2', 'rclpy', 'argcomplete', 'numba',
+            'pinocchio', 'importlib.metadata', 'email'}  # fmt: skip
+    slow |= set() if yaml else {'yaml'}
     code = (
-        'import sys; from sgp_ros.cli import main\n'
-        "slow = {'numpy', 'scipy', 'yaml', 'rosbags', 'matplotlib', 'jinja2', 'rclpy'}\n"
-        "try: main(['--help'])\n"
-        'except SystemExit: assert not slow & set(sys.modules)'
+        'import sys; before = set(sys.modules)\n'
+        'from sgp_ros.cli import main\n'
+        f'try: main({words.split()})\n'
+        'except SystemExit: pass\n'
+        f'assert not ({slow} & set(sys.modules)) - before'
     )
     done = subprocess.run(
         [sys.executable, '-c', code], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    assert 'simulate' in done.stdout
+    assert said in done.stdout
+
+
+def test_the_list_of_robots_is_that_of_the_robots_themselves():
+    """Though it builds none of them."""
+    listed = list(listed_robots())
+    assert [r.name for r in listed] == list(robot_names())
+    for robot in listed:
+        assert robot.joints == tuple(load_robot(robot.name).joint_names), robot.name
 
 
 def test_another_package_adds_a_command_by_an_entry_point(tmp_path, monkeypatch, capsys):

@@ -37,11 +37,11 @@ _SETTINGS = {
 _STATES, _STEP_NS = 60, 10_000_000
 
 
-def run_compile(out: Path, progress: Callable[[float], None]) -> dict[str, Any]:  # noqa: ARG001 - it writes nothing
+def run_compile(out: Path | None, progress: Callable[[float], None]) -> dict[str, Any]:  # noqa: ARG001 - it writes nothing
     """Compile, or find in the cache, what commands and nodes call.
 
     Args:
-        out: unused.
+        out: of every command; not used.
         progress: called with the share that is done.
     """
     began = time.process_time()

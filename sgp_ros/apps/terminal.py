@@ -27,6 +27,8 @@ def warned(text: str) -> str:
     return _coloured(text, '33')
 
 
+WITHOUT_RESULTS = ('robots', 'compile', 'watch')
+"""Commands that print what they have to say and have no --out."""
 BESIDE_INPUT = 'import'
 """The command that adds a recording to what is there: it may lie beside the log that it was."""
 _IMPORTS = f'{_LISTING}{BESIDE_INPUT}_'

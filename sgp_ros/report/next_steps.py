@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
+from typing import TYPE_CHECKING
 
-from sgp_ros.diagnosis.result import Diagnosis
+if TYPE_CHECKING:  # a command that only lists things ends with its next step too
+    from sgp_ros.diagnosis.result import Diagnosis
 
 Steps = Sequence[tuple[str, str]]
 PLUS_MINUS = '+- is half the width of a 95 % interval'

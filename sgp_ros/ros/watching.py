@@ -64,8 +64,8 @@ class Picture:
 
 
 def run_watch(
-    node: str, wait: float, layouts: str | None, out: Path, progress: Callable[[float], None],
-    *, once: bool,
+    node: str, wait: float, layouts: str | None, out: Path | None,
+    progress: Callable[[float], None], *, once: bool,
 ) -> dict[str, Any]:  # fmt: skip
     """Show a node until Ctrl-C.
 
