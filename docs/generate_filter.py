@@ -30,7 +30,7 @@ def _rows(cases):
 
 def _promises(cases):
     lines = [
-        '| case | joint | diagnosed | promised | delivered | ratio |',
+        '| case | joint | model of the diagnosis | stated | online | ratio |',
         '|---|---|---|---|---|---|',
     ]
     lines += [
@@ -45,8 +45,8 @@ def _misses(cases):
     rows = _rows(cases)
     missed = [f'case {c}, {j} ({ratio:.2g} times)' for c, j, _, ratio in rows if ratio > FACTOR]
     if not missed:
-        return f'None of the {len(rows)} joints is more than {FACTOR:g} times worse than promised.'
-    return f'More than {FACTOR:g} times worse than promised: {"; ".join(missed)}.'
+        return f'None of the {len(rows)} joints is more than {FACTOR:g} times worse than stated.'
+    return f'More than {FACTOR:g} times worse than stated: {"; ".join(missed)}.'
 
 
 def _left_out(cases):
@@ -55,7 +55,7 @@ def _left_out(cases):
         for name, case in cases.items()
         for finding in case['left_out']
     ]
-    return f'Not taken over by a node: {"; ".join(named) or "nothing"}.'
+    return f'Effects that a node does not model: {"; ".join(named) or "none"}.'
 
 
 def _rest(worlds):
@@ -64,9 +64,9 @@ def _rest(worlds):
     best = [min(x['effort_nmse'] for x in world['spans'].values()) for world in worlds]
     lines = [
         (
-            f'The span was chosen on two practice cases (05 and 45). On {len(worlds)} drawn worlds with stated '
+            f'The span was chosen on two practice cases (05 and 45). On {len(worlds)} simulated robots with stated '
             'dry friction and clean sensors (`sgp_proof.concealed.draw`, tier A), each replayed with the true '
-            'robot, nMSE of the effort of the worst joint, over that of the best span for that world:'
+            'parameters: nMSE of the effort of the worst joint, relative to the best span for that robot:'
         ),
         '',
         '| span [s] | median | largest | equations held, mean |',
@@ -83,9 +83,9 @@ def _rest(worlds):
     best_span = min(middle, key=middle.__getitem__)
     if float(best_span) != SPAN_S:
         said = (
-            f'{best_span} s leaves less here than {SPAN_S:g} s, in part because it holds more equations, which are '
-            'not scored. Worlds with noisy encoders, in which a short span cannot tell slow motion from rest, '
-            'were not measured: the setting is not settled.'
+            f'{best_span} s leaves less here than {SPAN_S:g} s, in part because it treats more equations as held, which are '
+            'not scored. Robots with noisy encoders, where a short span cannot distinguish slow motion from rest, '
+            'were not tested: the setting is provisional.'
         )
         lines += ['', said]
     effects = sorted({e for world in worlds for e in world['effects']})

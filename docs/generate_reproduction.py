@@ -25,10 +25,10 @@ Written by `python docs/generate_reproduction.py` from the committed results of
 sgp reproduce all
 ```
 
-It took {seconds} s on two cores that other work shared. {worlds} worlds per experiment, where the paper has five. Every method goes
-through one interface and learns its hyper-parameters by evidence. nMSE is against the noise-free
-target, coverage of the 95 % interval against measured ones. **SGP** lets evidence choose what Z sees
-and whether it is smooth or linear; GP and PRGP see all candidates; **SGP_all** is the paper's choice,
+It took {seconds} s on two cores shared with other jobs. Each experiment is run in {worlds} simulated worlds (random seeds); the paper uses five. All methods
+share one interface and learn their hyper-parameters by maximising the evidence. nMSE is relative to the noise-free
+target; coverage of the 95 % interval is that of measured values. **SGP** selects by evidence the inputs of Z
+and whether Z is smooth or linear; GP and PRGP use all candidate inputs; **SGP_all** is the paper's choice,
 a squared exponential of the paper's inputs with one length scale each.
 
 {tables}
@@ -45,18 +45,18 @@ a squared exponential of the paper's inputs with one length scale each.
 
 | the paper says | here |
 |---|---|
-| GP is very good near the data and fails when queries are far | confirmed: pole axis {gp_down} down, {gp_up} up (medians) |
-| PRGP is misled by the bump, SGP is not | confirmed, and modest: error of w {w_pr} against {w_sgp}, sparse nMSE {sparse_prgp} against {sparse_sgp} (means). A bump with one sign has a mean that a zero-mean Z explains only in part |
-| SGP relies on physics where data are sparse | confirmed: upright {sgp_up} against {pr_up} of PR (pole axis, medians) |
+| GP is very good near the data and fails far from them | confirmed: pole axis {gp_down} down, {gp_up} up (medians) |
+| PRGP is misled by the bump, SGP is not | confirmed, but the difference is modest: error of w {w_pr} against {w_sgp}, sparse nMSE {sparse_prgp} against {sparse_sgp} (means). A bump with one sign has a mean that a zero-mean Z explains only in part |
+| SGP relies on physics where data are sparse | confirmed: with the pole up {sgp_up} against {pr_up} of PR (pole axis, medians) |
 | SGP predicts the wheel axis almost perfectly where PR and GP do not | confirmed: {sgp_wheel} against {pr_wheel} and {gp_wheel} |
-| a squared exponential kernel on all inputs carries this | not robustly: the mean over worlds is {all_up_mean} upright, the median {all_up}. The evidence cannot tell sin(theta) from a straight line in the region of the data, so Z takes linear terms in theta, which it then extrapolates by pi |
-| SGP knows its own uncertainty | confirmed on true velocities ({cover_down} down, {cover_up} up); from encoders the wheel axis covers {cover_encoder} hanging down: see below |
-| parameters absorb the discontinuity in PRGP (IV.D), which learns the bump from what they leave | confirmed: joint 3 on the vertical curve {arm_prgp} against {arm_sgp} of SGP (medians), both seeing the same inputs |
+| a squared exponential kernel on all inputs carries this | not robustly: with the pole up the mean over worlds is {all_up_mean}, the median {all_up}. Within the data the evidence cannot distinguish sin(theta) from a straight line, so Z takes up linear terms in theta and extrapolates them by pi |
+| SGP knows its own uncertainty | confirmed on true velocities ({cover_down} down, {cover_up} up); from encoders, the intervals of the wheel axis cover {cover_encoder} with the pole down: see below |
+| in PRGP (IV.D) the parameters absorb the discontinuity, and the GP learns the bump from their residual | confirmed: joint 3 on the vertical curve {arm_prgp} against {arm_sgp} of SGP (medians), both seeing the same inputs |
 | PR fails on joint 3, GP fails on the vertical curve | confirmed: PR {arm_pr} horizontally, GP {arm_gp} vertically, joint 3 |
-| SGP with the paper's kernel is best on the vertical curve | not here: {arm_all} against {arm_pr_v} of PR (joint 3, medians). Positions and velocities leave the jump of dry friction to short length scales. With the direction of motion among the candidates, evidence chooses position and direction of joint 3 and reaches {arm_sgp} |
+| SGP with the paper's kernel is best on the vertical curve | not here: {arm_all} against {arm_pr_v} of PR (joint 3, medians). With positions and velocities alone, only short length scales can follow the jump of dry friction. With the direction of motion among the candidates, the evidence selects position and direction of joint 3 and reaches {arm_sgp} |
 | SGP is best or equal in every cell | {best_cells} of {all_cells} cells within 15 % of the best median |
 
-## Which inputs Z should see
+## Which inputs Z should have
 
 Starting from all candidate inputs, those worth less than three nats of evidence are dropped; then Z is made linear
 where this raises the evidence (`gp/selection.py`). Columns chosen per component. Wheel: 0 pole
@@ -67,12 +67,12 @@ positions, 3 to 5 velocities, 12 to 14 directions of the joints:
 
 The physics that was left out is viscous friction and back-EMF, linear in the two velocities; in the
 third experiment it is friction that depends on the angle of the pole and its direction; in the last
-one it is friction that depends on position and direction of joint 3. The selection was given none of this. A direction
+one it is friction that depends on position and direction of joint 3. The selection was told none of this. A direction
 is `tanh(velocity / width)`: dry friction jumps with it, and a smooth function of the velocity can follow
 a jump only with length scales too short to generalise elsewhere.
 
-A squared exponential that is to be linear needs long length scales and a large variance, hence also a
-large free constant. Upright, where there are no data, this constant caused the errors: a linear kernel
+To be nearly linear, a squared exponential needs long length scales and a large variance, and thus also a
+large free constant. With the pole up, where there are no data, this constant caused the errors. A linear kernel
 has none.
 
 ## Where SGP is not the best
@@ -81,15 +81,15 @@ Cells in which the median of SGP is more than 15 % above the best method:
 
 {not_best}
 
-Seeds in which SGP is not below PR, cell by cell. Joints 1 and 2 of the arm and the wheel axis of the third
-experiment lack no physics: there both are limited by noise, and either may be better. In the
-toy world, six samples contain little information on the sparse region:
+Seeds in which SGP is not below PR, cell by cell. For joints 1 and 2 of the arm and the wheel axis of the third
+experiment no physics is missing: both methods are limited by noise, and either may be better. In the
+toy experiment, six samples contain little information on the sparse region:
 
 {behind}
 
-With encoders, the noise of the positions also enters the inputs and columns, which the model assumes to be
-exact. On the wheel axis hanging down all other errors are so small that the intervals are too
-narrow for this reason, and evidence may choose more than the two velocities there.
+With encoders, position noise also enters the inputs and columns, which the model assumes to be
+exact. On the wheel axis with the pole down all other errors are so small that the intervals are too
+narrow for this reason, and the evidence may select more than the two velocities.
 
 ## Outlying worlds
 
@@ -117,8 +117,8 @@ come with the package (`residual_inputs`); the weak form of 0.1 s with windows t
   standard deviation is meant, or does not matter: see the table.
 * **Noise, sizes and physical parameters** are not given. They are in `sgp_proof/paper/` and in
   `simulation/reaction_wheel.py`; only orderings can be compared with the paper.
-* **Balancing.** The regulator starts a few hundredths of a radian off and first catches the pole. That half second makes most
-  of the variance that nMSE upright divides by. Leaving it out multiplied all nMSE upright by about three and
+* **Balancing.** The regulator starts a few hundredths of a radian off and first catches the pole. That half second contributes most
+  of the variance that normalises the nMSE with the pole up. Leaving it out multiplied all nMSE upright by about three and
   changed no ordering (five worlds, by hand).
 * **Half a step.** The target is the forward difference of the velocity, half a step later than the state.
   w9 and w10 are therefore about 1 % low in every method that gets them right.
