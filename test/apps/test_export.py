@@ -72,6 +72,27 @@ def test_exported_mjcf_finds_its_meshes_when_both_are_moved(tmp_path):
     assert mujoco.MjModel.from_xml_path(str(moved)).nmesh == 1
 
 
+def test_corrected_bodies_take_the_place_of_a_diagonal_inertia(tmp_path):
+    """MuJoCo refuses a body that has both a full inertia and a diagonal one."""
+    model = tmp_path / 'rod.xml'
+    model.write_text(
+        '<mujoco><worldbody><body name="rod"><joint name="hinge" axis="0 1 0"/>'
+        '<inertial pos="0 0 -0.1" quat="0.9 0.1 0 0" mass="1" diaginertia="0.02 0.02 0.01"/>'
+        '</body></worldbody></mujoco>'
+    )
+    (tmp_path / 'rod.urdf').write_text(
+        '<robot name="rod"><link name="base"/><link name="rod"><inertial>'
+        '<origin xyz="0 0 -0.2"/><mass value="3"/>'
+        '<inertia ixx="0.05" ixy="0" ixz="0" iyy="0.04" iyz="0" izz="0.02"/></inertial></link>'
+        '<joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/>'
+        '<axis xyz="0 1 0"/></joint></robot>'
+    )
+    written = _exported(str(tmp_path / 'rod.urdf'), tmp_path, 'mjcf', '--model', str(model))
+    found = mujoco.MjModel.from_xml_path(str(written))
+    assert found.body_mass[1] == pytest.approx(3.0)
+    assert sorted(found.body_inertia[1]) == pytest.approx([0.02, 0.04, 0.05], rel=1e-5)
+
+
 def test_exported_mjcf_moves_in_mujoco_as_our_simulation(tmp_path):
     """Under the recorded commands, within 1 % of the motion, over the whole recording."""
     robot = _robot(tmp_path)

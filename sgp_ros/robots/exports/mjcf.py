@@ -129,6 +129,7 @@ def _change_bodies(library: Any, spec: Any, handed: Handover, *, is_original: bo
         inertia = _rounded_safely(inertia)
         body.explicitinertial = True
         body.mass, body.ipos = mass, centre
+        body.inertia, body.iquat = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])  # instead of them
         body.fullinertia = [inertia[i, j] for i, j in
                             ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]  # fmt: skip
 
