@@ -22,17 +22,17 @@ NOTE = 'Generated from the code by `python docs/generate_reference.py`.'
 TOPICS = {
     '~/prediction': 'mean of accelerations and efforts, made before the measurement',
     '~/prediction_variance': 'its variance, calibrated by earlier errors',
-    '~/prediction_raw_variance': 'its variance as the model states it',
-    '~/predicted_joint_states': 'predicted effort under the names of the joints, to lay over the measured one',
+    '~/prediction_raw_variance': 'its variance before calibration',
+    '~/predicted_joint_states': 'predicted effort by joint name, to plot over the measured one',
     '~/residual': 'measured minus predicted effort',
     '~/band/lower': 'lower end of the 95 % interval of the effort',
     '~/band/upper': 'upper end of it',
     '~/parameters': 'value, standard deviation and unit of every parameter',
     '~/parameter_values': 'the values alone, to plot',
-    '~/monitor': 'how far the robot is from what was learned of it',
-    '~/alarm': 'whether that is too far',
+    '~/monitor': 'distance of the robot from the learned model',
+    '~/alarm': 'true while that distance is above its threshold',
     '~/diagnosis': 'the last verdict, the content of diagnosis.json',
-    '~/diagnosis_status': 'how far a running diagnosis is',
+    '~/diagnosis_status': 'progress of a running diagnosis',
     '/diagnostics': 'rate, refused samples by reason, timing, quality of the fit, findings',
 }
 SERVICES = {
@@ -40,7 +40,7 @@ SERVICES = {
     'reset': 'forget what was learned, keep the settings',
     'save': 'write the model to `save.path`',
     'diagnose': 'look for missing physics in the last `diagnosis.window` seconds, in another process',
-    'cancel_diagnosis': 'stop that',
+    'cancel_diagnosis': 'cancel a running diagnosis',
     'learn': 'learn, or only predict',
 }
 
@@ -93,7 +93,7 @@ def topics():
         '',
         NOTE,
         '',
-        '## Heard',
+        '## Subscribed',
         '',
         '| topic | type | |',
         '|---|---|---|',

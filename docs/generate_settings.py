@@ -26,9 +26,9 @@ below), whose hyper-parameters then take their place.
 |---|---|---|---|---|
 """
 NODE_HEAD = """
-## The node alone
+## Settings of the node only
 
-Where the robot comes from, what is recorded and saved, how often the node says something. Commands ignore these.
+Source of the robot, recording, saving and rates of publication. Commands ignore these.
 
 | setting | default | range | unit | what it does |
 |---|---|---|---|---|

@@ -203,7 +203,7 @@ class _Sgp(_Parser):
 
 
 def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
-    parser = _Sgp(prog='sgp', description='Find out what physics a robot has and its model lacks.')
+    parser = _Sgp(prog='sgp', description='Find the physics that a robot has and its model lacks.')
     parser.summaries = {}
     parser.add_argument('--version', action='version', version=f'sgp {__version__}')
     commands = parser.add_subparsers(
@@ -219,7 +219,7 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
         if name not in WITHOUT_RESULTS:
             found.add_argument(
                 '--out', metavar='DIR', type=Path, default=Path('out') / name,
-                help='folder of the results (default: %(default)s)',
+                help='folder of the results, which are replaced (default: %(default)s)',
             )  # fmt: skip
             found.add_argument('--force', dest='_force', action='store_true',
                                help='write into DIR even if it contains other files')  # fmt: skip

@@ -210,7 +210,7 @@ def _plain(options: dict[str, Any]) -> dict[str, Any]:
 
 
 def simulate(robot: Place, out: Place, **options: Any) -> Path:
-    """Simulate a robot, write its recording and the truth about it; return the recording's path.
+    """Simulate a robot, write its recording and true parameters; return the recording's path.
 
     Args:
         robot: a built-in name, or the file of a robot.

@@ -66,9 +66,9 @@ def _add_recording(
                         help=f'.mcap file, rosbag2 directory or ROS 1 .bag{several or ""}'
                         )  # fmt: skip
     parser.add_argument(
-        '--robot', required=True, metavar='ROBOT', help='a built-in robot, a robot YAML or a URDF'
+        '--robot', required=True, metavar='ROBOT', help='built-in robot, robot YAML or model file'
     )
-    parser.add_argument('--joint-states', metavar='TOPIC', help='topic of the states')
+    parser.add_argument('--joint-states', metavar='TOPIC', help='topic of the joint states')
     parser.add_argument('--command', metavar='TOPIC', help='topic of the commands')
     parser.add_argument(
         '--effort', choices=('auto', 'measured', 'commanded', 'state', 'command'), default='auto',
@@ -92,21 +92,21 @@ def _add_demo(add: AddCommand) -> None:
         'sgp demo --duration 20 --out out/demo',
     )  # fmt: skip
     parser.add_argument('--duration', type=_above(0.0), default=20.0, metavar='S',
-                        help='length [s]')  # fmt: skip
-    parser.add_argument('--seed', type=_seed, default=0, metavar='N', help='seed')
+                        help='duration [s] (default: %(default)s)')  # fmt: skip
+    parser.add_argument('--seed', type=_seed, default=0, metavar='N', help='random seed')
 
 
 def _add_simulate(add: AddCommand) -> None:
     parser = add(
         'simulate', 'sgp_ros.apps.simulation:run_simulation',
-        'Write a recording of a simulated robot, built-in or from a URDF, and the truth about it.',
+        'Simulate a robot, with effects to choose; write the recording and the true parameters.',
         'sgp simulate arm.urdf --effect coulomb_friction:joint=elbow,level=0.3 --sensor bits=14',
     )  # fmt: skip
-    parser.add_argument('robot', metavar='ROBOT', help='a built-in robot, a URDF or a robot YAML')
+    parser.add_argument('robot', metavar='ROBOT', help='built-in robot, robot YAML or model file')
     parser.add_argument('--duration', type=_above(0.0), default=20.0, metavar='S',
-                        help='length [s]')  # fmt: skip
-    parser.add_argument('--rate', type=_above(0.0), metavar='HZ', help='sampling rate')
-    parser.add_argument('--seed', type=_seed, default=0, metavar='N', help='seed')
+                        help='duration [s] (default: %(default)s)')  # fmt: skip
+    parser.add_argument('--rate', type=_above(0.0), metavar='HZ', help='sampling rate [Hz]')
+    parser.add_argument('--seed', type=_seed, default=0, metavar='N', help='random seed')
     parser.add_argument('--controller', metavar='NAME', help='controller that drives the robot')
     parser.add_argument(
         '--effect', dest='effects', action='append', default=[], metavar='NAME:joint=J,k=v',
@@ -120,15 +120,15 @@ def _add_simulate(add: AddCommand) -> None:
         '--sensor', dest='sensors', action='append', default=[], metavar='NAME=VALUE',
         help='sensor property, such as bits=14, velocity=no or jitter=0.001; may be repeated',
     )  # fmt: skip
-    parser.add_argument('--commands', metavar='BAG', help='replay its commands and compare')
-    parser.add_argument('--nominal', metavar='ROBOT', help='a second robot to replay beside ROBOT')
+    parser.add_argument('--commands', metavar='BAG', help='replay the commands of BAG and compare')
+    parser.add_argument('--nominal', metavar='ROBOT', help='second robot to compare with')
     _add_gains(parser, has_sim=False)
 
 
 def _add_replay(add: AddCommand) -> None:
     parser = add(
         'replay', 'sgp_ros.apps.replay:run_replay',
-        'Run a recording through the online engine and report what it learned.',
+        'Replay a recording through the online engine and report what it learned.',
         'sgp replay robot.mcap --robot linear_axis --out out/replay',
     )  # fmt: skip
     _add_recording(parser)
@@ -149,36 +149,36 @@ def _add_identify(add: AddCommand) -> None:
     )  # fmt: skip
     _add_recording(parser)
     parser.add_argument('--test', dest='tests', action='append', default=[], metavar='BAG',
-                        help='recording to score on; may be repeated')  # fmt: skip
+                        help='held-out recording to score on; may be repeated')  # fmt: skip
     parser.add_argument('--holdout', choices=('tail', 'alternate'), default='tail',
                         help='part held out without --test (default: %(default)s)')  # fmt: skip
     parser.add_argument('--share', type=_above(0.0, 1.0), default=0.4, metavar='X',
-                        help='share that is held out (default: %(default)s)')  # fmt: skip
+                        help='fraction to hold out (default: %(default)s)')  # fmt: skip
     parser.add_argument('--stretch', type=_above(0.0), default=6.0, metavar='S',
-                        help='length of stretches of --holdout alternate [s]')  # fmt: skip
+                        help='length of the parts of --holdout alternate [s]')  # fmt: skip
     parser.add_argument('--cutoff', type=_above(0.0), metavar='HZ',
-                        help='cut-off of the low-pass (default: from the data)')  # fmt: skip
+                        help='cut-off of the low-pass (default: from data)')  # fmt: skip
     parser.add_argument('--inputs', nargs='+', metavar='NAME',
-                        help='inputs of Z, such as own:velocity or every:velocity')  # fmt: skip
+                        help='inputs of the Gaussian process Z, such as own:velocity')  # fmt: skip
     _add_gains(parser, has_sim=False)
 
 
 def _add_diagnose(add: AddCommand) -> None:
     parser = add(
         'diagnose', 'sgp_ros.apps.diagnose:run_diagnose',
-        'Locate, name and model the physics that the nominal robot lacks.',
+        'Find the physics that the model lacks: which effect, at which joint, how large.',
         'sgp diagnose real.mcap --robot robot.urdf --test real_test.mcap --out out/diagnose',
     )  # fmt: skip
     _add_recording(parser, 'REAL', '; several recordings of one machine give one diagnosis')
     _add_gains(parser)
     parser.add_argument('--test', dest='tests', action='append', default=[], metavar='BAG',
-                        help='held-out recording for the proof; may be repeated; without any, '
-                        'a quarter of REAL is held out')  # fmt: skip
-    parser.add_argument('--static', action='store_true', help='rows are settled poses, not motion')
+                        help='held-out recording to validate on; may be repeated (default: '
+                        'a quarter of REAL)')  # fmt: skip
+    parser.add_argument('--static', action='store_true', help='REAL holds poses, not motion')
     parser.add_argument('--bodies', metavar='YAML',
-                        help='mass, com and inertia of links for which the URDF gives none; '
-                        'without it they are estimated from REAL')  # fmt: skip
-    parser.add_argument('--rerun', action='store_true', help='write finding.rrd for Rerun too')
+                        help='mass, com and inertia of links without them in the model file '
+                        '(default: estimated from REAL)')  # fmt: skip
+    parser.add_argument('--rerun', action='store_true', help='also write finding.rrd for Rerun')
 
 
 def _add_campaign(add: AddCommand) -> None:
@@ -189,19 +189,19 @@ def _add_campaign(add: AddCommand) -> None:
     )  # fmt: skip
     _add_recording(parser, 'PLACE', ", folder of them, or pattern such as 'bags/*/*.mcap'")
     parser.add_argument('--task', choices=('both', 'diagnose', 'identify'), default='both',
-                        help='what is done with each recording (default: both)')  # fmt: skip
+                        help='what to do with each recording (default: both)')  # fmt: skip
     _add_gains(parser)
     parser.add_argument('--covariates', metavar='CSV',
-                        help='table with a column recording; robot, session and time are known, '
-                        'other columns of numbers are covariates')  # fmt: skip
+                        help='table with a column `recording` and optional robot, session and '
+                        'time; all other numeric columns are covariates')  # fmt: skip
     parser.add_argument('--covariate-topic', dest='topics', action='append', default=[],
-                        metavar='TOPIC', help='of numbers, such as a temperature, whose mean over '
-                        'a recording is a covariate; may be repeated')  # fmt: skip
+                        metavar='TOPIC', help='numeric topic, such as a temperature, whose mean '
+                        'is a covariate; may be repeated')  # fmt: skip
     parser.add_argument('--scheduler', metavar='ADDRESS',
-                        help='of a Dask cluster, such as tcp://host:8786 (default: one of this '
-                        'computer)')  # fmt: skip
+                        help='address of a Dask cluster, such as tcp://host:8786 (default: a '
+                        'local one)')  # fmt: skip
     parser.add_argument('--workers', type=_count, metavar='N',
-                        help='processes of a cluster of this computer (default: one a core)'
+                        help='processes of a local cluster (default: one per core)'
                         )  # fmt: skip
 
 
@@ -215,15 +215,15 @@ def _add_import(add: AddCommand) -> None:
                         help='.csv, .npz, .mat, .parquet, .h5, .json or .jsonl')  # fmt: skip
     parser.add_argument('--map', dest='map_path', metavar='YAML',
                         help='columns and units (default: guessed and written)')  # fmt: skip
-    parser.add_argument('--robot', metavar='ROBOT', help='robot whose joints the columns are')
+    parser.add_argument('--robot', metavar='ROBOT', help='robot that the columns belong to')
     parser.add_argument('--rate', type=_above(0.0), metavar='HZ',
-                        help='sampling rate, where the table has no time column')  # fmt: skip
+                        help='sampling rate of a table without a time column [Hz]')  # fmt: skip
 
 
 def _add_check(add: AddCommand) -> None:
     parser = add(
         'check', 'sgp_ros.apps.check:run_check',
-        'Check whether a recording is fit for a diagnosis: clock, channels, motion, set-up.',
+        'Check whether a recording is suitable for a diagnosis: clock, channels, motion, set-up.',
         'sgp check real.mcap --robot robot.urdf',
     )  # fmt: skip
     _add_recording(parser)
@@ -233,11 +233,11 @@ def _add_check(add: AddCommand) -> None:
 def _add_effects(add: AddCommand) -> None:
     parser = add(
         'effects', 'sgp_ros.apps.effects:run_effects',
-        'List the physics that a robot may have beside its bodies: names, formulas, units.',
+        'List the effects that a robot can have beside rigid bodies: names, formulas, units.',
         'sgp effects --robot arm.yaml',
     )  # fmt: skip
     parser.add_argument('--robot', metavar='ROBOT',
-                        help='a robot whose own effects and laws are listed too')  # fmt: skip
+                        help='also list the effects and laws of this robot')  # fmt: skip
 
 
 def _add_export(add: AddCommand) -> None:
@@ -246,10 +246,10 @@ def _add_export(add: AddCommand) -> None:
         'Export a robot for another program, and list what its format cannot express.',
         'sgp export out/diagnose/robot_diagnosed.yaml --to mjcf --out out/export',
     )  # fmt: skip
-    parser.add_argument('robot', metavar='ROBOT', help='a robot YAML or a model file')
+    parser.add_argument('robot', metavar='ROBOT', help='robot YAML or model file')
     parser.add_argument(
         '--to', required=True,
-        choices=('mjcf', 'urdf', 'sdf', 'isaaclab', 'ros2_control', 'json'), help='the format',
+        choices=('mjcf', 'urdf', 'sdf', 'isaaclab', 'ros2_control', 'json'), help='format',
     )  # fmt: skip
     parser.add_argument('--model', metavar='MJCF',
                         help='MJCF to change (default: that of the robot)')  # fmt: skip
@@ -258,13 +258,11 @@ def _add_export(add: AddCommand) -> None:
 
 
 def _add_without_arguments(add: AddCommand) -> None:
-    add(
-        'robots', 'sgp_ros.apps.robots:run_robots',
-        'List the built-in robots: names, joints, what they are.',
-        'sgp robots',
-    )  # fmt: skip
+    add('robots', 'sgp_ros.apps.robots:run_robots', 'List the built-in robots and their joints.',
+        'sgp robots')  # fmt: skip
     add('compile', 'sgp_ros.apps.compiling:run_compile',
-        'Compile now what the first commands would compile.', 'sgp compile')  # fmt: skip
+        'Compile the numerical code now instead of in the first commands.', 'sgp compile'
+        )  # fmt: skip
 
 
 def _add_watch(add: AddCommand) -> None:
@@ -273,12 +271,13 @@ def _add_watch(add: AddCommand) -> None:
         'Show the state of a running node: joints, parameters, warnings, verdict.',
         'sgp watch --node /left/sgp_node',
     )  # fmt: skip
-    parser.add_argument('--node', default='/sgp_node', metavar='NAME', help='default: %(default)s')
+    parser.add_argument('--node', default='/sgp_node', metavar='NAME',
+                        help='name of the node (default: %(default)s)')  # fmt: skip
     parser.add_argument('--wait', type=_above(0.0), default=10.0, metavar='S',
                         help='wait for its first message [s] (default: %(default)s)')  # fmt: skip
     parser.add_argument('--once', action='store_true', help='print the state once and exit')
-    parser.add_argument('--layouts', metavar='DIR', help='write layouts of PlotJuggler, '
-                        'Lichtblick and Foxglove for the node and its joints')  # fmt: skip
+    parser.add_argument('--layouts', metavar='DIR', help='write layouts for PlotJuggler, '
+                        'Lichtblick and Foxglove into DIR')  # fmt: skip
 
 
 GROUPS = (
@@ -289,7 +288,7 @@ GROUPS = (
     ('Watch a running robot', ('watch',)),
 )
 """Titles and commands of the help; others come after them."""
-EXAMPLE = """example, no data of your own needed:
+EXAMPLE = """example without data of your own:
   sgp simulate double_pendulum --effect coulomb_friction:joint=elbow,level=0.05 --out out/real
   sgp diagnose out/real/double_pendulum.mcap --robot double_pendulum"""
 

@@ -38,7 +38,7 @@ class EngineConfig:
     """All settings of the engine. Build it with `from_mapping`."""
 
     reorder_window: float = _setting(
-        'reorder_window', 'float', 0.1, 'Delay in which samples are sorted by their stamps.',
+        'reorder_window', 'float', 0.1, 'Time for which samples wait to be sorted by stamp.',
         unit='s', low=0.0, high=10.0,
     )  # fmt: skip
     max_gap: float = _setting(
@@ -127,7 +127,7 @@ class EngineConfig:
     )  # fmt: skip
     buffer_remember: bool = _setting(
         'buffer.remember', 'bool', default=True,
-        description='Keep what dropped samples say about the parameters W.',
+        description='Keep the information of dropped samples on the parameters W.',
     )  # fmt: skip
     buffer_policy: str = _setting(
         'buffer.policy', 'str', 'oldest',
