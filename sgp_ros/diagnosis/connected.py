@@ -35,7 +35,7 @@ from sgp_ros.diagnosis.shown import Predictions
 from sgp_ros.physics.catalogue import COMMAND_DELAY, TORQUE_GAIN
 from sgp_ros.rigid.tree import Tree
 
-_CORRECTED = 'All results below are for the recording corrected in this way.'
+_CORRECTED = 'All other results are for the recording corrected in this way.'
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,7 @@ from sgp_ros.physics.catalogue import words_of
 
 UNKNOWN = 'unknown'
 """Name of what no effect of the catalogue describes."""
+_WORDS = {UNKNOWN: 'an unknown effect', 'gain_scale': 'a factor on the stated gains'}
 _PLACES = {'base': 'at the base', 'tool': 'at the tool', 'all': 'on all joints'}
 _ENTRIES = {f'com_{axis}': f'{axis} of the centre' for axis in 'xyz'}
 _MEANINGLESS = 1e6
@@ -75,7 +76,7 @@ def phrase(finding: Finding | Difference) -> str:
 
 def plain_name(effect: str) -> str:
     """Return the plain name of an effect, also of an unknown one."""
-    return 'an unknown effect' if effect == UNKNOWN else words_of(effect)
+    return _WORDS.get(effect) or words_of(effect)
 
 
 def effect_name(finding: Finding | Difference) -> str:

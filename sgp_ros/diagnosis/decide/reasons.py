@@ -77,14 +77,15 @@ def why_not(model: Model, decision: Decision, scale: Scale) -> str:
 def _losses(model: Model, against: Model, scale: Scale) -> dict[str, float]:
     """Return by how much a model is worth less than another, by cause [nats]."""
     unlikely = (sum(s.effect.surprise(s) for s in m.effects) for m in (model, against))
+    fit = scale.likelihood(against) - scale.likelihood(model)
+    more = 'it needs more' if fit < 0.0 else 'it fits no better and needs more'
+    justified = ' than the improvement justifies' if fit < 0.0 else ''
     return {
-        _FIT: scale.likelihood(against) - scale.likelihood(model),
+        _FIT: fit,
         'it needs inertial parameters further from the nominal ones': 0.5
         * float(model.w @ model.w - against.w @ against.w),
-        'it needs more parameters than the improvement justifies': PER_PARAMETER
-        * (model.freedom - against.freedom),
-        'it needs more, or rarer, effects than the improvement justifies': model.law_price
-        - against.law_price,
+        f'{more} parameters{justified}': PER_PARAMETER * (model.freedom - against.freedom),
+        f'{more}, or rarer, effects{justified}': model.law_price - against.law_price,
         'it needs effects of an unlikely size': next(unlikely) - next(unlikely),
     }
 
@@ -92,13 +93,12 @@ def _losses(model: Model, against: Model, scale: Scale) -> dict[str, float]:
 def _joint(
     model: Model, against: Model, decision: Decision, scale: Scale, *, is_refused: bool
 ) -> int:
-    """Return the joint to speak of: the open one, else where the fits differ most."""
+    """Return the joint to speak of: the open one, else where the fit lost, or gained, most."""
     if is_refused and decision.unknown:
         return max(decision.unknown, key=lambda j: float(decision.excess[j]))
     rests = [m.mean_square / scale.power + scale.floor for m in (model, against)]
     ratio = np.log(rests[0] / rests[1]) + 2.0 * (against.inertia - model.inertia)
-    is_worse = scale.worth(model) < scale.worth(against) and float(ratio.sum()) > 0.0
-    return int(np.argmax(ratio if is_worse else np.abs(ratio)))
+    return int(np.argmax(ratio) if float(ratio.sum()) > 0.0 else np.argmin(ratio))
 
 
 def _unsupported(model: Model, scale: Scale) -> str:

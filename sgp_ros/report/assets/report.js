@@ -11,8 +11,14 @@
   const width = { thick: 4, dashed: 1.8, line: 1.5, points: 0 };
 
   const number = x => x == null ? '–' : Number(x.toPrecision(4)).toString();
-  const axis = label => ({
-    label, labelSize: 20, size: 46, stroke: tone('ink'), labelFont: '12px system-ui',
+  function ticks(u, splits, i, space, step) { // as many digits as tell them apart
+    let digits = 0;
+    while (digits < 7 && Math.abs(step * 10 ** digits - Math.round(step * 10 ** digits)) > 1e-6) digits += 1;
+    const shown = x => digits < 7 ? x.toFixed(digits) : Number(x.toPrecision(4)).toString();
+    return splits.map(x => x == null ? '' : shown(x));
+  }
+  const axis = (label, log) => ({
+    ...(log ? {} : { values: ticks }), label, labelSize: 20, size: 46, stroke: tone('ink'), labelFont: '12px system-ui',
     font: '12px system-ui', grid: { stroke: tone('grid'), width: 1 }, ticks: { stroke: tone('grid') },
   });
 
@@ -87,7 +93,14 @@
       });
     }
     const scales = { x: { time: false, distr: chart.log ? 3 : 1 }, y: { distr: chart.log ? 3 : 1 } };
-    if (chart.limit) scales.y = { range: chart.limit };
+    if (chart.limit) { // what is in view, as far as it lies within the limits
+      const [low, high] = chart.limit;
+      scales.y = { range: (u, from, to) => {
+        if (from === null || from >= high || to <= low) return chart.limit;
+        const pad = 0.05 * Math.max(Math.min(to, high) - Math.max(from, low), 1e-6 * (high - low));
+        return [Math.max(from - pad, low), Math.min(to + pad, high)];
+      } };
+    }
     const c = chart.cells;
     if (c) {
       scales.x.range = [c.x[0], c.x[c.x.length - 1]];
@@ -99,7 +112,7 @@
     return [values, {
       width: at.clientWidth || 600, height: tall(at.clientWidth || 600),
       scales, series, bands,
-      axes: [axis(chart.x_label), { ...axis(chart.y_label), size: 58 }],
+      axes: [axis(chart.x_label, chart.log), { ...axis(chart.y_label, chart.log), size: 58 }],
       cursor: {
         drag: { x: true, y: false, uni: 10 },
         ...(chart.group ? { sync: { key: chart.group, setSeries: false } } : {}),

@@ -58,6 +58,9 @@ def test_a_rival_that_leaves_less_is_told_what_is_wrong_with_it(damped, models):
     assert 'too small' in _said(more, right, damped)
     more.__dict__['shares'] = [1.0, 1.0]
     assert 'than the improvement justifies' in _said(more, right, damped)
+    worse = replace(more, residual=1.001 * right.residual)
+    worse.__dict__['shares'] = [1.0, 1.0]
+    assert 'it fits no better and needs more' in _said(worse, right, damped)
     heavy = replace(more, w=np.full_like(more.w, 30.0), inertia=np.zeros(1))
     heavy.__dict__['shares'] = [1.0, 1.0]
     assert 'further from the nominal' in _said(heavy, right, damped)
@@ -111,6 +114,10 @@ def test_no_reason_contradicts_the_numbers_beside_it(
     scale = Scale.of(damped, _comparison(damped, models[against]))
     if 'needs' in reason:
         assert scale.worth(drawn) < scale.worth(models[against])
+    if 'improvement' in reason:
+        assert scale.likelihood(drawn) > scale.likelihood(models[against])
+    if 'no better' in reason:
+        assert scale.likelihood(drawn) <= scale.likelihood(models[against])
     if not models[against].effects:
         assert 'asserted model' not in said
 
