@@ -124,7 +124,7 @@ class LiveProcesses:
         for module, child in self._children.items():
             if child.poll() is not None:
                 raise RecordingError(
-                    f'{module} ended with status {child.returncode}', 'it to run on',
+                    f'{module} ended with status {child.returncode}', 'it to keep running',
                     self._said(module),
                 )  # fmt: skip
 

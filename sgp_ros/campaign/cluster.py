@@ -68,9 +68,13 @@ def _require_version(client: Any) -> None:
     try:
         versions = set(client.run(worker_version).values())
     except ImportError as error:
-        raise ConfigError(f'workers cannot import sgp_ros ({error})', 'it on each') from error
+        raise ConfigError(
+            f'workers cannot import sgp_ros ({error})', 'sgp_ros on every worker'
+        ) from error
     if versions - {__version__}:
-        raise ConfigError(f'workers with sgp_ros {sorted(versions)}', f'{__version__} on each')
+        raise ConfigError(
+            f'workers with sgp_ros {sorted(versions)}', f'{__version__} on every worker'
+        )
 
 
 def run_tasks(

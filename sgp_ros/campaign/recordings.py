@@ -113,7 +113,7 @@ def read_covariates(path: str | None, names: Sequence[str], remarks: list[str]) 
         if name is None:
             strangers.append(str(cell))
         elif name in rows:
-            raise ConfigError(f'{path} has {name} in two rows', 'one row a recording')
+            raise ConfigError(f'{path} has {name} in two rows', 'one row per recording')
         else:
             rows[name] = row
     if strangers:

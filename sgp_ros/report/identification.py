@@ -94,7 +94,7 @@ def render(
         target=findings['target'],
         tables=[
             {
-                'title': 'Learned from' if name == 'train' else called(name).capitalize(),
+                'title': 'Learned from' if name == 'train' else called(name),
                 'rows': _rows(findings, name), 'is_open': name in findings['held_out'],
             }
             for name in sorted(regions, key=lambda name: name not in findings['held_out'])

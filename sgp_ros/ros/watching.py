@@ -97,7 +97,7 @@ def run_watch(
                 others = f'heard of {sorted(picture.others)}' if picture.others else 'is it up?'
                 raise ConfigError(
                     f'nothing from {node} on /diagnostics within {wait:g} s', '',
-                    f'{others}; the same ROS_DOMAIN_ID? --node NAME',
+                    f'{others}; check ROS_DOMAIN_ID and --node NAME',
                 )  # fmt: skip
         if layouts is not None:
             joints = [n.removeprefix('fit ') for n in picture.statuses if n.startswith('fit ')]
