@@ -35,7 +35,7 @@ from sgp_ros.report.diagnosis_text import (
     visibility_sentences,
 )
 from sgp_ros.report.files import replacing_results, write_text
-from sgp_ros.report.next_steps import Given, after_diagnosis, ending
+from sgp_ros.report.next_steps import Given, Steps, after_diagnosis, ending
 from sgp_ros.report.overlay import write_overlay
 from sgp_ros.report.verdict import simulated, verdict_sentence
 from sgp_ros.robots.bare import simulated_model
@@ -122,7 +122,7 @@ def run_diagnose(
     examined = examine(bag, robot, progress=progress, **options)
     content, found = write_examined(out, examined, rerun=rerun)
     print_diagnosis(found)
-    print(ending(out, after_diagnosis(found, examined.given, out)))
+    print(ending(out, _steps(examined, found, out)))
     return content
 
 
@@ -231,9 +231,12 @@ def write_examined(
             content['online'] = online.content()
         write_text(out / 'diagnosis.json', json.dumps(content, indent=1, allow_nan=False) + '\n')
         write_overlay(out, found.joints, found.units, found.overlays)
-        steps = after_diagnosis(found, examined.given, out)
-        write_diagnosis(out, found, nominal.tree, steps)
+        write_diagnosis(out, found, nominal.tree, _steps(examined, found, out))
     return content, found
+
+
+def _steps(examined: Examined, found: Diagnosis, out: Path) -> Steps:
+    return after_diagnosis(found.verdict, examined.given, out, has_setup_error=bool(found.setup))
 
 
 def print_diagnosis(found: Diagnosis) -> None:

@@ -56,8 +56,9 @@ def cautions(findings: Mapping[str, Any]) -> list[str]:
     if not plan['is_white'] and plan['residual_autocorrelation'] > by_chance:
         found.append(
             'The residual of the physics is not white (correlation '
-            f'{plan["residual_autocorrelation"]:.2f} from row to row): physics is missing, or the noise '
-            'is coloured. The intervals of the parameters allow for this correlation, but not for a bias.'
+            f'{plan["residual_autocorrelation"]:.2f} from row to row): physics is missing, or the '
+            'noise is coloured. The intervals of the parameters allow for this correlation, but '
+            'not for a bias.'
         )
     narrow = [
         f'{joint} ({100 * score["coverage95"]:.0f} %)'

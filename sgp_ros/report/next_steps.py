@@ -6,10 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:  # a command that only lists things ends with its next step too
-    from sgp_ros.diagnosis.result import Diagnosis
 
 Steps = Sequence[tuple[str, str]]
 PLUS_MINUS = '+- is half the width of a 95 % interval'
@@ -39,16 +35,16 @@ class Given:
         return f'{quote(bag)} --robot {quote(self.robot)}{gains}'
 
 
-def after_diagnosis(found: Diagnosis, given: Given, out: Path) -> Steps:
+def after_diagnosis(verdict: str, given: Given, out: Path, *, has_setup_error: bool) -> Steps:
     """Return what to do with a diagnosis, the results of which are in `out`."""
     bag, diagnosed = given.bag, _path(out / 'robot_diagnosed.yaml')
     again = f'sgp diagnose {given.words(bag)} --out {_path(out)}'
-    if found.setup:
+    if has_setup_error:
         return [('Correct the set-up or the robot file, record, and diagnose again:', again)]
-    if found.verdict == 'no_mismatch':
+    if verdict == 'no_mismatch':
         other = f'sgp diagnose {given.words(_OTHER)}'
         return [('Nothing to correct. A larger or faster motion may show more:', other)]
-    if found.verdict == 'unexplained':
+    if verdict == 'unexplained':
         learn = f'sgp replay {quote(bag)} --robot {diagnosed}'
         return [('Learn the unexplained part with a Gaussian process:', learn)]
     steps = [

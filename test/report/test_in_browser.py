@@ -68,7 +68,12 @@ def page_path(tmp_path_factory):
     found = diagnosis('missing_physics', [COULOMB], alternatives=[ASYMMETRIC], errors=[MASS])
     found = replace(found, law_searches=(search(),))
     write_diagnosis(
-        out, found, tree, after_diagnosis(found, Given('a.mcap', 'arm.urdf'), Path('out'))
+        out,
+        found,
+        tree,
+        after_diagnosis(
+            found.verdict, Given('a.mcap', 'arm.urdf'), Path('out'), has_setup_error=False
+        ),
     )
     return out / 'report.html'
 
