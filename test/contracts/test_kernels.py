@@ -142,7 +142,7 @@ def test_learning_raises_the_evidence(name):
     truth, data = _stream(kernel, 60)
     prior = CoefficientPrior.from_std(np.zeros(1), np.ones(1))
     start = initial_model(data, (kernel.inputs,), kernel=type(kernel))
-    learned = learn(data, prior, start)
+    learned = learn(data, prior, start, 4, np.random.default_rng(1))
     assert type(learned.model.kernels[0]) is type(kernel)
     assert learned.log_evidence > Posterior(start, data, prior).log_evidence
     assert learned.log_evidence > Posterior(truth, data, prior).log_evidence - 1e-6
