@@ -80,8 +80,9 @@ def _run(arguments: dict[str, Any]) -> int:
     )
     signal.signal(signal.SIGTERM, _interrupt)
     warnings.filterwarnings('ignore', category=RuntimeWarning, module=r'scipy\.')
+    out = arguments['out']
+    is_new = out is not None and not out.exists()
     try:
-        out = arguments['out']
         if name == BESIDE_INPUT and not is_forced:
             require_own_recording(arguments['table'], out)
         elif out is not None and not is_forced:
@@ -90,6 +91,7 @@ def _run(arguments: dict[str, Any]) -> int:
             result = _load(function)(progress=Progress(name, is_quiet=is_quiet), **arguments)
         if out is not None and name != BESIDE_INPUT:
             mark_folder(out, name)
+        is_new = False
         if prints_json:
             sys.stdout.write(json.dumps(result, allow_nan=False) + '\n')
         sys.stdout.flush()
@@ -102,6 +104,10 @@ def _run(arguments: dict[str, Any]) -> int:
     except KeyboardInterrupt:
         sys.stderr.write(f'sgp {name}: interrupted\n')
         return INTERRUPTED
+    finally:
+        if is_new:
+            with suppress(OSError):  # there is none, or there are results in it
+                out.rmdir()
     return 0
 
 

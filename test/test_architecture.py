@@ -26,10 +26,11 @@ LAYERS = {
     'gp': NUMERIC | {'numba', 'errors'},
     'physics': {'numpy', 'numba', 'errors'},
     'strangers': {'yaml', 'errors'},
+    'apart': {'strangers', 'errors'},
     'rigid': NUMERIC | {
         'numba', 'pinocchio', 'clarabel', 'gp', 'physics', 'strangers', 'errors',
     },
-    'robots': {'numpy', 'yaml', 'physics', 'rigid', 'optional', 'strangers', 'errors'},
+    'robots': {'numpy', 'yaml', 'physics', 'rigid', 'optional', 'apart', 'strangers', 'errors'},
     'simulation': NUMERIC | {
         'mujoco', 'physics.catalogue', 'physics.effect', 'physics.effect_at', 'physics.parts',
         'physics.law', 'physics.grammar', 'rigid', 'optional', 'errors',
@@ -40,7 +41,7 @@ LAYERS = {
     },
     'recordings': {
         'numpy', 'scipy', 'yaml', 'rosbags', 'mcap', 'lz4', 'zstandard', 'engine.samples',
-        'engine.results', 'optional', 'strangers', 'errors',
+        'engine.results', 'optional', 'apart', 'strangers', 'errors',
     },
     'diagnosis': NUMERIC | {
         'numba', 'gp', 'physics', 'rigid', 'robots', 'engine', 'batch', 'errors',

@@ -39,6 +39,7 @@ from sgp_ros.report.next_steps import after_replay, ending
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.shipped import find_shipped
+from sgp_ros.strangers import read_text, readable
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,13 +182,9 @@ def load_truth(path: str) -> dict[str, float]:
     Raises:
         ConfigError: no such file or no coefficients in it.
     """
-    try:
-        document = json.loads(Path(path).read_text(encoding='utf-8'))
+    with readable(path, ConfigError, 'a truth.json of `sgp simulate`'):
+        document = json.loads(read_text(Path(path)))
         return {name: float(c['value']) for name, c in document['coefficients'].items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise ConfigError(
-            f'{path} holds no coefficients ({error})', 'a truth.json of `sgp simulate`'
-        ) from error
 
 
 def write_identified_robot(out: Path, engine: Engine) -> str:

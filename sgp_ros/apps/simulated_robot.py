@@ -17,6 +17,7 @@ from sgp_ros.simulation.registry import SIMULATORS
 from sgp_ros.simulation.simulator import Simulator
 from sgp_ros.simulation.tree_simulator import tree_simulator
 from sgp_ros.simulation.tree_text import Load, TreePart
+from sgp_ros.strangers import read_text
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,7 +54,7 @@ def find_robot(robot: str) -> SimulatedRobot:
 
 def _of_urdf(path: Path) -> Simulator:
     try:
-        return tree_simulator(path.read_text(encoding='utf-8-sig'))
+        return tree_simulator(read_text(path))
     except UnicodeDecodeError as error:
         raise ConfigError(f'URDF {path} is not UTF-8 ({error})', 'a URDF in UTF-8') from error
 

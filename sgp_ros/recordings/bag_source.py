@@ -1,19 +1,23 @@
-"""Bags that are not plain MCAP: SQLite3, compressed rosbag2 directories, ROS 1."""
+"""Bags that are not MCAP: SQLite3 and ROS 1."""
 
 from __future__ import annotations
 
 import heapq
 import sqlite3
+from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
+from typing import Any
 
-from rosbags.rosbag1 import Reader as Ros1Reader
-from rosbags.rosbag2 import Reader as Ros2Reader
+from rosbags.rosbag1.reader import Chunk, Reader, decompressors
 
-from sgp_ros.errors import RecordingError
+from sgp_ros.errors import RecordingError, SgpError
 from sgp_ros.recordings.topics import RawMessage, Topic
 from sgp_ros.recordings.typestore import short_type
+from sgp_ros.recordings.unpacking import Unpacking
+from sgp_ros.strangers import require_within
 
 
 class SqliteSource:
@@ -30,12 +34,12 @@ class SqliteSource:
 
     def __init__(self, paths: Sequence[Path]) -> None:
         self._paths = tuple(paths)
-        counts: dict[tuple[str, str, str], int] = {}
+        counts: Counter[tuple[str, str, str]] = Counter()
         for path in self._paths:
             self._require_tables(path)
-            for name, kind, encoding, count in self._rows(path, _COUNT_QUERY):
-                key = (str(name), short_type(str(kind)), str(encoding))
-                counts[key] = counts.get(key, 0) + int(str(count))
+            number = dict(self._rows(path, _COUNT_QUERY))
+            for key, *described in self._topics(path):
+                counts[described[0], described[1], described[2]] += int(str(number.get(key, 0)))
         self.topics = tuple(
             Topic(name, kind, count, encoding)
             for (name, kind, encoding), count in sorted(counts.items())
@@ -43,34 +47,53 @@ class SqliteSource:
 
     def messages(self, topics: Collection[Topic]) -> Iterator[RawMessage]:
         """Yield the messages of `topics` by log time; equal times keep the order of the file."""
-        names = tuple(topic.name for topic in topics)
-        query = _MESSAGE_QUERY.format(', '.join('?' * len(names)))
-        streams = [self._file_messages(path, query, names) for path in self._paths]
+        wanted = {topic.name for topic in topics}
+        streams = [self._file_messages(path, wanted) for path in self._paths]
         yield from heapq.merge(*streams, key=lambda message: message.log_ns)
 
-    def _file_messages(
-        self, path: Path, query: str, names: tuple[str, ...]
-    ) -> Iterator[RawMessage]:
-        for log_ns, name, data in self._rows(path, query, names):
+    def _file_messages(self, path: Path, wanted: Collection[str]) -> Iterator[RawMessage]:
+        names = {key: name for key, name, *_ in self._topics(path) if name in wanted}
+        query = _MESSAGE_QUERY.format(', '.join('?' * len(names)))
+        for log_ns, key, data in self._rows(path, query, tuple(names)):
             if not isinstance(log_ns, int) or not isinstance(data, bytes):
                 raise RecordingError(
                     f'{path}: a message of {type(log_ns).__name__} and {type(data).__name__}',
                     'an integer time and binary data',
                 )
-            yield RawMessage(log_ns, str(name), data)
+            yield RawMessage(log_ns, names[key], data)
+
+    def _topics(self, path: Path) -> Iterator[tuple[object, str, str, str]]:
+        """Yield key, name, type and encoding of the topics of a file.
+
+        Raises:
+            RecordingError: several topics of one key, or more than `ENTRIES`.
+        """
+        known: set[object] = set()
+        for key, name, kind, encoding in self._rows(path, _TOPIC_QUERY):
+            if key in known:
+                raise RecordingError(f'{path} has several topics of key {key}', 'one of each')
+            known.add(key)
+            require_within(len(known), 'ENTRIES', f'number of topics in {path}')
+            yield key, str(name), short_type(str(kind)), str(encoding)
 
     def _require_tables(self, path: Path) -> None:
-        """Refuse views and virtual tables, which may compute without end."""
+        """Refuse views, virtual tables and columns, which may compute without end."""
         found = {str(name): str(sql) for name, sql in self._rows(path, _TABLES_QUERY)}
-        wrong = [n for n in ('topics', 'messages') if not found.get(n, '').startswith(_TABLE)]
+        wrong = [
+            name
+            for name in ('topics', 'messages')
+            if not found.get(name, '').startswith(_TABLE)
+            or any(hidden for (hidden,) in self._rows(path, _COLUMNS_QUERY, (name,)))
+        ]
         if wrong:
             raise RecordingError(f'{path} has no plain tables {wrong}', 'a .db3 file of rosbag2')
 
     def _rows(
-        self, path: Path, query: str, values: tuple[str, ...] = ()
-    ) -> Iterator[tuple[object, ...]]:
+        self, path: Path, query: str, values: tuple[object, ...] = ()
+    ) -> Iterator[tuple[Any, ...]]:
         try:
             with closing(sqlite3.connect(f'{path.absolute().as_uri()}?mode=ro', uri=True)) as base:
+                base.execute('PRAGMA trusted_schema = OFF')
                 yield from base.execute(query, values)
         except sqlite3.DatabaseError as error:
             raise RecordingError(
@@ -82,21 +105,19 @@ class SqliteSource:
 
 _TABLE = 'CREATE TABLE'
 _TABLES_QUERY = "SELECT name, sql FROM sqlite_master WHERE name IN ('topics', 'messages')"
-_COUNT_QUERY = (
-    'SELECT name, type, serialization_format, count(messages.id) FROM topics '
-    'LEFT JOIN messages ON topics.id == messages.topic_id GROUP BY topics.id'
-)
+_COLUMNS_QUERY = 'SELECT hidden FROM pragma_table_xinfo(?)'
+_TOPIC_QUERY = 'SELECT id, name, type, serialization_format FROM topics'
+_COUNT_QUERY = 'SELECT topic_id, count(*) FROM messages GROUP BY topic_id'
 _MESSAGE_QUERY = (
-    'SELECT timestamp, name, data FROM messages JOIN topics ON topics.id == messages.topic_id '
-    'WHERE name IN ({}) ORDER BY timestamp, messages.id'
+    'SELECT timestamp, topic_id, data FROM messages WHERE topic_id IN ({}) ORDER BY timestamp, id'
 )
 
 
-class RosbagsSource:
-    """The messages of a ROS 1 bag, or of a rosbag2 directory with compression.
+class Ros1Source:
+    """The messages of a ROS 1 bag.
 
     Args:
-        path: the `.bag` file or the directory.
+        path: the `.bag` file.
 
     Raises:
         RecordingError: what rosbags says about a broken one.
@@ -106,34 +127,48 @@ class RosbagsSource:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._encoding = 'ros1' if path.is_file() else 'cdr'
-        try:
-            with self._reader() as reader:
-                self.topics = tuple(
-                    Topic(name, short_type(info.msgtype or ''), info.msgcount, self._encoding)
-                    for name, info in sorted(reader.topics.items())
-                )
-        except RecordingError:
-            raise
-        except Exception as error:  # the library raises what its parsers do
-            raise self._broken(error) from error
+        with self._reader() as reader:
+            self.topics = tuple(
+                Topic(name, short_type(info.msgtype or ''), info.msgcount, 'ros1')
+                for name, info in sorted(reader.topics.items())
+            )
 
     def messages(self, topics: Collection[Topic]) -> Iterator[RawMessage]:
         """Yield the messages of `topics` by log time."""
         names = {topic.name for topic in topics}
+        with self._reader() as reader:
+            connections = [c for c in reader.connections if c.topic in names]
+            for connection, log_ns, data in reader.messages(connections):
+                yield RawMessage(log_ns, connection.topic, data)
+
+    @contextmanager
+    def _reader(self) -> Iterator[Reader]:
         try:
-            with self._reader() as reader:
-                connections = [c for c in reader.connections if c.topic in names]
-                for connection, log_ns, data in reader.messages(connections):
-                    yield RawMessage(log_ns, connection.topic, data)
-        except RecordingError:
+            with _Ros1Reader(self._path) as reader:
+                yield reader
+        except SgpError:
             raise
         except Exception as error:  # the library raises what its parsers do
-            raise self._broken(error) from error
+            raise RecordingError(
+                f'{self._path} cannot be read ({error})', 'an intact bag',
+                'repair it with `rosbag reindex`',
+            ) from error  # fmt: skip
 
-    def _reader(self) -> Ros1Reader | Ros2Reader:
-        return Ros1Reader(self._path) if self._path.is_file() else Ros2Reader(self._path)
 
-    def _broken(self, error: Exception) -> RecordingError:
-        remedy = 'repair it with `rosbag reindex`' if self._encoding == 'ros1' else ''
-        return RecordingError(f'{self._path} cannot be read ({error})', 'an intact bag', remedy)
+class _Ros1Reader(Reader):
+    """A reader whose chunks unpack within bounds."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self._unpacking = Unpacking()
+
+    def read_chunk(self) -> Chunk:
+        """Return where a chunk is, with what unpacks it."""
+        chunk = super().read_chunk()
+        kind = _PACKED.get(chunk.decompressor)
+        if kind is None:
+            return chunk
+        return chunk._replace(decompressor=partial(self._unpacking.unpacked, kind))
+
+
+_PACKED = {decompressors['bz2']: 'bz2', decompressors['lz4']: 'lz4'}

@@ -8,19 +8,18 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator
 from io import BytesIO
 from typing import IO
 
 import zstandard
-from lz4.frame import LZ4FrameDecompressor
-from mcap.exceptions import EndOfFile, McapError
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Chunk, McapRecord
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.records import Channel, Chunk, Message, Schema
+from mcap.stream_reader import CRCValidationError
 
-from sgp_ros.strangers import bound, require_within
+from sgp_ros.recordings.unpacking import Unpacking
 
 MAGIC = b'\x89MCAP0\r\n'
 DAMAGE = (
@@ -30,10 +29,16 @@ DAMAGE = (
 """What reading damaged records raises."""
 
 _LOOSE_BYTES = 1 << 20
-_RECORD_HEAD = struct.Struct('<BQ')
+_RECORD_HEAD, _MESSAGE_HEAD = struct.Struct('<BQ'), struct.Struct('<HIQQ')
 SOUND, DAMAGED, MISSING = 'sound', 'damaged', 'missing'
 _FOOTER = struct.Struct('<BQQQI')
 _DATA_END = struct.Struct('<BQI')
+
+
+Record = Schema | Channel | Message
+_READERS: dict[int, Callable[[ReadDataStream], Record]] = {
+    Opcode.SCHEMA: Schema.read, Opcode.CHANNEL: Channel.read,
+}  # fmt: skip
 
 
 class Walk:
@@ -113,31 +118,40 @@ def state_of_summary(stream: IO[bytes]) -> str:
     return SOUND if start else MISSING
 
 
-def read_records(data: bytes) -> Iterator[McapRecord]:
-    """Yield the records in `data`, those of chunks included; a wrong checksum raises."""
-    reader = StreamReader(BytesIO(data), skip_magic=True, validate_crcs=True, emit_chunks=True)
-    try:
-        for record in reader.records:
-            if isinstance(record, Chunk):
-                yield from breakup_chunk(_unpacked(record), validate_crc=True)
-            else:
-                yield record
-    except EndOfFile:
-        return
+def read_records(data: bytes, unpacking: Unpacking | None) -> Iterator[Record]:
+    """Yield schemas, channels and messages of complete records, those in chunks included.
 
-
-def _unpacked(chunk: Chunk) -> Chunk:
-    """Return a chunk whose data are plain, or can be unpacked to what it says itself.
+    Args:
+        data: of one segment.
+        unpacking: bounds what chunks unpack to; None inside a chunk, where there are no others.
 
     Raises:
-        TooMuchError: it unpacks to more than `CHUNK_MB`, whatever it says.
+        TooMuchError: beyond `CHUNK_MB` or `RATIO`.
+        McapError: a wrong checksum, or what is no record; others of `DAMAGE`.
     """
-    most = bound('CHUNK_MB') << 20
-    size = chunk.uncompressed_size
-    if chunk.compression == 'zstd':
-        size = max(size, zstandard.frame_content_size(chunk.data))
-    elif chunk.compression == 'lz4' and size <= most:
-        data = LZ4FrameDecompressor().decompress(chunk.data, max_length=most + 1)
-        chunk, size = replace(chunk, compression='', data=data), len(data)
-    require_within(size / (1 << 20), 'CHUNK_MB', 'chunk size in MB')
-    return chunk
+    end = 0
+    while end < len(data):
+        opcode, length = _RECORD_HEAD.unpack_from(data, end)
+        start, end = end + _RECORD_HEAD.size, end + _RECORD_HEAD.size + length
+        if opcode == 0 or end > len(data):
+            raise McapError(f'no record at byte {start - _RECORD_HEAD.size} of it')
+        if opcode == Opcode.MESSAGE:
+            channel, sequence, log_ns, publish_ns = _MESSAGE_HEAD.unpack_from(data, start)
+            content = data[start + _MESSAGE_HEAD.size : end]
+            yield Message(channel, log_ns, content, publish_ns, sequence)
+        elif opcode in _READERS:
+            yield _READERS[opcode](ReadDataStream(BytesIO(data[start:end])))
+        elif opcode == Opcode.CHUNK and unpacking is not None:
+            chunk = Chunk.read(ReadDataStream(BytesIO(data[start:end])))
+            yield from read_records(_plain(chunk, unpacking), None)
+
+
+def _plain(chunk: Chunk, unpacking: Unpacking) -> bytes:
+    data = chunk.data
+    if chunk.compression:
+        data = unpacking.unpacked(chunk.compression, data)
+    if len(data) != chunk.uncompressed_size:
+        raise McapError(f'a chunk of {len(data)} bytes that states {chunk.uncompressed_size}')
+    if chunk.uncompressed_crc not in {0, zlib.crc32(data)}:
+        raise CRCValidationError(chunk.uncompressed_crc, zlib.crc32(data), chunk)
+    return data

@@ -32,6 +32,7 @@ from sgp_ros.recordings.mcap_records import (
 )
 from sgp_ros.recordings.topics import RawMessage, Topic
 from sgp_ros.recordings.typestore import short_type
+from sgp_ros.recordings.unpacking import Unpacking
 
 
 class McapSource:
@@ -76,8 +77,9 @@ class McapSource:
         order = sorted(range(len(segments)), key=lambda place: segments[place].start_ns)
         following = [segments[place].start_ns for place in order[1:]]
         pending: list[tuple[int, int, RawMessage]] = []
+        unpacking = Unpacking()
         for number, place in enumerate(order):
-            read = self._segment_messages(segments[place], wanted)
+            read = self._segment_messages(segments[place], wanted, unpacking)
             pending += ((message.log_ns, place, message) for message in read)
             pending.sort(key=itemgetter(0, 1))
             if number < len(following):
@@ -87,7 +89,7 @@ class McapSource:
         yield from (message for _, _, message in pending)
 
     def _segment_messages(
-        self, segment: _Segment, wanted: Collection[tuple[str, str, str]]
+        self, segment: _Segment, wanted: Collection[tuple[str, str, str]], unpacking: Unpacking
     ) -> Iterator[RawMessage]:
         path = self._paths[segment.file]
         channels = self._files[segment.file].channels
@@ -96,7 +98,7 @@ class McapSource:
             stream.seek(segment.offset)
             data = stream.read(segment.length)
         try:
-            for record in read_records(data):
+            for record in read_records(data, unpacking):
                 if isinstance(record, Message) and record.channel_id in names:
                     yield RawMessage(record.log_time, names[record.channel_id], record.data)
         except DAMAGE as error:
@@ -200,21 +202,23 @@ def _scan(stream: IO[bytes], path: Path, number: int) -> _FileIndex:
     index = _FileIndex()
     schemas: dict[int, Schema] = {}
     latest_ns = 0
-    walk = Walk(stream)
+    walk, unpacking = Walk(stream), Unpacking()
     try:
         for offset, data in walk.segments():
-            times = []
-            for record in list(read_records(data)):
+            counts, first_ns, last_ns = Counter[int](), 0, 0
+            for record in read_records(data, unpacking):
                 if isinstance(record, Schema):
                     schemas[record.id] = record
                 elif isinstance(record, Channel):
                     index.channels[record.id] = _describe(record, schemas)
                 elif isinstance(record, Message):
-                    index.counts[record.channel_id] += 1
-                    times.append(record.log_time)
-            if times:
-                index.segments.append(_Segment(min(times), number, offset, len(data)))
-                latest_ns = max(latest_ns, *times)
+                    first_ns = min(first_ns, record.log_time) if counts else record.log_time
+                    last_ns = max(last_ns, record.log_time)
+                    counts[record.channel_id] += 1
+            if counts:  # all of it is intact
+                index.segments.append(_Segment(first_ns, number, offset, len(data)))
+                index.counts.update(counts)
+                latest_ns = max(latest_ns, last_ns)
     except DAMAGE:
         walk.is_complete = False
     index.remark = _state_of(walk, path.name, index.counts.total(), latest_ns)

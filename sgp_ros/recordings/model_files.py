@@ -18,6 +18,7 @@ from sgp_ros.engine.samples import SettingValue
 from sgp_ros.errors import ConfigError
 from sgp_ros.strangers import (
     load_yaml,
+    read_text,
     readable,
     replace_file,
     require_file,
@@ -118,14 +119,13 @@ def load_parameters(path: str | Path) -> dict[str, object]:
     source = Path(path)
     if not source.is_file():
         raise ConfigError(f'no parameter file {source}', _EXPECTED)
-    require_file(source, 'TEXT_MB')
     with readable(source, ConfigError, _EXPECTED):
         return _parameters_of(source)
 
 
 def _parameters_of(source: Path) -> dict[str, object]:
     try:
-        document = load_yaml(source.read_text(encoding='utf-8'))
+        document = load_yaml(read_text(source))
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ConfigError(f'{source} is not YAML ({error})', _EXPECTED) from error
     if not isinstance(document, dict):

@@ -6,31 +6,29 @@ which it is. `Recording.events` yields what a node would have consumed, in the o
 
 from __future__ import annotations
 
-import re
 import struct
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
-from typing import Protocol, cast
-
-import yaml
+from typing import cast
 
 from sgp_ros.engine.samples import Event, Reset, SettingsChange
 from sgp_ros.errors import MessageError, RecordingError
-from sgp_ros.recordings.bag_source import RosbagsSource, SqliteSource
+from sgp_ros.recordings.bag_directory import read_directory
+from sgp_ros.recordings.bag_source import Ros1Source, SqliteSource
 from sgp_ros.recordings.command_types import COMMAND_TYPES
 from sgp_ros.recordings.mcap_records import MAGIC
 from sgp_ros.recordings.mcap_source import McapSource
 from sgp_ros.recordings.messages import TEXT, Message, change_from_text, joint_sample
 from sgp_ros.recordings.topics import (
     CHANGES_TOPIC,
-    RawMessage,
+    Source,
     Topic,
     choose_command,
     choose_joint_states,
 )
 from sgp_ros.recordings.typestore import decoder
-from sgp_ros.strangers import load_yaml, readable, require_file
+from sgp_ros.strangers import readable, require_file
 
 _TABLES = ('.csv', '.npz', '.mat', '.parquet', '.h5', '.json', '.jsonl')
 _WRONG = (
@@ -44,21 +42,6 @@ _WRONG = (
 )
 """What the decoding of a damaged message raises, beside `MessageError`."""
 _KINDS = 'an .mcap file, a rosbag2 directory or a ROS 1 .bag'
-
-
-class Source(Protocol):
-    """Topics and raw messages of a recording, whatever its format."""
-
-    @property
-    def topics(self) -> tuple[Topic, ...]:
-        """All topics."""
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """What the user should know of its state."""
-
-    def messages(self, topics: Collection[Topic]) -> Iterator[RawMessage]:
-        """Yield the messages of `topics` by log time."""
 
 
 class Recording:
@@ -179,7 +162,7 @@ def open_recording(path: str | Path) -> Recording:
     if not path.exists():
         raise RecordingError(f'no recording at {path}', _KINDS, 'check the path')
     with readable(path, RecordingError, _KINDS):
-        source, remarks = _directory_source(path) if path.is_dir() else (_file_source(path), ())
+        source, remarks = read_directory(path) if path.is_dir() else (_file_source(path), ())
     if not any(topic.count for topic in source.topics):
         why = ''.join(f' ({remark})' for remark in (*remarks, *source.remarks))
         raise RecordingError(f'{path} contains no messages{why}', 'a recording with joint states')
@@ -197,67 +180,11 @@ def _file_source(path: Path) -> Source:
     if head.startswith(b'SQLite format 3'):
         return SqliteSource([path])
     if head.startswith(b'#ROSBAG V2'):
-        return RosbagsSource(path)
+        return Ros1Source(path)
     remedy = f'convert the table first: sgp import {path}' if path.suffix in _TABLES else ''
     raise RecordingError(
         f'{path} is not a recording (it starts with {head[:8]!r})', _KINDS, remedy
     )
-
-
-def _directory_source(path: Path) -> tuple[Source, tuple[str, ...]]:
-    listed, is_compressed, counts = _metadata(path)
-    if is_compressed or any(path.glob('*.zstd')):
-        return RosbagsSource(path), ()
-    missing = [name for name in listed if not (path / name).is_file()]
-    remarks = (f'metadata.yaml lists {", ".join(missing)}, which is missing',) if missing else ()
-    files = [path / name for name in listed if name not in missing] or sorted(
-        (file for file in path.iterdir() if file.suffix in {'.mcap', '.db3'}), key=_natural_order
-    )
-    if files and all(file.suffix == '.mcap' for file in files):
-        return _counted(McapSource(files), counts, remarks)
-    if files and all(file.suffix == '.db3' for file in files):
-        return _counted(SqliteSource(files), counts, remarks)
-    raise RecordingError(f'directory {path} contains no .mcap or .db3 file', _KINDS)
-
-
-def _counted(
-    source: Source, counts: dict[str, int], remarks: tuple[str, ...]
-) -> tuple[Source, tuple[str, ...]]:
-    """Compare the numbers of messages with those that metadata.yaml has."""
-    found = {topic.name: topic.count or 0 for topic in source.topics}
-    wrong = [
-        f'metadata.yaml counts {count} messages on {name}, the files contain {found.get(name, 0)}'
-        for name, count in counts.items()
-        if found.get(name, 0) != count
-    ]
-    return source, (*remarks, *wrong)
-
-
-def _metadata(path: Path) -> tuple[list[str], bool, dict[str, int]]:
-    """Return files that metadata.yaml lists, whether they are compressed, and counts by topic.
-
-    A missing or broken metadata.yaml, as after a crash of the recorder, lists nothing.
-    """
-    place = path / 'metadata.yaml'
-    try:
-        require_file(place, 'TEXT_MB')
-        content = load_yaml(place.read_text(encoding='utf-8'))
-        information = content['rosbag2_bagfile_information']
-        names = [Path(str(name)).name for name in information['relative_file_paths']]
-        counts = {
-            str(entry['topic_metadata']['name']): int(entry['message_count'])
-            for entry in information.get('topics_with_message_count') or ()
-        }
-        return names, bool(information.get('compression_format')), counts
-    except (
-        FileNotFoundError, yaml.YAMLError, KeyError, TypeError, AttributeError, ValueError,
-    ):  # fmt: skip
-        return [], False, {}
-
-
-def _natural_order(path: Path) -> list[tuple[int, str]]:
-    """Order split files by their numbers: `bag_10` after `bag_9`."""
-    return [(int(part or 0), text) for text, part in re.findall(r'(\D*)(\d*)', path.name)]
 
 
 def _change(message: Message, _receipt_ns: int) -> SettingsChange | Reset:

@@ -15,7 +15,7 @@ from sgp_ros.recordings.model_files import require_unpacked
 from sgp_ros.recordings.table_apart import READERS, load_apart
 from sgp_ros.recordings.table_formats import load_json, refuse
 from sgp_ros.recordings.table_units import as_numbers, is_number
-from sgp_ros.strangers import readable, require_file, require_within
+from sgp_ros.strangers import read_text, readable, require_file, require_within
 
 Columns = dict[str, np.ndarray]
 ENDINGS = (
@@ -26,8 +26,8 @@ _DELIMITERS = (';', '\t', ',', ' ')
 _COMMENTS = '#%'
 _FEW = 0.1
 """Share of the cells of a column up to which those that are no numbers are mistakes."""
-_IN_BRACKETS = re.compile(r'\[[^\]]*\]')
-_APART = re.compile(r'\[[^\]]*\]|\S+')
+_IN_BRACKETS = re.compile(r'\[[^\[\]]*\]')
+_APART = re.compile(r'\[[^\[\]]*\]|\S+')
 _TIME = re.compile(r'\d{4}-\d\d-\d\d[T ]\d')
 
 
@@ -65,7 +65,7 @@ def _load(path: Path, suffix: str, remarks: list[str]) -> tuple[Columns, Sequenc
 
 def _load_csv(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]]:
     try:
-        lines = path.read_text(encoding='utf-8-sig').splitlines()
+        lines = read_text(path, 'TABLE_MB').splitlines()
     except UnicodeDecodeError as error:
         raise RecordingError(
             f'{path} is not a text file ({error})', 'a CSV file in UTF-8'

@@ -11,6 +11,7 @@ import numpy as np
 
 from sgp_ros.errors import RecordingError
 from sgp_ros.optional import optional_package
+from sgp_ros.strangers import read_text
 
 Columns = dict[str, np.ndarray]
 
@@ -63,7 +64,7 @@ def feature_names(path: Path) -> dict[str, list[str]]:
         if not info.is_file():
             continue
         try:
-            features = json.loads(info.read_text(encoding='utf-8')).get('features', {})
+            features = json.loads(read_text(info)).get('features', {})
         except (OSError, ValueError, AttributeError):
             return {}
         found = {}
@@ -117,7 +118,7 @@ def load_json(path: Path) -> Columns:
         RecordingError: no JSON, or no table.
     """
     try:
-        text = path.read_text(encoding='utf-8-sig')
+        text = read_text(path, 'TABLE_MB')
         if path.suffix.lower() == '.json':
             content = json.loads(text)
         else:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.command_types import COMMAND_TYPES, NO_COMMAND
@@ -57,6 +57,21 @@ class RawMessage(NamedTuple):
     log_ns: int
     topic: str
     data: bytes
+
+
+class Source(Protocol):
+    """Topics and raw messages of a recording, whatever its format."""
+
+    @property
+    def topics(self) -> tuple[Topic, ...]:
+        """All topics."""
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the user should know of its state."""
+
+    def messages(self, topics: Collection[Topic]) -> Iterator[RawMessage]:
+        """Yield the messages of `topics` by log time."""
 
 
 def choose_joint_states(topics: Sequence[Topic], wanted: str | None) -> Topic:

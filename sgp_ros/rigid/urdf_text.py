@@ -21,7 +21,7 @@ from sgp_ros.rigid.urdf_model import (
     commanded_joints,
     mimic_parameters,
 )
-from sgp_ros.strangers import parse_xml, require_file, require_within
+from sgp_ros.strangers import parse_xml, read_text, require_within
 
 _KNOWN = (*MOVING, 'fixed')
 _INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
@@ -68,8 +68,7 @@ def _text(path_or_text: str | Path) -> tuple[str, str]:
     if not path.exists():
         raise ConfigError(f'no file {path}', 'a URDF')
     try:
-        require_file(path, 'TEXT_MB')
-        text = path.read_text(encoding='utf-8-sig')
+        text = read_text(path)
     except UnicodeDecodeError as error:
         raise ConfigError(f'URDF {path} is not UTF-8 ({error})', 'a URDF in UTF-8') from error
     return f'URDF {path}', text.lstrip()

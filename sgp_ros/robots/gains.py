@@ -20,7 +20,7 @@ import yaml
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.drive import servo_parts
-from sgp_ros.strangers import load_yaml
+from sgp_ros.strangers import load_yaml, read_text
 
 _KEYS = ('kp', 'kd', 'feedforward')
 _FEEDFORWARD = ('none', 'gravity')
@@ -82,7 +82,7 @@ def read_gains(path: Path, joints: Sequence[str], actuated: Sequence[str]) -> Ga
         ConfigError: no such file, or not one number of each kind for each drive.
     """
     try:
-        content = load_yaml(path.read_text(encoding='utf-8'))
+        content = load_yaml(read_text(path))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         reason = str(error).splitlines()[0]
         raise ConfigError(

@@ -25,7 +25,7 @@ from sgp_ros.rigid.urdf_writer import write_urdf
 from sgp_ros.robots.entries import Entries
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.urdf_robot import nominal_tree, urdf_text
-from sgp_ros.strangers import load_yaml
+from sgp_ros.strangers import load_yaml, read_text
 
 _EXAMPLE = 'such as link: {mass: 0.2, com: [0, 0, 0.04], inertia: [xx, xy, yy, xz, yz, zz]}'
 
@@ -45,7 +45,7 @@ def with_bodies(robot: Robot, path: str | Path) -> Robot:
     if not path.is_file():
         raise ConfigError(f'no bodies at {path}', f'a YAML file, {_EXAMPLE}', 'check the path')
     try:
-        document = load_yaml(path.read_text(encoding='utf-8'))
+        document = load_yaml(read_text(path))
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ConfigError(f'bodies {path} are not YAML ({error})', 'a YAML file') from error
     if not isinstance(document, dict) or not document:

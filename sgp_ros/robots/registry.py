@@ -32,7 +32,7 @@ from sgp_ros.robots.lumped import LUMPED_KEYS, build_lumped_robot
 from sgp_ros.robots.models.door import MODEL_ENDINGS, find_file, read_model
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.shipped import shipped_folder
-from sgp_ros.strangers import load_yaml, readable, require_file
+from sgp_ros.strangers import load_yaml, read_text, readable, require_file
 
 _KEYS = frozenset({'schema', 'robot', 'joints', 'parameters'})
 _URDF_KEYS = frozenset({
@@ -112,7 +112,7 @@ def _from_text(text: str) -> Robot:
 
 def _build(path: Path) -> Robot:
     try:
-        text = path.read_text(encoding='utf-8')
+        text = read_text(path)
     except UnicodeDecodeError as error:
         raise ConfigError(f'robot file {path} is not YAML ({error})', 'a robot YAML') from error
     return _from_document(text, path)

@@ -54,6 +54,7 @@ from sgp_ros.robots.models.door import find_file
 from sgp_ros.robots.nominal_prior import inertial_prior, joint_prior
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.stated_effects import read_effects
+from sgp_ros.strangers import read_text
 
 DEFAULT_TERMS: Mapping[str, str] = dict.fromkeys(
     ('inertial', 'viscous', 'coulomb', 'offset'), 'all'
@@ -160,7 +161,7 @@ def _shape(entries: Entries) -> Shape:
 def urdf_text(robot: Robot) -> str:
     """Return the text of the URDF of a robot from one."""
     place = _place(str(robot.source['urdf']), Path())
-    return place if isinstance(place, str) else place.read_text(encoding='utf-8-sig')
+    return place if isinstance(place, str) else read_text(place)
 
 
 def _place(urdf: str, folder: Path) -> Path | str:

@@ -28,7 +28,7 @@ from sgp_ros.ros.messages import new_message
 from sgp_ros.ros.parameters import declare
 from sgp_ros.ros.settings import FIRST, node_settings
 from sgp_ros.ros.verdict import ERROR, WARN
-from sgp_ros.strangers import load_yaml
+from sgp_ros.strangers import load_yaml, read_text
 
 _TOPIC = 'robot_description'
 _PERIOD_S = 1.0
@@ -177,7 +177,7 @@ def refuse_foreign_files(name: str, arguments: Sequence[str]) -> None:
         if option != '--params-file':
             continue
         try:
-            content = load_yaml(Path(path).read_text(encoding='utf-8'))
+            content = load_yaml(read_text(Path(path)))
         except (OSError, yaml.YAMLError, UnicodeDecodeError):
             continue  # ROS itself has refused it
         sections = list(_sections('', content))

@@ -7,16 +7,18 @@ all formats alike. Files are named by a path, or by `package://NAME/PATH`, `mode
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 from xml.etree import ElementTree as ET
 
+from sgp_ros.apart import read_apart
 from sgp_ros.errors import ConfigError
 from sgp_ros.optional import optional_package
 from sgp_ros.robots.models.mjcf import read_mjcf
 from sgp_ros.robots.models.sdf import read_sdf
-from sgp_ros.strangers import parse_xml
+from sgp_ros.strangers import parse_xml, read_text
 
 READ = (
     ('link; inertial mass, origin, inertia', 'link with mass, centre and inertia'),
@@ -55,7 +57,7 @@ def read_model(path: Path) -> dict[str, Any]:
     """
     kind = _OTHER.get(path.suffix.lower()) or _kind_of(path)
     if kind == 'mjcf':
-        return {**read_mjcf(path).document(), 'model': str(path.resolve())}
+        return {**_compiled(path), 'model': str(path.resolve())}
     if kind == 'sdf':
         return read_sdf(path).document()
     if kind == 'xacro':
@@ -123,7 +125,7 @@ def _kind_of(path: Path) -> str:
 
 def _text(path: Path) -> str:
     try:
-        text = path.read_text(encoding='utf-8-sig').lstrip()
+        text = read_text(path).lstrip()
     except UnicodeDecodeError as error:
         raise ConfigError(f'{path.name} is not UTF-8 ({error})', 'a model in UTF-8') from error
     if '<!DOCTYPE' in text or '<!ENTITY' in text:
@@ -137,17 +139,44 @@ def _text(path: Path) -> str:
 
 def _expanded(path: Path) -> str:
     """Return the URDF that a xacro file stands for, with its default arguments."""
+    expected = 'a file that xacro expands without arguments'
+    return read_apart(f'{__name__}:write_expanded', path, ConfigError, expected).decode()
+
+
+def write_expanded(path: Path, stream: BinaryIO) -> None:
+    """Write the URDF that a xacro file stands for.
+
+    Raises:
+        ConfigError: xacro is missing, or fails in whatever way such a program may.
+    """
     xacro = optional_package('xacro', 'to read .xacro files', 'models')
     try:
-        document = xacro.process_file(str(path))
-    except Exception as error:  # the file is a program, which may fail in any way
+        text: str = xacro.process_file(str(path)).toxml()
+    except Exception as error:
         raise ConfigError(
             f'xacro {path.name}: {" ".join(str(error).split()) or type(error).__name__}',
             'a file that xacro expands without arguments',
             'expand it yourself: xacro FILE name:=value > robot.urdf',
         ) from error  # fmt: skip
-    text: str = document.toxml()
-    return text[text.index('<robot') :]
+    stream.write(text[text.index('<robot') :].encode())
+
+
+def _compiled(path: Path) -> dict[str, Any]:
+    """Return what MuJoCo's compiler makes of an MJCF file."""
+    data = read_apart(
+        f'{__name__}:write_compiled', path, ConfigError, 'a file that MuJoCo compiles'
+    )
+    document: dict[str, Any] = json.loads(data)
+    return document
+
+
+def write_compiled(path: Path, stream: BinaryIO) -> None:
+    """Write what MuJoCo's compiler makes of an MJCF file as JSON.
+
+    Raises:
+        ConfigError: a file that cannot be read, see `read_mjcf`.
+    """
+    stream.write(json.dumps(read_mjcf(path).document()).encode())
 
 
 def _remarks(text: str) -> Mapping[str, list[str]]:

@@ -21,7 +21,7 @@ from sgp_ros.physics.catalogue import SPRING
 from sgp_ros.rigid.rotations import of_quaternion, of_rpy
 from sgp_ros.rigid.tree import GRAVITY
 from sgp_ros.robots.models.model import Body, Model, ModelJoint, Pose, counted, stated
-from sgp_ros.strangers import parse_xml
+from sgp_ros.strangers import parse_xml, read_text
 
 READ = (
     ('link; inertial mass, inertia, pose', 'link with mass, centre and inertia'),
@@ -85,7 +85,7 @@ def read_sdf(path: Path) -> Model:
 
 
 def _text(path: Path) -> str:
-    text = path.read_text(encoding='utf-8-sig').lstrip()
+    text = read_text(path).lstrip()
     if '<!DOCTYPE' in text or '<!ENTITY' in text:
         raise ConfigError(
             f'{path.name} contains a document type declaration', 'SDF', 'remove <!DOCTYPE ...>'

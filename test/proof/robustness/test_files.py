@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bz2
 import os
 import re
 import sqlite3
@@ -14,14 +15,18 @@ import lz4.frame
 import numpy as np
 import pytest
 import zstandard
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.typesys import Stores, get_typestore
 
 from sgp_proof.robustness import files
 from sgp_proof.robustness.events import Faults
 from sgp_ros import strangers
+from sgp_ros.apps.replay import load_truth
 from sgp_ros.errors import SgpError
 from sgp_ros.recordings.model_files import load_model, load_parameters
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.table_files import load_columns
+from sgp_ros.robots.gains import read_gains
 from sgp_ros.robots.registry import load_robot
 
 
@@ -71,6 +76,49 @@ def _bomb(path, kind=b'zstd', pack=zstandard.compress):
     path.write_bytes(b'\x89MCAP0\r\n' + chunk)
 
 
+def _empty_messages(path):
+    """A small file of several chunks, each full of messages without content."""
+    message = b'\x05' + struct.pack('<QHIQQ', 22, 1, 0, 1, 1)
+    packed = zstandard.compress(message * 30_000)
+    body = (
+        struct.pack('<QQQII', 1, 1, 31 * 30_000, 0, 4) + b'zstd' + struct.pack('<Q', len(packed))
+    )
+    chunk = b'\x06' + struct.pack('<Q', len(body) + len(packed)) + body + packed
+    path.write_bytes(b'\x89MCAP0\r\n' + chunk * 90)
+
+
+def _ros1_bomb(path, kind, pack):
+    state = get_typestore(Stores.ROS1_NOETIC).types['sensor_msgs/msg/JointState'].__msgtype__
+    writer = Ros1Writer(path)
+    writer.set_compression(kind)
+    writer.compressor = lambda _: pack(bytes(1 << 21))
+    with writer:
+        store = get_typestore(Stores.ROS1_NOETIC)
+        writer.write(writer.add_connection('/joint_states', state, typestore=store), 1, b'')
+
+
+def _packed_directory(path):
+    path.mkdir()
+    (path / 'x_0.db3.zstd').write_bytes(zstandard.compress(bytes(65 << 20)))
+
+
+def _piped_directory(path):
+    path.mkdir()
+    os.mkfifo(path / 'x_0.mcap')
+
+
+def _tables(path, columns, *rows):
+    with sqlite3.connect(path) as base:
+        base.execute('CREATE TABLE topics(id, name, type, serialization_format)')
+        base.execute(f'CREATE TABLE messages(id, topic_id, timestamp, {columns})')
+        base.executemany("INSERT INTO topics VALUES(?, '/a', 'b', 'cdr')", [(r,) for r in rows])
+    base.close()
+
+
+def _xacro(path, text):
+    path.write_text(f'<robot name="x" xmlns:xacro="http://www.ros.org/wiki/xacro">{text}</robot>')
+
+
 def _zip(path):
     np.savez_compressed(path, t=np.zeros(1 << 18))
 
@@ -88,6 +136,29 @@ def _zip(path):
         ('x.mcap', _bomb, open_recording, 'SGP_MOST_CHUNK_MB'),
         ('lz4.mcap', lambda p: _bomb(p, b'lz4', lz4.frame.compress), open_recording,
          'SGP_MOST_CHUNK_MB'),
+        ('zeros.mcap', lambda p: p.write_bytes(b'\x89MCAP0\r\n' + bytes(1 << 20)), open_recording,
+         'damaged'),
+        ('empty.mcap', _empty_messages, lambda p: list(open_recording(p).messages('/a')),
+         'SGP_MOST_RATIO'),
+        ('bz2.bag', lambda p: _ros1_bomb(p, Ros1Writer.CompressionFormat.BZ2, bz2.compress),
+         lambda p: list(open_recording(p).events()), 'SGP_MOST_CHUNK_MB'),
+        ('lz4.bag', lambda p: _ros1_bomb(p, Ros1Writer.CompressionFormat.LZ4, lz4.frame.compress),
+         lambda p: list(open_recording(p).events()), 'SGP_MOST_CHUNK_MB'),
+        ('packed', _packed_directory, open_recording, 'SGP_MOST_RATIO'),
+        ('piped', _piped_directory, open_recording, 'not a regular file'),
+        ('twice.db3', lambda p: _tables(p, 'data', 1, 1), open_recording, 'several topics'),
+        ('computed.db3', lambda p: _tables(p, 'data AS (zeroblob(9e8))', 1), open_recording,
+         'no plain tables'),
+        ('date.yaml', lambda p: p.write_text('a: 2001-13-45'), load_parameters, 'month'),
+        ('pipe.sdf', os.mkfifo, lambda p: load_robot(str(p)), 'not a regular file'),
+        ('pipe.yaml', os.mkfifo, lambda p: read_gains(p, (), ()), 'not a regular file'),
+        ('pipe.json', os.mkfifo, load_truth, 'not a regular file'),
+        ('deep.json', lambda p: p.write_text('[' * 3000), load_truth, 'cannot be read'),
+        ('endless.xacro', lambda p: _xacro(p, '<link name="${9**9**9}"/>'),
+         lambda p: load_robot(str(p)), 'SGP_MOST_SECONDS'),
+        ('many.xml', lambda p: p.write_text(
+            '<mujoco><worldbody><replicate count="1000000"><geom size="1"/></replicate>'
+            '</worldbody></mujoco>'), lambda p: load_robot(str(p)), 'SGP_MOST_'),
         ('x.npz', _zip, lambda p: load_columns(p, []), 'SGP_MOST_UNPACKED_MB'),
         ('pipe.mcap', os.mkfifo, open_recording, 'not a regular file'),
         ('pipe.npz', os.mkfifo, load_model, 'not a regular file'),
@@ -99,8 +170,8 @@ def _zip(path):
     ],
 )  # fmt: skip
 def test_files_made_to_harm_are_refused(tmp_path, monkeypatch, name, make, read, says):
-    for size in ('CHUNK', 'UNPACKED'):
-        monkeypatch.setenv(f'SGP_MOST_{size}_MB', '1')
+    for bound in ('CHUNK_MB', 'UNPACKED_MB', 'SECONDS'):
+        monkeypatch.setenv(f'SGP_MOST_{bound}', '1')
     path = tmp_path / name
     make(path)
     with pytest.raises(SgpError, match=says):

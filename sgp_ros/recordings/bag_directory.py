@@ -1,0 +1,139 @@
+"""Directories of rosbag2: their files, what metadata.yaml says of them, their compression."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tempfile
+import weakref
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import yaml
+import zstandard
+
+from sgp_ros.errors import RecordingError
+from sgp_ros.recordings.bag_source import SqliteSource
+from sgp_ros.recordings.mcap_source import McapSource
+from sgp_ros.recordings.topics import RawMessage, Source, Topic
+from sgp_ros.recordings.unpacking import Unpacking
+from sgp_ros.strangers import load_yaml, read_text, require_file
+
+_KINDS: dict[str, type[McapSource | SqliteSource]] = {'.mcap': McapSource, '.db3': SqliteSource}
+_PACKED = '.zstd'
+
+
+def read_directory(path: Path) -> tuple[Source, tuple[str, ...]]:
+    """Return the messages of a directory, and what the user should know of it.
+
+    Raises:
+        RecordingError: no file of a recording in it, or a damaged one.
+        TooMuchError: a file that is none, or that unpacks to more than `RATIO`.
+    """
+    metadata = _read_metadata(path)
+    missing = [name for name in metadata.files if not (path / name).exists()]
+    remarks = [f'metadata.yaml lists {", ".join(missing)}, which is missing'] if missing else []
+    files = [path / name for name in metadata.files if name not in missing] or sorted(
+        (file for file in path.iterdir() if _kind(file) in _KINDS), key=_natural_order
+    )
+    kinds = {_kind(file) for file in files}
+    if len(kinds) != 1 or not kinds <= set(_KINDS):
+        raise RecordingError(
+            f'directory {path} contains no .mcap or .db3 file',
+            'a rosbag2 directory with files of one of these kinds',
+        )
+    for file in files:
+        require_file(file)
+    has_packed_files = any(file.suffix == _PACKED for file in files)
+    kind = _KINDS[kinds.pop()]
+    source: Source = _of_packed(files, kind) if has_packed_files else kind(files)
+    if metadata.is_compressed and not has_packed_files:
+        source = _PackedMessages(source)
+    found = {topic.name: topic.count for topic in source.topics}
+    remarks += (
+        f'metadata.yaml counts {count} messages on {name}, the files contain {found.get(name, 0)}'
+        for name, count in metadata.counts.items()
+        if found.get(name, 0) != count
+    )
+    return source, tuple(remarks)
+
+
+@dataclass(frozen=True, slots=True)
+class _PackedMessages:
+    """A recording each message of which is compressed."""
+
+    inner: Source
+
+    @property
+    def topics(self) -> tuple[Topic, ...]:
+        return self.inner.topics
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        return self.inner.remarks
+
+    def messages(self, topics: Collection[Topic]) -> Iterator[RawMessage]:
+        unpacking = Unpacking()
+        for message in self.inner.messages(topics):
+            data = b''  # of a damaged one, which whoever decodes it counts
+            with suppress(zstandard.ZstdError):
+                data = unpacking.unpacked('zstd', message.data)
+            yield message._replace(data=data)
+
+
+def _of_packed(files: Sequence[Path], kind: type[McapSource | SqliteSource]) -> Source:
+    """Return the recording of compressed files, unpacked into a folder that goes with it."""
+    folder = Path(tempfile.mkdtemp(prefix='sgp_'))
+    try:
+        unpacking, plain = Unpacking(), [folder / file.stem for file in files]
+        for file, target in zip(files, plain, strict=True):
+            unpacking.unpack_file(file, target)
+        source = kind(plain)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    weakref.finalize(source, shutil.rmtree, folder, ignore_errors=True)
+    return source
+
+
+@dataclass(frozen=True, slots=True)
+class _Metadata:
+    """What metadata.yaml says; a missing or broken one, as after a crash, says nothing.
+
+    Attributes:
+        files: names of the files.
+        is_compressed: whether messages or files are.
+        counts: topic to number of messages.
+    """
+
+    files: Sequence[str] = ()
+    is_compressed: bool = False
+    counts: Mapping[str, int] = field(default_factory=dict)
+
+
+def _read_metadata(path: Path) -> _Metadata:
+    try:
+        content = load_yaml(read_text(path / 'metadata.yaml'))
+        information = content['rosbag2_bagfile_information']
+        names = [Path(str(name)).name for name in information['relative_file_paths']]
+        counts = {
+            str(entry['topic_metadata']['name']): int(entry['message_count'])
+            for entry in information.get('topics_with_message_count') or ()
+        }
+        return _Metadata(names, bool(information.get('compression_format')), counts)
+    except (
+        FileNotFoundError, yaml.YAMLError, KeyError, TypeError, AttributeError, ValueError,
+    ):  # fmt: skip
+        return _Metadata()
+
+
+def _kind(file: Path) -> str:
+    """Return the ending of a file, that before the compression where it is compressed."""
+    return Path(file.stem).suffix if file.suffix == _PACKED else file.suffix
+
+
+def _natural_order(path: Path) -> list[tuple[int, str]]:
+    """Order split files by their numbers: `bag_10` after `bag_9`."""
+    return [(int(part or 0), text) for text, part in re.findall(r'(\D*)(\d*)', path.name)]
