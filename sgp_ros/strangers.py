@@ -22,7 +22,7 @@ from sgp_ros.errors import SgpError
 
 DEFAULTS = {
     'TEXT_MB': 16, 'TABLE_MB': 512, 'UNPACKED_MB': 768, 'CHUNK_MB': 256, 'RATIO': 200,
-    'DEPTH': 100, 'ENTRIES': 200_000, 'ALIASES': 100, 'LINKS': 500, 'LINE': 100_000,
+    'DEPTH': 100, 'ENTRIES': 200_000, 'ALIASES': 100, 'LINKS': 250, 'LINE': 100_000,
     'SECONDS': 7,
 }  # fmt: skip
 """Bound to its default: sizes of robot and settings files, of tables, of what a table unpacks to,
@@ -196,21 +196,35 @@ def load_yaml(text: str) -> Any:
         TooMuchError: more nesting, entries or aliases than a settings file has.
         yaml.YAMLError: no YAML.
     """
-    depth = aliases = 0
-    for entries, event in enumerate(yaml.parse(text, Loader=_LOADER)):
-        if isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent)):
-            depth += 1
-            require_within(depth, 'DEPTH', 'nesting depth of the YAML')
-        elif isinstance(event, (yaml.MappingEndEvent, yaml.SequenceEndEvent)):
-            depth -= 1
-        elif isinstance(event, yaml.AliasEvent):
-            aliases += 1
-            require_within(aliases, 'ALIASES', 'number of aliases in the YAML')
-        require_within(entries, 'ENTRIES', 'number of entries in the YAML')
+    _require_bounded(text)
     try:
         return yaml.load(text, Loader=_LOADER)  # noqa: S506  # a safe one
     except (ValueError, TypeError, OverflowError) as error:  # such as a date of month 13
         raise YAMLError(' '.join(str(error).split())) from error
+
+
+def _require_bounded(text: str) -> None:
+    """Refuse a YAML text beyond a bound; an alias counts as all that it stands for."""
+    aliases = entries = 0
+    inside: list[tuple[str | None, int]] = []
+    sizes: dict[str | None, int] = {}
+    for event in yaml.parse(text, Loader=_LOADER):
+        if isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent)):
+            inside.append((event.anchor, entries))
+            require_within(len(inside), 'DEPTH', 'nesting depth of the YAML')
+        elif isinstance(event, (yaml.MappingEndEvent, yaml.SequenceEndEvent)):
+            anchor, before = inside.pop()
+            sizes[anchor] = entries - before
+        elif isinstance(event, yaml.ScalarEvent):
+            sizes[event.anchor] = 1
+        elif isinstance(event, yaml.AliasEvent):
+            aliases += 1
+            require_within(aliases, 'ALIASES', 'number of aliases in the YAML')
+            if event.anchor not in sizes:
+                raise YAMLError(f'the alias {event.anchor} stands for nothing before it')
+            entries += sizes[event.anchor]
+        entries += 1
+        require_within(entries, 'ENTRIES', 'number of entries in the YAML')
 
 
 def parse_xml(text: str) -> ET.Element:

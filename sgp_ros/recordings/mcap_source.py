@@ -12,6 +12,7 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from operator import itemgetter
 from pathlib import Path
 from typing import IO, NamedTuple
@@ -189,6 +190,9 @@ def _indexed(summary: Summary, number: int) -> _FileIndex | None:
     chunks = summary.chunk_indexes
     if (counts.total() and not chunks) or not set(counts) <= set(summary.channels):
         return None
+    places = sorted((c.chunk_start_offset, c.chunk_length) for c in chunks)
+    if any(start + length > after for (start, length), (after, _) in pairwise(places)):
+        return None  # one chunk, read again and again
     channels = {key: _describe(c, summary.schemas) for key, c in summary.channels.items()}
     segments = [
         _Segment(c.message_start_time, number, c.chunk_start_offset, c.chunk_length)

@@ -18,6 +18,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from sgp_ros.engine.samples import CommandSample, JointSample
 from sgp_ros.errors import RecordingError, SgpError
+from sgp_ros.recordings import mcap_source
 from sgp_ros.recordings.reader import open_recording
 from test.recordings import worlds
 
@@ -378,3 +379,17 @@ def test_recorded_arm_is_read_from_its_directory():
     events = list(recording.events())
     assert len(events) == 8022
     assert events[0].names[0] == 'torso_lift_joint'
+
+
+def test_an_index_that_names_a_chunk_twice_is_not_believed(tmp_path, monkeypatch):
+    """Small files would else stand for recordings without end."""
+    path = worlds.write(tmp_path / 'x.mcap', EVENTS)
+    intact = mcap_source._read_summary
+
+    def doubled(stream):
+        summary = intact(stream)
+        summary.chunk_indexes *= 2
+        return summary
+
+    monkeypatch.setattr(mcap_source, '_read_summary', doubled)
+    assert worlds.everything(open_recording(path)) == EXPECTED

@@ -21,7 +21,7 @@ from sgp_ros.physics.catalogue import SPRING
 from sgp_ros.rigid.rotations import of_quaternion, of_rpy
 from sgp_ros.rigid.tree import GRAVITY
 from sgp_ros.robots.models.model import Body, Model, ModelJoint, Pose, counted, stated
-from sgp_ros.strangers import parse_xml, read_text
+from sgp_ros.strangers import parse_xml, read_text, require_within
 
 READ = (
     ('link; inertial mass, inertia, pose', 'link with mass, centre and inertia'),
@@ -81,6 +81,7 @@ def read_sdf(path: Path) -> Model:
             f'SDF {path.name}: {len(moving)} models with moving joints {names}', 'one robot',
             'keep one model in the file; expand <include> with: gz sdf -p',
         )  # fmt: skip
+    require_within(len(moving[0].findall('link')), 'LINKS', f'links of {path.name}')
     return _Reading(path.name, moving[0], root.get('version', '1.12')).result(world)
 
 

@@ -17,15 +17,20 @@ import pytest
 import zstandard
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.typesys import Stores, get_typestore
+from scipy.io import savemat
 
 from sgp_proof.robustness import files
 from sgp_proof.robustness.events import Faults
 from sgp_ros import strangers
 from sgp_ros.apps.replay import load_truth
+from sgp_ros.engine.samples import JointSample
 from sgp_ros.errors import SgpError
 from sgp_ros.recordings.model_files import load_model, load_parameters
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.table_files import load_columns
+from sgp_ros.recordings.unpacking import Unpacking
+from sgp_ros.recordings.writer import RecordingWriter
+from sgp_ros.rigid.urdf_text import parse_urdf
 from sgp_ros.robots.gains import read_gains
 from sgp_ros.robots.registry import load_robot
 
@@ -57,6 +62,21 @@ def _long_urdf(path, n=5000):
         for i in range(n)
     )
     path.write_text(f'<robot name="x">{links}{joints}</robot>')
+
+
+def _long_sdf(path, n=300):
+    links = ''.join(f'<link name="l{i}"/>' for i in range(n))
+    joint = '<joint name="j" type="revolute"><parent>l0</parent><child>l1</child></joint>'
+    path.write_text(f'<sdf version="1.9"><model name="m">{links}{joint}</model></sdf>')
+
+
+def _laughs(path):
+    """Few aliases that stand for 43 million entries."""
+    levels = [
+        f'  a{i}: &a{i} {{' + ', '.join(f'k{j}: *a{i - 1}' for j in range(9)) + '}'
+        for i in range(1, 9)
+    ]
+    path.write_text('\n'.join(['/**:', ' ros__parameters:', '  a0: &a0 {x: 1}', *levels]))
 
 
 def _view(path):
@@ -97,9 +117,13 @@ def _ros1_bomb(path, kind, pack):
         writer.write(writer.add_connection('/joint_states', state, typestore=store), 1, b'')
 
 
+def _packed_zeros(path):
+    path.write_bytes(zstandard.compress(bytes(65 << 20)))
+
+
 def _packed_directory(path):
     path.mkdir()
-    (path / 'x_0.db3.zstd').write_bytes(zstandard.compress(bytes(65 << 20)))
+    _packed_zeros(path / 'x_0.db3.zstd')
 
 
 def _piped_directory(path):
@@ -149,16 +173,20 @@ def _zip(path):
         ('twice.db3', lambda p: _tables(p, 'data', 1, 1), open_recording, 'several topics'),
         ('computed.db3', lambda p: _tables(p, 'data AS (zeroblob(9e8))', 1), open_recording,
          'no plain tables'),
+        ('laughs.yaml', _laughs, load_parameters, 'SGP_MOST_ENTRIES'),
+        ('long.sdf', _long_sdf, lambda p: load_robot(str(p)), 'links of long.sdf'),
+        ('circle.yaml', lambda p: p.write_text('/**:\n  ros__parameters: &p\n    a: *p\n'),
+         load_parameters, 'stands for nothing'),
         ('date.yaml', lambda p: p.write_text('a: 2001-13-45'), load_parameters, 'month'),
-        ('pipe.sdf', os.mkfifo, lambda p: load_robot(str(p)), 'not a regular file'),
+        ('pipe.sdf', os.mkfifo, lambda p: load_robot(str(p)), 'nor a file'),
         ('pipe.yaml', os.mkfifo, lambda p: read_gains(p, (), ()), 'not a regular file'),
         ('pipe.json', os.mkfifo, load_truth, 'not a regular file'),
         ('deep.json', lambda p: p.write_text('[' * 3000), load_truth, 'cannot be read'),
         ('endless.xacro', lambda p: _xacro(p, '<link name="${9**9**9}"/>'),
          lambda p: load_robot(str(p)), 'SGP_MOST_SECONDS'),
         ('many.xml', lambda p: p.write_text(
-            '<mujoco><worldbody><replicate count="1000000"><geom size="1"/></replicate>'
-            '</worldbody></mujoco>'), lambda p: load_robot(str(p)), 'SGP_MOST_'),
+            '<mujoco><worldbody><replicate count="1000000"><geom size="1"/>'
+            '</replicate></worldbody></mujoco>'), lambda p: load_robot(str(p)), 'SGP_MOST_'),
         ('x.npz', _zip, lambda p: load_columns(p, []), 'SGP_MOST_UNPACKED_MB'),
         ('pipe.mcap', os.mkfifo, open_recording, 'not a regular file'),
         ('pipe.npz', os.mkfifo, load_model, 'not a regular file'),
@@ -170,8 +198,9 @@ def _zip(path):
     ],
 )  # fmt: skip
 def test_files_made_to_harm_are_refused(tmp_path, monkeypatch, name, make, read, says):
-    for bound in ('CHUNK_MB', 'UNPACKED_MB', 'SECONDS'):
-        monkeypatch.setenv(f'SGP_MOST_{bound}', '1')
+    monkeypatch.setenv('SGP_MOST_CHUNK_MB', '1')
+    monkeypatch.setenv('SGP_MOST_UNPACKED_MB', '1' if name == 'x.npz' else '200')
+    monkeypatch.setenv('SGP_MOST_SECONDS', '2')
     path = tmp_path / name
     make(path)
     with pytest.raises(SgpError, match=says):
@@ -184,12 +213,49 @@ def test_every_bound_is_documented_with_its_default():
     assert {name: int(default) for name, default in told} == strangers.DEFAULTS
 
 
-def test_a_bound_may_be_raised(tmp_path, monkeypatch):
-    monkeypatch.setenv('SGP_MOST_ALIASES', '1000')
-    (tmp_path / 'x.yaml').write_text(
-        '/**: {ros__parameters: {a: &a 1.0, b: [' + '*a,' * 200 + ']}}'
-    )
-    assert len(load_parameters(tmp_path / 'x.yaml')['b']) == 200
+def _of_depth(path):
+    path.write_text('/**: {ros__parameters: {a: ' + '{a: ' * 120 + '1' + '}' * 120 + '}}')
+
+
+def _small_bag(path):
+    with RecordingWriter(path) as writer:
+        for stamp in range(1, 5):
+            writer.write_event(JointSample(stamp, ('hinge',), np.zeros(1)))
+
+
+def _columns(path):
+    return load_columns(path, [])
+
+
+@pytest.mark.parametrize(
+    ('bound', 'low', 'high', 'name', 'make', 'read'),
+    [
+        ('TEXT_MB', 0, 1, 'x.yaml', lambda p: p.write_text('/**: {ros__parameters: {}}'),
+         load_parameters),
+        ('TABLE_MB', 0, 1, 'x.csv', lambda p: p.write_text('t,q\n1,2\n'), _columns),
+        ('UNPACKED_MB', 1, 3, 'x.npz', lambda p: np.savez(p, t=np.zeros(1 << 18)), _columns),
+        ('UNPACKED_MB', 100, 768, 'x.mat', lambda p: savemat(p, {'t': np.zeros(1 << 24)},
+         do_compression=True), _columns),
+        ('CHUNK_MB', 0, 1, 'x.mcap', _small_bag, lambda p: list(open_recording(p).events())),
+        ('RATIO', 10, 100_000, 'x.zstd', _packed_zeros,
+         lambda p: Unpacking().unpack_file(p, p.parent / str(strangers.bound('RATIO')))),
+        ('DEPTH', 100, 130, 'x.yaml', _of_depth, load_parameters),
+        ('ENTRIES', 300, 800, 'x.yaml', lambda p: p.write_text(
+            '/**: {ros__parameters: {a: [' + '1,' * 600 + ']}}'), load_parameters),
+        ('ALIASES', 100, 300, 'x.yaml', lambda p: p.write_text(
+            '/**: {ros__parameters: {a: &a 1.0, b: [' + '*a,' * 200 + ']}}'), load_parameters),
+        ('LINKS', 3, 8, 'x.urdf', lambda p: _long_urdf(p, 5), parse_urdf),
+        ('LINE', 10, 90, 'x.csv', lambda p: p.write_text('t,q\n1,' + '2' * 50 + '\n'), _columns),
+        ('SECONDS', 0, 30, 'x.mat', lambda p: savemat(p, {'t': np.zeros(9)}), _columns),
+    ],
+)  # fmt: skip
+def test_each_bound_may_be_raised(tmp_path, monkeypatch, bound, low, high, name, make, read):
+    make(tmp_path / name)
+    monkeypatch.setenv(f'SGP_MOST_{bound}', str(low))
+    with pytest.raises(SgpError, match=f'SGP_MOST_{bound}'):
+        read(tmp_path / name)
+    monkeypatch.setenv(f'SGP_MOST_{bound}', str(high))
+    read(tmp_path / name)
 
 
 @pytest.mark.parametrize('kind', files.APART)
