@@ -29,6 +29,7 @@ DEFAULTS = {
 of one chunk of a recording [MB]; how many times its own size a recording unpacks to; nesting,
 entries and aliases of YAML or XML; links of a robot; characters of a line; time for a file that is
 read in a process of its own [s]."""
+_QUOTED = ('"', "'", '|', '>')
 _MEGABYTE = 1 << 20
 _GROWING = '.sgp_growing_'
 YAMLError = yaml.YAMLError
@@ -217,6 +218,8 @@ def _require_bounded(text: str) -> None:
             sizes[anchor] = entries - before
         elif isinstance(event, yaml.ScalarEvent):
             sizes[event.anchor] = 1
+            if event.style not in _QUOTED:  # it is tried as a number
+                require_within(len(event.value), 'LINE', 'length of an entry in the YAML')
         elif isinstance(event, yaml.AliasEvent):
             aliases += 1
             require_within(aliases, 'ALIASES', 'number of aliases in the YAML')

@@ -11,7 +11,7 @@ import numpy as np
 
 from sgp_ros.errors import RecordingError
 from sgp_ros.optional import optional_package
-from sgp_ros.strangers import read_text
+from sgp_ros.strangers import read_text, require_within
 
 Columns = dict[str, np.ndarray]
 
@@ -131,6 +131,8 @@ def load_json(path: Path) -> Columns:
     if isinstance(content, list) and content and all(isinstance(x, dict) for x in content):
         records = [dict(_flattened('', x)) for x in content]
         names = dict.fromkeys(name for record in records for name in record)
+        megabytes = 8e-6 * len(records) * len(names)
+        require_within(megabytes, 'UNPACKED_MB', f'size of the table {path} in MB')
         for name in names:
             _enter(columns, name, [record.get(name) for record in records])
     elif isinstance(content, dict):

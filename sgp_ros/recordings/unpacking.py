@@ -13,7 +13,7 @@ from lz4.frame import LZ4FrameDecompressor
 from sgp_ros.strangers import bound, require_within
 
 _MEGABYTE = 1 << 20
-_FREE = 64 * _MEGABYTE
+_FREE = 16 * _MEGABYTE
 """Bytes that may be unpacked at any ratio: a short recording of a dark camera."""
 
 

@@ -104,7 +104,7 @@ def _empty_messages(path):
         struct.pack('<QQQII', 1, 1, 31 * 30_000, 0, 4) + b'zstd' + struct.pack('<Q', len(packed))
     )
     chunk = b'\x06' + struct.pack('<Q', len(body) + len(packed)) + body + packed
-    path.write_bytes(b'\x89MCAP0\r\n' + chunk * 90)
+    path.write_bytes(b'\x89MCAP0\r\n' + chunk * 20)
 
 
 def _ros1_bomb(path, kind, pack):
@@ -118,7 +118,7 @@ def _ros1_bomb(path, kind, pack):
 
 
 def _packed_zeros(path):
-    path.write_bytes(zstandard.compress(bytes(65 << 20)))
+    path.write_bytes(zstandard.compress(bytes(17 << 20)))
 
 
 def _packed_directory(path):
@@ -175,6 +175,11 @@ def _zip(path):
          'no plain tables'),
         ('laughs.yaml', _laughs, load_parameters, 'SGP_MOST_ENTRIES'),
         ('long.sdf', _long_sdf, lambda p: load_robot(str(p)), 'links of long.sdf'),
+        ('sixty.yaml', lambda p: p.write_text('a: 1' + ':59' * 40_000), load_parameters,
+         'SGP_MOST_LINE'),
+        ('wide.jsonl', lambda p: p.write_text(
+            ''.join(f'{{"c{i}": 1}}\n' for i in range(10_000))), lambda p: load_columns(p, []),
+         'SGP_MOST_UNPACKED_MB'),
         ('circle.yaml', lambda p: p.write_text('/**:\n  ros__parameters: &p\n    a: *p\n'),
          load_parameters, 'stands for nothing'),
         ('date.yaml', lambda p: p.write_text('a: 2001-13-45'), load_parameters, 'month'),
