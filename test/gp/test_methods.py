@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -208,3 +210,21 @@ def test_scores_of_the_true_density_are_calibrated():
     zero = np.zeros_like(y)
     assert abs(coverage95(y, zero, variance)[0] - 0.95) < 4 * np.sqrt(0.95 * 0.05 / 4000)
     assert abs(pit(y, zero, variance).mean() - 0.5) < 4 / np.sqrt(12 * 4000)
+
+
+def test_a_process_alone_learns_each_component_by_itself():
+    """Put together, the parts are the model of all: its evidence is the sum of theirs.
+
+    A component ten times as large has a hundred times the noise and n log 10 nats less.
+    """
+    one, other = _pendulum(4), _pendulum(5)
+    y = np.hstack([one.y, 10.0 * other.y])
+    data = Observations(one.U, np.zeros((len(y), 2, 0)), y)
+    none = CoefficientPrior.flat(0)
+    fitted = METHODS['GP'](data, none, ((0,), (0,)), FitOptions())
+    whole = Posterior(fitted.model, data, none)
+    assert fitted.log_evidence == pytest.approx(whole.log_evidence, rel=1e-12)
+    same = METHODS['GP'](replace(data, y=y / [1.0, 10.0]), none, ((0,), (0,)), FitOptions())
+    assert fitted.model.noise[1] == pytest.approx(100.0 * same.model.noise[1], rel=1e-3)
+    loss = same.log_evidence - fitted.log_evidence
+    assert loss == pytest.approx(len(y) * np.log(10.0), rel=1e-6)
