@@ -16,20 +16,27 @@ from sgp_ros.gp.linear_algebra import least_norm
 _RANK_TOLERANCE = 1e-10
 
 
-def triangular(F: np.ndarray, y: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Return R (r, p + 1) with `R^T R` the products of the rows [F y] in units of `scale`.
+def triangles(F: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return R_j (k, r, p + 1) with `R_j^T R_j` the products of the rows [F y] of each joint.
+
+    The rows are gone through once; in other units of a joint only its triangle changes.
 
     Args:
         F: (n, k, p).
         y: (n, k).
-        scale: (k,) size of the error of each joint [unit of y].
     """
-    rows = np.concatenate([F, y[:, :, None]], axis=2) / scale[:, None]
+    rows = np.concatenate([F, y[:, :, None]], axis=2)
+    return np.asarray(np.linalg.qr(rows.transpose(1, 0, 2), mode='r'))
+
+
+def joined(triangle: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Return R (r, p + 1) of the rows of all joints in units of `scale` (k,), from `triangles`."""
+    rows = triangle / scale[:, None, None]
     return np.asarray(np.linalg.qr(rows.reshape(-1, rows.shape[2]), mode='r'))
 
 
 def solved(parts: list[np.ndarray]) -> np.ndarray:
-    """Return the coefficients (p,) that fit the rows behind the factors of `triangular`.
+    """Return the coefficients (p,) that fit the rows behind the factors of `joined`.
 
     Of what nothing determines, the least in units of the columns.
     """
@@ -41,16 +48,24 @@ def solved(parts: list[np.ndarray]) -> np.ndarray:
     return np.asarray(scaled / norms)
 
 
-def least_squares(F: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def least_squares(
+    F: np.ndarray, y: np.ndarray, triangle: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Fit all joints together, each in units of its own error (two steps).
+
+    Args:
+        F: (n, k, p).
+        y: (n, k).
+        triangle: of these rows, see `triangles`; None where it is not known.
 
     Returns:
         coefficients (p,) and the root mean square error of each joint (k,) [unit of y].
     """
+    triangle = triangles(F, y) if triangle is None else triangle
     scale = _error(np.sqrt(np.mean(y * y, axis=0)), y)
     w = np.zeros(F.shape[2])
     for _ in range(2):
-        w = solved([triangular(F, y, scale)])
+        w = solved([joined(triangle, scale)])
         scale = _error(np.sqrt(np.mean((y - F @ w) ** 2, axis=0)), y)
     return w, scale
 

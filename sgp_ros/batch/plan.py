@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sgp_ros.batch.least_squares import autocorrelation, least_squares, solved, triangular
+from sgp_ros.batch.least_squares import autocorrelation, joined, least_squares, solved, triangles
 from sgp_ros.batch.regression_data import FilteredData, FilterPlan, filtered_data
 from sgp_ros.batch.signals import Signals
 from sgp_ros.errors import RecordingError
@@ -201,8 +201,9 @@ class _Trial:
         unknowns = data.F.shape[2]
         if len(present) < len(edges) - 1 or data.y.size < 3 * unknowns:
             return None
-        w, scale = least_squares(data.F, data.y)
-        parts = [triangular(data.F[number == i], data.y[number == i], scale) for i in present]
+        blocks = [triangles(data.F[number == i], data.y[number == i]) for i in present]
+        w, scale = least_squares(data.F, data.y, np.concatenate(blocks, axis=1))
+        parts = [joined(block, scale) for block in blocks]
         left_out = [solved(parts[:i] + parts[i + 1 :]) for i in range(len(parts))]
         whiteness = autocorrelation(data.y - data.F @ w, data.block, 1)
         reference = fine.thinned(usual)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sgp_ros.batch import plan
-from sgp_ros.batch.least_squares import autocorrelation, least_squares, solved, triangular
+from sgp_ros.batch.least_squares import autocorrelation, joined, least_squares, solved, triangles
 from sgp_ros.batch.plan import WHITE, choose_plan
 from sgp_ros.batch.regression_data import filtered_data
 from sgp_ros.batch.signals import collect_signals
@@ -135,8 +135,8 @@ def test_leaving_out_a_block_equals_fitting_the_rest():
     """The triangular factors of the blocks hold all that the fit needs."""
     rng = np.random.default_rng(0)
     F, y, scale = rng.normal(size=(60, 2, 4)), rng.normal(size=(60, 2)), np.array([1.0, 3.0])
-    parts = [triangular(F[i : i + 20], y[i : i + 20], scale) for i in (0, 20, 40)]
-    direct = solved([triangular(F[20:], y[20:], scale)])
+    parts = [joined(triangles(F[i : i + 20], y[i : i + 20]), scale) for i in (0, 20, 40)]
+    direct = solved([joined(triangles(F[20:], y[20:]), scale)])
     assert solved(parts[1:]) == pytest.approx(direct, rel=1e-10)
 
 
