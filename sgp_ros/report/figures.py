@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from sgp_ros.engine.engine import Engine
@@ -46,9 +48,10 @@ def draw_all(
 
 
 def png(figure: Figure) -> bytes:
-    """Return a figure as PNG."""
+    """Lay a figure out and return it as PNG; `savefig` would draw all of it twice."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format='png', dpi=_DPI)
+    figure.dpi = _DPI
+    FigureCanvasAgg(figure).print_png(buffer)
     return buffer.getvalue()
 
 
@@ -56,7 +59,7 @@ def svg(figure: Figure) -> bytes:
     """Return a figure as SVG, its letters as text; the same figure gives the same bytes."""
     buffer = io.BytesIO()
     with rc_context({'svg.fonttype': 'none', 'svg.hashsalt': 'sgp'}):
-        figure.savefig(buffer, format='svg', dpi=_DPI, metadata={'Date': None})
+        FigureCanvasSVG(figure).print_svg(buffer, metadata={'Date': None})
     return buffer.getvalue()
 
 
