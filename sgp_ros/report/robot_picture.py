@@ -13,6 +13,7 @@ import numpy as np
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.rigid.rigid_geometry import full_motion
+from sgp_ros.rigid.rotations import about
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.robot import Robot
 
@@ -108,9 +109,7 @@ def link_places(tree: Tree, posture: np.ndarray) -> tuple[np.ndarray, np.ndarray
         if tree.is_prismatic[i]:
             origins[i] += rotations[i] @ axis * q[i]
         else:
-            cross = np.cross(np.eye(3), -axis)  # of the axis with a vector; Rodrigues' formula
-            turn = np.eye(3) + np.sin(q[i]) * cross + (1.0 - np.cos(q[i])) * cross @ cross
-            rotations[i] = rotations[i] @ turn
+            rotations[i] = rotations[i] @ about(axis, q[i])
     return rotations, origins
 
 
