@@ -16,6 +16,7 @@ no transform.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -170,27 +171,31 @@ def _marker(
     """Return a line of one link, from grey to red with its share of the mismatch."""
     stamped = header(new_message, stamp_ns)
     stamped.frame_id = frame
-    zero = _point(np.zeros(3))
-    pose = new_message(
-        'geometry_msgs/Pose', position=zero,
-        orientation=new_message('geometry_msgs/Quaternion', x=0.0, y=0.0, z=0.0, w=1.0),
-    )  # fmt: skip
-    nothing = new_message('builtin_interfaces/Duration', sec=0, nanosec=0)
     return new_message(
-        'visualization_msgs/Marker', header=stamped, ns=name, id=number, type=_LINE_LIST, action=0,
-        pose=pose, scale=new_message('geometry_msgs/Vector3', x=width, y=0.0, z=0.0),
-        color=_colour(*colour_of(share)), lifetime=nothing, frame_locked=False,
-        points=[_point(end) for end in line], colors=[], texture_resource='',
-        texture=new_message(
-            'sensor_msgs/CompressedImage', header=header(new_message, 0), format='',
-            data=np.zeros(0, dtype=np.uint8),
-        ),
-        uv_coordinates=[], text=f'{name} {100.0 * share:.0f} %', mesh_resource='',
-        mesh_file=new_message(
-            'visualization_msgs/MeshFile', filename='', data=np.zeros(0, dtype=np.uint8)
-        ),
-        mesh_use_embedded_materials=False,
+        'visualization_msgs/Marker', header=stamped, ns=name, id=number,
+        scale=new_message('geometry_msgs/Vector3', x=width, y=0.0, z=0.0),
+        color=_colour(*colour_of(share)), points=[_point(end) for end in line],
+        text=f'{name} {100.0 * share:.0f} %', **_in_every_marker(),
     )  # fmt: skip
+
+
+@cache
+def _in_every_marker() -> dict[str, Any]:
+    nothing = np.zeros(0, dtype=np.uint8)
+    return {
+        'type': _LINE_LIST, 'action': 0, 'frame_locked': False, 'colors': [],
+        'texture_resource': '', 'uv_coordinates': [], 'mesh_resource': '',
+        'mesh_use_embedded_materials': False,
+        'pose': new_message(
+            'geometry_msgs/Pose', position=_point(np.zeros(3)),
+            orientation=new_message('geometry_msgs/Quaternion', x=0.0, y=0.0, z=0.0, w=1.0),
+        ),
+        'lifetime': new_message('builtin_interfaces/Duration', sec=0, nanosec=0),
+        'texture': new_message(
+            'sensor_msgs/CompressedImage', header=header(new_message, 0), format='', data=nothing
+        ),
+        'mesh_file': new_message('visualization_msgs/MeshFile', filename='', data=nothing),
+    }  # fmt: skip
 
 
 def _point(values: Sequence[float] | np.ndarray) -> Any:

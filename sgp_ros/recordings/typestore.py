@@ -22,7 +22,7 @@ def new_message(kind: str, **fields: Any) -> Message:
     """Return a message of type `kind`; every field must be given."""
     # rosbags holds an octet as a number
     values = {n: v[0] if isinstance(v, bytes) else v for n, v in fields.items()}
-    return _typestore(Stores.ROS2_JAZZY).types[full_type(kind)](**values)
+    return _message_class(kind)(**values)
 
 
 def serialize(kind: str, message: Message) -> bytes:
@@ -73,6 +73,12 @@ def short_type(name: str) -> str:
 def full_type(name: str) -> str:
     """Return a short type name as `package/msg/Type`."""
     return name.replace('/', '/msg/', 1)
+
+
+@cache
+def _message_class(kind: str) -> Callable[..., Message]:
+    found: Callable[..., Message] = _typestore(Stores.ROS2_JAZZY).types[full_type(kind)]
+    return found
 
 
 @cache
