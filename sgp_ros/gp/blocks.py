@@ -6,7 +6,7 @@ stand in a single block, since g(u) mixes the components.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import linalg
@@ -26,6 +26,7 @@ class Block:
         L: (N, N) lower factor, or None where the covariance is `noise I`.
         noise: variance on the diagonal, used without L.
         A, b: whitened regressor (N, p) and observations (N,).
+        K: (N, N) covariance of Z of the one component of these rows; None with gain or without Z.
     """
 
     components: tuple[int, ...]
@@ -34,6 +35,7 @@ class Block:
     noise: float
     A: np.ndarray
     b: np.ndarray
+    K: np.ndarray | None = None
 
     @property
     def log_det(self) -> float:
@@ -77,8 +79,9 @@ def _direct_block(j: int, kernel: Kernel | None, noise: float, data: Observation
         root = np.sqrt(noise)
         return Block((j,), None, None, noise, data.F[:, j] / root, data.y[:, j] / root)
     K = kernel.matrix(data.U)
-    K[np.diag_indices(len(K))] += noise
-    return _factored_block((j,), None, K, data.F[:, j], data.y[:, j])
+    noisy = K.copy()
+    noisy[np.diag_indices(len(K))] += noise
+    return replace(_factored_block((j,), None, noisy, data.F[:, j], data.y[:, j]), K=K)
 
 
 def _factored_block(

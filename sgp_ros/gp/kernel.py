@@ -186,6 +186,11 @@ class Kernel(ABC):
     def gradient(self, U: np.ndarray, H: np.ndarray) -> np.ndarray:
         """Contract a symmetric H (n, n) with the derivatives by `log_parameters`, (h,)."""
 
+    def gradient_from(self, K: np.ndarray, U: np.ndarray, H: np.ndarray) -> np.ndarray:
+        """Return `gradient` where `K = matrix(U)` is at hand; a kernel that can use it does."""
+        del K
+        return self.gradient(U, H)
+
 
 @dataclass(frozen=True, slots=True)
 class Stationary(Kernel):

@@ -55,8 +55,11 @@ class SquaredExponential(Stationary):
 
     def gradient(self, U: np.ndarray, H: np.ndarray) -> np.ndarray:
         """Contract a symmetric H (n, n) with dK/dtheta, (1 + d,); one exponential serves all."""
-        weighted = self.matrix(U)
-        weighted *= H
+        return self.gradient_from(self.matrix(U), U, H)
+
+    def gradient_from(self, K: np.ndarray, U: np.ndarray, H: np.ndarray) -> np.ndarray:
+        """Return `gradient` from `K = matrix(U)`: no exponential is taken again."""
+        weighted = K * H
         return np.array([weighted.sum(axis=1).sum(), *distance_sums(self.scale(U), weighted)])
 
 

@@ -160,7 +160,9 @@ class Posterior:
             noise[first : first + len(outputs)] += 0.5 * outputs
             for column, component in enumerate(block.components):
                 kernel = kernels[component]
-                if kernel is not None:
+                if kernel is not None and block.K is not None:
+                    parts[component] = 0.5 * kernel.gradient_from(block.K, self.data.U, H)
+                elif kernel is not None:
                     folded = self._fold(H, block, column)
                     parts[component] = 0.5 * kernel.gradient(self.data.U, folded)
             start = stop
@@ -210,8 +212,7 @@ class Posterior:
         return linalg.solve_triangular(block.L, k, lower=True, check_finite=False)
 
     def _fold(self, H: np.ndarray, block: Block, column: int) -> np.ndarray:
-        if block.gain is None:
-            return H
+        assert block.gain is not None
         n = len(self.data.U)
         weighted = H * np.outer(block.gain[:, column], block.gain[:, column])
         return weighted.reshape(n, len(block.b) // n, n, -1).sum(axis=(1, 3))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -98,12 +99,17 @@ def joint_names(names: Sequence[str]) -> tuple[str, ...]:
     Raises:
         MessageError: none, or one of them twice.
     """
-    result = tuple(names)
-    if not result:
+    return _checked(tuple(names))
+
+
+@lru_cache(maxsize=256)
+def _checked(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names that were equal first: all messages of a recording share one tuple."""
+    if not names:
         raise MessageError('a message without joint names', 'one name per joint')
-    if len(set(result)) != len(result):
-        raise MessageError(f'repeated joint names in {list(result)}', 'each joint once')
-    return result
+    if len(set(names)) != len(names):
+        raise MessageError(f'repeated joint names in {list(names)}', 'each joint once')
+    return names
 
 
 def matching(values: Sequence[float], names: tuple[str, ...], what: str) -> np.ndarray:
