@@ -51,15 +51,17 @@ def png(figure: Figure) -> bytes:
     """Lay a figure out and return it as PNG; `savefig` would draw all of it twice."""
     buffer = io.BytesIO()
     figure.dpi = _DPI
-    FigureCanvasAgg(figure).print_png(buffer)
+    canvas = FigureCanvasAgg(figure)
+    canvas.print_png(buffer)  # type: ignore[no-untyped-call] # matplotlib leaves it without types
     return buffer.getvalue()
 
 
 def svg(figure: Figure) -> bytes:
     """Return a figure as SVG, its letters as text; the same figure gives the same bytes."""
     buffer = io.BytesIO()
+    canvas = FigureCanvasSVG(figure)
     with rc_context({'svg.fonttype': 'none', 'svg.hashsalt': 'sgp'}):
-        FigureCanvasSVG(figure).print_svg(buffer, metadata={'Date': None})
+        canvas.print_svg(buffer, metadata={'Date': None})  # type: ignore[no-untyped-call] # as above
     return buffer.getvalue()
 
 
