@@ -90,6 +90,15 @@ def _stages(result):
     return '\n'.join(lines)
 
 
+def _changes(result):
+    """Return the stages of commands before and after the last changes, a command after the other."""
+    lines = ['| command | stage | before [s] | after [s] |', '|---|---|---|---|']
+    for row in result['changes']:
+        size = f'{row["command"]}, {row["joints"]} joints, {row["seconds"]:g} s'
+        lines.append(f'| {size} | {row["stage"]} | {row["before_s"]:.2f} | {row["after_s"]:.2f} |')
+    return '\n'.join(lines)
+
+
 def _rivals(result):
     """Return what mujoco.sysid took for a recording, beside the diagnosis of the same one."""
     for row in result['diagnose']:
@@ -116,7 +125,7 @@ def text():
         machine=', '.join(f'{k} {v}' for k, v in result['machine'].items()),
         remark=result.get('remark', ''),
         tables='\n\n'.join(tables), targets=_targets(result), stages=_stages(result),
-        rivals=_rivals(result),
+        changes=_changes(result), rivals=_rivals(result),
     )  # fmt: skip
 
 
