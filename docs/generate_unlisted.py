@@ -103,8 +103,8 @@ momentum does to it. {mount_worlds} worlds of tier A:
 
 {mount_missed}
 
-A base that rocks has no name, and a recording that begins while the base swings is taken to begin with one that follows the
-arm: its first swings are then explained badly. A node does not model the law; it says so.
+How the base swings where a recording begins follows from its first rows, by least squares in two phases. A base that rocks
+has no name. A node does not model the law; it says so.
 
 ```bash
 python -m sgp_proof.concealed.elastic --effect mount_elasticity --seeds {mount_seeds} --worlds out/mount

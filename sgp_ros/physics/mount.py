@@ -26,10 +26,49 @@ _PERIODS = 5.0
 _STIFFEST = 3.0
 """Stiffest mount over the bandwidth."""
 _DAMPING, _USUAL_RATIO = (1e-3, 1.0), 0.1
-_AT_REST = 0.1
-"""Speed over the greatest one below which an arm is at rest."""
+_DECAYS = 3.0
+_LARGEST_RING = 3.0
+"""Largest ring at a start over the largest one that the motion causes."""
 _LIGHTEST = 0.75
 """Least mass on the mount over the nominal one of the arm, whose prior is 25 %."""
+
+
+def _rows(part: slice, step: float, shape: np.ndarray) -> int:
+    """Return the rows of a stretch in which a ring at its start is seen, at least one period."""
+    decay = _DECAYS / (2.0 * math.pi * shape[0] * shape[1])
+    return min(part.stop - part.start, math.ceil(max(decay, 1.0 / shape[0]) / step))
+
+
+def _ring(
+    thrust: np.ndarray, seen: np.ndarray, left: np.ndarray, edge: int, step: float,
+    shape: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Return how a base rings that does not begin at rest, (n,), beside what shakes it.
+
+    Both phases follow by least squares from what the nominal robot leaves of the efforts there,
+    with an offset per joint; nothing where that has no sign of the mount.
+
+    Args:
+        thrust: (n,) of a stretch, the base beginning at rest.
+        seen: (m, k) effort of the joints per thrust in its first rows.
+        left: (m, k) what the nominal robot leaves there.
+        edge: so many of these rows tell nothing.
+        step: of the grid [s].
+        shape: frequency and damping ratio.
+    """
+    rate, ratio = 2.0 * math.pi * shape[0], shape[1]
+    t = step * np.arange(len(thrust))
+    swing = rate * math.sqrt(max(1.0 - ratio**2, 0.0)) * t
+    phases = np.exp(-ratio * rate * t) * np.stack([np.cos(swing), np.sin(swing)])
+    m, k = seen.shape
+    offsets = np.tile(np.eye(k), (m, 1))
+    columns = [(seen * x[:m, None]).ravel() for x in (thrust, *phases)]
+    A, y = np.column_stack([*columns, offsets])[edge * k :], left.ravel()[edge * k :]
+    mobility, *sizes = np.linalg.lstsq(A, y, rcond=None)[0][:3]
+    ring = np.asarray(sizes @ phases)
+    if mobility * float(np.abs(thrust).max()) * _LARGEST_RING <= float(np.abs(ring).max()):
+        return np.zeros_like(thrust)
+    return np.asarray(ring / mobility)
 
 
 class MountElasticity(Effect):
@@ -86,28 +125,23 @@ class MountElasticity(Effect):
         return bool(1.02 * low < at.shape[0] < 0.98 * high)
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
-        """Return the force per 1/m, (n, k, 1); each stretch begins at rest, or carried along."""
+        """Return the force per 1/m, (n, k, 1), see `_ring` for how each stretch begins."""
         per_speed = -motion.gravity_columns[:, :, AXES.index(place.kind)]
         momentum = smooth(motion, (per_speed * motion.velocity).sum(axis=1))
-        speed = np.abs(motion.velocity).max(axis=1)
-        moves = speed > _AT_REST * speed.max()
-        slope, ends = derivatives(motion, momentum)[0], (*motion.starts[1:], len(momentum))
-        swung = [
-            self._swung(momentum[i:j] - moves[i] * momentum[i], moves[i] * slope[i],
-                        motion.step, shape)
-            for i, j in zip((0, *ends[:-1]), ends, strict=True)
-        ]  # fmt: skip
-        thrust = derivatives(motion, np.concatenate(swung))[0]
-        return np.asarray((per_speed * thrust[:, None])[:, :, None])
-
-    @staticmethod
-    def _swung(momentum: np.ndarray, slope: float, step: float, shape: np.ndarray) -> np.ndarray:
-        """Return a momentum (n,) behind the high-pass, the base having followed its slope."""
+        left = (motion.nominal_effort - motion.effort) / motion.effort.std(axis=0).clip(1e-300)
         rate, ratio = 2.0 * math.pi * shape[0], shape[1]
-        t, swing = step * np.arange(len(momentum)), math.sqrt(max(1.0 - ratio**2, 0.0))
-        carried = slope * t * np.sinc(rate * swing / math.pi * t) * np.exp(-ratio * rate * t)
         a, b = 1.0 / rate**2, 2.0 * ratio / rate
-        return np.asarray(momentum - carried - resonator(momentum, a, b, step, is_settled=False))
+        ends = [*motion.starts[1:], len(momentum)]
+        parts = [slice(i, j) for i, j in zip(motion.starts, ends, strict=True)]
+        swung = [x - resonator(x, a, b, motion.step, is_settled=False)
+                 for x in (momentum[part] - momentum[part.start] for part in parts)]  # fmt: skip
+        thrust = derivatives(motion, np.concatenate(swung))[0]
+        for part in parts:
+            rows = slice(part.start, part.start + _rows(part, motion.step, shape))
+            seen = per_speed[rows] / motion.effort.std(axis=0).clip(1e-300)
+            edge = math.ceil(0.5 / motion.bandwidth / motion.step)  # accelerations are poor there
+            thrust[part] += _ring(thrust[part], seen, left[rows], edge, motion.step, shape)
+        return np.asarray((per_speed * thrust[:, None])[:, :, None])
 
     def places(self, motion: SeenMotion) -> list[Place]:
         """Return the axes along which the arm pushes the base."""
