@@ -94,6 +94,7 @@ class MountElasticity(Effect):
     drawn_over = 'seconds'
     is_online = False
     uses_bodies = True
+    sees_acceleration = True
     has_memory = True
 
     def coefficient_quantities(self, kind: str = '') -> tuple[Quantity, ...]:
