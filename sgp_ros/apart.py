@@ -1,4 +1,4 @@
-"""Reading of strangers' files in a process of its own, bounded in time and memory.
+"""Reading of strangers' files in a process of its own, bounded in processor time and memory.
 
 Large libraries in C and programs in files may crash, hang or take all memory. There they end
 nothing but the reading of that file.
@@ -10,6 +10,7 @@ import contextlib
 import math
 import os
 import resource
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -20,6 +21,8 @@ from sgp_ros.errors import SgpError
 from sgp_ros.strangers import TooMuchError, bound, readable
 
 _SAID, _BYTES_PER_S = 1, 20e6
+_BUSY = 4.0
+"""Longest time over that of the processor: of a computer that does other work too."""
 
 
 def read_apart(reader: str, path: Path, kind: type[SgpError], expected: str) -> bytes:
@@ -39,18 +42,21 @@ def read_apart(reader: str, path: Path, kind: type[SgpError], expected: str) -> 
     program = f'from {__name__} import write; write({reader!r}, {math.ceil(seconds)})'
     # The allocator of Arrow reserves more than it takes, which the bound of memory would count.
     environment = {**os.environ, 'ARROW_DEFAULT_MEMORY_POOL': 'system'}
+    late = TooMuchError(
+        f'{path} could not be read within {seconds:.0f} s', 'an intact file',
+        'to allow more time, raise SGP_MOST_SECONDS',
+    )  # fmt: skip
     try:
         done = subprocess.run(  # noqa: S603  # this interpreter, this package
             [sys.executable, '-c', program, str(path), expected], capture_output=True,
-            timeout=seconds, check=False, env=environment, stdin=subprocess.DEVNULL,
+            timeout=_BUSY * seconds, check=False, env=environment, stdin=subprocess.DEVNULL,
         )  # fmt: skip
     except subprocess.TimeoutExpired as error:
-        raise TooMuchError(
-            f'{path} could not be read within {seconds:.0f} s', 'an intact file',
-            'to allow more time, raise SGP_MOST_SECONDS',
-        ) from error  # fmt: skip
+        raise late from error
     if done.returncode == 0:
         return done.stdout
+    if done.returncode == -signal.SIGXCPU:
+        raise late
     said = done.stderr.decode(errors='replace').strip().splitlines()
     if done.returncode == _SAID and said:
         raise kind(said[-1])
@@ -64,9 +70,11 @@ def write(reader: str, seconds: int) -> None:
     """Write what a function says of a file to stdout; what it raises, as one line to stderr."""
     _, path, expected = sys.argv
     most = bound('UNPACKED_MB') << 20
-    for limit, value in ((resource.RLIMIT_DATA, most), (resource.RLIMIT_CPU, seconds)):
+    for limit, value, last in (
+        (resource.RLIMIT_DATA, most, most), (resource.RLIMIT_CPU, seconds, seconds + 1),
+    ):  # fmt: skip
         with contextlib.suppress(ValueError, OSError):
-            resource.setrlimit(limit, (value, value))
+            resource.setrlimit(limit, (value, last))
     module, _, function = reader.partition(':')
     with os.fdopen(os.dup(1), 'wb') as stream:
         os.dup2(2, 1)  # what a library prints is not part of it
