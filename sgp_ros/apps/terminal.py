@@ -11,7 +11,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from sgp_ros.errors import ConfigError
+from sgp_ros.errors import ConfigError, SgpError
 
 _LISTING = '.sgp_'
 """Beginning of the names of the files that list the results of a command, see `report.files`."""
@@ -85,10 +85,12 @@ def imports_of(path: Path) -> str:
 
 def _imported(folder: Path) -> set[str]:
     """Return the names of imported files in a folder, and of their listings."""
+    from sgp_ros.strangers import read_text  # noqa: PLC0415 - it takes time
+
     found = set()
     for listing in folder.glob(f'{_IMPORTS}*.json'):
-        with suppress(OSError, ValueError):
-            found |= {listing.name, *json.loads(listing.read_text(encoding='utf-8'))}
+        with suppress(SgpError, OSError, ValueError, TypeError):
+            found |= {listing.name, *json.loads(read_text(listing))}
     return found
 
 
