@@ -250,7 +250,7 @@ def test_a_test_recording_of_another_robot_is_refused_by_its_name(folder, tmp_pa
 def test_a_file_in_the_place_of_the_results_is_refused_before_anything_is_read(tmp_path, capsys):
     (tmp_path / 'out').write_text('mine')
     line = _refused(_command('nowhere.mcap', 'linear_axis', tmp_path / 'out'), capsys)
-    assert 'change --out' in line
+    assert 'choose another --out' in line
     assert (tmp_path / 'out').read_text() == 'mine'
 
 
