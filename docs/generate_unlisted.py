@@ -103,8 +103,8 @@ momentum does to it. {mount_worlds} worlds of tier A:
 
 {mount_missed}
 
-How the base swings where a recording begins follows from its first rows, by least squares in two phases. A base that rocks
-has no name. A node does not model the law; it says so.
+How the base swings where a recording begins follows from its first rows, by least squares in two phases; it was added because
+case_7204 had been missed without. A base that rocks has no name. A node does not model the law; it says so.
 
 ```bash
 python -m sgp_proof.concealed.elastic --effect mount_elasticity --seeds {mount_seeds} --worlds out/mount
