@@ -64,6 +64,8 @@ def _ring(
     offsets = np.tile(np.eye(k), (m, 1))
     columns = [(seen * x[:m, None]).ravel() for x in (thrust, *phases)]
     A, y = np.column_stack([*columns, offsets])[edge * k :], left.ravel()[edge * k :]
+    if not (np.isfinite(A).all() and np.isfinite(y).all()):  # of a roll-out that diverges
+        return np.zeros_like(thrust)
     mobility, *sizes = np.linalg.lstsq(A, y, rcond=None)[0][:3]
     ring = np.asarray(sizes @ phases)
     if mobility * float(np.abs(thrust).max()) * _LARGEST_RING <= float(np.abs(ring).max()):
@@ -129,7 +131,9 @@ class MountElasticity(Effect):
         """Return the force per 1/m, (n, k, 1), see `_ring` for how each stretch begins."""
         per_speed = -motion.gravity_columns[:, :, AXES.index(place.kind)]
         momentum = smooth(motion, (per_speed * motion.velocity).sum(axis=1))
-        left = (motion.nominal_effort - motion.effort) / motion.effort.std(axis=0).clip(1e-300)
+        size = np.sqrt((motion.effort**2 + motion.nominal_effort**2).mean(axis=0))
+        size[size == 0.0] = 1.0
+        left = (motion.nominal_effort - motion.effort) / size
         rate, ratio = 2.0 * math.pi * shape[0], shape[1]
         a, b = 1.0 / rate**2, 2.0 * ratio / rate
         ends = [*motion.starts[1:], len(momentum)]
@@ -139,7 +143,7 @@ class MountElasticity(Effect):
         thrust = derivatives(motion, np.concatenate(swung))[0]
         for part in parts:
             rows = slice(part.start, part.start + _rows(part, motion.step, shape))
-            seen = per_speed[rows] / motion.effort.std(axis=0).clip(1e-300)
+            seen = per_speed[rows] / size
             edge = math.ceil(0.5 / motion.bandwidth / motion.step)  # accelerations are poor there
             thrust[part] += _ring(thrust[part], seen, left[rows], edge, motion.step, shape)
         return np.asarray((per_speed * thrust[:, None])[:, :, None])

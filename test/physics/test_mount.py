@@ -13,6 +13,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 from test.physics.test_elasticity import equations_of, moved
 
 LAW = EFFECTS['mount_elasticity']
@@ -67,3 +68,17 @@ def test_frequency_damping_and_mass_follow_from_a_motion(axis):
     assert numbers['axis'] == axis
     for name, truth in NUMBERS.items():
         assert numbers[name] == pytest.approx(truth, rel=0.02), name
+
+
+def test_a_joint_without_effort_does_no_harm():
+    """A passive joint has a nominal effort alone; a roll-out that diverged has no numbers."""
+    found = equations('x').motion
+    passive = replace(found, effort=found.effort * [1.0, 0.0])
+    still = replace(found, effort=np.zeros_like(found.effort))
+    lost = replace(found, position=np.where(found.time[:, None] > 0.1, np.inf, found.position))
+    with np.errstate(all='ignore'):
+        assert not np.isfinite(LAW.columns(lost, Place(-1, 'x'), np.array([8.0, 0.05]))).all()
+    for motion in (passive, still):
+        columns = LAW.columns(motion, Place(-1, 'x'), np.array([8.0, 0.05]))
+        assert np.isfinite(columns).all()
+        assert np.abs(columns).max() < 1e3
