@@ -27,6 +27,7 @@ _STIFFEST = 3.0
 """Stiffest mount over the bandwidth."""
 _DAMPING, _USUAL_RATIO = (1e-3, 1.0), 0.1
 _DECAYS = 3.0
+"""Times of decay after which nothing is left of a ring at a start."""
 _LARGEST_RING = 3.0
 """Largest ring at a start over the largest one that the motion causes."""
 _LIGHTEST = 0.75
@@ -35,7 +36,7 @@ _LIGHTEST = 0.75
 
 def _rows(part: slice, step: float, shape: np.ndarray) -> int:
     """Return the rows of a stretch in which a ring at its start is seen, at least one period."""
-    decay = _DECAYS / (2.0 * math.pi * shape[0] * shape[1])
+    decay = _DECAYS / (2.0 * math.pi * shape[0] * max(shape[1], _DAMPING[0]))
     return min(part.stop - part.start, math.ceil(max(decay, 1.0 / shape[0]) / step))
 
 
