@@ -121,7 +121,7 @@ def diagnosed(seed, nominal, events, seconds, answer) -> dict:
         'noise': float((equations.noise**2 / equations.power).max()),
         'left': float((decision.model.mean_square / equations.power).max()),
         'verdict': decision.verdict, 'effect': top, 'truth': answer['verdict'],
-        'certainty': certainty_of(findings, equations, comparison),
+        'certainty': certainty_of(findings, comparison),
         'is_right': (decision.verdict, top) in right,
         'verdict_is_right': decision.verdict in {v for v, _ in right},
     }  # fmt: skip

@@ -135,7 +135,7 @@ def statistics(folder, truth=None):
         'verdict': decision.verdict,
         'said': [_key(equations, s) for s in decision.model.effects],
         'cutoff_hz': equations.filter.cutoff,
-        'left': float(scale.shares(comparison.parameters).max()),
+        'left': float(comparison.parameters.left.max()),
         'base': _terms(scale, base),
         'models': [_terms(scale, model) for model in ranked[:_KEPT]],
         'structured_rest': None if best is None else _structured(equations, scale, best),

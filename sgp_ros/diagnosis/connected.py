@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations, joint_name, make_equations
+from sgp_ros.diagnosis.compare.grid import noisy_volume
 from sgp_ros.diagnosis.compare.sufficiency import require_rows
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth
 from sgp_ros.diagnosis.criteria import (
@@ -112,7 +113,8 @@ class Connected:
         )
         if self.correction is not None:
             recorded = recorded[list(self.correction.effort_order)]
-            model = replace(model, inertia=model.inertia - np.log(np.abs(self.correction.scale)))
+            units = model.inertia - np.log(np.abs(self.correction.scale))
+            model = replace(model, inertia=noisy_volume(units, self.equations.noise_part))
         return replace(scale, nominal=nominal, power=recorded).worth(model)
 
     def recorded(self, found: Predictions) -> Predictions:

@@ -19,10 +19,12 @@ from functools import cached_property
 import numpy as np
 
 from sgp_ros.diagnosis.compare.bodies import Factor, body_directions
+from sgp_ros.diagnosis.compare.grid import noisy_volume, part_of_noise
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
     RawTrajectory,
+    measured_noise,
     observe,
     parallel_filter,
 )
@@ -56,8 +58,9 @@ class Equations:
         moving: (n, k) 0 where a joint rests that dry friction may hold, 1 elsewhere; all 1
             unless the joint has, or is supposed to have, dry friction.
         rests: (n, k) whether a joint rests.
-        model_error: (k,) mean square by which d changes with the smoothing of the states: what
-            filters leave of a perfect model where the motion is fast.
+        model_error: (k,) mean square that a perfect model leaves: by how much d changes with the
+            smoothing of the states, for the motion is fast, and the noise of measured efforts.
+        noise_part: (k,) part of d that the noise of measured efforts makes, in mean squares.
         free: the same equations where dry friction holds fewer joints; None where there are none.
     """
 
@@ -72,6 +75,7 @@ class Equations:
     moving: np.ndarray
     rests: np.ndarray
     model_error: np.ndarray
+    noise_part: np.ndarray
     free: Equations | None = None
 
     @cached_property
@@ -156,8 +160,9 @@ class Equations:
 
         Their sum is the mean of log det(M / M nominal) for changed bodies and what is added to M;
         joints differ by the diagonal of M. What is measured is the motion: a model of other
-        inertia must not gain from residuals in smaller units of effort. Minus infinity where the
-        mass matrix is not positive, infinity where the nominal one has none.
+        inertia must not gain from residuals in smaller units of effort. That holds as far as they
+        are no noise of measured efforts, which no inertia changes. Minus infinity where the mass
+        matrix is not positive, infinity where the nominal one has none.
 
         Args:
             w: (p,) change of the bodies.
@@ -175,7 +180,7 @@ class Equations:
             return np.full(M.shape[1], np.inf)
         whole = (np.linalg.slogdet(M)[1] - np.linalg.slogdet(nominal)[1]).mean()
         own = np.log(np.diagonal(M, 0, 1, 2) / np.diagonal(nominal, 0, 1, 2)).mean(axis=0)
-        return np.asarray(own + (whole - own.sum()) / len(own))
+        return noisy_volume(own + (whole - own.sum()) / len(own), self.noise_part)
 
 
 def resting(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) -> np.ndarray:
@@ -241,9 +246,10 @@ def make_equations(
     power = np.where(motion.moves & (power > 0.0), power, 1.0)
     inertia = motion.mass_diagonal.mean(axis=0)
     variance = inertia**2 * (2 * np.pi) ** 4 * raw.noise_density * bandwidth.cutoff**5 / 5.0
+    noise = measured_noise(raw, motion, bandwidth)
     equations = Equations(
         motion, low, motion.time[low.rows], d, bases, directions, power, np.sqrt(variance),
         np.ones(motion.position.shape), resting(raw, motion, bandwidth),
-        _smoothing_error(raw, motion, low, bandwidth),
+        _smoothing_error(raw, motion, low, bandwidth) + noise, part_of_noise(noise, d),
     )  # fmt: skip
     return replace(equations.with_dry_friction(motion.dry_joints), free=None)

@@ -1,15 +1,24 @@
-"""A stretch of a recording on a uniform grid, and the noise of positions there."""
+"""A stretch of a recording on a uniform grid, and the noise of positions and efforts there."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy import interpolate
 
 from sgp_ros.batch.acceptance import Accepted
+
+_POSITIONS = 0.3, 0.48
+"""Frequencies at which no robot moves, in parts of the rate."""
+_EFFORTS = 0.225, 0.32
+"""Frequencies below which noise of efforts is looked for at the latest, and at the most: a
+recording that was thinned has less above."""
+_ABOVE = 1.5
+"""Cut-offs from which it is looked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,12 +68,57 @@ def noise_density(position: np.ndarray, segments: Sequence[slice], step: float) 
         segments: stretches of rows without a pause; the longest is looked at.
         step: of the grid [s].
     """
+    return _levels(position, segments, step, np.array(_POSITIONS))[0]
+
+
+def effort_noise(
+    effort: np.ndarray, segments: Sequence[slice], step: float, cutoff: float
+) -> np.ndarray:
+    """Return the mean square that noise of measured efforts may have below a cut-off, (k,).
+
+    It is taken for white, at the lowest level that the spectra have in a quarter of what lies
+    above: motion, ripple and what a current loop adds there are no noise of the measurement.
+    That is exceeded by chance by three standard deviations at most.
+
+    Args:
+        effort: (n, k) [N m or N].
+        segments: stretches of rows without a pause; the longest is looked at.
+        step: of the grid [s].
+        cutoff: [Hz].
+    """
+    latest, highest = _EFFORTS
+    edges = np.linspace(min(_ABOVE * cutoff * step, latest), highest, 5)
+    rows = 2.0 * cutoff * step * sum(s.stop - s.start for s in segments)
+    level = _levels(effort, segments, step, edges).min(axis=0)
+    return np.asarray(cutoff * level * (1.0 + 3.0 * math.sqrt(2.0 / rows)))
+
+
+def part_of_noise(noise: np.ndarray, d: np.ndarray) -> np.ndarray:
+    """Return what part of discrepancies d (N, k) noise of mean squares (k,) makes, (k,)."""
+    return np.asarray(np.minimum(noise / np.maximum((d**2).mean(axis=0), 1e-300), 1.0))
+
+
+def noisy_volume(volume: np.ndarray, part: np.ndarray) -> np.ndarray:
+    """Return logarithms of the units of residuals, (k,), of which a part is noise of efforts.
+
+    Only what the motion shows is measured in units of motion.
+    """
+    return np.asarray(0.5 * np.log(part + (1.0 - part) * np.exp(2.0 * volume)))
+
+
+def _levels(
+    x: np.ndarray, segments: Sequence[slice], step: float, edges: np.ndarray
+) -> np.ndarray:
+    """Return the one-sided spectral densities of x (n, k) between edges (b + 1,), (b, k).
+
+    Edges are in parts of the rate.
+    """
     longest = max(segments, key=lambda s: s.stop - s.start)
-    q = position[longest]
-    window = np.hanning(len(q))[:, None]
-    spectrum = np.abs(np.fft.rfft((q - q.mean(axis=0)) * window, axis=0)) ** 2
+    x = x[longest]
+    window = np.hanning(len(x))[:, None]
+    spectrum = np.abs(np.fft.rfft((x - x.mean(axis=0)) * window, axis=0)) ** 2
     density = 2.0 * spectrum * step / np.sum(window**2)
-    frequency = np.fft.rfftfreq(len(q), step)
-    upper = (frequency > 0.3 / step) & (frequency < 0.48 / step)
+    frequency = np.fft.rfftfreq(len(x))
+    bands = [(frequency > a) & (frequency < b) for a, b in pairwise(edges)]
     # the median of an exponential variable is ln 2 of its mean
-    return np.asarray(np.median(density[upper], axis=0) / math.log(2.0))
+    return np.array([np.median(density[band], axis=0) for band in bands]) / math.log(2.0)

@@ -172,11 +172,7 @@ def probabilities(
     )
 
 
-def certainty_of(
-    findings: Sequence[Finding | Difference],
-    equations: Equations,
-    comparison: Comparison,
-) -> float:
+def certainty_of(findings: Sequence[Finding | Difference], comparison: Comparison) -> float:
     """Return the probability that the verdict is right: the least of what it rests on.
 
     That is all findings that count as physics; of unknowns alone the most certain one.
@@ -186,5 +182,5 @@ def certainty_of(
         return min(named)
     if findings:
         return max(f.probability for f in findings)
-    left = float((comparison.parameters.mean_square / equations.power).max())
+    left = float(comparison.parameters.left.max())
     return float(np.clip(1.0 / (1.0 + (left / CALM_SHARE) ** 2), 0.5, MOST_CERTAIN))

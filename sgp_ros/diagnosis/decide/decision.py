@@ -99,18 +99,13 @@ class Scale:
     def of(cls, equations: Equations, comparison: Comparison) -> Scale:
         """Return the scale of a recording."""
         power, error = equations.power, equations.model_error
-        base = np.maximum(comparison.base.mean_square - error, 0.0) / power
-        nominal = comparison.nominal.mean_square / power
+        base, nominal = comparison.base.left, comparison.nominal.mean_square / power
         return cls(power, error, base, nominal, min(INDEPENDENT_ROWS, len(equations.d)))
 
     @property
     def floor(self) -> np.ndarray:
         """What the right model may leave, (k,) shares."""
         return np.asarray(FLOOR_SHARE + SHAPE_ERROR * self.nominal + self.error / self.power)
-
-    def shares(self, model: Model) -> np.ndarray:
-        """Return what a model leaves beyond the errors of the filters, (k,) shares."""
-        return np.maximum(model.mean_square - self.error, 0.0) / self.power
 
     def explained(self, model: Model) -> float:
         """Return the size of what is to explain.
@@ -123,7 +118,7 @@ class Scale:
 
     def rest(self, model: Model, structured: np.ndarray | float = 1.0) -> float:
         """Return the rest of a model relative to what it explains; `structured` (k,) of it."""
-        return float((structured * self.shares(model)).sum()) / self.explained(model)
+        return float((structured * model.left).sum()) / self.explained(model)
 
     def found(self, model: Model) -> np.ndarray:
         """Return what there is to explain at each joint, (k,) shares, as in `explained`."""
@@ -148,7 +143,7 @@ class Scale:
         explained = np.where(is_own, self.found(model), self.explained(model))
         slight = np.where(is_own, SLIGHT_REST, LEAST_SHARE)
         limits = np.maximum(np.multiply.outer([ADEQUATE_REST, COLOURED_REST], explained), slight)
-        return np.asarray((told * self.shares(model) / limits).max(axis=0))
+        return np.asarray((told * model.left / limits).max(axis=0))
 
     def counts(self, model: Model) -> bool:
         """Return whether effects are large enough, credible, and do not cancel each other."""
@@ -209,7 +204,7 @@ def decide(equations: Equations, comparison: Comparison) -> Decision:
         likely = []
     best = supported(equations, scale.rows, scale.floor * scale.power, likely)
     rivals = tuple(m for m in ranked if m is not best)
-    left = scale.shares(comparison.parameters)
+    left = comparison.parameters.left
     if best is not None:
         return _judged(equations, scale, comparison, best, rivals)
     nothing = np.where(left > LEAST_SHARE, NOTHING_EXPLAINED, 0.0)
@@ -285,7 +280,7 @@ def _opened(
         others = (best, *rivals)
         return Decision('missing_physics', known, others, excess, unknown[0], unknown,
                         against=base.score)  # fmt: skip
-    if scale.shares(comparison.parameters).max() > COUNTED_SHARE:
+    if comparison.parameters.left.max() > COUNTED_SHARE:
         unknown = _ordered(np.where(is_open, excess, 0.0), worst)
         return Decision('unexplained', base, (best, *rivals), excess, worst, unknown, best,
                         base.score)  # fmt: skip

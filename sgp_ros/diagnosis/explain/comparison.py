@@ -97,7 +97,7 @@ def _more(columns: Columns, best: Model) -> list[Model]:
 
     From that model, and from what nearly every joint has, with bodies that may differ.
     """
-    if (best.mean_square / best.frame.equations.power).max() < COUNTED_SHARE:
+    if best.left.max() < COUNTED_SHARE:
         return []
     starts = [best, usual(columns, fit(columns, (), best.sigma, is_free=True))]
     if isinstance(best.frame.equations.motion.drive, Servo):
@@ -126,11 +126,10 @@ def _exchanged(columns: Columns, ranked: list[Model]) -> list[Model]:
     that is better and leaves what counts as physics, it is done again with the best of them.
     """
     found: list[Model] = []
-    equations = columns.equations(frozenset())
-    power, effects = equations.power, equations.motion.catalogue.values()
+    effects = columns.equations(frozenset()).motion.catalogue.values()
     best = ranked[0] if ranked else None
     for _ in range(EXCHANGES):
-        if best is None or (best.mean_square / power).max() < COUNTED_SHARE:
+        if best is None or best.left.max() < COUNTED_SHARE:
             break
         trials: list[Model] = []
         for kept in best.effects:

@@ -62,6 +62,12 @@ class Model:
         return np.asarray((self.residual**2).mean(axis=0))
 
     @property
+    def left(self) -> np.ndarray:
+        """Shares of the mean squared efforts that it leaves beyond errors of the signals, (k,)."""
+        equations = self.frame.equations
+        return np.maximum(self.mean_square - equations.model_error, 0.0) / equations.power
+
+    @property
     def size(self) -> int:
         """Number of fitted parameters of the effects."""
         return sum(

@@ -80,8 +80,7 @@ class _Block:
 
     def left(self, model: Model) -> float:
         """Return the greatest share of the mean squared effort that a model leaves here."""
-        share = model.mean_square / model.frame.equations.power
-        return float(share[list(self.joints)].max() if self.joints else share.max())
+        return float((model.left[list(self.joints)] if self.joints else model.left).max())
 
 
 def by_joint(columns: Columns, model: Model) -> list[Model]:

@@ -18,8 +18,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sgp_ros.diagnosis.compare.bodies import body_directions
+from sgp_ros.diagnosis.compare.grid import noisy_volume, part_of_noise
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
-from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, observe
+from sgp_ros.diagnosis.compare.trajectory import (
+    Bandwidth,
+    RawTrajectory,
+    measured_noise,
+    observe,
+)
 from sgp_ros.diagnosis.criteria import INDEPENDENT_ROWS, SHAPE_ERROR
 from sgp_ros.diagnosis.setup.correction import Acting, Correction, delayed
 from sgp_ros.diagnosis.setup.unknowns import Unknowns
@@ -109,6 +115,10 @@ class Probe:
         inertial = (self.motion.mass_diagonal * self.motion.acceleration).var(axis=0)
         self.power = np.where(self.driven, effort, inertial)
         self.power = np.where(self.power > 0.0, self.power, 1.0)
+        d = self.motion.nominal_effort - self.motion.effort - self.motion.stated_force
+        # rows that are left out alias the noise
+        noise = every * measured_noise(raw, motion, bandwidth)
+        self._noise_part = part_of_noise(noise, self.filter(d))
         self._pose = np.linspace(0, len(pick) - 1, 24).astype(int)
         M = mass_matrix(tree, tree.parameters, self.motion.position[self._pose])
         self.nominal_inertia = float(np.linalg.slogdet(M)[1].mean())
@@ -154,8 +164,8 @@ class Probe:
         power = self._delivered(motion, correction)
         rms = np.sqrt(power)
         # by how much the density of recorded accelerations exceeds that of relative errors
-        volume = -0.5 * float(np.log(power / self.power)[self.driven].sum())
-        volume -= float(np.log(np.abs(correction.scale)).sum())
+        units = -0.5 * self.driven * np.log(power / self.power) - np.log(np.abs(correction.scale))
+        volume = float(noisy_volume(units, self._noise_part).sum())
         rows = min(INDEPENDENT_ROWS, len(d))
         found = []
         for number in range(3) if unknowns is None else (unknowns,):

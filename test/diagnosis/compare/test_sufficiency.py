@@ -75,6 +75,26 @@ def test_the_noise_of_a_still_joint_explains_nothing(robots):
     assert 'joint1' not in {f.joint for f in (*found.findings, *found.alternatives)}
 
 
+@pytest.mark.parametrize('level', [0.0, 0.6])
+def test_a_joint_whose_efforts_are_noise_takes_nothing_from_the_others(robots, level):
+    """Noise of three times its effort: no law, body or torque constant makes that small.
+
+    A gain that divides the measured efforts makes their noise small too, in other units.
+    """
+    world = simulate(CHAINS[2], 11, force=lambda t, q, v: (-level * np.tanh(v[0] / 1e-2), 0.0))
+    acts = world.command.copy()
+    acts[1:] = 0.5 * (acts[1:] + acts[:-1])
+    noise = np.random.default_rng(0).standard_normal(len(acts))
+    acts[:, 1] += 3.0 * np.sqrt((acts[:, 1] ** 2).mean()) * noise
+    found = diagnose(events_of(world, effort=acts, commands=False), *robots[2], {})
+    if level:
+        (friction,) = found.findings
+        assert (friction.joint, friction.effect) == ('joint0', 'coulomb_friction')
+        assert friction.parameters['level'].value == pytest.approx(level, rel=0.01)
+    else:
+        assert found.verdict == 'no_mismatch'
+
+
 def test_a_model_worse_than_a_constant_certifies_nothing(robots):
     """A robot that swings without effort: no effort varies that a model could explain."""
     world = simulate(CHAINS[1], 11, 6.0)

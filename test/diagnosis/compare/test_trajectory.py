@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis.compare.grid import effort_noise
 from sgp_ros.diagnosis.compare.trajectory import (
     HIGHEST_CUTOFF_HZ,
     LOWEST_CUTOFF_HZ,
@@ -186,3 +187,17 @@ def test_the_source_of_efforts_can_be_stated(robots, perfect, source):
     assert (raw.drive is None) == (source == 'state')
     assert (raw.effort is None) == (source == 'command')
     assert raw.remarks == ()
+
+
+@pytest.mark.parametrize('cutoff', [5.0, 25.0])
+def test_the_noise_of_efforts_is_told_from_motion_and_ripple(cutoff):
+    """It is neither missed nor taken for more than chance allows: white noise in the band."""
+    step, n, sigma = 0.005, 4000, 0.02
+    t = step * np.arange(n)
+    seen = 3.0 * np.sin(2.0 * np.pi * 0.5 * t) + 0.1 * np.sin(2.0 * np.pi * 57.0 * t)
+    noise = sigma * np.random.default_rng(0).standard_normal(n)
+    in_band = 2.0 * sigma**2 * step * cutoff
+    (found,) = effort_noise((seen + noise)[:, None], [slice(0, n)], step, cutoff)
+    assert in_band < found < 1.5 * in_band
+    (none,) = effort_noise(seen[:, None], [slice(0, n)], step, cutoff)
+    assert none < 0.01 * in_band

@@ -112,7 +112,7 @@ def test_a_finding_too_small_to_count_is_doubted(equations_for, viscous):
     assert told.probability <= DOUBTED
     assert 'too small' in told.why
     sure = replace(finding, effect='spring', share=0.1, probability=0.97)
-    assert certainty_of([told, sure], equations, _comparison(equations)) == 0.97
+    assert certainty_of([told, sure], _comparison(equations)) == 0.97
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,7 @@ def test_a_verdict_is_as_certain_as_the_least_that_it_rests_on(
         for effect, chances in (('spring', named), (UNKNOWN, unknown))
         for p in chances
     ]
-    assert certainty_of(findings, equations, _comparison(equations)) == expected
+    assert certainty_of(findings, _comparison(equations)) == expected
 
 
 @pytest.mark.parametrize(('std', 'is_doubted'), [(0.002, False), (0.006, True), (None, False)])

@@ -139,7 +139,7 @@ def test_what_leaves_next_to_nothing_is_adequate_whatever_it_explained(damped):
     """A rest that is no physics condemns no model, though there was little to explain."""
     comparison = _comparison(damped, fitted(damped, 'viscous_friction'))
     scale, (model,) = Scale.of(damped, comparison), comparison.singles
-    small = replace(scale, base=10.0 * scale.shares(model), nominal=10.0 * scale.shares(model))
+    small = replace(scale, base=10.0 * model.left, nominal=10.0 * model.left)
     assert small.rest(model) > 0.05
     assert small.excess(model).max() < 0.1
 
