@@ -17,6 +17,8 @@ _POSITIONS = 0.3, 0.48
 _EFFORTS = 0.225, 0.32
 """Frequencies below which noise of efforts is looked for at the latest, and at the most: a
 recording that was thinned has less above."""
+_MEDIAN = 3.0
+"""Relative variance of the median of a spectrum, times its lines, with that of the window."""
 _ABOVE = 1.5
 """Cut-offs from which it is looked for."""
 
@@ -78,7 +80,7 @@ def effort_noise(
 
     It is taken for white, at the lowest level that the spectra have in a quarter of what lies
     above: motion, ripple and what a current loop adds there are no noise of the measurement.
-    That is exceeded by chance by three standard deviations at most.
+    Two standard deviations of that, and of what so many rows have by chance, are added.
 
     Args:
         effort: (n, k) [N m or N].
@@ -89,8 +91,10 @@ def effort_noise(
     latest, highest = _EFFORTS
     edges = np.linspace(min(_ABOVE * cutoff * step, latest), highest, 5)
     rows = 2.0 * cutoff * step * sum(s.stop - s.start for s in segments)
+    lines = (edges[1] - edges[0]) * max(s.stop - s.start for s in segments)
+    chance = math.sqrt(2.0 / rows + _MEDIAN / lines)
     level = _levels(effort, segments, step, edges).min(axis=0)
-    return np.asarray(cutoff * level * (1.0 + 3.0 * math.sqrt(2.0 / rows)))
+    return np.asarray(cutoff * level * (1.0 + 2.0 * chance))
 
 
 def part_of_noise(noise: np.ndarray, d: np.ndarray) -> np.ndarray:

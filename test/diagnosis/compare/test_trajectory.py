@@ -195,9 +195,10 @@ def test_the_noise_of_efforts_is_told_from_motion_and_ripple(cutoff):
     step, n, sigma = 0.005, 4000, 0.02
     t = step * np.arange(n)
     seen = 3.0 * np.sin(2.0 * np.pi * 0.5 * t) + 0.1 * np.sin(2.0 * np.pi * 57.0 * t)
-    noise = sigma * np.random.default_rng(0).standard_normal(n)
+    noise = sigma * np.random.default_rng(0).standard_normal((n, 40))
     in_band = 2.0 * sigma**2 * step * cutoff
-    (found,) = effort_noise((seen + noise)[:, None], [slice(0, n)], step, cutoff)
-    assert in_band < found < 1.5 * in_band
+    found = effort_noise(seen[:, None] + noise, [slice(0, n)], step, cutoff) / in_band
+    assert np.quantile(found, 0.1) > 1.0
+    assert found.max() < 1.6
     (none,) = effort_noise(seen[:, None], [slice(0, n)], step, cutoff)
     assert none < 0.01 * in_band
