@@ -83,6 +83,7 @@ def _run(arguments: dict[str, Any]) -> int:
     out = arguments['out']
     is_new = out is not None and not out.exists()
     try:
+        _load('sgp_ros.scratch:sweep')()
         if name == BESIDE_INPUT and not is_forced:
             require_own_recording(arguments['table'], out)
         elif out is not None and not is_forced:

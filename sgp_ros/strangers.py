@@ -22,13 +22,15 @@ from sgp_ros.errors import SgpError
 
 DEFAULTS = {
     'TEXT_MB': 16, 'TABLE_MB': 512, 'UNPACKED_MB': 768, 'CHUNK_MB': 256, 'RATIO': 200,
+    'HELD_MB': 384, 'MESSAGES': 5_000_000, 'ROWS': 5_000_000, 'CELLS': 20_000_000,
     'DEPTH': 100, 'ENTRIES': 200_000, 'ALIASES': 100, 'LINKS': 250, 'LINE': 100_000,
     'SECONDS': 7,
 }  # fmt: skip
 """Bound to its default: sizes of robot and settings files, of tables, of what a table unpacks to,
-of one chunk of a recording [MB]; how many times its own size a recording unpacks to; nesting,
-entries and aliases of YAML or XML; links of a robot; characters of a line; time for a file that is
-read in a process of its own [s]."""
+of one chunk of a recording [MB]; how many times its own size a recording unpacks to; messages of
+a recording that are held at once [MB]; numbers of messages of a recording, of rows and of cells of
+a table; nesting, entries and aliases of YAML or XML; links of a robot; characters of a line; time
+for a file that is read in a process of its own [s]."""
 _QUOTED = ('"', "'", '|', '>')
 _MEGABYTE = 1 << 20
 _GROWING = '.sgp_growing_'
@@ -188,6 +190,27 @@ def read_text(path: Path, name: str = 'TEXT_MB') -> str:
     """
     require_file(path, name)
     return path.read_text(encoding='utf-8-sig')
+
+
+def read_lines(path: Path, name: str) -> Iterator[str]:
+    """Yield the lines of a text without their ends.
+
+    Args:
+        path: in UTF-8, with or without a mark of it.
+        name: of the bound of its size.
+
+    Raises:
+        TooMuchError: no plain file, a larger one, or a line beyond `LINE`.
+        UnicodeDecodeError: no text.
+    """
+    require_file(path, name)
+    most = bound('LINE')
+    with path.open(encoding='utf-8-sig') as stream:
+        while line := stream.readline(most + 2):
+            text = line.removesuffix('\n')
+            if len(text) > most:
+                require_within(len(text), 'LINE', f'length of a line of {path}')
+            yield text
 
 
 def load_yaml(text: str) -> Any:

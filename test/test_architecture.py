@@ -27,6 +27,7 @@ LAYERS = {
     'physics': {'numpy', 'numba', 'errors'},
     'strangers': {'yaml', 'errors'},
     'apart': {'strangers', 'errors'},
+    'scratch': set(),
     'rigid': NUMERIC | {
         'numba', 'pinocchio', 'clarabel', 'gp', 'physics', 'strangers', 'errors',
     },
@@ -41,7 +42,7 @@ LAYERS = {
     },
     'recordings': {
         'numpy', 'scipy', 'yaml', 'rosbags', 'mcap', 'lz4', 'zstandard', 'engine.samples',
-        'engine.results', 'optional', 'apart', 'strangers', 'errors',
+        'engine.results', 'optional', 'apart', 'scratch', 'strangers', 'errors',
     },
     'diagnosis': NUMERIC | {
         'numba', 'gp', 'physics', 'rigid', 'robots', 'engine', 'batch', 'errors',
@@ -57,8 +58,8 @@ LAYERS = {
     },
     'apps': {
         'numpy', 'yaml', 'matplotlib', 'gp', 'physics', 'rigid', 'robots', 'simulation', 'engine',
-        'batch', 'recordings', 'diagnosis', 'campaign', 'report', 'optional', 'strangers',
-        'errors',
+        'batch', 'recordings', 'diagnosis', 'campaign', 'report', 'optional', 'scratch',
+        'strangers', 'errors',
     },
     'cli': {'apps', 'argcomplete', 'errors'},
 }  # fmt: skip

@@ -45,7 +45,7 @@ MAP = {
     'time': {'column': 't', 'unit': 's'},
     'joints': {'hinge': {'position': {'column': 'q', 'unit': 'rad'}}},
 }
-APART = ('mat', 'h5', 'parquet')
+APART = ('mat', 'h5', 'parquet', 'json')
 WEIGHTS = dict.fromkeys(APART, 0.1)
 """Share of seeds of a format that takes a process of its own."""
 

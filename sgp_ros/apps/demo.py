@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -27,6 +26,7 @@ from sgp_ros.report.html import write_report
 from sgp_ros.report.metrics import Timing, collect_metrics
 from sgp_ros.report.next_steps import after_demo, ending
 from sgp_ros.robots.registry import load_robot
+from sgp_ros.scratch import Scratch
 from sgp_ros.simulation.assembly import make_simulation
 
 ROBOT = 'reaction_wheel_6'
@@ -180,7 +180,7 @@ def _hold(comparison: Comparison, one: np.ndarray, other: np.ndarray, where: str
 
 def _run_live(duration_s: float, seed: int, bag: Path, progress: Callable[[float], None]) -> None:
     bag.unlink(missing_ok=True)
-    with tempfile.TemporaryDirectory() as logs, graph_environment(Path(logs)) as environment:
+    with Scratch() as logs, graph_environment(logs) as environment:
         processes = LiveProcesses(environment)
         try:
             node = processes.start('sgp_ros.ros.sgp_node', {

@@ -8,7 +8,6 @@ Where a node does not model all that was found, a replay measures what it leaves
 from __future__ import annotations
 
 import math
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,6 +33,7 @@ from sgp_ros.robots.stated_effects import dry_friction
 from sgp_ros.robots.stated_laws import is_open
 from sgp_ros.robots.stated_values import stated_urdf
 from sgp_ros.robots.urdf_robot import DEFAULT_TERMS, nominal_tree, urdf_text
+from sgp_ros.scratch import Scratch
 
 YAML_NAME, URDF_NAME = 'robot_diagnosed.yaml', 'robot_diagnosed.urdf'
 SPREAD = 0.05
@@ -138,9 +138,9 @@ def replayed(
     left_out = tuple(f for f in found.findings if not _is_online(f))
     if not left_out or not events:
         return None
-    with tempfile.TemporaryDirectory() as name:
-        write_diagnosed(Path(name), robot, found, gains)
-        robot = load_robot(str(Path(name) / YAML_NAME))
+    with Scratch() as folder:
+        write_diagnosed(folder, robot, found, gains)
+        robot = load_robot(str(folder / YAML_NAME))
     engine = Engine(robot, EngineConfig.from_mapping({'effort.source': effort_source}, robot))
     stamps = [event.stamp_ns for event in events]
     end_ns = min(stamps) + round(_REPLAYED_S * 1e9)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
-import tempfile
 import weakref
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -19,6 +17,7 @@ from sgp_ros.recordings.bag_source import SqliteSource
 from sgp_ros.recordings.mcap_source import McapSource
 from sgp_ros.recordings.topics import RawMessage, Source, Topic
 from sgp_ros.recordings.unpacking import Unpacking
+from sgp_ros.scratch import Scratch
 from sgp_ros.strangers import load_yaml, read_text, require_file
 
 _KINDS: dict[str, type[McapSource | SqliteSource]] = {'.mcap': McapSource, '.db3': SqliteSource}
@@ -50,7 +49,7 @@ def read_directory(path: Path) -> tuple[Source, tuple[str, ...]]:
     kind = _KINDS[kinds.pop()]
     source: Source = _of_packed(files, kind) if has_packed_files else kind(files)
     if metadata.is_compressed and not has_packed_files:
-        source = _PackedMessages(source)
+        source = _PackedMessages(source, _size(files))
     found = {topic.name: topic.count for topic in source.topics}
     remarks += (
         f'metadata.yaml counts {count} messages on {name}, the files contain {found.get(name, 0)}'
@@ -62,9 +61,15 @@ def read_directory(path: Path) -> tuple[Source, tuple[str, ...]]:
 
 @dataclass(frozen=True, slots=True)
 class _PackedMessages:
-    """A recording each message of which is compressed."""
+    """A recording each message of which is compressed.
+
+    Attributes:
+        inner: the recording.
+        size: of its files [bytes].
+    """
 
     inner: Source
+    size: int
 
     @property
     def topics(self) -> tuple[Topic, ...]:
@@ -75,7 +80,7 @@ class _PackedMessages:
         return self.inner.remarks
 
     def messages(self, topics: Collection[Topic]) -> Iterator[RawMessage]:
-        unpacking = Unpacking()
+        unpacking = Unpacking(self.size)
         for message in self.inner.messages(topics):
             data = b''  # of a damaged one, which whoever decodes it counts
             with suppress(zstandard.ZstdError):
@@ -85,17 +90,17 @@ class _PackedMessages:
 
 def _of_packed(files: Sequence[Path], kind: type[McapSource | SqliteSource]) -> Source:
     """Return the recording of compressed files, unpacked into a folder that goes with it."""
-    folder = Path(tempfile.mkdtemp(prefix='sgp_'))
-    try:
-        unpacking, plain = Unpacking(), [folder / file.stem for file in files]
-        for file, target in zip(files, plain, strict=True):
-            unpacking.unpack_file(file, target)
-        source = kind(plain)
-    except BaseException:
-        shutil.rmtree(folder, ignore_errors=True)
-        raise
-    weakref.finalize(source, shutil.rmtree, folder, ignore_errors=True)
+    scratch, size = Scratch(), _size(files)
+    unpacking, plain = Unpacking(size), [scratch.path / file.stem for file in files]
+    for file, target in zip(files, plain, strict=True):
+        unpacking.unpack_file(file, target)
+    source = kind(plain, size)
+    weakref.finalize(source, scratch.remove)
     return source
+
+
+def _size(files: Sequence[Path]) -> int:
+    return sum(file.stat().st_size for file in files)
 
 
 @dataclass(frozen=True, slots=True)

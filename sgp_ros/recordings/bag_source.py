@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 import sqlite3
+import struct
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import closing, contextmanager
@@ -11,13 +12,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from rosbags.rosbag1.reader import Chunk, Reader, decompressors
+from rosbags.rosbag1.reader import Chunk, IndexData, Reader, decompressors
 
 from sgp_ros.errors import RecordingError, SgpError
 from sgp_ros.recordings.topics import RawMessage, Topic
 from sgp_ros.recordings.typestore import short_type
 from sgp_ros.recordings.unpacking import Unpacking
-from sgp_ros.strangers import require_within
+from sgp_ros.strangers import bound, require_within
 
 
 class SqliteSource:
@@ -25,18 +26,22 @@ class SqliteSource:
 
     Args:
         paths: the files, in the order in which they were written.
+        size: of the files that these were unpacked from [bytes]; None where they were not.
 
     Raises:
         RecordingError: a file without the tables of rosbag2.
+        TooMuchError: more messages than `MESSAGES`.
     """
 
     remarks: tuple[str, ...] = ()
 
-    def __init__(self, paths: Sequence[Path]) -> None:
+    def __init__(self, paths: Sequence[Path], size: int | None = None) -> None:
         self._paths = tuple(paths)
         counts: Counter[tuple[str, str, str]] = Counter()
+        unpacking = Unpacking(size or sum(path.stat().st_size for path in paths))
         for path in self._paths:
             self._require_tables(path)
+            unpacking.count_messages(*next(self._rows(path, _NUMBER_QUERY)))
             number = dict(self._rows(path, _COUNT_QUERY))
             for key, *described in self._topics(path):
                 counts[described[0], described[1], described[2]] += int(str(number.get(key, 0)))
@@ -54,7 +59,10 @@ class SqliteSource:
     def _file_messages(self, path: Path, wanted: Collection[str]) -> Iterator[RawMessage]:
         names = {key: name for key, name, *_ in self._topics(path) if name in wanted}
         query = _MESSAGE_QUERY.format(', '.join('?' * len(names)))
-        for log_ns, key, data in self._rows(path, query, tuple(names)):
+        most = bound('CHUNK_MB') << 20
+        for log_ns, key, data in self._rows(path, query, (most, *names)):
+            if isinstance(data, int):
+                require_within(data / (1 << 20), 'CHUNK_MB', 'size of a message in MB')
             if not isinstance(log_ns, int) or not isinstance(data, bytes):
                 raise RecordingError(
                     f'{path}: a message of {type(log_ns).__name__} and {type(data).__name__}',
@@ -107,9 +115,12 @@ _TABLE = 'CREATE TABLE'
 _TABLES_QUERY = "SELECT name, sql FROM sqlite_master WHERE name IN ('topics', 'messages')"
 _COLUMNS_QUERY = 'SELECT hidden FROM pragma_table_xinfo(?)'
 _TOPIC_QUERY = 'SELECT id, name, type, serialization_format FROM topics'
+_NUMBER_QUERY = 'SELECT count(*) FROM messages'
 _COUNT_QUERY = 'SELECT topic_id, count(*) FROM messages GROUP BY topic_id'
 _MESSAGE_QUERY = (
-    'SELECT timestamp, topic_id, data FROM messages WHERE topic_id IN ({}) ORDER BY timestamp, id'
+    "SELECT timestamp, topic_id, CASE WHEN typeof(data) <> 'blob' THEN typeof(data) "
+    'WHEN length(data) > ? THEN length(data) ELSE data END '
+    'FROM messages WHERE topic_id IN ({}) ORDER BY timestamp, id'
 )
 
 
@@ -156,19 +167,43 @@ class Ros1Source:
 
 
 class _Ros1Reader(Reader):
-    """A reader whose chunks unpack within bounds."""
+    """A reader whose chunks and index are read within bounds."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self._unpacking = Unpacking()
+        self._unpacking = Unpacking(path.stat().st_size)
+        self._held = 0
 
     def read_chunk(self) -> Chunk:
         """Return where a chunk is, with what unpacks it."""
         chunk = super().read_chunk()
         kind = _PACKED.get(chunk.decompressor)
-        if kind is None:
-            return chunk
-        return chunk._replace(decompressor=partial(self._unpacking.unpacked, kind))
+        return chunk._replace(decompressor=partial(self._unpacked, kind))
 
+    def read_index_data(self, pos: int, indexes: dict[int, list[IndexData]]) -> None:
+        """Read where the messages of a connection are in a chunk."""
+        assert self.bio is not None
+        head = self.bio.read(_INDEX_HEAD.size)
+        self.bio.seek(-len(head), 1)
+        number = _INDEX_HEAD.unpack(head)[0] // _INDEX_BYTES
+        self._unpacking.count_messages(number)
+        self._held += number * _OBJECT
+        require_within(
+            self._held / (1 << 20), 'HELD_MB', f'size of the index of {self.path} in MB'
+        )
+        super().read_index_data(pos, indexes)
+
+    def _unpacked(self, kind: str | None, data: bytes) -> bytes:
+        """Return a chunk; an index may ask for the same one again and again."""
+        if kind is not None:
+            return self._unpacking.unpacked(kind, data)
+        self._unpacking.count(len(data))
+        return data
+
+
+_INDEX_HEAD, _INDEX_BYTES = struct.Struct('<51xI'), 12
+"""Of a record of the index: its size behind its head, and the size of an entry."""
+_OBJECT = 256
+"""Bytes that an entry takes."""
 
 _PACKED = {decompressors['bz2']: 'bz2', decompressors['lz4']: 'lz4'}

@@ -29,6 +29,8 @@ DAMAGE = (
 """What reading damaged records raises."""
 
 _LOOSE_BYTES = 1 << 20
+_MANY = 4096
+"""Records that are counted at once."""
 _RECORD_HEAD, _MESSAGE_HEAD = struct.Struct('<BQ'), struct.Struct('<HIQQ')
 SOUND, DAMAGED, MISSING = 'sound', 'damaged', 'missing'
 _FOOTER = struct.Struct('<BQQQI')
@@ -118,19 +120,24 @@ def state_of_summary(stream: IO[bytes]) -> str:
     return SOUND if start else MISSING
 
 
-def read_records(data: bytes, unpacking: Unpacking | None) -> Iterator[Record]:
+def read_records(data: bytes, unpacking: Unpacking, *, is_chunk: bool = False) -> Iterator[Record]:
     """Yield schemas, channels and messages of complete records, those in chunks included.
 
     Args:
         data: of one segment.
-        unpacking: bounds what chunks unpack to; None inside a chunk, where there are no others.
+        unpacking: bounds what chunks unpack to, and the number of records.
+        is_chunk: whether they are the content of a chunk, where there are no others.
 
     Raises:
-        TooMuchError: beyond `CHUNK_MB` or `RATIO`.
+        TooMuchError: beyond `CHUNK_MB`, `MESSAGES` or `RATIO`.
         McapError: a wrong checksum, or what is no record; others of `DAMAGE`.
     """
-    end = 0
+    end = number = 0
     while end < len(data):
+        number += 1
+        if number == _MANY:
+            unpacking.count_messages(number)
+            number = 0
         opcode, length = _RECORD_HEAD.unpack_from(data, end)
         start, end = end + _RECORD_HEAD.size, end + _RECORD_HEAD.size + length
         if opcode == 0 or end > len(data):
@@ -141,9 +148,10 @@ def read_records(data: bytes, unpacking: Unpacking | None) -> Iterator[Record]:
             yield Message(channel, log_ns, content, publish_ns, sequence)
         elif opcode in _READERS:
             yield _READERS[opcode](ReadDataStream(BytesIO(data[start:end])))
-        elif opcode == Opcode.CHUNK and unpacking is not None:
+        elif opcode == Opcode.CHUNK and not is_chunk:
             chunk = Chunk.read(ReadDataStream(BytesIO(data[start:end])))
-            yield from read_records(_plain(chunk, unpacking), None)
+            yield from read_records(_plain(chunk, unpacking), unpacking, is_chunk=True)
+    unpacking.count_messages(number)
 
 
 def _plain(chunk: Chunk, unpacking: Unpacking) -> bytes:

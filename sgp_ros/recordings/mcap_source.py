@@ -34,6 +34,12 @@ from sgp_ros.recordings.mcap_records import (
 from sgp_ros.recordings.topics import RawMessage, Topic
 from sgp_ros.recordings.typestore import short_type
 from sgp_ros.recordings.unpacking import Unpacking
+from sgp_ros.strangers import bound, require_within
+
+_OBJECT = 256
+"""Bytes that a message takes beside its content."""
+_LISTED = 5
+"""Damaged places that are listed one by one."""
 
 
 class McapSource:
@@ -41,14 +47,22 @@ class McapSource:
 
     Args:
         paths: the files, in the order in which they were written.
+        size: of the files that these were unpacked from [bytes]; None where they were not.
 
     Raises:
         RecordingError: a file that is no MCAP file.
+        TooMuchError: more messages than `MESSAGES`.
     """
 
-    def __init__(self, paths: Sequence[Path]) -> None:
+    def __init__(self, paths: Sequence[Path], size: int | None = None) -> None:
         self._paths = tuple(paths)
-        self._files = [_index_file(path, number) for number, path in enumerate(self._paths)]
+        self._size = size or sum(path.stat().st_size for path in paths)
+        unpacking = Unpacking(self._size)
+        self._files = [
+            _index_file(path, number, unpacking) for number, path in enumerate(self._paths)
+        ]
+        count = sum(file.counts.total() for file in self._files)
+        require_within(count, 'MESSAGES', 'number of messages')
         self._damage: dict[tuple[int, int], str] = {}
 
     @property
@@ -66,7 +80,10 @@ class McapSource:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What was wrong with the files, one sentence each."""
-        return (*(file.remark for file in self._files if file.remark), *self._damage.values())
+        damage = [*self._damage.values()]
+        if len(damage) > _LISTED:
+            damage[_LISTED:] = [f'{len(damage) - _LISTED} more places are damaged']
+        return (*(file.remark for file in self._files if file.remark), *damage)
 
     def messages(self, topics: Collection[Topic]) -> Iterator[RawMessage]:
         """Yield the messages of `topics` by log time; equal times keep the order of the file.
@@ -78,14 +95,19 @@ class McapSource:
         order = sorted(range(len(segments)), key=lambda place: segments[place].start_ns)
         following = [segments[place].start_ns for place in order[1:]]
         pending: list[tuple[int, int, RawMessage]] = []
-        unpacking = Unpacking()
+        unpacking, held, most = Unpacking(self._size), 0, bound('HELD_MB') << 20
         for number, place in enumerate(order):
-            read = self._segment_messages(segments[place], wanted, unpacking)
-            pending += ((message.log_ns, place, message) for message in read)
+            for message in self._segment_messages(segments[place], wanted, unpacking):
+                pending.append((message.log_ns, place, message))
+                held += len(message.data) + _OBJECT
+                if held > most:
+                    require_within(held / (1 << 20), 'HELD_MB', 'size of overlapping chunks in MB')
             pending.sort(key=itemgetter(0, 1))
             if number < len(following):
                 ready = bisect_left(pending, following[number], key=itemgetter(0))
-                yield from (message for _, _, message in pending[:ready])
+                for _, _, message in pending[:ready]:
+                    held -= len(message.data) + _OBJECT
+                    yield message
                 del pending[:ready]
         yield from (message for _, _, message in pending)
 
@@ -144,7 +166,7 @@ class _FileIndex:
     remark: str = ''
 
 
-def _index_file(path: Path, number: int) -> _FileIndex:
+def _index_file(path: Path, number: int, unpacking: Unpacking) -> _FileIndex:
     """Return the index of the file at `path`, its segments marked with `number`.
 
     Raises:
@@ -163,7 +185,7 @@ def _index_file(path: Path, number: int) -> _FileIndex:
             state, summary = DAMAGED, None
         index = _indexed(summary, number) if summary else None
         if index is None:
-            index = _scan(stream, path, number)
+            index = _scan(stream, path, number, unpacking)
             if summary is not None and summary.statistics is not None:
                 index.counts.update(_missing(summary.statistics.channel_message_counts, index))
         if state == DAMAGED and not index.remark:
@@ -201,12 +223,12 @@ def _indexed(summary: Summary, number: int) -> _FileIndex | None:
     return _FileIndex(channels, counts, segments)
 
 
-def _scan(stream: IO[bytes], path: Path, number: int) -> _FileIndex:
+def _scan(stream: IO[bytes], path: Path, number: int, unpacking: Unpacking) -> _FileIndex:
     """Walk the records of a file without index, up to the last complete segment."""
     index = _FileIndex()
     schemas: dict[int, Schema] = {}
     latest_ns = 0
-    walk, unpacking = Walk(stream), Unpacking()
+    walk = Walk(stream)
     try:
         for offset, data in walk.segments():
             counts, first_ns, last_ns = Counter[int](), 0, 0

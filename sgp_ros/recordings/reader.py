@@ -41,6 +41,8 @@ _WRONG = (
     MemoryError,
 )
 """What the decoding of a damaged message raises, beside `MessageError`."""
+_HOPELESS, _MOST, _LONGEST = 100_000, 0.9, 200
+"""Unreadable messages, and their share, beyond which no more are tried; length of a reason."""
 _KINDS = 'an .mcap file, a rosbag2 directory or a ROS 1 .bag'
 
 
@@ -118,7 +120,7 @@ class Recording:
         decoders = {
             name: decoder(topic.type, topic.encoding) for name, (topic, _) in chosen.items()
         }
-        found = Counter[str]()
+        found, wrong = Counter[str](), 0
         topics = [topic for topic, _ in chosen.values()]
         with readable(self.path, RecordingError, _KINDS):
             for log_ns, name, data in self._source.messages(topics):
@@ -129,10 +131,20 @@ class Recording:
                     reason = (
                         error.found if isinstance(error, MessageError) else type(error).__name__
                     )
-                    unreadable[f'{name}: {reason}'] += 1
+                    unreadable[f'{name}: {reason[:_LONGEST]}'] += 1
+                    wrong += 1
+                    if wrong > _HOPELESS and wrong > _MOST * found.total():
+                        raise self._hopeless(wrong, found.total()) from None
                 else:
                     yield event
         self._compare(topics, found)
+
+    def _hopeless(self, wrong: int, found: int) -> RecordingError:
+        reason, _ = self.unreadable.most_common(1)[0]
+        return RecordingError(
+            f'{self.path}: {wrong} of the first {found} messages cannot be read ({reason})',
+            'an intact recording',
+        )
 
     def _compare(self, topics: Collection[Topic], found: Counter[str]) -> None:
         """Say where the file holds another number of messages than it says it does."""

@@ -1,4 +1,4 @@
-"""Columns of MAT, HDF5 and Parquet files, read in a process of its own.
+"""Columns of MAT, HDF5, Parquet and JSON files, read in a process of its own.
 
 It sends arrays back, no objects.
 """
@@ -17,12 +17,15 @@ from scipy.io.matlab import MatReadError
 
 from sgp_ros.apart import read_apart
 from sgp_ros.errors import RecordingError
-from sgp_ros.recordings.table_formats import load_hdf5, load_parquet
+from sgp_ros.recordings.table_formats import load_hdf5, load_json, load_parquet
+from sgp_ros.strangers import require_within
 
 Columns = dict[str, np.ndarray]
 
 _NAMES = 'names'
-_KINDS = 'a MATLAB .mat, an HDF5 or a Parquet file'
+_KINDS = 'a MATLAB .mat, an HDF5, a Parquet or a JSON file'
+_COPIES = 3
+"""Of what is sent, while it is: packed, received and as arrays."""
 
 
 def load_apart(path: Path) -> Columns:
@@ -40,9 +43,24 @@ def load_apart(path: Path) -> Columns:
 def write_columns(path: Path, stream: BinaryIO) -> None:
     """Write the arrays of a file as NPZ."""
     columns = READERS[path.suffix.lower()](path)
+    require_bounded(path, columns)
+    megabytes = _COPIES * sum(array.nbytes for array in columns.values()) / (1 << 20)
+    require_within(megabytes, 'UNPACKED_MB', f'size of the table {path} in MB')
     arrays = {f'c{i}': array for i, array in enumerate(columns.values())}
     arrays[_NAMES] = np.array([*columns], dtype=str)
     np.savez(stream, allow_pickle=False, **arrays)
+
+
+def require_bounded(path: Path, columns: Columns) -> None:
+    """Refuse a table of too many numbers.
+
+    Raises:
+        TooMuchError: more than `ROWS` or `CELLS`.
+    """
+    rows = max((len(array) for array in columns.values()), default=0)
+    require_within(rows, 'ROWS', f'number of rows of {path}')
+    cells = sum(array.size for array in columns.values())
+    require_within(cells, 'CELLS', f'number of cells of {path}')
 
 
 def _load_mat(path: Path) -> Columns:
@@ -81,5 +99,6 @@ READERS: dict[str, Callable[[Path], Columns]] = {
     '.mat': _load_mat,
     **dict.fromkeys(('.h5', '.hdf5', '.hdf'), load_hdf5),
     **dict.fromkeys(('.parquet', '.pq'), load_parquet),
+    **dict.fromkeys(('.json', '.jsonl', '.ndjson'), load_json),
 }
 """Ending to what reads such a file."""

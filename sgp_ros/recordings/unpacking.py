@@ -13,6 +13,8 @@ from lz4.frame import LZ4FrameDecompressor
 from sgp_ros.strangers import bound, require_within
 
 _MEGABYTE = 1 << 20
+_OBJECT = 1000
+"""Bytes that a message counts beside its content, for what is made of it."""
 _FREE = 16 * _MEGABYTE
 """Bytes that may be unpacked at any ratio: a short recording of a dark camera."""
 
@@ -32,22 +34,36 @@ _KINDS: dict[str, Callable[[bytes, int], bytes]] = {
 
 
 class Unpacking:
-    """One pass over a recording: how much of it was unpacked, out of how much."""
+    """One pass over a recording: how much was made of how much.
 
-    def __init__(self) -> None:
-        self._packed = self._unpacked = 0
+    Args:
+        size: of its files, as they were before anything was unpacked [bytes].
+    """
 
-    def count(self, packed: int, unpacked: int) -> None:
-        """Add numbers of bytes.
+    def __init__(self, size: int) -> None:
+        self._size = size
+        self._unpacked = self._messages = 0
+
+    def count(self, unpacked: int) -> None:
+        """Add a number of bytes.
 
         Raises:
-            TooMuchError: altogether more than `RATIO` unpacked for each compressed one.
+            TooMuchError: altogether more than `RATIO` for each byte of the recording.
         """
-        self._packed += packed
         self._unpacked += unpacked
         if self._unpacked > _FREE:
-            ratio = self._unpacked / max(self._packed, 1)
+            ratio = self._unpacked / max(self._size, 1)
             require_within(ratio, 'RATIO', 'ratio of the unpacked size to the compressed one')
+
+    def count_messages(self, number: int) -> None:
+        """Add a number of messages or other records.
+
+        Raises:
+            TooMuchError: altogether more than `MESSAGES`, or than fits the `RATIO`.
+        """
+        self._messages += number
+        require_within(self._messages, 'MESSAGES', 'number of messages')
+        self.count(number * _OBJECT)
 
     def unpacked(self, kind: str, data: bytes) -> bytes:
         """Return what data of kind `zstd`, `lz4` or `bz2` unpack to.
@@ -58,7 +74,7 @@ class Unpacking:
         most = bound('CHUNK_MB') * _MEGABYTE
         found = _KINDS[kind](data, most + 1)
         require_within(len(found) / _MEGABYTE, 'CHUNK_MB', 'size of compressed data in MB')
-        self.count(len(data), len(found))
+        self.count(len(found))
         return found
 
     def unpack_file(self, path: Path, out: Path) -> None:
@@ -68,10 +84,8 @@ class Unpacking:
             TooMuchError: more than `RATIO` altogether.
             zstandard.ZstdError: a damaged file.
         """
+        unpacker = zstandard.ZstdDecompressor()
         with path.open('rb') as source, out.open('xb') as target:
-            taken = 0
-            with zstandard.ZstdDecompressor().stream_reader(source) as stream:
-                while data := stream.read(_MEGABYTE):
-                    self.count(source.tell() - taken, len(data))
-                    taken = source.tell()
-                    target.write(data)
+            for data in unpacker.read_to_iter(source, write_size=_MEGABYTE):
+                self.count(len(data))
+                target.write(data)
