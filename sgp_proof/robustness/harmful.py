@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from multiprocessing import get_context
 from pathlib import Path
 from threading import Timer
 from typing import Any
@@ -95,7 +96,10 @@ def cases(kinds: list[str], folder: Path) -> Iterator[tuple[str, list[str]]]:
         for name, make in files.items():
             with tempfile.TemporaryDirectory(dir=folder) as place:
                 path = Path(place) / name
-                make(path)
+                # in a process of its own: a command would inherit the memory of its parent
+                maker = get_context('fork').Process(target=make, args=(path,))
+                maker.start()
+                maker.join()
                 filled = {'{}': str(path), 'BAG': bag, 'TABLE': str(table)}
                 for command in commands:
                     title = ' '.join(x if x == '{}' else Path(x).name for x in command)

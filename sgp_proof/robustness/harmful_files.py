@@ -64,6 +64,22 @@ def tiny_messages(path: Path, n: int, chunks: int = 20) -> None:
     path.write_bytes(_MAGIC + _CHANNEL + chunk * chunks)
 
 
+def noisy_messages(path: Path, n: int, chunks: int = 20) -> None:
+    """Write messages without content that pack badly, so that the ratio is an honest one."""
+    kinds = [('opcode', 'u1'), ('length', '<u8'), ('channel', '<u2'), ('sequence', '<u4'),
+             ('log', '<u8'), ('publish', '<u8')]  # fmt: skip
+    rows = np.zeros(n // chunks, dtype=kinds)
+    rows['opcode'], rows['length'], rows['channel'] = 5, 22, 1
+    rng = np.random.default_rng(0)
+    with path.open('wb') as stream:
+        stream.write(_MAGIC + _CHANNEL)
+        for _ in range(chunks):
+            rows['sequence'] = rng.integers(1 << 32, size=len(rows))
+            rows['log'] = rng.integers(1 << 16, size=len(rows))
+            content = rows.tobytes()
+            stream.write(_chunk(zstandard.compress(content), len(content)))
+
+
 def same_time(path: Path, n: int) -> None:
     """Write messages, uncompressed, none of which may be let go before the last."""
     content = _message(bytes(1000), 7) * 1000
@@ -227,9 +243,10 @@ RECORDINGS: dict[str, Make] = {
     'bomb.mcap': partial(bomb, size=_LARGE),
     'lz4.mcap': partial(bomb, size=_LARGE, kind=b'lz4', pack=lz4.frame.compress),
     'tiny.mcap': partial(tiny_messages, n=8_000_000),
+    'noisy.mcap': partial(noisy_messages, n=4_000_000),
     'one_chunk.mcap': partial(tiny_messages, n=4_000_000, chunks=1),
-    'loose.mcap': lambda path: path.write_bytes(_MAGIC + _CHANNEL + _message(b'') * 6_000_000),
-    'same_time.mcap': partial(same_time, n=600_000),
+    'loose.mcap': lambda path: path.write_bytes(_MAGIC + _CHANNEL + _message(b'') * 3_000_000),
+    'same_time.mcap': partial(same_time, n=300_000),
     'liar.mcap': liar,
     'zeros.mcap': lambda path: path.write_bytes(_MAGIC + bytes(1 << 20)),
     'view.db3': view,

@@ -10,13 +10,13 @@ import struct
 import zlib
 from collections.abc import Callable, Iterator
 from io import BytesIO
-from typing import IO
+from typing import IO, NamedTuple
 
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Message, Schema
+from mcap.records import Channel, Chunk, Schema
 from mcap.stream_reader import CRCValidationError
 
 from sgp_ros.recordings.unpacking import Unpacking
@@ -28,13 +28,21 @@ DAMAGE = (
 )  # fmt: skip
 """What reading damaged records raises."""
 
-_LOOSE_BYTES = 1 << 20
+_LOOSE_BYTES, _BLOCK_BYTES = 1 << 20, 1 << 16
 _MANY = 4096
 """Records that are counted at once."""
-_RECORD_HEAD, _MESSAGE_HEAD = struct.Struct('<BQ'), struct.Struct('<HIQQ')
+_RECORD_HEAD, _MESSAGE_HEAD = struct.Struct('<BQ'), struct.Struct('<H4xQ8x')
 SOUND, DAMAGED, MISSING = 'sound', 'damaged', 'missing'
 _FOOTER = struct.Struct('<BQQQI')
 _DATA_END = struct.Struct('<BQI')
+
+
+class Message(NamedTuple):
+    """What a record of a message says: its channel, its log time [ns], its content."""
+
+    channel_id: int
+    log_time: int
+    data: bytes
 
 
 Record = Schema | Channel | Message
@@ -53,6 +61,7 @@ class Walk:
         self.is_complete = False
         self._sum = zlib.crc32(MAGIC)
         self._stated_sum = 0
+        self._start, self._block = 0, b''
 
     def segments(self) -> Iterator[tuple[int, bytes]]:
         """Yield offset and bytes.
@@ -62,12 +71,8 @@ class Walk:
         offset = start = len(MAGIC)
         while True:
             self.offset = offset
-            self._stream.seek(offset)
-            head = self._stream.read(_RECORD_HEAD.size)
-            opcode, length = (
-                _RECORD_HEAD.unpack(head) if len(head) == _RECORD_HEAD.size else (0, 0)
-            )
-            end = offset + len(head) + length
+            opcode, length = self._head(offset)
+            end = offset + _RECORD_HEAD.size + length
             is_end = opcode in {0, Opcode.DATA_END, Opcode.FOOTER} or end > self._size
             if start < offset and (is_end or opcode == Opcode.CHUNK or end - start > _LOOSE_BYTES):
                 yield start, self._read(start, offset)
@@ -86,6 +91,17 @@ class Walk:
     def is_sound(self) -> bool:
         """Whether the data walked through have the checksum that the file states, if any."""
         return self._stated_sum in {0, self._sum}
+
+    def _head(self, offset: int) -> tuple[int, int]:
+        """Return kind and length of the record there; 0 and 0 at the end of the file."""
+        place = offset - self._start
+        if not 0 <= place <= len(self._block) - _RECORD_HEAD.size:
+            self._start, place = offset, 0
+            self._block = self._at(offset, offset + _BLOCK_BYTES)
+        if len(self._block) < _RECORD_HEAD.size:
+            return 0, 0
+        opcode, length = _RECORD_HEAD.unpack_from(self._block, place)
+        return opcode, length
 
     def _read(self, start: int, end: int) -> bytes:
         data = self._at(start, end)
@@ -143,9 +159,8 @@ def read_records(data: bytes, unpacking: Unpacking, *, is_chunk: bool = False) -
         if opcode == 0 or end > len(data):
             raise McapError(f'no record at byte {start - _RECORD_HEAD.size} of it')
         if opcode == Opcode.MESSAGE:
-            channel, sequence, log_ns, publish_ns = _MESSAGE_HEAD.unpack_from(data, start)
-            content = data[start + _MESSAGE_HEAD.size : end]
-            yield Message(channel, log_ns, content, publish_ns, sequence)
+            channel, log_ns = _MESSAGE_HEAD.unpack_from(data, start)
+            yield Message(channel, log_ns, data[start + _MESSAGE_HEAD.size : end])
         elif opcode in _READERS:
             yield _READERS[opcode](ReadDataStream(BytesIO(data[start:end])))
         elif opcode == Opcode.CHUNK and not is_chunk:

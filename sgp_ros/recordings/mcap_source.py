@@ -8,17 +8,16 @@ one segment however long the recording is.
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from heapq import heappop, heappush
 from itertools import pairwise
-from operator import itemgetter
 from pathlib import Path
 from typing import IO, NamedTuple
 
 from mcap.reader import make_reader
-from mcap.records import Channel, Message, Schema
+from mcap.records import Channel, Schema
 from mcap.summary import Summary
 
 from sgp_ros.errors import RecordingError
@@ -27,6 +26,7 @@ from sgp_ros.recordings.mcap_records import (
     DAMAGED,
     MAGIC,
     SOUND,
+    Message,
     Walk,
     read_records,
     state_of_summary,
@@ -94,22 +94,19 @@ class McapSource:
         segments = [segment for file in self._files for segment in file.segments]
         order = sorted(range(len(segments)), key=lambda place: segments[place].start_ns)
         following = [segments[place].start_ns for place in order[1:]]
-        pending: list[tuple[int, int, RawMessage]] = []
+        pending: list[tuple[int, int, int, RawMessage]] = []
         unpacking, held, most = Unpacking(self._size), 0, bound('HELD_MB') << 20
-        for number, place in enumerate(order):
-            for message in self._segment_messages(segments[place], wanted, unpacking):
-                pending.append((message.log_ns, place, message))
+        for place, until in zip(order, (*following, None), strict=True):
+            read = self._segment_messages(segments[place], wanted, unpacking)
+            for number, message in enumerate(read):
+                heappush(pending, (message.log_ns, place, number, message))
                 held += len(message.data) + _OBJECT
                 if held > most:
                     require_within(held / (1 << 20), 'HELD_MB', 'size of overlapping chunks in MB')
-            pending.sort(key=itemgetter(0, 1))
-            if number < len(following):
-                ready = bisect_left(pending, following[number], key=itemgetter(0))
-                for _, _, message in pending[:ready]:
-                    held -= len(message.data) + _OBJECT
-                    yield message
-                del pending[:ready]
-        yield from (message for _, _, message in pending)
+            while pending and (until is None or pending[0][0] < until):
+                message = heappop(pending)[-1]
+                held -= len(message.data) + _OBJECT
+                yield message
 
     def _segment_messages(
         self, segment: _Segment, wanted: Collection[tuple[str, str, str]], unpacking: Unpacking
@@ -233,14 +230,16 @@ def _scan(stream: IO[bytes], path: Path, number: int, unpacking: Unpacking) -> _
         for offset, data in walk.segments():
             counts, first_ns, last_ns = Counter[int](), 0, 0
             for record in read_records(data, unpacking):
-                if isinstance(record, Schema):
+                if isinstance(record, Message):
+                    channel, log_ns, _ = record
+                    if log_ns < first_ns or not counts:
+                        first_ns = log_ns
+                    last_ns = max(last_ns, log_ns)
+                    counts[channel] += 1
+                elif isinstance(record, Schema):
                     schemas[record.id] = record
-                elif isinstance(record, Channel):
+                else:
                     index.channels[record.id] = _describe(record, schemas)
-                elif isinstance(record, Message):
-                    first_ns = min(first_ns, record.log_time) if counts else record.log_time
-                    last_ns = max(last_ns, record.log_time)
-                    counts[record.channel_id] += 1
             if counts:  # all of it is intact
                 index.segments.append(_Segment(first_ns, number, offset, len(data)))
                 index.counts.update(counts)

@@ -137,6 +137,8 @@ class Recording:
                         raise self._hopeless(wrong, found.total()) from None
                 else:
                     yield event
+        if wrong and wrong == found.total():
+            raise self._hopeless(wrong, wrong)
         self._compare(topics, found)
 
     def _hopeless(self, wrong: int, found: int) -> RecordingError:
