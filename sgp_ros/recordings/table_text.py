@@ -110,7 +110,7 @@ class _Blocks:
     def __init__(self, path: Path, names: Sequence[str], mark: str) -> None:
         self._path, self._names, self._mark = path, names, mark
         self._rows: list[list[str]] = []
-        self._longest = self._bytes = 0
+        self._longest = self._bytes = self._cells = 0
         self._blocks: list[list[np.ndarray]] = [[] for _ in names]
         self.lines = array('q')
 
@@ -129,7 +129,9 @@ class _Blocks:
                 texts = np.char.replace(texts, ',', '.')  # a decimal comma goes with semicolons
             blocks.append(_compact(_column(texts)))
             self._bytes += blocks[-1].nbytes
+            self._cells += blocks[-1].size
         self._require(self._bytes)
+        require_within(self._cells, 'CELLS', f'number of cells of {self._path}')
         self._rows.clear()
         self._longest = 0
 
@@ -151,7 +153,7 @@ class _Blocks:
 def _compact(texts: np.ndarray) -> np.ndarray:
     """Return numbers where they say what the texts say."""
     numbers = as_numbers(texts)
-    if numbers is None:
+    if numbers is None or texts.dtype.kind == 'f':
         return texts
     try:
         whole = texts.astype(np.int64)
@@ -259,8 +261,15 @@ def _is_value(cell: str) -> bool:
 
 
 def _column(cells: np.ndarray) -> np.ndarray:
-    """Return a column (n,) of texts; of lists in its cells, the matrix (n, m) of their texts."""
+    """Return a column (n,) of texts; of lists in its cells, the matrix (n, m)."""
     if not all(cell.startswith('[') and cell.endswith(']') for cell in cells):
         return cells
     rows = [cell[1:-1].replace(',', ' ').replace(';', ' ').split() for cell in cells]
-    return np.array(rows, dtype=str) if len({len(row) for row in rows}) == 1 else cells
+    if len({len(row) for row in rows}) > 1:
+        return cells
+    try:
+        numbers = np.array(rows, dtype=np.float64)
+    except ValueError:
+        return np.array(rows, dtype=str)
+    is_exact = '_' not in ''.join(cells) and not np.any(np.abs(numbers) >= _FINE)
+    return numbers if is_exact else np.array(rows, dtype=str)
