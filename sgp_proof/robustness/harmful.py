@@ -1,6 +1,7 @@
 """Harmful files through every command: one line, status 2, in bounds, and nothing left behind.
 
-    python -m sgp_proof.robustness.harmful
+    python -m sgp_proof.robustness.harmful              # all files through all commands
+    python -m sgp_proof.robustness.harmful --turn 0     # each file through one command
 
 Each file of `harmful_files` is given to every command that reads one of its kind. Anything else
 than status 2 with one line within ten seconds of the processor and one gibibyte is a fault, and so
@@ -86,14 +87,22 @@ def measure(command: list[str], folder: Path) -> dict[str, Any]:
             'said': said.decode(errors='replace')}  # fmt: skip
 
 
-def cases(kinds: list[str], folder: Path) -> Iterator[tuple[str, list[str]]]:
-    """Yield the name and the command of each case; its file exists until the next one."""
+def cases(kinds: list[str], folder: Path, turn: int | None) -> Iterator[tuple[str, list[str]]]:
+    """Yield the name and the command of each case; its file exists until the next one.
+
+    Args:
+        kinds: of files.
+        folder: to write them into.
+        turn: gives each file to one command, the next file to the next one, from that one on;
+            None gives each to all.
+    """
     bag = str(make_recordings(folder)[0])
     table = folder / 'log.csv'
     table.write_text('t,q\n' + ''.join(f'{0.01 * i},{0.1 * i}\n' for i in range(900)))
     for kind in kinds:
         files, commands = KINDS[kind]
-        for name, make in files.items():
+        for number, (name, make) in enumerate(files.items()):
+            chosen = commands if turn is None else [commands[(number + turn) % len(commands)]]
             with tempfile.TemporaryDirectory(dir=folder) as place:
                 path = Path(place) / name
                 # in a process of its own: a command would inherit the memory of its parent
@@ -101,7 +110,7 @@ def cases(kinds: list[str], folder: Path) -> Iterator[tuple[str, list[str]]]:
                 maker.start()
                 maker.join()
                 filled = {'{}': str(path), 'BAG': bag, 'TABLE': str(table)}
-                for command in commands:
+                for command in chosen:
                     title = ' '.join(x if x == '{}' else Path(x).name for x in command)
                     yield (f'{kind} {name}: {title}', [filled.get(x, x) for x in command])
 
@@ -109,10 +118,11 @@ def cases(kinds: list[str], folder: Path) -> Iterator[tuple[str, list[str]]]:
 def main() -> None:
     """Run all cases of the named kinds and add what came of them to the result."""
     parser = make_parser(__doc__, 'robust_harmful', KINDS)
+    parser.add_argument('--turn', type=int, help='give each file to one command, from that on')
     arguments = parser.parse_args()
     rows = read_result(arguments.out).get('cases', {})
     with tempfile.TemporaryDirectory() as name:
-        for title, command in cases(arguments.names, Path(name)):
+        for title, command in cases(arguments.names, Path(name), arguments.turn):
             found = measure(command, Path(name))
             if found['faults']:
                 print(title, found, flush=True)
