@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sgp_proof.robustness.events import LONGEST_S
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.fitting import ROWS, TOGETHER
 from sgp_ros.engine.gate import LARGEST
@@ -110,6 +111,7 @@ def text() -> str:
     events, files, gates = (_load(f'robust_{n}') for n in ('events', 'files', 'gates'))
     messages, kills, disk = (_load(f'robust_{n}') for n in ('messages', 'kills', 'disk'))
     gate_time, summary = _load('robust_gate_time'), gates['summary']
+    harm = _load('robust_harmful')
     rate = summary['falsely_refused'] / summary['equations']
     machine = events['environment']
     known = {x.name: x.default for x in fields(EngineConfig)}
@@ -128,7 +130,10 @@ def text() -> str:
         ELAPSED=f'{max(x["elapsed_per_s"] for x in many["runs"].values()):.1f}',
         MESSAGES=messages['messages'],
         MESSAGE_FAULTS=_faults(messages), MESSAGE_MB=messages['peak_megabytes'],
-        GATE_TIME=_gate_time(gate_time), KILLS=kills['number'], KILL_FAULTS=_faults(kills), KILL_COUNTS=_kills(kills),
+        HARM=harm['number'], HARM_S=harm['most_seconds'], HARM_MB=harm['most_megabytes'],
+        HARM_FILES=len({name.partition(':')[0] for name in harm['cases']}),
+        HARM_FAULTS='; '.join(f'{x}: {", ".join(y)}' for x, y in harm['faults'].items()) or 'none',
+        HARM_LIMIT=LONGEST_S, GATE_TIME=_gate_time(gate_time), KILLS=kills['number'], KILL_FAULTS=_faults(kills), KILL_COUNTS=_kills(kills),
         KEPT='; '.join(f'{n} {kept}' for kept, n in kills['kept'].items()),
         LOST=f'{kills["most_lost_s"]:.2f}', DISK=_disk(disk),
         MACHINE=f'{machine["processor"]}, Python {machine["python"]}, NumPy {machine["numpy"]}',

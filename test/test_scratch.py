@@ -10,6 +10,7 @@ import tempfile
 
 import pytest
 
+from sgp_ros.cli import main
 from sgp_ros.scratch import Scratch, sweep
 
 
@@ -42,6 +43,13 @@ def test_what_a_killed_process_left_is_removed_by_the_next(folder):
     assert [*folder.iterdir()]
     sweep()
     assert not [*folder.iterdir()]
+
+
+def test_every_command_sweeps(folder, capsys):
+    (folder / 'sgp_scratch_left').mkdir()
+    words = ['check', 'none.mcap', '--robot', 'toy_pendulum', '--out', str(folder / 'out')]
+    assert main(words) == 2
+    assert not [*folder.iterdir()], capsys.readouterr().err
 
 
 def test_links_and_other_folders_are_left_alone(folder, tmp_path_factory):
