@@ -28,8 +28,8 @@ from sgp_ros.cli import BAD_INPUT
 
 _ROBOT = ['--robot', str(ROBOT)]
 _SIMULATE = ['simulate', str(ROBOT), '--duration', '2']
-ELAPSED_S = 60.0
-"""After which a command hangs."""
+ELAPSED_S = 600.0
+"""After which a command hangs, on a computer that does other work too [s]."""
 KINDS = {
     'recording': (harmful_files.RECORDINGS, [
         ['check', '{}', *_ROBOT], ['replay', '{}', *_ROBOT], ['identify', '{}', *_ROBOT],
@@ -128,13 +128,17 @@ def main() -> None:
                 print(title, found, flush=True)
             found.pop('said')  # it names folders of one computer
             rows[title] = found
+            _write(arguments.out, rows)
+    print(len(rows), 'cases')
+
+
+def _write(path: Path, rows: dict[str, Any]) -> None:
     faults = {title: row['faults'] for title, row in rows.items() if row['faults']}
-    write_result(arguments.out, {
+    write_result(path, {
         'number': len(rows), 'most_seconds': max(row['seconds'] for row in rows.values()),
         'most_megabytes': max(row['megabytes'] for row in rows.values()),
         'faults': faults, 'cases': rows,
     })  # fmt: skip
-    print(len(rows), 'cases,', len(faults), 'with faults')
 
 
 if __name__ == '__main__':
