@@ -90,6 +90,16 @@ def _disk(result):
     return f'{names}: faults: {"; ".join(result["faults"]) or "none"}.'
 
 
+def _readers(cases):
+    """Return the commands, with the option by which they were given a file."""
+    found = set()
+    for title in cases:
+        words = title.partition(': ')[2].split()
+        before = words[words.index('{}') - 1]
+        found.add(f'`{words[0]} {before}`' if before.startswith('--') else f'`{words[0]}`')
+    return ', '.join(sorted(found))
+
+
 def _gate_time(result):
     lines = [
         '| stream | what | equation, with and without [µs] | grows by | other steps [µs] | stream grows by |',
@@ -133,7 +143,7 @@ def text() -> str:
         HARM=harm['number'], HARM_S=harm['most_seconds'], HARM_MB=harm['most_megabytes'],
         HARM_FILES=len({name.partition(':')[0] for name in harm['cases']}),
         HARM_FAULTS='; '.join(f'{x}: {", ".join(y)}' for x, y in harm['faults'].items()) or 'none',
-        HARM_LIMIT=LONGEST_S, GATE_TIME=_gate_time(gate_time), KILLS=kills['number'], KILL_FAULTS=_faults(kills), KILL_COUNTS=_kills(kills),
+        HARM_LIMIT=LONGEST_S, HARM_COMMANDS=_readers(harm['cases']), GATE_TIME=_gate_time(gate_time), KILLS=kills['number'], KILL_FAULTS=_faults(kills), KILL_COUNTS=_kills(kills),
         KEPT='; '.join(f'{n} {kept}' for kept, n in kills['kept'].items()),
         LOST=f'{kills["most_lost_s"]:.2f}', DISK=_disk(disk),
         MACHINE=f'{machine["processor"]}, Python {machine["python"]}, NumPy {machine["numpy"]}',

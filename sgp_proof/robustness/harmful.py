@@ -3,9 +3,9 @@
     python -m sgp_proof.robustness.harmful              # all files through all commands
     python -m sgp_proof.robustness.harmful --turn 0     # each file through one command
 
-Each file of `harmful_files` is given to every command that reads one of its kind. Anything else
-than status 2 with one line within ten seconds of the processor and one gibibyte is a fault, and so
-is a file that is left in the folder of the results or of temporary files.
+Each file of `harmful_files` and `harmful_recordings` is given to every command that reads one of
+its kind. Anything else than status 2 with one line within ten seconds of the processor and one
+gibibyte is a fault, and so is a file that is left in the folder of the results or of temporary files.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from threading import Timer
 from typing import Any
 
 from sgp_proof.result_files import make_parser, read_result, write_result
-from sgp_proof.robustness import harmful_files
+from sgp_proof.robustness import harmful_files, harmful_recordings
 from sgp_proof.robustness.events import LONGEST_S, MOST_KILOBYTES
 from sgp_proof.robustness.kills import ROBOT, make_recordings
 from sgp_ros.cli import BAD_INPUT
@@ -31,7 +31,7 @@ _SIMULATE = ['simulate', str(ROBOT), '--duration', '2']
 ELAPSED_S = 600.0
 """After which a command hangs, on a computer that does other work too [s]."""
 KINDS = {
-    'recording': (harmful_files.RECORDINGS, [
+    'recording': (harmful_recordings.RECORDINGS, [
         ['check', '{}', *_ROBOT], ['replay', '{}', *_ROBOT], ['identify', '{}', *_ROBOT],
         ['diagnose', '{}', *_ROBOT], [*_SIMULATE[:2], '--commands', '{}'],
         ['identify', 'BAG', *_ROBOT, '--test', '{}'], ['diagnose', 'BAG', *_ROBOT, '--test', '{}'],

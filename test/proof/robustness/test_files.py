@@ -20,6 +20,7 @@ from scipy.io import savemat
 
 from sgp_proof.robustness import files
 from sgp_proof.robustness import harmful_files as harm
+from sgp_proof.robustness import harmful_recordings as bags
 from sgp_proof.robustness.events import Faults
 from sgp_ros import strangers
 from sgp_ros.apps.replay import load_truth
@@ -75,28 +76,28 @@ def _robot(path):
         ('deep.urdf', harm.ROBOTS['deep.urdf'], _robot, 'SGP_MOST_DEPTH'),
         ('deep.yaml', harm.SETTINGS['deep.yaml'], load_parameters, 'SGP_MOST_DEPTH'),
         ('many.yaml', harm.SETTINGS['aliases.yaml'], load_parameters, 'SGP_MOST_ALIASES'),
-        ('x.db3', harm.view, open_recording, 'no plain tables'),
-        ('x.mcap', partial(harm.bomb, size=1 << 21), open_recording, 'SGP_MOST_CHUNK_MB'),
-        ('lz4.mcap', partial(harm.bomb, size=1 << 21, kind=b'lz4', pack=lz4.frame.compress),
+        ('x.db3', bags.view, open_recording, 'no plain tables'),
+        ('x.mcap', partial(bags.bomb, size=1 << 21), open_recording, 'SGP_MOST_CHUNK_MB'),
+        ('lz4.mcap', partial(bags.bomb, size=1 << 21, kind=b'lz4', pack=lz4.frame.compress),
          open_recording, 'SGP_MOST_CHUNK_MB'),
-        ('zeros.mcap', harm.RECORDINGS['zeros.mcap'], open_recording, 'damaged'),
-        ('tiny.mcap', partial(harm.tiny_messages, n=600_000), open_recording, 'SGP_MOST_RATIO'),
-        ('bz2.bag', partial(harm.ros1, kind=BZ2, pack=lambda _: bz2.compress(bytes(1 << 21))),
+        ('zeros.mcap', bags.RECORDINGS['zeros.mcap'], open_recording, 'damaged'),
+        ('tiny.mcap', partial(bags.tiny_messages, n=600_000), open_recording, 'SGP_MOST_RATIO'),
+        ('bz2.bag', partial(bags.ros1, kind=BZ2, pack=lambda _: bz2.compress(bytes(1 << 21))),
          _read_all, 'SGP_MOST_CHUNK_MB'),
-        ('lz4.bag', partial(harm.ros1, kind=LZ4, pack=lambda _: lz4.frame.compress(
+        ('lz4.bag', partial(bags.ros1, kind=LZ4, pack=lambda _: lz4.frame.compress(
             bytes(1 << 21))), _read_all, 'SGP_MOST_CHUNK_MB'),
-        ('packed', partial(harm.packed_directory, make=partial(harm.zeros, size=17 << 20)),
+        ('packed', partial(bags.packed_directory, make=partial(bags.zeros, size=17 << 20)),
          open_recording, 'SGP_MOST_RATIO'),
-        ('rows', partial(harm.packed_directory, make=partial(
-            harm.messages_of, content="x''", n=200_000, stamp='1')), open_recording,
+        ('rows', partial(bags.packed_directory, make=partial(
+            bags.messages_of, content="x''", n=200_000, stamp='1')), open_recording,
          'SGP_MOST_RATIO'),
-        ('message', partial(harm.packed_directory, make=partial(
-            harm.messages_of, content='zeroblob(2e6)')), _read_all, 'SGP_MOST_CHUNK_MB'),
-        ('piped', harm.piped_directory, open_recording, 'not a regular file'),
-        ('deep', harm.deep_directory, open_recording, 'SGP_MOST_DEPTH'),
-        ('twice.db3', harm.RECORDINGS['twice.db3'], open_recording, 'several topics'),
-        ('types.db3', harm.RECORDINGS['types.db3'], _read_all, 'a message of int and str'),
-        ('computed.db3', harm.RECORDINGS['computed.db3'], open_recording, 'no plain tables'),
+        ('message', partial(bags.packed_directory, make=partial(
+            bags.messages_of, content='zeroblob(2e6)')), _read_all, 'SGP_MOST_CHUNK_MB'),
+        ('piped', bags.piped_directory, open_recording, 'not a regular file'),
+        ('deep', bags.deep_directory, open_recording, 'SGP_MOST_DEPTH'),
+        ('twice.db3', bags.RECORDINGS['twice.db3'], open_recording, 'several topics'),
+        ('types.db3', bags.RECORDINGS['types.db3'], _read_all, 'a message of int and str'),
+        ('computed.db3', bags.RECORDINGS['computed.db3'], open_recording, 'no plain tables'),
         ('laughs.yaml', harm.laughs, load_parameters, 'SGP_MOST_ENTRIES'),
         ('long.sdf', harm.long_sdf, _robot, 'links of long.sdf'),
         ('sixty.yaml', harm.SETTINGS['sixty.yaml'], load_parameters, 'SGP_MOST_LINE'),
@@ -169,12 +170,12 @@ def _unpack(path):
         ('CHUNK_MB', 0, 1, 'x.mcap', _bag, _read_all),
         ('RATIO', 10, 100_000, 'x.zstd', _zeros, _unpack),
         ('MESSAGES', 3, 20, 'x.mcap', _bag, _read_all),
-        ('MESSAGES', 3, 4, 'x.db3', partial(harm.messages_of, content="x'00'", n=4),
+        ('MESSAGES', 3, 4, 'x.db3', partial(bags.messages_of, content="x'00'", n=4),
          open_recording),
-        ('MESSAGES', 3, 4, 'x.bag', partial(harm.ros1, kind=None, pack=bytes, n=4),
+        ('MESSAGES', 3, 4, 'x.bag', partial(bags.ros1, kind=None, pack=bytes, n=4),
          open_recording),
         ('HELD_MB', 1, 2, 'x.mcap', partial(_bag, n=4000, step=0), _read_all),
-        ('HELD_MB', 1, 2, 'x.bag', partial(harm.ros1, kind=None, pack=bytes, n=5000),
+        ('HELD_MB', 1, 2, 'x.bag', partial(bags.ros1, kind=None, pack=bytes, n=5000),
          open_recording),
         ('DEPTH', 100, 130, 'x.yaml', _of_depth, load_parameters),
         ('ENTRIES', 300, 800, 'x.yaml', lambda p: p.write_text(
@@ -243,7 +244,7 @@ def test_quoted_numbers_are_read(tmp_path):
 
 
 def test_a_command_ends_with_status_2_and_one_line(tmp_path):
-    harm.view(tmp_path / 'x.db3')
+    bags.view(tmp_path / 'x.db3')
     done = subprocess.run(
         [sys.executable, '-m', 'sgp_ros.cli', 'replay', str(tmp_path / 'x.db3'), '--robot',
          'toy_pendulum', '--out', str(tmp_path / 'out')],
