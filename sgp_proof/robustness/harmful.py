@@ -5,7 +5,8 @@
 
 Each file of `harmful_files` and `harmful_recordings` is given to every command that reads one of
 its kind. Anything else than status 2 with one line within ten seconds of the processor and one
-gibibyte is a fault, and so is a file that is left in the folder of the results or of temporary files.
+gibibyte is a fault, and so is a file that is left in the folder of the results or of temporary
+files.
 """
 
 from __future__ import annotations
