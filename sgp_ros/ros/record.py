@@ -99,8 +99,8 @@ class Record:
         path: of the file; missing folders are made, and nothing is overwritten.
         topics: names in the file.
         command_type: as the setting `command.type`.
-        most_mb, most_s: size [MB] and age [s] at which a next file begins; 0 for no limit. With a
-            limit `path` less its suffix is a folder.
+        most_mb, most_s: size [MB] and age [s], from its first message on, at which a next file
+            begins; 0 for no limit. With a limit `path` less its suffix is a folder.
 
     Attributes:
         path: what a replay takes.
@@ -141,6 +141,8 @@ class Record:
             self._is_open = True
             opening = SettingsChange(max(event.stamp_ns - 1, 0), _changeable(engine))
             self._writer.write_event(opening)
+        if self._began is None:
+            self._began = time.monotonic()
         self._writer.write_event(event, self._log_ns(event.stamp_ns))
 
     def write_outputs(self, outputs: Outputs) -> None:
@@ -170,9 +172,12 @@ class Record:
         self._writer = RecordingWriter(
             path, topics.joint_states, topics.command, self._kind, is_live=True
         )
-        self._file, self._number, self._began = path, self._number + 1, time.monotonic()
+        self._file, self._number = path, self._number + 1
+        self._began: float | None = None
 
     def _is_full(self) -> bool:
+        if self._began is None:
+            return False
         is_large = 0.0 < self._most_bytes <= self._file.stat().st_size
         return is_large or 0.0 < self._most_s <= time.monotonic() - self._began
 

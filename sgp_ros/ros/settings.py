@@ -48,7 +48,8 @@ _OTHERS = (
     ),
     Setting(
         'record.split.age', 'float', 0.0,
-        'File age at which a new file of the record begins; the files share a folder. 0: never.',
+        'Time after its first message at which a new file of the record begins; the files share a '
+        'folder. 0: never.',
         unit='s', low=0.0, high=1e7, read_only=True,
     ),
     Setting(

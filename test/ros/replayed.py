@@ -20,10 +20,10 @@ Numbers = dict[int, tuple[bytes, bytes]]
 """Stamp [ns] to the bytes of predicted accelerations and efforts."""
 
 
-def recorded_predictions(path: Path) -> Numbers:
-    """Return what the node wrote."""
+def recorded_predictions(*paths: Path) -> Numbers:
+    """Return what the node wrote into complete files."""
     found: Numbers = {}
-    with AnyReader([path]) as reader:
+    with AnyReader(list(paths)) as reader:
         topics = [c for c in reader.connections if c.topic == '/sgp_node/prediction']
         for connection, _, raw in reader.messages(topics):
             message = reader.deserialize(raw, connection.msgtype)

@@ -325,6 +325,30 @@ def test_a_record_survives_a_killed_node(graph: Graph, tmp_path: Path) -> None:
     assert 'recovered' in ' '.join(recording.remarks)
 
 
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGKILL])
+def test_a_record_split_by_age_replays_to_the_same_numbers(
+    graph: Graph, tmp_path: Path, number: int
+) -> None:
+    """The folder is what one file would be, whether the node ended or was killed."""
+    folder = tmp_path / 'run'
+    node = _start(graph, record__path=f'{folder}.mcap', record__split__age=0.1)
+    stream = Stream(graph)
+    _ready(graph, stream)
+
+    def has_parts() -> bool:
+        stream.publish(20)
+        return len(list(folder.iterdir())) > 3
+
+    graph.wait_until(has_parts, 'parts of the record')
+    node.stop(number)
+    parts = sorted(folder.iterdir(), key=lambda path: int(path.stem.removeprefix('run_')))
+    complete = parts[:-1] if number == signal.SIGKILL else parts
+    given = {name.replace('__', '.'): value for name, value in QUICK.items()}
+    live, again = recorded_predictions(*complete), replayed_predictions(folder, given)
+    assert len(live) > 50
+    assert live.items() <= again.items() if number == signal.SIGKILL else live == again
+
+
 def test_a_full_disk_ends_the_record_and_not_the_node(graph: Graph, tmp_path: Path) -> None:
     """As a bound on the size of files does here; /diagnostics says it, and counts what is lost."""
     path = tmp_path / 'run.mcap'

@@ -51,6 +51,18 @@ def test_a_record_in_parts_is_read_as_one(tmp_path: Path, limit: dict[str, float
     assert found[1:] == [event.stamp_ns for event in events]
 
 
+def test_a_robot_that_is_silent_fills_no_folder(tmp_path: Path) -> None:
+    """A file ages from its first message on."""
+    record = Record(tmp_path / 'run.mcap', TOPICS, COMMAND, most_s=1e-9)
+    for _ in range(5):
+        record.flush()
+    _write(record, _engine(), _events(20))
+    record.flush()
+    record.flush()
+    record.close()
+    assert sorted(p.name for p in record.path.iterdir()) == ['run_0.mcap', 'run_1.mcap']
+
+
 def test_a_clock_that_is_set_back_keeps_the_order_of_the_record(tmp_path: Path) -> None:
     """As of a bag that is played in a loop: the replay meets the same events in the same order."""
     loop = _events(20)
