@@ -76,9 +76,11 @@ class Graph:
         self._messages: dict[str, str] = {}
         self.client.create_subscription(DiagnosticArray, '/diagnostics', self._note, 10)
 
-    def start(self, module: str, *, file: Path | None = None, **settings: Any) -> NodeProcess:
+    def start(
+        self, module: str, *, file: Path | None = None, namespace: str = '', **settings: Any
+    ) -> NodeProcess:
         """Start a node; `__` in the name of a setting stands for a dot."""
-        arguments = ['--ros-args']
+        arguments = ['--ros-args', '-r', f'__ns:=/{namespace}']
         if file is not None:
             arguments += ['--params-file', str(file)]
         for name, value in settings.items():

@@ -17,6 +17,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.ros.nodes import SgpNode
 from sgp_ros.ros.robot_source import RobotSource, refuse_foreign_files
@@ -197,6 +198,42 @@ def test_a_managed_node_goes_through_its_transitions(graph: Graph) -> None:
     graph.wait_until(lambda: graph.status('model').get('buffer') == '0', 'an empty model')
     assert node.stop() == 0
     assert 'Traceback' not in node.stderr
+
+
+@pytest.mark.ros
+def test_a_managed_node_that_is_shut_down_completes_its_record(
+    graph: Graph, tmp_path: Path
+) -> None:
+    """While it is active, with messages on the way."""
+    path = tmp_path / 'run.mcap'
+    node = graph.start('sgp_lifecycle_node', record__path=path, **QUICK)
+
+    def change(transition: int) -> bool:
+        request = ChangeState.Request(transition=Transition(id=transition))
+        return bool(graph.call(ChangeState, '/sgp_node/change_state', request).success)
+
+    assert change(Transition.TRANSITION_CONFIGURE)
+    assert change(Transition.TRANSITION_ACTIVATE)
+    stream = Stream(graph)
+    stream.publish_until_read(50)
+    assert change(Transition.TRANSITION_ACTIVE_SHUTDOWN)
+    state = graph.call(GetState, '/sgp_node/get_state').current_state.label
+    assert state == 'finalized'
+    assert not change(Transition.TRANSITION_CONFIGURE)
+    recording = open_recording(path)
+    assert not recording.remarks
+    assert len(list(recording.events())) > 50
+    assert node.stop() == 0
+
+
+@pytest.mark.ros
+def test_a_managed_node_that_cannot_be_configured_says_why_and_waits(graph: Graph) -> None:
+    node = graph.start('sgp_lifecycle_node', **{**QUICK, 'robot': 'submarine'})
+    request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_CONFIGURE))
+    for _ in range(2):
+        assert not graph.call(ChangeState, '/sgp_node/change_state', request).success
+    assert 'submarine' in node.stderr
+    assert node.is_running
 
 
 @pytest.mark.ros

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -141,6 +142,80 @@ def test_a_publisher_that_is_restarted_is_heard_again(graph: Graph, reliability:
             lambda before=before: graph.count('used') > before + 20,
         )
         graph.client.destroy_publisher(states)
+
+
+def test_a_node_that_comes_late_or_again_hears_a_publisher_that_was_there(graph: Graph) -> None:
+    """The other order of discovery than in most tests, and a restart beside a running robot."""
+    states = graph.client.create_publisher(JointState, 'joint_states', 100)
+    sent = 0
+
+    def is_heard() -> bool:
+        nonlocal sent
+        sent += 1
+        states.publish(_state(sent * STEP_NS))
+        return graph.count('used') > 20
+
+    for _ in range(2):
+        node = graph.start('sgp_node', **MEASURED)
+        graph.wait_until(is_heard, 'states of a publisher that was there before')
+        node.stop(signal.SIGKILL)
+        graph.forget()
+
+
+def test_every_message_of_a_burst_is_read_or_counted(graph: Graph) -> None:
+    """While the node stands still, more come than its queue holds."""
+    node = graph.start('sgp_node', **MEASURED, qos__depth=5)
+    states = graph.client.create_publisher(JointState, 'joint_states', 1000)
+    sent, turns = 0, 0
+
+    def send(count: int) -> None:
+        nonlocal sent
+        for _ in range(count):
+            states.publish(_state(sent * STEP_NS))
+            sent += 1
+
+    def is_any_heard() -> bool:
+        nonlocal turns
+        turns += 1
+        if turns % 50 == 1:
+            send(1)
+        return graph.count('messages') > 0
+
+    graph.wait_until(is_any_heard, 'the first message')
+    first = sent - 1
+    for _ in range(100):
+        send(1)
+        graph.turn()
+    os.kill(node.process.pid, signal.SIGSTOP)
+    send(500)
+    os.kill(node.process.pid, signal.SIGCONT)
+
+    def are_all_counted() -> bool:
+        nonlocal turns
+        turns += 1
+        if turns % 50 == 0:
+            send(1)  # what is missing shows with the message after it
+        return graph.count('messages') + graph.count('lost') == sent - first
+
+    graph.wait_until(are_all_counted, 'all messages')
+    assert graph.count('lost') > 0
+
+
+def test_nodes_in_namespaces_of_their_own_share_nothing(graph: Graph, tmp_path: Path) -> None:
+    """Three processes with one robot each, and one folder for all of their records."""
+    sides = ('left', 'right', 'spare')
+    record = tmp_path / '{node}.mcap'
+    nodes = [graph.start('sgp_node', namespace=s, record__path=record, **QUICK) for s in sides]
+    for side in sides[:2]:
+        stream = Stream(graph, namespace=side)
+        while graph.status('model', f'{side}/sgp_node').get('ready') != '1':
+            stream.publish_until_read(50)
+    graph.wait_until(lambda: graph.status('model', 'spare/sgp_node'), 'diagnostics')
+    assert graph.count('read', node='spare/sgp_node') == 0
+    assert [node.stop() for node in nodes] == [0, 0, 0]
+    assert {p.name for p in tmp_path.glob('*.mcap')} == {f'{s}.sgp_node.mcap' for s in sides}
+    for side in sides[:2]:
+        assert len(list(open_recording(tmp_path / f'{side}.sgp_node.mcap').events())) > 50
 
 
 def test_residual_lies_in_its_band_and_an_alarm_is_said(graph: Graph) -> None:
