@@ -223,6 +223,21 @@ def _hourly(count, hours):
     return low, 0.5 * stats.chi2.ppf(0.975, 2 * count + 2) / hours
 
 
+def _null_alarms(result):
+    rows, hours = (
+        [],
+        {'first': result['series'], 'later': result['series'] * (result['hours'] - 1)},
+    )
+    for name, rates in result['kinds'].items():
+        cells = []
+        for row in rates.values():
+            low, high = _hourly(row['later'], hours['later'])
+            cells.append(f'{row["first"] / hours["first"]:.2f}')
+            cells.append(f'{row["later"] / hours["later"]:.2f} ({low:.2f} to {high:.2f})')
+        rows.append(f'| {name} | {" | ".join(cells)} |')
+    return '\n'.join(rows)
+
+
 def _long_alarms(result):
     rows = []
     for asked, row in result['rates'].items():
@@ -275,6 +290,9 @@ def text():
         'DIAGNOSIS': _diagnosis(diagnosis), 'DIAGNOSIS_TEXT': _diagnosis_text(diagnosis),
         'ALARM_BOUND': f'{-math.log(0.05) / alarms["hours"]:.0f}', 'ALARMS': _alarms(alarms), 'ALARM_HOURS': f'{alarms["hours"]:.2g}',
         'ALARM_GAIN': _percent(alarms['gain_lost'], 0),
+        'ALARM_LEAST': f'{alarms["least_s"]:g}',
+        'NULL_ALARMS': _null_alarms(alarms['nulls']), 'NULL_SERIES': alarms['nulls']['series'],
+        'NULL_HOURS': alarms['nulls']['hours'], 'NULL_RATE': f'{alarms["nulls"]["rate_hz"]:g}',
         'LONG_ALARMS': _long_alarms(alarms['long']),
         'LONG_ALARMS_TEXT': _long_alarms_text(alarms['long']),
         'ALARM_LASTING': f'{alarms["lasting_s"]:g}',
