@@ -6,6 +6,7 @@ the files ask of it.
 
 from __future__ import annotations
 
+import re
 import runpy
 import sys
 from pathlib import Path
@@ -107,3 +108,28 @@ def test_every_argument_reaches_the_node(launch):
 def test_a_robot_without_a_shipped_file_needs_none(launch):
     _, (node,) = launch(NODE, robot='/my/arm.urdf')
     assert node.parameters == [{'robot': '/my/arm.urdf'}]
+
+
+def test_the_arguments_of_the_bringup_page_are_those_of_the_launch_file(launch):
+    page = (ROOT / 'docs' / 'bringup.md').read_text()
+    declared, _ = launch(NODE)
+    table = page.split('| launch argument |')[1].split('\n\n')[0]
+    named = {
+        name for row in table.splitlines()[2:] for name in re.findall('`(.+?)`', row.split('|')[1])
+    }
+    assert named == {argument.positional[0] for argument in declared}
+
+
+def test_what_the_bringup_page_includes_in_a_launch_file_starts_the_node(launch):
+    """The lines of the page, with stand-ins for what they import."""
+    page = (ROOT / 'docs' / 'bringup.md').read_text()
+    (code,) = re.findall(r'```python\n(IncludeLaunchDescription.*?)\n```', page, re.DOTALL)
+    names = {
+        n: _recorded(n) for n in ('IncludeLaunchDescription', 'PythonLaunchDescriptionSource')
+    }
+    names['FindPackageShare'] = lambda package: str(ROOT) if package == 'sgp_ros' else ''
+    included = eval(code, names)
+    path = ''.join(included.positional[0].positional[0])
+    _, (node,) = launch(path, **dict(included.launch_arguments))
+    assert node.respawn
+    assert node.parameters == ['/my/sgp.yaml']

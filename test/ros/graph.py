@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -77,10 +77,18 @@ class Graph:
         self.client.create_subscription(DiagnosticArray, '/diagnostics', self._note, 10)
 
     def start(
-        self, module: str, *, file: Path | None = None, namespace: str = '', **settings: Any
+        self,
+        module: str,
+        *,
+        file: Path | None = None,
+        namespace: str = '',
+        remaps: Mapping[str, str] | None = None,
+        **settings: Any,
     ) -> NodeProcess:
         """Start a node; `__` in the name of a setting stands for a dot."""
         arguments = ['--ros-args', '-r', f'__ns:=/{namespace}']
+        for name, topic in (remaps or {}).items():
+            arguments += ['-r', f'{name}:={topic}']
         if file is not None:
             arguments += ['--params-file', str(file)]
         for name, value in settings.items():

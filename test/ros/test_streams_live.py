@@ -12,11 +12,10 @@ import numpy as np
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, String
+from std_msgs.msg import Bool
 
 from sgp_ros.recordings.messages import header
 from sgp_ros.recordings.reader import open_recording
-from sgp_ros.robots.shipped import find_shipped, shipped_folder
 from sgp_ros.ros.messages import new_message
 from test.ros.graph import Graph
 from test.ros.stream import START_NS, Stream
@@ -278,24 +277,3 @@ def test_a_node_that_is_killed_goes_on_from_its_last_save(graph: Graph, tmp_path
     graph.wait_until(lambda: graph.count('buffer', 'model') > 0, 'the saved model')
     assert {'run.mcap', 'run_2.mcap'} <= {path.name for path in tmp_path.iterdir()}
     assert len(list(open_recording(run).events())) > 50
-
-
-def test_the_file_of_the_bringup_page_works(graph: Graph, tmp_path: Path) -> None:
-    """Beside a robot_state_publisher and a joint_state_broadcaster, which this client plays."""
-    file = find_shipped('bringup/ros2_control.yaml')
-    assert file is not None
-    graph.start(
-        'sgp_node', file=file, record__path=tmp_path / '{node}', save__path=tmp_path / '{node}',
-        diagnostics__period=0.1,
-    )  # fmt: skip
-    urdf = (shipped_folder() / 'robots' / 'double_pendulum_a0.urdf').read_text()
-    description = graph.client.create_publisher(String, 'robot_description', KEPT)
-    description.publish(String(data=urdf))
-    graph.wait_until(lambda: graph.status('model'), 'the robot')
-    states = graph.client.create_publisher(JointState, 'joint_states', 100)
-    _publish_until(
-        graph,
-        lambda i: states.publish(_state(i * STEP_NS, 'shoulder elbow')),
-        lambda: graph.status('model').get('ready') == '1',
-    )
-    assert (tmp_path / 'sgp_node' / 'sgp_node_0.mcap').is_file()
