@@ -28,6 +28,7 @@ ARGUMENTS = {
     'record': 'Where to record what the node takes and gives; may hold {time} and {node}.',
     'respawn': 'true: start the node again whenever it ends.',
     'managed': 'true: a node with lifecycle, to be configured and activated.',
+    'prefix': 'Command that starts the node, such as nice -n -5 or taskset -c 3.',
     'log_level': 'debug, info, warn, error or fatal.',
 }
 PARAMETERS = {'robot': 'robot', 'command_type': 'command.type', 'record': 'record.path'}
@@ -68,6 +69,7 @@ def _node(context: object) -> list[Node]:
             parameters=parameters,
             remappings=[(n, given[n]) for n in ('joint_states', 'command') if given[n]],
             arguments=['--ros-args', '--log-level', level] if level else [],
+            prefix=given['prefix'] or None,
             respawn=_is_true(given['respawn']),
             respawn_delay=1.0,
         )

@@ -82,6 +82,7 @@ def test_an_empty_argument_overrides_nothing(launch):
     _, (node,) = launch(NODE, params_file='mine.yaml')
     assert node.parameters == ['mine.yaml']
     assert node.namespace is None
+    assert node.prefix is None
     assert node.remappings == node.arguments == []
     assert not node.respawn
     assert node.executable == 'sgp_node'
@@ -91,7 +92,7 @@ def test_every_argument_reaches_the_node(launch):
     _, (node,) = launch(
         NODE, namespace='left', use_sim_time='true', robot='panda', command_type='none',
         record='a.mcap', respawn='true', managed='true', log_level='debug', command='/c',
-        joint_states='/j',
+        joint_states='/j', prefix='nice -n -5',
     )  # fmt: skip
     file, own = node.parameters
     assert file == str(ROOT / 'config' / 'panda.yaml')
@@ -99,6 +100,7 @@ def test_every_argument_reaches_the_node(launch):
         'robot': 'panda', 'command.type': 'none', 'record.path': 'a.mcap', 'use_sim_time': True,
     }  # fmt: skip
     assert node.namespace == 'left'
+    assert node.prefix == 'nice -n -5'
     assert node.remappings == [('joint_states', '/j'), ('command', '/c')]
     assert node.arguments == ['--ros-args', '--log-level', 'debug']
     assert node.respawn

@@ -110,7 +110,10 @@ class Listener:
             self.said[status.name.split(': ')[-1]] = status.message
             if 'push_ms_p99' in values:
                 self.callbacks.append(
-                    [float(values[f'push_ms_{q}']) for q in ('p50', 'p99', 'max')]
+                    [
+                        *(float(values[f'push_ms_{q}']) for q in ('p50', 'p99', 'max')),
+                        float(values['push_cpu_ms_p99']),
+                    ]
                 )
 
     def close(self):

@@ -52,6 +52,7 @@ class Health:
         self.record_problem, self.unrecorded = '', 0
         self.failures, self.first_failure = 0, ''
         self._durations_s: deque[float] = deque(maxlen=_DURATIONS)
+        self._processor_s: deque[float] = deque(maxlen=_DURATIONS)
         self._delays_s: deque[float] = deque(maxlen=_DURATIONS)
         self._unreadable = 0
         self._unreadable_reason = ''
@@ -68,9 +69,10 @@ class Health:
         else:
             self.without_effort = ()
 
-    def note_push(self, duration_s: float) -> None:
-        """Note how long the engine took for one event [s]."""
+    def note_push(self, duration_s: float, processor_s: float) -> None:
+        """Note how long the engine took for one event [s], and its processor time of that [s]."""
         self._durations_s.append(duration_s)
+        self._processor_s.append(processor_s)
 
     def note_delay(self, delay_s: float) -> None:
         """Note the time from the stamp of a state to the publication of its prediction [s]."""
@@ -188,7 +190,8 @@ class Health:
         chosen_s = engine.config.reorder_window + engine.delay_s
         values = {'delay_s_chosen': f'{chosen_s:.4f}'}
         for name, times_s, unit in (
-            ('push_ms', self._durations_s, 1e3), ('delay_s', self._delays_s, 1.0),
+            ('push_ms', self._durations_s, 1e3), ('push_cpu_ms', self._processor_s, 1e3),
+            ('delay_s', self._delays_s, 1.0),
         ):  # fmt: skip
             if times_s:
                 times = unit * np.array(times_s)

@@ -69,9 +69,9 @@ class Session:
     def take(self, event: Event) -> list[Outputs]:
         """Push an event; return what is to be published."""
         with self._fits.held():
-            started = time.perf_counter()
+            started, used = time.perf_counter(), time.thread_time()
             step = self.engine.push(event)
-            self.health.note_push(time.perf_counter() - started)
+            self.health.note_push(time.perf_counter() - started, time.thread_time() - used)
         found = self._settle(step)
         self._hand_out_fit()
         return found

@@ -140,8 +140,12 @@ def test_the_delay_is_what_the_settings_choose_and_what_was_measured(window, wai
     health = Health(MERGER)
     for delay_s in (0.1, 0.2, 0.3, 1e6):  # the last is of another clock
         health.note_delay(delay_s)
+    for waited_s in (0.0, 0.002):
+        health.note_push(0.003 + waited_s, 0.003)
     status = health.statuses(engine, 'node', 1.0, SOURCES)[1]
     assert status.name == 'node: timing'
     assert float(status.values['delay_s_chosen']) == pytest.approx(wait + 0.5 * window, abs=0.02)
     assert float(status.values['delay_s_p50']) == pytest.approx(0.2)
     assert float(status.values['delay_s_max']) == pytest.approx(0.3)
+    assert float(status.values['push_ms_max']) == pytest.approx(5.0)
+    assert float(status.values['push_cpu_ms_max']) == pytest.approx(3.0)
