@@ -181,6 +181,19 @@ def _soak_text(result):
     )
 
 
+def _priority(result):
+    rows = []
+    for niceness in sorted({block['niceness'] for block in result['blocks']}, reverse=True):
+        blocks = [block for block in result['blocks'] if block['niceness'] == niceness]
+        wall, used = ([b[f'callback_{name}ms_p99'] for b in blocks] for name in ('', 'cpu_'))
+        load = statistics.mean(block['load'] for block in blocks)
+        rows.append(
+            f'| {niceness} | {len(blocks)} | {statistics.median(wall):.2f}, {max(wall):.2f} | '
+            f'{statistics.median(used):.2f}, {max(used):.2f} | {load:.1f} |'
+        )
+    return '\n'.join(rows)
+
+
 def _diagnosis(result):
     rows = []
     for when in ('before', 'during'):
@@ -286,7 +299,7 @@ def text():
         'SETTLED': '100', 'RECORDINGS': _recordings(calibration['recordings']),
         'WHEELS_COUNT': str(wheels['exact']['wheels']), 'FALSE_EXACT': drifting['exact'],
         'FALSE_BASIS': drifting['basis'], 'LIVE': _live(live), 'LIVE_TEXT': _live_text(live),
-        'LIVE_BUDGET': str(live['budget']), 'SOAK': _soak(soak), 'SOAK_TEXT': _soak_text(soak),
+        'LIVE_BUDGET': str(live['budget']), 'PRIORITY': _priority(_load('soak_priority')), 'SOAK': _soak(soak), 'SOAK_TEXT': _soak_text(soak),
         'DIAGNOSIS': _diagnosis(diagnosis), 'DIAGNOSIS_TEXT': _diagnosis_text(diagnosis),
         'ALARM_BOUND': f'{-math.log(0.05) / alarms["hours"]:.0f}', 'ALARMS': _alarms(alarms), 'ALARM_HOURS': f'{alarms["hours"]:.2g}',
         'ALARM_GAIN': _percent(alarms['gain_lost'], 0),
