@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,28 @@ from rclpy.qos import QoSProfile
 DEADLINE_S = 300.0
 """Only ends a test that hangs: on a computer that is busy, a node may take a minute to start."""
 _TURN_S = 0.02
+
+
+@contextlib.contextmanager
+def spinning(context: rclpy.Context | None = None) -> Iterator[SingleThreadedExecutor]:
+    """Yield an executor that serves nodes in a thread of this process.
+
+    The thread ends before the executor does: rclpy fails on callbacks that end after it.
+    """
+    executor, done = SingleThreadedExecutor(context=context), threading.Event()
+
+    def spin() -> None:
+        while not done.is_set():
+            executor.spin_once(timeout_sec=_TURN_S)
+
+    thread = threading.Thread(target=spin, daemon=True)
+    thread.start()
+    try:
+        yield executor
+    finally:
+        done.set()
+        thread.join()
+        executor.shutdown()
 
 
 class NodeProcess:

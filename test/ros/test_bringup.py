@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import weakref
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +10,6 @@ from typing import Any
 import pytest
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
@@ -21,7 +19,7 @@ from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.ros.nodes import SgpNode
 from sgp_ros.ros.robot_source import RobotSource, refuse_foreign_files
-from test.ros.graph import Graph
+from test.ros.graph import Graph, spinning
 from test.ros.stream import Stream
 from test.ros.test_node import QUICK
 
@@ -123,14 +121,10 @@ def composed(context: int) -> Iterator[list[SgpNode]]:
         SgpNode(namespace=side, parameter_overrides=_overrides(buffer__budget=budget))
         for side, budget in (('left', 30), ('right', 40))
     ]
-    executor = SingleThreadedExecutor()
-    for node in nodes:
-        executor.add_node(node)
-    thread = threading.Thread(target=executor.spin)
-    thread.start()
-    yield nodes
-    executor.shutdown()
-    thread.join()
+    with spinning() as executor:
+        for node in nodes:
+            executor.add_node(node)
+        yield nodes
     for node in nodes:
         node.destroy_node()
 

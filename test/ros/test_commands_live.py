@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -19,7 +17,7 @@ from sgp_ros.recordings.command_types import COMMAND_TYPES
 from sgp_ros.recordings.messages import header
 from sgp_ros.ros.messages import message_class, new_message
 from sgp_ros.ros.nodes import SgpNode
-from test.ros.graph import Graph
+from test.ros.graph import Graph, spinning
 from test.ros.stream import START_NS
 from test.ros.test_node import QUICK
 
@@ -32,9 +30,6 @@ Start = Callable[..., Engine]
 def start(context: int) -> Iterator[Start]:
     """Make nodes under one executor in a thread, and return the engine behind each."""
     nodes: list[SgpNode] = []
-    executor = SingleThreadedExecutor()
-    thread = threading.Thread(target=executor.spin, daemon=True)
-    thread.start()
 
     def made(namespace: str, **settings: Any) -> Engine:
         given = {**QUICK, **settings}
@@ -45,9 +40,8 @@ def start(context: int) -> Iterator[Start]:
         assert found is not None
         return found._session.engine
 
-    yield made
-    executor.shutdown()
-    thread.join(10.0)
+    with spinning() as executor:
+        yield made
     for node in nodes:
         node.destroy_node()
 

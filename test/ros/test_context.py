@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -10,11 +9,10 @@ import pytest
 import rclpy
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
 from sgp_ros.ros.nodes import SgpLifecycleNode, SgpNode
-from test.ros.graph import Graph
+from test.ros.graph import Graph, spinning
 from test.ros.stream import Stream
 from test.ros.test_node import QUICK
 
@@ -30,13 +28,9 @@ def node(context: int, request: Any) -> Iterator[SgpNode | SgpLifecycleNode]:
     rclpy.init(args=OF_CONTEXT, context=own)
     overrides = [Parameter(n.replace('__', '.'), value=v) for n, v in QUICK.items()]
     made = request.param(context=own, parameter_overrides=overrides)
-    executor = SingleThreadedExecutor(context=own)
-    executor.add_node(made)
-    thread = threading.Thread(target=executor.spin)
-    thread.start()
-    yield made
-    executor.shutdown()
-    thread.join()
+    with spinning(own) as executor:
+        executor.add_node(made)
+        yield made
     made.destroy_node()
     own.shutdown()
     assert rclpy.ok()
