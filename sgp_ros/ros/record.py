@@ -128,6 +128,7 @@ class Record:
         self._is_open = False
         self._newest_ns: int | None = None
         self._shift_ns = 0
+        self._began: float | None = None
         self._begin()
 
     def write_event(self, event: Event, engine: Engine) -> None:
@@ -173,7 +174,7 @@ class Record:
             path, topics.joint_states, topics.command, self._kind, is_live=True
         )
         self._file, self._number = path, self._number + 1
-        self._began: float | None = None
+        self._began = None
 
     def _is_full(self) -> bool:
         if self._began is None:
