@@ -97,7 +97,8 @@ def _some_lost(arrivals: Arrivals) -> tuple[int, str] | None:
         return WARN, (
             f'{arrivals.lost} of {arrivals.received + arrivals.lost} messages on '
             f'{arrivals.joint_states} are missing, judging by their period: the source paused, or '
-            'messages were lost; raise qos.depth, or reduce the load of computer and network'
+            'messages were lost; raise qos.depth and the receive buffer of the socket, or reduce '
+            'the load of computer and network'
         )
     if arrivals.unreadable:
         return WARN, f'{arrivals.unreadable} messages not readable: {arrivals.unreadable_reason}'
