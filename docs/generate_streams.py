@@ -194,6 +194,13 @@ def _priority(result):
     return '\n'.join(rows)
 
 
+def _priority_text(result):
+    return (
+        f'Of {result["published"]} messages {result["lost"]} did not arrive, and the node counted '
+        f'{result["counted_lost"]} as missing.'
+    )
+
+
 def _diagnosis(result):
     rows = []
     for when in ('before', 'during'):
@@ -280,6 +287,7 @@ def _long_alarms_text(result):
 
 def text():
     """Return the page."""
+    nulls = _load('alarm_nulls')
     soak, alarms, diagnosis = (_load(n) for n in ('soak', 'alarms', 'live_diagnosis'))
     long, accuracy, live = (_load(n) for n in ('long_stream', 'stream_accuracy', 'live_rate'))
     calibration = _load('calibration')
@@ -299,13 +307,14 @@ def text():
         'SETTLED': '100', 'RECORDINGS': _recordings(calibration['recordings']),
         'WHEELS_COUNT': str(wheels['exact']['wheels']), 'FALSE_EXACT': drifting['exact'],
         'FALSE_BASIS': drifting['basis'], 'LIVE': _live(live), 'LIVE_TEXT': _live_text(live),
-        'LIVE_BUDGET': str(live['budget']), 'PRIORITY': _priority(_load('soak_priority')), 'SOAK': _soak(soak), 'SOAK_TEXT': _soak_text(soak),
+        'LIVE_BUDGET': str(live['budget']), 'PRIORITY_TEXT': _priority_text(_load('soak_priority')),
+        'PRIORITY': _priority(_load('soak_priority')), 'SOAK': _soak(soak), 'SOAK_TEXT': _soak_text(soak),
         'DIAGNOSIS': _diagnosis(diagnosis), 'DIAGNOSIS_TEXT': _diagnosis_text(diagnosis),
         'ALARM_BOUND': f'{-math.log(0.05) / alarms["hours"]:.0f}', 'ALARMS': _alarms(alarms), 'ALARM_HOURS': f'{alarms["hours"]:.2g}',
         'ALARM_GAIN': _percent(alarms['gain_lost'], 0),
         'ALARM_LEAST': f'{alarms["least_s"]:g}',
-        'NULL_ALARMS': _null_alarms(alarms['nulls']), 'NULL_SERIES': alarms['nulls']['series'],
-        'NULL_HOURS': alarms['nulls']['hours'], 'NULL_RATE': f'{alarms["nulls"]["rate_hz"]:g}',
+        'NULL_ALARMS': _null_alarms(nulls), 'NULL_SERIES': str(nulls['series']),
+        'NULL_HOURS': str(nulls['hours']), 'NULL_RATE': f'{nulls["rate_hz"]:g}',
         'LONG_ALARMS': _long_alarms(alarms['long']),
         'LONG_ALARMS_TEXT': _long_alarms_text(alarms['long']),
         'ALARM_LASTING': f'{alarms["lasting_s"]:g}',

@@ -1,5 +1,7 @@
 """Errors of an undisturbed joint, drawn: how often the monitor of the node alarms on them.
 
+    python -m sgp_proof.streams.alarm_nulls
+
 Twenty errors a second, with the intervals that the calibration gives them. They are white or
 correlated, as those of overlapping windows and missing physics are, have heavy tails, or a size
 that goes with the motion or wanders.
@@ -10,10 +12,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import lfilter
 
+from sgp_proof.result_files import make_parser, write_result
 from sgp_ros.engine.monitoring import ExcursionMonitor
 from sgp_ros.gp.calibration import IntervalScale
 
-RATE_HZ = 20.0
+ASKED = (1.0, 10.0, 100.0)
+LEAST_S, RATE_HZ = 0.3, 20.0
 _STEP_NS = round(1e9 / RATE_HZ)
 
 
@@ -48,10 +52,10 @@ NULLS = {
 }
 
 
-def hourly_alarms(errors, asked, least_s):
-    """Return the alarms of each hour, for each rate in `asked`, after one calibration."""
+def hourly_alarms(errors):
+    """Return the alarms of each hour, for each rate that is asked for, (hours, 3)."""
     scale, hour = IntervalScale(), round(3600.0 * RATE_HZ)
-    monitors = [ExcursionMonitor(least_s, rate) for rate in asked]
+    monitors = [ExcursionMonitor(LEAST_S, rate) for rate in ASKED]
     counts = []
     for i, error in enumerate(errors.tolist()):
         variance = scale.variance(1.0)
@@ -63,18 +67,27 @@ def hourly_alarms(errors, asked, least_s):
     return np.diff(counts, axis=0, prepend=0)
 
 
-def measure_nulls(asked, least_s, series, hours):
-    """Return alarms in the first hour and later, by kind of error and rate that is asked for."""
-    found = {}
+def main():
+    """Measure and write the result."""
+    parser = make_parser(__doc__, 'alarm_nulls')
+    parser.add_argument('--series', type=int, default=12)
+    parser.add_argument('--hours', type=int, default=6, help='of each series')
+    arguments = parser.parse_args()
+    found, series = {}, arguments.series
     for name, draw in NULLS.items():
-        n = round(3600.0 * RATE_HZ * hours)
-        counts = sum(
-            hourly_alarms(draw(n, np.random.default_rng(seed)), asked, least_s)
-            for seed in range(series)
-        )
+        n = round(3600.0 * RATE_HZ * arguments.hours)
+        counts = sum(hourly_alarms(draw(n, np.random.default_rng(i))) for i in range(series))
         found[name] = {
             str(rate): {'first': int(counts[0, i]), 'later': int(counts[1:, i].sum())}
-            for i, rate in enumerate(asked)
+            for i, rate in enumerate(ASKED)
         }
         print(name, found[name], flush=True)
-    return {'series': series, 'hours': hours, 'rate_hz': RATE_HZ, 'kinds': found}
+    result = {
+        'series': series, 'hours': arguments.hours, 'rate_hz': RATE_HZ, 'least_s': LEAST_S,
+        'kinds': found,
+    }  # fmt: skip
+    write_result(arguments.out, result, schema=1)
+
+
+if __name__ == '__main__':
+    main()

@@ -11,7 +11,7 @@ A rate of one an hour takes many hours to see. These are of linear axes whose mo
 effort are written down, so that an hour takes a minute: with cogging that the model lacks and Z
 has to learn, noise and an encoder, each on a motion of its own, through the whole engine too.
 
-Errors that are drawn, of several kinds, show what the monitor itself does: see `alarm_nulls`.
+What the monitor itself does on errors that are drawn, of several kinds: see `alarm_nulls`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import math
 import numpy as np
 
 from sgp_proof.result_files import ROOT, make_parser, write_result
-from sgp_proof.streams.alarm_nulls import measure_nulls
+from sgp_proof.streams.alarm_nulls import ASKED, LEAST_S
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
@@ -32,12 +32,9 @@ from sgp_ros.ros.fit_health import FitHealth
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.sensors import Sensors
 
-ASKED = (1.0, 10.0, 100.0)
-LEAST_S, WARM_UP_S = 0.3, 60.0
+WARM_UP_S = 60.0
 EVERY_S, LASTING_S, GAIN = 30.0, 2.0, 1.5
 ROBOT = 'reaction_wheel'
-NULL_H = 6
-"""Hours of each series of drawn errors."""
 AXIS, RATE_HZ, AXIS_H = 'linear_axis', 50.0, 2.0
 """Robot of the long streams, states a second, and hours of each."""
 
@@ -160,7 +157,6 @@ def main():
     parser = make_parser(__doc__, 'alarms')
     parser.add_argument('--seeds', type=int, default=12)
     parser.add_argument('--minutes', type=float, default=10.0)
-    parser.add_argument('--series', type=int, default=12, help=f'drawn errors of {NULL_H} h each')
     parser.add_argument('--axes', type=int, default=12, help=f'long streams of {AXIS_H:g} h each')
     arguments = parser.parse_args()
     false, delays = dict.fromkeys(ASKED, 0), {asked: [] for asked in ASKED}
@@ -183,7 +179,6 @@ def main():
         },
     }  # fmt: skip
     result['long'] = long_streams(arguments.axes, AXIS_H)
-    result['nulls'] = measure_nulls(ASKED, LEAST_S, arguments.series, NULL_H)
     write_result(arguments.out, result, schema=1)
 
 
