@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
+from sgp_proof.streams.alarm_nulls import NULLS
 from sgp_ros.engine.monitoring import ExcursionMonitor
 from sgp_ros.gp.calibration import IntervalScale
 
@@ -25,31 +25,10 @@ def _alarms(errors, per_hour, scale=None):
     return monitor.alarms, lasting
 
 
-def _correlated(correlation, count, rng):
-    innovations = np.sqrt(1.0 - correlation**2) * rng.standard_normal(count)
-    return lfilter([1.0], [1.0, -correlation], innovations)
-
-
-def _changing(rng):
-    """Return correlated errors whose size goes with the motion, by a factor of up to 30."""
-    t = np.arange(HOUR) * STEP_NS * 1e-9
-    size = np.sin(2.0 * np.pi * 0.3 * t) + 0.7 * np.sin(2.0 * np.pi * 0.11 * t)
-    return np.exp(size) * _correlated(0.6, HOUR, rng)
-
-
-NULLS = {
-    'white': lambda rng: rng.standard_normal(HOUR),
-    'heavy tails': lambda rng: rng.standard_t(4, HOUR),
-    **{f'correlated {c}': lambda rng, c=c: _correlated(c, HOUR, rng) for c in (0.6, 0.9, 0.97)},
-    'size changes with the motion': _changing,
-    'size wanders': lambda rng: np.exp(_correlated(0.95, HOUR, rng)) * rng.standard_normal(HOUR),
-}
-
-
 @pytest.mark.parametrize('null', NULLS)
 def test_false_alarms_are_as_rare_as_they_were_asked_to_be(null):
     """Sixty an hour are asked for, so that an hour tells: up to three deviations more."""
-    errors = NULLS[null](np.random.default_rng(0))
+    errors = NULLS[null](HOUR, np.random.default_rng(0))
     alarms, _ = _alarms(errors, 60.0, IntervalScale())
     assert alarms < 60 + 3.0 * np.sqrt(60)
 
@@ -57,7 +36,7 @@ def test_false_alarms_are_as_rare_as_they_were_asked_to_be(null):
 def test_a_monitor_does_not_get_used_to_collisions():
     """Though there are a hundred times as many as alarms are accepted by chance."""
     rng = np.random.default_rng(2)
-    errors = _correlated(0.6, HOUR, rng)
+    errors = NULLS['correlation 0.6'](HOUR, rng)
     starts = np.arange(1200, HOUR, HOUR // 100)
     for start in starts:
         errors[start : start + 40] += 12.0
