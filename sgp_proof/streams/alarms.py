@@ -11,7 +11,8 @@ A rate of one an hour takes many hours to see. These are of linear axes whose mo
 effort are written down, so that an hour takes a minute: with cogging that the model lacks and Z
 has to learn, noise and an encoder, each on a motion of its own, through the whole engine too.
 
-What the monitor itself does on errors that are drawn, of several kinds: see `alarm_nulls`.
+What the monitor itself does on errors that are drawn, of several kinds: see `alarm_nulls`. Results
+of schema 1 are of a monitor that took the lengths of excursions to be geometric.
 """
 
 from __future__ import annotations
@@ -179,7 +180,7 @@ def main():
         },
     }  # fmt: skip
     result['long'] = long_streams(arguments.axes, AXIS_H)
-    write_result(arguments.out, result, schema=1)
+    write_result(arguments.out, result, schema=2)
 
 
 def _detection(delays):
