@@ -270,13 +270,7 @@ def _long_alarms(result):
     return '\n'.join(rows)
 
 
-_FORMER = (
-    ' Both tables are of the former monitor, which took the lengths of excursions to be geometric; '
-    'they have not been measured again since.'
-)
-
-
-def _long_alarms_text(result, schema):
+def _long_alarms_text(result):
     over = [
         f'{float(asked):g}'
         for asked, row in result['rates'].items()
@@ -288,7 +282,6 @@ def _long_alarms_text(result, schema):
         'motion and effort are written down, with cogging that the model lacks and Z has to learn, '
         'noise and an encoder; windows of 0.2 s, one every 0.1 s. Intervals are those of a Poisson count.'
         + more
-        + (_FORMER if schema < 2 else '')
     )
 
 
@@ -323,7 +316,7 @@ def text():
         'NULL_ALARMS': _null_alarms(nulls), 'NULL_SERIES': str(nulls['series']),
         'NULL_HOURS': str(nulls['hours']), 'NULL_RATE': f'{nulls["rate_hz"]:g}',
         'LONG_ALARMS': _long_alarms(alarms['long']),
-        'LONG_ALARMS_TEXT': _long_alarms_text(alarms['long'], alarms['schema']),
+        'LONG_ALARMS_TEXT': _long_alarms_text(alarms['long']),
         'ALARM_LASTING': f'{alarms["lasting_s"]:g}',
         'LIVE_SECONDS': f'{live["seconds"]:g}', 'CORES': live['environment']['cores'],
     }  # fmt: skip
