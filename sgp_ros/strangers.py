@@ -22,7 +22,7 @@ from sgp_ros.errors import SgpError
 
 DEFAULTS = {
     'TEXT_MB': 16, 'TABLE_MB': 512, 'UNPACKED_MB': 768, 'CHUNK_MB': 256, 'RATIO': 200,
-    'HELD_MB': 256, 'MESSAGES': 2_000_000, 'ROWS': 5_000_000, 'CELLS': 20_000_000,
+    'HELD_MB': 256, 'MESSAGES': 5_000_000, 'ROWS': 5_000_000, 'CELLS': 20_000_000,
     'DEPTH': 100, 'ENTRIES': 200_000, 'ALIASES': 100, 'LINKS': 250, 'LINE': 100_000,
     'SECONDS': 7,
 }  # fmt: skip
