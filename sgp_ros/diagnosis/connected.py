@@ -144,15 +144,19 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
     if is_open or plain.several.decision.verdict == 'no_mismatch':
         return plain
     bandwidth = choose_bandwidth(recordings.learned, tree)
-    tried = plain
-    # gains can be told from bodies that are known alone
-    for knows_bodies in (True, False) if recordings.learned.gains is not None else (False,):
-        probe = Probe(recordings.learned, tree, bandwidth, knows_bodies=knows_bodies)
-        found = search(probe)
-        tried = _connected(plain, found, tree, each)
-        if tried.findings or (knows_bodies and not found.errors and found.is_explained):
-            break
-    return tried
+    known = plain
+    if recordings.learned.gains is not None:
+        # gains can be told from bodies that are known alone
+        by_gains = search(Probe(recordings.learned, tree, bandwidth, knows_bodies=True))
+        known = _connected(plain, by_gains, tree, each)
+        is_body = plain.several.decision.verdict == 'parameters_only'
+        if by_gains.is_enough or (known.findings and not is_body):
+            return known
+    found = search(Probe(recordings.learned, tree, bandwidth))
+    if not known.findings:
+        return _connected(plain, found, tree, each)
+    # what other bodies leave is too small to tell them from other gains
+    return _beside(plain, by_gains, 0.0) if found.is_enough else known
 
 
 def in_halves(progress: Callable[[float], None]) -> Iterator[Callable[[float], None]]:

@@ -75,9 +75,9 @@ class Connection:
     delay_std: float = 0.0
 
     @property
-    def is_explained(self) -> bool:
-        """Whether what is left does not count as physics at any joint."""
-        return float(self.end.left.max()) <= COUNTED_SHARE
+    def is_enough(self) -> bool:
+        """Whether nothing is wrong, and what is left does not count as physics at any joint."""
+        return not self.errors and float(self.end.left.max()) <= COUNTED_SHARE
 
 
 def search(probe: Probe) -> Connection:
