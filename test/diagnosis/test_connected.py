@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -45,3 +46,34 @@ def test_a_band_is_compared_once(monkeypatch, plain, corrected, times):
     assert connected._connected(_of(plain), found, None, each).correction is correction
     assert len(compared) == times
     assert compared[-1] == corrected
+
+
+@pytest.mark.parametrize(
+    ('verdict', 'is_enough', 'asserted'),
+    [('parameters_only', True, False), ('parameters_only', False, True),
+     ('missing_physics', True, True)],
+)  # fmt: skip
+def test_gains_are_asserted_only_where_bodies_do_not_explain_as_much(
+    monkeypatch, verdict, is_enough, asserted
+):
+    """Heavier bodies behind gains as stated move as lighter ones behind smaller gains do."""
+    several = SimpleNamespace(decision=SimpleNamespace(verdict=verdict))
+    learned = SimpleNamespace(gains='stated', approach=None)
+    plain = Connected(SimpleNamespace(learned=learned, unstated=()), None, several)
+    gains = SimpleNamespace(
+        hypothesis=SimpleNamespace(joint='knee', effect='gain_scale', is_of_gains=True)
+    )
+    found = {
+        True: SimpleNamespace(errors=(gains,), is_enough=False),
+        False: SimpleNamespace(errors=(), is_enough=is_enough),
+    }
+    for name, stub in {
+        'compared': lambda *_: plain, 'choose_bandwidth': lambda *_: None,
+        'Probe': lambda *_, knows_bodies=False: knows_bodies, 'search': found.get,
+        '_connected': lambda plain, found, *_: replace(plain, findings=found.errors),
+    }.items():  # fmt: skip
+        monkeypatch.setattr(connected, name, stub)
+    one = connected.connect(plain.recordings, None, lambda _: None)
+    assert bool(one.findings) == asserted
+    assert one.trust == (1.0 if asserted else 0.5)
+    assert bool(one.equivalents) != asserted
