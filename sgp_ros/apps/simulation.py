@@ -14,6 +14,7 @@ import numpy as np
 from sgp_ros.apps.commanded import run_commanded
 from sgp_ros.apps.simulated_robot import find_robot
 from sgp_ros.engine.samples import CommandSample, JointSample
+from sgp_ros.errors import ConfigError
 from sgp_ros.recordings.command_types import FLOAT64_ARRAY
 from sgp_ros.recordings.messages import JOINT_STATE
 from sgp_ros.recordings.writer import RecordingWriter
@@ -67,6 +68,13 @@ def run_simulation(
     """
     if commands is not None:
         return run_commanded(robot, out, progress, commands=commands, nominal=nominal, gains=gains)
+    given = [f'--{name}' for name, x in (('gains', gains), ('nominal', nominal)) if x is not None]
+    if given:
+        raise ConfigError(
+            f'{" and ".join(given)} without --commands',
+            'a recording whose commands are replayed',
+            'add --commands RECORDING, or leave the option out',
+        )
     found = find_robot(robot)
     simulator, name = found.simulator, found.name
     chosen, transport = parse_sensors(sensors, simulator.sensors, simulator.joints)

@@ -60,6 +60,8 @@ def test_equal_seeds_write_equal_files(urdf, tmp_path):
         ['--effect', 'backlash:joint=elbow,gap=0.01,motor_inertia=10'],
         ['--sensor', 'drop=2'],
         ['--controller', 'dance'],
+        ['--gains', 'gains.yaml'],
+        ['--nominal', 'other.urdf'],
     ],
 )
 def test_what_the_robot_cannot_have_ends_in_one_line(urdf, tmp_path, capsys, more):
