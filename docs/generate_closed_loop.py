@@ -46,7 +46,9 @@ _TAIL = """
   begins with the delay where that is worth its price; the delay is kept and named as physics. The comparison of physics also starts
   from the delay together with what every joint has, because a late target looks like viscous friction and rotors at all joints.
 * **Gains and bodies.** Where no effort is measured, doubling both gains and bodies does not change the motion. Gains are therefore
-  first searched with the bodies of the robot file, together with rotors and dry friction.
+  first searched with the bodies of the robot file, together with rotors and dry friction. Where other bodies alone leave nothing
+  that counts as physics, and a search beside open bodies finds no error, both explanations are given, at a certainty of a half:
+  then one of gains and masses must be measured.
 * **Gains beside a delay in slow motion.** A delay that is shorter by d, with `kd'/kp' = kd/kp + d` and
   `kp' = M/(M/kp + d kd/kp + d^2/2)`, gives the same motion to second order, so motion much slower than the loop hardly tells the
   two apart. All numbers are searched at once, with and without each error, and each interval allows for the uncertainty of all
