@@ -34,6 +34,8 @@ class Blemishes:
         parts: recordings that one file is joined from.
         pause_s: between the stamps of such parts, 0 where they go on [s].
         is_permuted: whether the joints stand in another order.
+        is_one_size: whether noise and resolution of all efforts are those of the greatest one, as
+            of drives of one size.
     """
 
     effort_noise: float
@@ -45,6 +47,7 @@ class Blemishes:
     parts: int
     pause_s: float
     is_permuted: bool
+    is_one_size: bool = False
 
     def described(self):
         """Return them as an answer holds them."""
@@ -66,6 +69,16 @@ def draw_blemishes(rng, joints, period_s):
     )
 
 
+def sizes_of(parts, blemishes):
+    """Return what noise and bias of efforts are relative to, and their resolution, (k,) each."""
+    clean = np.vstack([part.effort for part in parts])
+    sizes = np.sqrt(np.mean(clean**2, axis=0)) + 1e-12
+    steps = 8.0 * np.abs(clean).max(axis=0) / _EFFORT_STEPS + 1e-12
+    if blemishes.is_one_size:
+        return np.full_like(sizes, sizes.max()), np.full_like(steps, steps.max())
+    return sizes, steps
+
+
 def samples(parts, every, blemishes, rng):
     """Return what a file holds of simulated recordings, as messages.
 
@@ -77,9 +90,7 @@ def samples(parts, every, blemishes, rng):
     """
     found, shift_ns, end_ns = [], 0, None
     period_ns = every * int(np.median(np.diff(parts[0].stamps_ns)))
-    clean = np.vstack([part.effort for part in parts])
-    scale = np.sqrt(np.mean(clean**2, axis=0)) + 1e-12
-    step = 8.0 * np.abs(clean).max(axis=0) / _EFFORT_STEPS + 1e-12
+    scale, step = sizes_of(parts, blemishes)
     order = np.arange(len(scale))
     if blemishes.is_permuted:
         order = rng.permutation(order)

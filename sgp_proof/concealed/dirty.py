@@ -154,18 +154,19 @@ def draw_world(seed, attempt=0, largest_joints=7):
     return wanted, machine, effects, blemishes.draw_blemishes(rng, len(bodies), 1.0 / rate), rng
 
 
-def draw_case(seed, out, seconds=None, largest_joints=7):
+def draw_case(seed, out, seconds=None, largest_joints=7, *, is_one_size=False):
     """Write one world and return a line about it."""
     for attempt in range(_TRIES):
         try:
-            return _attempt(seed, attempt, out, seconds, largest_joints)
+            return _attempt(seed, attempt, out, seconds, largest_joints, is_one_size)
         except UnsuitableError:  # noqa: PERF203 - tries are few
             continue
     return f'case_{seed:03d}: no suitable world in {_TRIES}'
 
 
-def _attempt(seed, attempt, out, seconds, largest_joints):
+def _attempt(seed, attempt, out, seconds, largest_joints, is_one_size):
     wanted, machine, effects, spoilt, rng = draw_world(seed, attempt, largest_joints)
+    spoilt = replace(spoilt, is_one_size=is_one_size)
     seconds = seconds or float(rng.uniform(24.0, 45.0))
     parts = [
         machine.run(seconds / spoilt.parts, 1 + i, effects) for i in range(spoilt.parts)
@@ -177,7 +178,9 @@ def _attempt(seed, attempt, out, seconds, largest_joints):
         path.mkdir(parents=True, exist_ok=True)
     robot_file = folder / 'robot.urdf'
     robot_file.write_text(urdf(machine.family, machine.bodies), encoding='utf-8')
-    answer = several.answer(wanted, machine, effects, parts, robot_file)
+    size, step = blemishes.sizes_of(parts, spoilt)
+    noise = (spoilt.effort_noise * size) ** 2 + step**2 / 12.0 if is_one_size else 0.0
+    answer = several.answer(wanted, machine, effects, parts, robot_file, noise)
     answer |= {
         'case': case, 'key': f'C_{wanted}_{machine.family}{len(machine.bodies)}_{machine.kind}',
         'rate_hz': machine.rate_hz, 'seconds': seconds, 'blemishes': spoilt.described(),
@@ -211,10 +214,14 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
     parser.add_argument('--seeds', default='0:8', help='FIRST:LAST+1')
     parser.add_argument('--out', type=Path, required=True)
+    parser.add_argument(
+        '--one-size', action='store_true',
+        help='noise of all efforts as large as that of the greatest, as of drives of one size',
+    )  # fmt: skip
     arguments = parser.parse_args()
     for seed in seed_range(arguments.seeds):
         begin = time.perf_counter()
-        line = draw_case(seed, arguments.out)
+        line = draw_case(seed, arguments.out, is_one_size=arguments.one_size)
         print(f'{line}  {time.perf_counter() - begin:.1f} s', flush=True)
 
 

@@ -35,7 +35,7 @@ _HALVES = (COULOMB_FRICTION.name, CONSTANT_LOAD.name)
 """What friction that differs with direction is made of."""
 
 
-def answer(wanted, machine, effects, parts, urdf_path):
+def answer(wanted, machine, effects, parts, urdf_path, noise=0.0):
     """Return what is true of a world and what a diagnosis is asked to name.
 
     Args:
@@ -44,8 +44,9 @@ def answer(wanted, machine, effects, parts, urdf_path):
         effects: concealed ones.
         parts: simulated recordings that are diagnosed.
         urdf_path: of the robot file.
+        noise: (k,) mean square of that of the recorded efforts.
     """
-    motion = Motion.of(parts)
+    motion = Motion.of(parts, noise)
     tree = nominal_tree(load_robot(str(urdf_path)))
     forces = [force_of(effect, machine.true, motion) for effect in effects]
     shares = [np.mean(force**2, axis=0) / motion.mean_square for force in forces]

@@ -27,6 +27,7 @@ class Motion:
         time: (n,) since the beginning of its recording [s].
         position, velocity, acceleration: (n, k) [rad or m, per second].
         effort: (n, k) without noise [N m or N].
+        noise: (k,) mean square of that of the recorded efforts, which shares refer to too.
     """
 
     time: np.ndarray
@@ -34,9 +35,10 @@ class Motion:
     velocity: np.ndarray
     acceleration: np.ndarray
     effort: np.ndarray
+    noise: np.ndarray | float = 0.0
 
     @classmethod
-    def of(cls, parts):
+    def of(cls, parts, noise=0.0):
         """Take some rows of simulated recordings."""
         total = sum(len(part.stamps_ns) for part in parts)
         every = max(1, total // _MOST_ROWS)
@@ -46,12 +48,13 @@ class Motion:
             np.vstack([x.true_velocity[::every] for x in parts]),
             np.vstack([x.true_acceleration[::every] for x in parts]),
             np.vstack([x.effort[::every] for x in parts]),
+            noise,
         )
 
     @property
     def mean_square(self):
-        """Mean squared effort of each joint, (k,)."""
-        return np.mean(self.effort**2, axis=0)
+        """Mean squared recorded effort of each joint, (k,)."""
+        return np.mean(self.effort**2, axis=0) + self.noise
 
 
 def force_of(effect, simulator, motion):

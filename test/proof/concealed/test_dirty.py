@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -161,3 +162,15 @@ def test_recordings_have_pauses_repeated_stamps_and_gaps():
     assert (steps == 0).any()
     assert steps.max() >= 30e9
     assert len(files[1]) < len(files[0])
+
+
+@pytest.mark.parametrize('is_one_size', [False, True])
+def test_drives_of_one_size_have_noise_of_one_size(is_one_size):
+    """A wrist behind the drive of a shoulder shows little but noise."""
+    effort = np.array([[10.0, 0.1], [-10.0, -0.1]])
+    spoilt = replace(
+        blemishes.draw_blemishes(np.random.default_rng(0), 2, 0.01), is_one_size=is_one_size
+    )
+    size, step = blemishes.sizes_of([SimpleNamespace(effort=effort)], spoilt)
+    np.testing.assert_allclose(size, [10.0, 10.0 if is_one_size else 0.1])
+    np.testing.assert_allclose(step[0] / step[1], 1.0 if is_one_size else 100.0)
