@@ -70,13 +70,13 @@ def draw_blemishes(rng, joints, period_s):
 
 
 def sizes_of(parts, blemishes):
-    """Return what noise and bias of efforts are relative to, and their resolution, (k,) each."""
+    """Return what bias and noise of efforts are relative to, and their resolution, (k,) each."""
     clean = np.vstack([part.effort for part in parts])
     sizes = np.sqrt(np.mean(clean**2, axis=0)) + 1e-12
     steps = 8.0 * np.abs(clean).max(axis=0) / _EFFORT_STEPS + 1e-12
     if blemishes.is_one_size:
-        return np.full_like(sizes, sizes.max()), np.full_like(steps, steps.max())
-    return sizes, steps
+        return sizes, np.full_like(sizes, sizes.max()), np.full_like(steps, steps.max())
+    return sizes, sizes, steps
 
 
 def samples(parts, every, blemishes, rng):
@@ -90,7 +90,7 @@ def samples(parts, every, blemishes, rng):
     """
     found, shift_ns, end_ns = [], 0, None
     period_ns = every * int(np.median(np.diff(parts[0].stamps_ns)))
-    scale, step = sizes_of(parts, blemishes)
+    own, scale, step = sizes_of(parts, blemishes)
     order = np.arange(len(scale))
     if blemishes.is_permuted:
         order = rng.permutation(order)
@@ -102,10 +102,8 @@ def samples(parts, every, blemishes, rng):
         end_ns = int(stamps[-1]) + shift_ns
         noise = np.round(1e9 * blemishes.stamp_noise_s * rng.normal(size=len(rows)))
         shown = np.maximum.accumulate(stamps + shift_ns + noise.astype(np.int64))
-        effort = part.effort[rows] + scale * (
-            blemishes.effort_noise * rng.normal(size=(len(rows), len(scale)))
-            + np.array(blemishes.effort_bias)
-        )
+        white = blemishes.effort_noise * scale * rng.normal(size=(len(rows), len(scale)))
+        effort = part.effort[rows] + white + own * np.array(blemishes.effort_bias)
         effort = step * np.round(effort / step)
         velocity = _velocities(part, blemishes.velocity, rng)
         for i, row in enumerate(rows):

@@ -178,7 +178,7 @@ def _attempt(seed, attempt, out, seconds, largest_joints, is_one_size):
         path.mkdir(parents=True, exist_ok=True)
     robot_file = folder / 'robot.urdf'
     robot_file.write_text(urdf(machine.family, machine.bodies), encoding='utf-8')
-    size, step = blemishes.sizes_of(parts, spoilt)
+    _, size, step = blemishes.sizes_of(parts, spoilt)
     noise = (spoilt.effort_noise * size) ** 2 + step**2 / 12.0 if is_one_size else 0.0
     answer = several.answer(wanted, machine, effects, parts, robot_file, noise)
     answer |= {

@@ -171,6 +171,7 @@ def test_drives_of_one_size_have_noise_of_one_size(is_one_size):
     spoilt = replace(
         blemishes.draw_blemishes(np.random.default_rng(0), 2, 0.01), is_one_size=is_one_size
     )
-    size, step = blemishes.sizes_of([SimpleNamespace(effort=effort)], spoilt)
+    own, size, step = blemishes.sizes_of([SimpleNamespace(effort=effort)], spoilt)
+    np.testing.assert_allclose(own, [10.0, 0.1])
     np.testing.assert_allclose(size, [10.0, 10.0 if is_one_size else 0.1])
     np.testing.assert_allclose(step[0] / step[1], 1.0 if is_one_size else 100.0)
