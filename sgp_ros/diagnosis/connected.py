@@ -92,9 +92,9 @@ class Connected:
 
     @property
     def left(self) -> tuple[np.ndarray, np.ndarray]:
-        """Those shares, and how much less of them corrected bodies leave."""
-        bodies = self.several.comparison.parameters.mean_square / self.equations.power
-        return self.nominal, self.nominal - bodies
+        """What the nominal robot leaves beyond errors of signals, and how much less bodies do."""
+        nominal, bodies = self.several.comparison.nominal, self.several.comparison.parameters
+        return nominal.left, nominal.left - bodies.left
 
     def worth(self, nominal: np.ndarray, recorded: np.ndarray) -> float:
         """Return the worth of what is decided, as the density of the recorded motion [nats].
