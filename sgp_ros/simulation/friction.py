@@ -35,8 +35,8 @@ def stribeck(
     scale = float(values['stribeck_velocity'])
 
     def level(moment: Moment, _direction: int) -> float:
-        slowness = math.exp(-((float(moment.velocity[joint]) / scale) ** 2))
-        return coulomb + (static - coulomb) * slowness
+        ratio = float(moment.velocity[joint]) / scale
+        return coulomb + (static - coulomb) * math.exp(-ratio * ratio)
 
     return (Action(joint, dry_level=level),)
 

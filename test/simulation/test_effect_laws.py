@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from sgp_ros.simulation.assembly import make_simulation
+from sgp_ros.simulation.friction import stribeck
 from sgp_ros.simulation.recording import simulate
 from sgp_ros.simulation.sensors import Sensors
 from sgp_ros.simulation.tree_simulator import tree_simulator
@@ -255,3 +257,10 @@ def test_equal_seeds_give_equal_recordings():
     pair = [run('hysteresis:joint=elbow,level=0.2,presliding=0.1', sensors=noisy) for _ in '12']
     for name in ('stamps_ns', 'position', 'velocity', 'command', 'true_acceleration'):
         np.testing.assert_array_equal(*(getattr(recording, name) for recording in pair))
+
+
+def test_friction_of_a_simulation_that_runs_away_is_still_a_number():
+    """So that the simulation ends with its own message, not with one of arithmetic."""
+    (action,) = stribeck((), 0, {'coulomb': 0.2, 'static': 0.4, 'stribeck_velocity': 0.5})
+    fast = SimpleNamespace(velocity=np.array([1e200]))
+    assert action.dry_level(fast, 1) == 0.2
