@@ -68,13 +68,7 @@ def run_simulation(
     """
     if commands is not None:
         return run_commanded(robot, out, progress, commands=commands, nominal=nominal, gains=gains)
-    given = [f'--{name}' for name, x in (('gains', gains), ('nominal', nominal)) if x is not None]
-    if given:
-        raise ConfigError(
-            f'{" and ".join(given)} without --commands',
-            'a recording whose commands are replayed',
-            'add --commands RECORDING, or leave the option out',
-        )
+    _refuse_given(gains=gains, nominal=nominal)
     found = find_robot(robot)
     simulator, name = found.simulator, found.name
     chosen, transport = parse_sensors(sensors, simulator.sensors, simulator.joints)
@@ -102,6 +96,17 @@ def run_simulation(
         'recording': str(path), 'truth': str(truth), 'motion': str(motion), 'samples': n,
         'seed': seed,
     }  # fmt: skip
+
+
+def _refuse_given(**options: str | None) -> None:
+    """Refuse options of a replay where there are no commands to replay."""
+    given = [f'--{name}' for name, value in options.items() if value is not None]
+    if given:
+        raise ConfigError(
+            f'{" and ".join(given)} without --commands',
+            'a recording whose commands are replayed',
+            'add --commands RECORDING, or leave the option out',
+        )
 
 
 def write_simulated(

@@ -150,8 +150,7 @@ def _diagnosed(
     findings, forces = asserted(whole, on_all, lags, learned, chances, depends)
     findings, differ = tuple(map(connected.against_rivals, findings)), differences(several, names)
     progress(1.0)
-    certainty = certainty_of((*findings, *differ), comparison)
-    certainty = certainty if findings or differ else min(certainty, connected.trust)
+    certainty = certainty_of((*findings, *differ), comparison, connected.trust)
     if reasons_to_doubt({'train': proofs['train']}, recordings.still):
         findings = tuple(replace(f, probability=min(f.probability, DOUBTED)) for f in findings)
     return Diagnosis(

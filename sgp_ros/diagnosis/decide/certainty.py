@@ -172,10 +172,13 @@ def probabilities(
     )
 
 
-def certainty_of(findings: Sequence[Finding | Difference], comparison: Comparison) -> float:
+def certainty_of(
+    findings: Sequence[Finding | Difference], comparison: Comparison, trust: float = 1.0
+) -> float:
     """Return the probability that the verdict is right: the least of what it rests on.
 
-    That is all findings that count as physics; of unknowns alone the most certain one.
+    That is all findings that count as physics; of unknowns alone the most certain one; of none the
+    probability `trust` of bodies against errors of the connection.
     """
     named = [f.probability for f in findings if f.effect != UNKNOWN and f.share > COUNTED_SHARE]
     if named:
@@ -183,4 +186,4 @@ def certainty_of(findings: Sequence[Finding | Difference], comparison: Compariso
     if findings:
         return max(f.probability for f in findings)
     left = float(comparison.parameters.left.max())
-    return float(np.clip(1.0 / (1.0 + (left / CALM_SHARE) ** 2), 0.5, MOST_CERTAIN))
+    return min(trust, float(np.clip(1.0 / (1.0 + (left / CALM_SHARE) ** 2), 0.5, MOST_CERTAIN)))
