@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from sgp_proof.concealed import second_families as second
-from sgp_proof.concealed.unlisted import HASHES, SAME, SECOND_FROM
+from sgp_proof.concealed.unlisted import HASHES, SAME, SECOND_FROM, THIRD_FROM
 
 ROOT = Path(__file__).parents[1]
 TARGET = Path(__file__).parent / 'unlisted.md'
@@ -175,7 +175,8 @@ def _second():
     """Return how many worlds of the second set are sealed."""
     sealed = json.loads(HASHES.read_text(encoding='utf-8'))
     cases = [name for name in sealed if name.startswith('case_')]
-    return sum(int(name.removeprefix('case_')) >= SECOND_FROM for name in cases)
+    numbers = [int(name.removeprefix('case_')) for name in cases]
+    return sum(SECOND_FROM <= number < THIRD_FROM for number in numbers)
 
 
 def _no_law():

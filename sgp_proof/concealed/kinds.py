@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sgp_proof.concealed import third_families as third
 from sgp_proof.concealed.concealed_effect import Concealed
 from sgp_proof.concealed.unknown import NAME, UNKNOWN
 from sgp_proof.concealed.unlisted import family_of
@@ -54,6 +55,8 @@ def _unknown(scene, family=''):
         'source': int(rng.choice(others)) if others else -1,
         'source_v': float(motion.velocity[others].mean()) if others else 1.0,
     }  # fmt: skip
+    width = motion.high - motion.low
+    fixed |= third.constants(kind, rng, float(0.5 * width[fixed['source']]))
     place = {}
     if kind == 'burst':
         place = {

@@ -94,9 +94,8 @@ REMEMBER = {
 """Those that remember to the start of the memory, and its rate."""
 
 
-def remembering(kind):
-    """Return what builds the action of a family that remembers."""
-    start, rate = REMEMBER[kind]
+def remembering(start, rate, law):
+    """Return what builds the action of a force of its memory, of this start and rate."""
 
     def build(joint, p, _joints):
         def changing(m):
@@ -106,7 +105,7 @@ def remembering(kind):
         return (
             Action(
                 joint,
-                force=lambda m: p['a'] * _remembered(0.0, 0.0, m, p),
+                force=lambda m: p['a'] * law(0.0, 0.0, m, p),
                 start=lambda q, v: (start(q, v),),
                 state_rate=changing, substep_s=_STEP_S,
             ),
@@ -115,9 +114,8 @@ def remembering(kind):
     return build
 
 
-def memory_along(kind, q, v, step, p):
+def memory_along(start, rate, q, v, step, p):
     """Return the memory (n,) along a motion of even steps [s], by the rate itself."""
-    start, rate = REMEMBER[kind]
     z = np.empty(len(q))
     z[0] = start(q[0], v[0])
     for i in range(1, len(q)):

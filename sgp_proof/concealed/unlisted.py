@@ -24,8 +24,10 @@ from types import SimpleNamespace
 import numpy as np
 
 from sgp_proof.concealed import second_families as second
+from sgp_proof.concealed import third_families as third
 from sgp_proof.concealed.unknown import OF_TIME, force
 from sgp_proof.result_files import RESULTS, write_result
+from sgp_ros.physics.drawing import UnsuitableError
 from sgp_ros.physics.formula import read_formula
 
 HASHES = RESULTS / 'unlisted_hashes.json'
@@ -76,19 +78,34 @@ FAMILIES = {
     'walk': _walk,
 }
 """Name to force over its size. The last is no function of the motion: nothing is to be found."""
-SECOND_FROM = 20_000
-"""Seeds from here on conceal a law of the second set."""
-_LAWS = FAMILIES | second.FAMILIES
+SECOND_FROM, THIRD_FROM = 20_000, 40_000
+"""Seeds from here on conceal a law of the second set, and of the third."""
+_SETS = (
+    (THIRD_FROM, third.FAMILIES, ''),
+    (SECOND_FROM, second.FAMILIES, 'air_spring'),
+    (0, FAMILIES, 'gas_spring'),
+)
+"""First seed, laws, and the law of robots of one joint in place of one of another joint."""
+_LAWS = FAMILIES | second.FAMILIES | third.FAMILIES
+_REMEMBER = second.REMEMBER | third.REMEMBER
 BUILDERS = {name: force(law) for name, law in _LAWS.items()}
-BUILDERS |= {name: second.remembering(name) for name in second.REMEMBER}
+BUILDERS |= {name: third.builder(name) for name in third.FAMILIES}
+BUILDERS |= {name: second.remembering(*x, _LAWS[name]) for name, x in _REMEMBER.items()}
 
 
 def family_of(seed, *, has_others):
-    """Return the family that a seed conceals."""
-    known = FAMILIES if seed < SECOND_FROM else second.FAMILIES
+    """Return the family that a seed conceals.
+
+    Raises:
+        UnsuitableError: the family of another joint has no other one in its set.
+    """
+    known, alone = next(x[1:] for x in _SETS if seed >= x[0])
     kind = list(known)[seed % len(known)]
-    alone = 'gas_spring' if seed < SECOND_FROM else 'air_spring'
-    return kind if has_others or not kind.endswith('other') else alone
+    if has_others or not kind.endswith('other'):
+        return kind
+    if not alone:
+        raise UnsuitableError('a robot of one joint')
+    return alone
 
 
 def true_force(parameters, q, v):
@@ -97,8 +114,8 @@ def true_force(parameters, q, v):
     Of one that remembers they are a motion in steps of `STEP_S`.
     """
     kind, memory = parameters['kind'], np.zeros(len(q[0]))
-    if kind in second.REMEMBER:
-        memory = second.memory_along(kind, q[0], v[0], STEP_S, parameters)
+    if kind in _REMEMBER:
+        memory = second.memory_along(*_REMEMBER[kind], q[0], v[0], STEP_S, parameters)
     law = _LAWS[kind]
     return np.array([
         parameters['a'] * law(q[0][i], v[0][i], SimpleNamespace(
@@ -112,14 +129,15 @@ def true_force(parameters, q, v):
 def _states(p):
     """Return positions and velocities of a joint and its source, (n,) each, at random."""
     rng = np.random.default_rng(0)
-    q = [p['reach'] * rng.uniform(-1.0, 1.0, STATES), rng.uniform(-1.0, 1.0, STATES)]
+    q = [s * rng.uniform(-1.0, 1.0, STATES) for s in (p['reach'], p.get('source_reach', 1.0))]
     return q, [s * rng.normal(0.0, 1.2, STATES) for s in (p['v'], p['source_v'])]
 
 
 def _motion(p):
     """Return a motion with about such states, sums of two sines that do not repeat."""
     t, found = STEP_S * np.arange(STATES), ([], [])
-    for reach, usual, ratio in ((p['reach'], p['v'], 1.618), (1.0, p['source_v'], 1.414)):
+    source = p.get('source_reach', 1.0), p['source_v'], 1.414
+    for reach, usual, ratio in ((p['reach'], p['v'], 1.618), source):
         rate = usual / reach * np.array([1.0, ratio])
         size = 0.6 * reach * np.array([1.0, 0.7])
         found[0].append(np.sin(t[:, None] * rate) @ size)
@@ -127,12 +145,15 @@ def _motion(p):
     return found
 
 
-def law_error(effect, finding):
-    """Return the error of a found law, relative, over states as in the motion; inf for no law."""
+def law_error(effect, finding, beside=()):
+    """Return the error of a found law, relative, over states as in the motion; inf for no law.
+
+    `beside` are findings of dry friction that are part of it.
+    """
     p = effect['parameters']
     if p['kind'] in OF_TIME:
         return math.inf
-    remembers = p['kind'] in second.REMEMBER
+    remembers = p['kind'] in _REMEMBER
     q, v = _motion(p) if remembers or _REMEMBERS(finding['formula']) else _states(p)
     names = [effect['joint'], p['source'] if isinstance(p['source'], str) else '']
     true = true_force(p, q, v)
@@ -150,6 +171,8 @@ def law_error(effect, finding):
     found = formula.compiled(
         lambda name: lambda _at: numbers[name], signal, lambda name, _signals: special(name)
     )(None)
+    for part in beside:
+        found = found - part['parameters']['level']['value'] * np.sign(v[0])
     return float(np.sqrt(np.mean((found - true) ** 2) / np.mean(true**2)))
 
 
@@ -178,8 +201,11 @@ def score(answer, diagnosis):
     (effect,) = answer['effects']
     findings = [f for f in diagnosis['findings'] if f['probability'] >= 0.5]
     laws = [f for f in findings if f['effect'] == 'law']
-    errors = [law_error(effect, f) for f in laws]
+    part = third.LISTED_PARTS.get(effect['parameters']['kind']), effect['joint']
+    parts = [f for f in findings if (f['effect'], f['joint']) == part]
+    errors = [law_error(effect, f, parts) for f in laws]
     listed = [[f['effect'], f['joint']] for f in findings if f['effect'] not in {'law', 'unknown'}]
+    listed = [named for named in listed if tuple(named) != part]
     said = diagnosis['findings'][0]['joint'] if diagnosis['findings'] else ''
     is_found = not listed and len(errors) == 1 and errors[0] <= SAME
     is_found = is_found and laws[0]['joint'] == effect['joint']

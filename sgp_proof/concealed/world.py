@@ -86,7 +86,7 @@ class World:
         try:
             with np.errstate(all='ignore'):
                 recording = simulate(simulation, seconds)
-        except NumericalError as error:
+        except (NumericalError, OverflowError) as error:
             raise UnsuitableError(str(error)) from error
         self._check(recording, region)
         self._check_motion(recording, reference)

@@ -5,20 +5,26 @@ from __future__ import annotations
 import json
 import math
 import sys
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from sgp_proof.concealed import second_families as second
+from sgp_proof.concealed import third_families as third
 from sgp_proof.concealed import unlisted
 from sgp_proof.concealed.unknown import OF_TIME, UNKNOWN
 from sgp_proof.concealed.unlisted import (
     FAMILIES,
     SECOND_FROM,
+    THIRD_FROM,
     family_of,
     law_error,
     score,
     summary,
+    true_force,
 )
+from sgp_ros.physics.drawing import UnsuitableError
 
 P = {'kind': 'magnetic_brake', 'a': 0.5, 'v': 1.5, 'reach': 1.0, 'source': -1.0, 'source_v': 1.0}
 EFFECT = {'effect': 'unknown', 'joint': 'elbow', 'parameters': P}
@@ -72,17 +78,73 @@ def test_the_second_set_is_apart_from_all_others():
     assert set(second.KNOWN_SHAPES) <= set(second.FAMILIES)
 
 
+def _third(kind):
+    return {**P, 'kind': kind, **third.constants(kind, np.random.default_rng(1), 0.7)}
+
+
+def test_the_third_set_is_apart_from_all_others():
+    """Each has its share of seeds: no robot of one joint takes the turn of a law of another."""
+    assert not set(third.FAMILIES) & (set(FAMILIES) | set(second.FAMILIES) | set(UNKNOWN))
+    seeds = range(THIRD_FROM, THIRD_FROM + len(third.FAMILIES))
+    assert {family_of(s, has_others=True) for s in seeds} == set(third.FAMILIES)
+    of_other = next(s for s in seeds if family_of(s, has_others=True).endswith('other'))
+    with pytest.raises(UnsuitableError):
+        family_of(of_other, has_others=False)
+    assert not third.constants('air_spring', np.random.default_rng(1), 0.7)
+
+
+@pytest.mark.parametrize('kind', third.FAMILIES)
+def test_a_law_of_the_third_set_is_finite(kind):
+    """Twice as wide and fast as its motion too, and what is simulated is what is scored."""
+    p, rng = _third(kind), np.random.default_rng(2)
+    states = rng.uniform(-2.0, 2.0, (2, 2, 200))
+    force = true_force(p, *states)
+    assert np.isfinite(force).all()
+    assert force.std() > 0.05
+    if kind in third.REMEMBER:
+        return
+    source = p['source']
+    (action,) = unlisted.BUILDERS[kind](0, p, ())
+    for k, told in enumerate(force):
+        q, v = ({0: x[0, k], source: x[1, k]} for x in states)
+        moment = SimpleNamespace(position=q, velocity=v)
+        exerted = action.force(moment) if action.force else 0.0
+        if action.dry_level:
+            direction = int(np.sign(v[0]))
+            assert action.dry_level(moment, direction) > 0.0
+            exerted -= direction * action.dry_level(moment, direction)
+        assert exerted == pytest.approx(told)
+
+
+@pytest.mark.parametrize('is_apart', [True, False])
+def test_listed_friction_in_a_law_may_be_told_beside_the_rest(is_apart):
+    """Or within the formula; elsewhere it is a wrong name."""
+    (kind,) = third.LISTED_PARTS
+    p = {name: float(x) if name != 'kind' else x for name, x in _third(kind).items()}
+    whole = f'-0.35*(g/max(q[elbow] + g, 0.6))**2{"" if is_apart else " - r*sign(dq[elbow])"}'
+    numbers = {'g': {'value': p['gap']}, 'r': {'value': 0.5 * p['gland']}}
+    law = {**RIGHT, 'formula': f'tau_x[elbow] = {whole}', 'parameters': numbers}
+    dry = {**LISTED, 'effect': third.LISTED_PARTS[kind], 'parameters': {'level': numbers['r']}}
+    answer = {'case': 'case_1', 'effects': [{**EFFECT, 'parameters': p}]}
+    for findings, right in (
+        ([law, dry], is_apart), ([law], not is_apart), ([law, {**dry, 'joint': 'j2'}], False),
+    ):  # fmt: skip
+        row = score(answer, {'verdict': 'missing_physics', 'findings': findings, 'fit': {}})
+        assert (row['found'], row['wrong']) == (right, not right)
+
+
 @pytest.mark.parametrize(
     ('kind', 'formula', 'numbers'),
     [
         ('one_way_damper', 'a*max(dq[elbow], 0)', {'a': -0.5 / 1.5}),
         ('lagged_damper', '-a*lag(dq[elbow], T)', {'a': 0.5 / 1.5, 'T': second.LAG_S}),
+        ('throttled_balancer', '-a*lag(q[elbow], T)', {'a': 0.5, 'T': 0.25}),
         ('play_spring', '-a*play(q[elbow], w)', {'a': 0.5, 'w': 2.0 * second.HALF_PLAY}),
     ],
 )
 def test_laws_that_remember_are_compared_along_a_motion(kind, formula, numbers):
     """But for the steps of that motion; without its memory none of them is right."""
-    effect = {'joint': 'elbow', 'parameters': {**P, 'kind': kind}}
+    effect = {'joint': 'elbow', 'parameters': {**P, 'kind': kind, 'fill_s': 0.25}}
     finding = {'formula': f'tau_x[elbow] = {formula}',
                'parameters': {name: {'value': x} for name, x in numbers.items()}}  # fmt: skip
     assert law_error(effect, finding) < 0.01
