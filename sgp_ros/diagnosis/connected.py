@@ -19,20 +19,19 @@ from sgp_ros.diagnosis.compare.sufficiency import require_rows
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth
 from sgp_ros.diagnosis.criteria import (
     ALIKE,
-    MOST_CERTAIN,
     PER_EFFECT,
-    PER_PARAMETER,
-    PER_UNUSUAL,
     TEMPER,
 )
 from sgp_ros.diagnosis.decide.decision import Scale
 from sgp_ros.diagnosis.decide.differences import Several, decide_several
 from sgp_ros.diagnosis.gathered import Recordings
-from sgp_ros.diagnosis.result import Equivalent, Finding, Location, Parameter
+from sgp_ros.diagnosis.result import Equivalent, Finding
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.evidence import Probe
+from sgp_ros.diagnosis.setup.said import equal_errors, error_finding, price_of, suspicion
 from sgp_ros.diagnosis.setup.search import Connection, search
-from sgp_ros.diagnosis.shown import Predictions
+from sgp_ros.diagnosis.shown import LawSearch, Predictions
+from sgp_ros.diagnosis.unlisted.told import extended
 from sgp_ros.physics.catalogue import COMMAND_DELAY, TORQUE_GAIN
 from sgp_ros.rigid.tree import Tree
 
@@ -55,6 +54,9 @@ class Connected:
         trust: probability of the physics against these.
         has_rival_gains: whether these are gains of drives.
         delay_std: what errors of the connection add to the uncertainty of a delay [s].
+        laws: what a search for laws that no list has said.
+        uncorrected: what was compared on the recordings as they are; None where these are.
+        price: what the errors must be worth [nats].
     """
 
     recordings: Recordings
@@ -68,6 +70,9 @@ class Connected:
     trust: float = 1.0
     has_rival_gains: bool = False
     delay_std: float = 0.0
+    laws: tuple[LawSearch, ...] = ()
+    uncorrected: Connected | None = None
+    price: float = 0.0
 
     def against_rivals(self, finding: Finding) -> Finding:
         """Return physics with its probability against errors of the connection elsewhere.
@@ -159,6 +164,23 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
     return _beside(plain, by_gains, 0.0) if found.is_enough else known
 
 
+def with_laws(connected: Connected) -> Connected:
+    """Return what is decided where laws that no list has are looked for.
+
+    Where some are, the recording as it is may have such a law and no error of its connection.
+    """
+    found = _extended(connected)
+    if not found.laws or connected.uncorrected is None:
+        return found
+    alone = _extended(connected.uncorrected)
+    return found if _gain(alone, found) - found.price >= PER_EFFECT else alone
+
+
+def _extended(connected: Connected) -> Connected:
+    several, laws = extended(connected.several)
+    return replace(connected, several=several, laws=laws)
+
+
 def in_halves(progress: Callable[[float], None]) -> Iterator[Callable[[float], None]]:
     """Yield the progress of one comparison after the other; how many come is not known ahead.
 
@@ -183,10 +205,9 @@ def _connected(
     )
     if corrected.several.decision.verdict == 'unexplained':
         is_explained = plain.several.decision.verdict != 'unexplained'
-        return plain if is_explained else _suspected(plain, found)
-    numbers = sum(len(e.numbers) for e in found.errors)
-    rare = PER_UNUSUAL * sum(not e.hypothesis.is_of_gains for e in found.errors)
-    price = PER_EFFECT * len(found.errors) + PER_PARAMETER * numbers + rare
+        said = () if is_explained else (suspicion(found),)
+        return replace(plain, remarks=(*said, *plain.remarks))
+    price, rare = price_of(found)
     gain = _gain(plain, corrected) - price
     if gain >= PER_EFFECT and plain.several.decision.verdict != 'unexplained':
         # on the same band: what is slower has less noise
@@ -199,9 +220,11 @@ def _connected(
         return plain if gain + rare < -ALIKE else _beside(plain, found, gain)
     return replace(
         corrected,
-        findings=tuple(_finding(found, i, gain) for i in range(len(found.errors))),
-        equivalents=_equal(found),
+        findings=tuple(error_finding(found, i, gain) for i in range(len(found.errors))),
+        equivalents=equal_errors(found),
         delay_std=found.delay_std,
+        uncorrected=plain,
+        price=price,
         remarks=(*(f'{e.remedy} {_CORRECTED}' for e in found.errors), *recordings.remarks),
     )
 
@@ -222,15 +245,6 @@ def _gain(plain: Connected, corrected: Connected) -> float:
     """Return by how much the corrected recording is better explained [nats]."""
     nominal, recorded = np.minimum(plain.nominal, corrected.nominal), plain.equations.power
     return corrected.worth(nominal, recorded) - plain.worth(nominal, recorded)
-
-
-def _suspected(plain: Connected, found: Connection) -> Connected:
-    """Return the recording as it is, and say what to check: neither way is it explained."""
-    told = ', '.join(
-        f'{e.hypothesis.effect.replace("_", " ")} ({e.hypothesis.joint})' for e in found.errors
-    )
-    said = f'Check the set-up: {told} would reduce the residual, but not enough to be asserted.'
-    return replace(plain, remarks=(said, *plain.remarks))
 
 
 def _beside(plain: Connected, found: Connection, gain: float) -> Connected:
@@ -258,31 +272,3 @@ def compared(
     equations = make_equations(recordings.learned, tree, bandwidth, recordings.unstated)
     several = decide_several(equations, len(recordings.names), progress)
     return Connected(recordings, equations, several, remarks=recordings.remarks)
-
-
-def _finding(found: Connection, number: int, gain: float) -> Finding:
-    """Return an error with its probability against its rivals and against none."""
-    e = found.errors[number]
-    rivals = [r.worth - e.worth for r in found.rivals[number]]
-    odds = math.exp(-TEMPER * gain) + math.exp(-TEMPER * e.needed)
-    odds += sum(math.exp(min(TEMPER * r, 50.0)) for r in rivals)
-    numbers: dict[str, Parameter] = {
-        name: Parameter(float(x), float(s) if math.isfinite(s) and s > 0.0 else None, unit)
-        for name, x, s, unit in zip(
-            e.hypothesis.names, e.numbers, e.std, e.hypothesis.units, strict=True
-        )
-    }
-    words = {name: Parameter(word) for name, word in e.hypothesis.words.items()}
-    return Finding(
-        e.hypothesis.joint, e.hypothesis.effect, {**numbers, **words}, Location(), gain,
-        min(1.0 / (1.0 + odds), MOST_CERTAIN), 1.0,
-    )  # fmt: skip
-
-
-def _equal(found: Connection) -> tuple[Equivalent, ...]:
-    return tuple(
-        Equivalent(((r.hypothesis.joint, r.hypothesis.effect),), '', 1.0)
-        for e, rivals in zip(found.errors, found.rivals, strict=True)
-        for r in rivals
-        if e.worth - r.worth < ALIKE and math.isfinite(r.worth)
-    )

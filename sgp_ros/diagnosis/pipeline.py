@@ -13,7 +13,7 @@ from sgp_ros.diagnosis.compare.open_bodies import open_bodies, open_remark, with
 from sgp_ros.diagnosis.compare.sufficiency import require_signed
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.diagnosis.compare.velocity_sensor import sensor_lags
-from sgp_ros.diagnosis.connected import Connected, compared, connect
+from sgp_ros.diagnosis.connected import Connected, compared, connect, with_laws
 from sgp_ros.diagnosis.criteria import DOUBTED
 from sgp_ros.diagnosis.decide.certainty import Probabilities, certainty_of, probabilities, settled
 from sgp_ros.diagnosis.decide.differences import Several, without_laws_of
@@ -47,7 +47,6 @@ from sgp_ros.diagnosis.reference import (
 )
 from sgp_ros.diagnosis.result import Diagnosis, Proof
 from sgp_ros.diagnosis.shown import Predictions, Traces
-from sgp_ros.diagnosis.unlisted.told import extended
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import NumericalError
@@ -115,7 +114,7 @@ def diagnose(
         remarks=(*recordings.remarks, *open_remark(tree, unstated)),
     )  # fmt: skip
     try:
-        connected = connect(recordings, tree, lambda x: progress(0.05 + 0.85 * x))
+        connected = with_laws(connect(recordings, tree, lambda x: progress(0.05 + 0.85 * x)))
         found = _diagnosed(connected, robot.name, progress, replays=has_overlays)
         if simulated is not None:
             reference = against_model(connected.equations, connected.several, simulated)
@@ -136,10 +135,9 @@ def _diagnosed(
     connected: Connected, robot: str, progress: Progress, *, replays: bool
 ) -> Diagnosis:
     recordings, whole = connected.recordings, connected.equations
-    several, laws = extended(connected.several)
     raw, tree, names = recordings.learned, whole.motion.tree, recordings.names
     parts = {'train': raw, **recordings.kept, **recordings.held}
-    several, sides, chances, final, learned, on_z, proofs = _proven(connected, several, parts)
+    several, sides, chances, final, learned, on_z, proofs = _proven(connected, parts)
     equations, model = several.equations, several.model
     comparison, decision = several.comparison, several.decision
     depends = dependences(equations, comparison.base.residual)
@@ -179,7 +177,7 @@ def _diagnosed(
         setup=connected.findings,
         visibility=visibility(equations, comparison, decision),
         overlays=overlays(final, parts if replays else {}, tree),
-        law_searches=laws,
+        law_searches=connected.laws,
     )
 
 
@@ -187,8 +185,9 @@ _Proven = tuple[Several, Contrasts, Probabilities, FinalModel, tuple[Remainder, 
                 tuple[str, ...], dict[str, Proof]]  # fmt: skip
 
 
-def _proven(connected: Connected, several: Several, parts: Mapping[str, RawTrajectory]) -> _Proven:
+def _proven(connected: Connected, parts: Mapping[str, RawTrajectory]) -> _Proven:
     """Return what is asserted with its proofs; a law that fails on another recording is none."""
+    several = connected.several
     while True:
         several, sides, chances = _settled(several)
         final, learned, on_z = _final(several, connected.equations)

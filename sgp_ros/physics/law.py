@@ -262,6 +262,11 @@ def _played(x: np.ndarray, half: float) -> np.ndarray:
     return z
 
 
+def remembered(name: str, motion: SeenMotion, x: np.ndarray, number: float) -> np.ndarray:
+    """Return a function that remembers, of `MEMORY`, of a signal x (n,) on the grid, (n,)."""
+    return np.asarray(_REMEMBERED[name](_Seen(motion, {}), x, number))
+
+
 def _row(x: object, seen: _Seen) -> np.ndarray:
     return np.ascontiguousarray(
         np.broadcast_to(np.asarray(x, dtype=np.float64), (len(seen.motion.position),))

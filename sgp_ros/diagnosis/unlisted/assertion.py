@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import COUNTED_SHARE, LACKING, LEAST_LAW, SIGNIFICANT
+from sgp_ros.diagnosis.criteria import LACKING, LEAST_LAW, SIGNIFICANT
 from sgp_ros.diagnosis.decide.certainty import probabilities
 from sgp_ros.diagnosis.decide.decision import Decision, Scale, decide, refused
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, moved
@@ -22,9 +22,8 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.diagnosis.explain.uncertainty import reported_std
-from sgp_ros.diagnosis.unlisted.search import Searched, law_of, own_effects, search
-from sgp_ros.physics.catalogue import CONSTANT_LOAD, COULOMB_FRICTION, VISCOUS_FRICTION
+from sgp_ros.diagnosis.unlisted.beside import PLAIN, law_of, own_effects, says_less
+from sgp_ros.diagnosis.unlisted.search import Searched, search
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 
@@ -32,9 +31,6 @@ MOST_JOINTS = 3
 """Joints at which a law is looked for, those first of which most is left or explained."""
 _RIVALS = 8
 _STEPS = 8
-_PLAIN = (COULOMB_FRICTION, VISCOUS_FRICTION, CONSTANT_LOAD)
-_NONE = 2.0
-"""Standard deviations from zero below which a coefficient cannot be told from none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,31 +62,13 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
     for joint in _joints(equations, comparison, decision):
         listed = found.decision.tentative or found.decision.model
         searched = search(equations, Scale.of(equations, comparison), listed, joint)
-        if searched is None or _is_slight(equations, listed, searched):
+        if searched is None:
             continue
-        found = replace(found, searched=(*found.searched, searched))
-        found = _decided(equations, found, searched)
+        more = replace(found, searched=(*found.searched, searched))
+        more = _decided(equations, more, searched)
+        if not searched.is_slight or law_of(more.decision.model, joint) is not None:
+            found = more
     return found
-
-
-def _is_slight(equations: Equations, listed: Model, searched: Searched) -> bool:
-    """Return whether the smooth force differs from plain laws by less than counts as physics.
-
-    Friction that creeps a little near rest is friction, a spring that hardens a little a spring.
-    A law with a shape of its own could be bent to stand for another one, and so could several.
-    """
-    joint = searched.joint
-    own = own_effects(listed, joint)
-    rare = [s for s in own if not (s.effect.is_usual or s.effect in _PLAIN or _is_plain_sum(s))]
-    if rare and (len(own) > 1 or len(rare[0].shape)):
-        return False
-    apart = listed.residual[:, joint] - searched.smooth.residual[:, joint]
-    return bool((apart**2).mean() < COUNTED_SHARE * equations.power[joint])
-
-
-def _is_plain_sum(s: EffectAt) -> bool:
-    """Return whether a law is plain ones added up: it adds to one, and has no shape to bend."""
-    return bool(s.effect.plain) and not len(s.shape)
 
 
 def _joints(equations: Equations, comparison: Comparison, decision: Decision) -> list[int]:
@@ -105,7 +83,7 @@ def _joints(equations: Equations, comparison: Comparison, decision: Decision) ->
 
 def _decided(equations: Equations, found: Explained, searched: Searched) -> Explained:
     """Return what is decided with the laws of one more joint."""
-    if _says_less(equations, searched):
+    if searched.laws and says_less(equations, searched.laws[0], searched.joint):
         plain = _with_plain_laws(equations, searched)
         comparison = replace(found.comparison, more=(*found.comparison.more, *plain))
         return replace(found, comparison=comparison, decision=decide(equations, comparison))
@@ -129,26 +107,6 @@ def _decided(equations: Equations, found: Explained, searched: Searched) -> Expl
     return replace(found, decision=decision, why_not=found.why_not | {searched.joint: why})
 
 
-def _says_less(equations: Equations, searched: Searched) -> bool:
-    """Return whether the best formula has a coefficient that cannot be told from none.
-
-    It then says what a shorter one says, which is a listed effect.
-    """
-    law = law_of(searched.laws[0], searched.joint) if searched.laws else None
-    if law is None:
-        return False
-    model = searched.laws[0]
-    index = [s is law for s in model.effects].index(True)
-    std = reported_std(model, Columns(equations))[index]
-    numbers = law.report(equations.motion)
-    names = [q.name for q in law.effect.coefficient_quantities(law.kind)]
-    return any(
-        abs(float(numbers[name])) < _NONE * std[name]
-        for name in names
-        if name in numbers and name in std and np.isfinite(std[name])
-    )
-
-
 def _with_plain_laws(equations: Equations, searched: Searched) -> tuple[Model, ...]:
     """Return the model of the best formula with one plain law of friction or load in its place."""
     best, columns = searched.laws[0], Columns(equations)
@@ -160,7 +118,7 @@ def _with_plain_laws(equations: Equations, searched: Searched) -> tuple[Model, .
             columns, (*others, EffectAt(effect, Place(searched.joint))), start,
             is_free=is_free, steps=_STEPS,
         )
-        for effect in _PLAIN
+        for effect in PLAIN
         for is_free in dict.fromkeys((False, best.is_free))
     )  # fmt: skip
 

@@ -1,48 +1,46 @@
-"""Formulas that a smooth force may have, in the order of their length.
+"""Formulas that a smooth force may have, those that follow its data best.
 
-A formula is a shape in the variable of the smooth force, times its factor:
+A formula is a text of `sentences` in the variable of the smooth force, times its factor:
 
-    tau_x[elbow] = (a*tanh((q[elbow] - x0)/w) + b)*sign(dq[elbow])
+    tau_x[elbow] = (a*tanh((q[elbow] - x0)/w0) + d)*sign(dq[elbow])
 
-Factors are found as coefficients, and places and widths by a search within the range that was
-seen. Every formula is a law as a user could write it, with units.
+All texts are compared with the curve that the data of the smooth force are (`curves`); those that
+follow it best become laws as a user could write them, with units.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from sgp_ros.diagnosis.criteria import PER_UNUSUAL
-from sgp_ros.diagnosis.unlisted.shapes import UNITS, SmoothForce
+from sgp_ros.diagnosis.criteria import PER_PARAMETER, PER_UNUSUAL
+from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.unlisted.curves import Curve, Followed, follow
+from sgp_ros.diagnosis.unlisted.sentences import (
+    COEFFICIENTS,
+    of_position,
+    of_velocity,
+    smoothed,
+)
+from sgp_ros.diagnosis.unlisted.shapes import (
+    MEMORY,
+    SLOWEST,
+    SMOOTHED,
+    UNITS,
+    SmoothForce,
+    smooth_of,
+)
 from sgp_ros.physics.formula import Formula, read_formula
 from sgp_ros.physics.law import FormulaLaw
-from sgp_ros.physics.parts import LawParameter
+from sgp_ros.physics.motion import SeenMotion
+from sgp_ros.physics.parts import LawParameter, Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 PER_PIECE = 0.5
 """What each number, name and operation of a formula takes [nats]."""
-_ANY = ('a', 'b', 'c')
-"""Parameters that are factors."""
-OF_POSITION = (
-    'a*X', 'a*X**2', 'a*X**3',
-    'a*(X - x0)**2', 'a*(X - x0)**3', 'a*abs(X - x0)*(X - x0)',
-    'a*sin(n*X) + b*cos(n*X)', 'a*sin(m*X) + b*cos(m*X)',
-    'a*tanh((X - x0)/w)', 'a*exp(X/w1)', 'a*exp(-X/w1)',
-    'a*max(X - x0, 0)', 'a*max(x0 - X, 0)', 'a*max(X - x0, 0)**2', 'a*max(x0 - X, 0)**2',
-    'a*exp(-((X - x0)/w)**2)', 'a/(1 + ((X - x0)/w)**2)',
-    'a*X + b*(X - x0)**3', 'a*(abs(X - x0)/r)**p*sign(X - x0)',
-)  # fmt: skip
-"""Shapes in a position X."""
-OF_VELOCITY = (
-    'a*X', 'a*X**2', 'a*abs(X)*X', 'a*X**3',
-    'a*sqrt(abs(X))*sign(X)', 'a*tanh(X/v0)', 'a*X/(1 + (X/v0)**2)', 'a*X/(1 + abs(X)/v0)',
-    'a*exp(-abs(X)/v0)*sign(X)', 'a*max(X, 0)', 'a*min(X, 0)', 'a*max(abs(X) - v0, 0)*sign(X)',
-    'a*X + b*X**3', 'a*X + b*abs(X)*X', 'a*X + b*tanh(X/v0)', 'a*(abs(X)/r)**p*sign(X)',
-)  # fmt: skip
-"""Shapes in a velocity X."""
 NAMELESS = 'a law found from the data'
 NEAREST = {
     'a*X/(1 + (X/v0)**2)': 'an eddy-current brake',
@@ -55,43 +53,76 @@ NEAREST = {
     'a*min(X, 0)': 'a one-way damper',
     'a*X + b*(X - x0)**3': 'a hardening or softening spring',
     'a*(X - x0)**3': 'a hardening spring',
-    'a*tanh((X - x0)/w)': 'a spring that saturates',
-    'a*exp(X/w1)': 'a spring that stiffens exponentially',
-    'a*exp(-X/w1)': 'a spring that stiffens exponentially',
+    'a*tanh((X - x0)/w0)': 'a spring that saturates',
+    'a*exp(X/w0)': 'a spring that stiffens exponentially',
+    'a*exp(-X/w0)': 'a spring that stiffens exponentially',
     'a*max(X - x0, 0)': 'a spring on one side',
     'a*max(x0 - X, 0)': 'a spring on one side',
     'a*max(X - x0, 0)**2': 'a soft contact',
     'a*max(x0 - X, 0)**2': 'a soft contact',
-    'a*exp(-((X - x0)/w)**2) sign': 'friction at a place',
+    'a*max(abs(X - x0) - w0, 0)*sign(X - x0)': 'a spring with slack',
+    'a*((o0 - X)/r)**(-p0)': 'a gas spring or a magnet',
+    'a*((X - u0)/r)**(-p0)': 'a gas spring or a magnet',
+    'a*exp(-((X - x0)/w0)**2) sign': 'friction at a place',
     'a*X speed': 'damping of a place',
-    'a*sin(n*X) + b*cos(n*X)': 'a slow wave, such as a load on an arm or a magnet',
-}
-"""Shape and factor to the nearest known physics."""
-_WAVES = (0.15, 1.6, 4.5)
-"""Periods of a sine within the range that was seen: least of slow ones, of others, greatest."""
+    'a*sin(n0*X) + b*cos(n0*X)': 'a slow wave, such as a load on an arm or a magnet',
+    'a*sin(n0*(X - x0)) + b*sin(n0*(X - x0))/sqrt(1 + e0*cos(n0*(X - x0)))':
+        'a spring between two points of a linkage',
+}  # fmt: skip
+"""Text (without a constant) and factor to the nearest known physics."""
+_OF_GATE = {gate: 'sign' if gate == 'soft' else gate for gate in UNITS}
+_WAVES = (0.15, 4.5)
+"""Periods of a sine within the range that was seen, least and greatest."""
 _NARROWEST, _WIDEST = 0.03, 3.0
 """Widths in parts of the range that was seen."""
+_WIDE = 5.0
+"""Range in which some part of every formula is not zero, in parts of the greatest value."""
+_PIECES = 120
+"""Of a curve, even."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Range:
+class Range:
     """What was seen of a variable."""
 
     low: float
     high: float
     unit: str
 
+    @classmethod
+    def of_variable(cls, smooth: SmoothForce, motion: ObservedMotion) -> Range:
+        """Return that of the variable of a smooth force."""
+        x = smooth.variable.values(motion)
+        return cls(float(x.min()), float(x.max()), smooth.variable.unit(motion.tree))
+
     @property
     def span(self) -> float:
+        """Width."""
         return self.high - self.low
 
     @property
     def size(self) -> float:
+        """Greatest absolute value."""
         return max(abs(self.low), abs(self.high))
+
+    def ends(self, name: str) -> tuple[float, float, str]:
+        """Return the ends of a parameter that is no coefficient, and its unit."""
+        span, turn = self.span, 2.0 * np.pi / self.span
+        return {
+            'x': (self.low - 0.25 * span, self.high + 0.25 * span, self.unit),
+            'w': (_NARROWEST * span, _WIDEST * span, self.unit),
+            'v': (SLOWEST * self.size, _WIDEST * self.size, self.unit),
+            'n': (_WAVES[0] * turn, _WAVES[1] * turn, f'1/{self.unit}'),
+            'p': (0.05, 6.0, '1'),
+            'o': (self.high + 0.02 * span, self.high + _WIDEST * span, self.unit),
+            'u': (self.low - _WIDEST * span, self.low - 0.02 * span, self.unit),
+            'e': (-0.95, 0.95, '1'),
+            'r': (self.size, self.size, self.unit),
+        }[name[0]]
 
 
 class FoundLaw(FormulaLaw):
-    """A formula in place of a smooth force."""
+    """A formula in place of a smooth force, with the numbers that a search starts from."""
 
     def __init__(
         self, smooth: SmoothForce, formula: Formula, joint: str,
@@ -100,89 +131,136 @@ class FoundLaw(FormulaLaw):
         super().__init__(formula, joint, parameters, words, is_open=True, price=price)
         self.smooth = smooth
 
-
-def formulas(smooth: SmoothForce, motion: ObservedMotion) -> Iterator[FoundLaw]:
-    """Yield the formulas with the variable and the factor of a smooth force."""
-    x = smooth.variable.values(motion)
-    prismatic = motion.tree.is_prismatic
-    length = 'm' if prismatic[smooth.variable.index] else 'rad'
-    own = 'm' if prismatic[smooth.joint] else 'rad'
-    seen = _Range(float(x.min()), float(x.max()),
-                  length if smooth.variable.kind == 'q' else f'{length}/s')  # fmt: skip
-    force = 'N' if own == 'm' else 'N m'
-    per = UNITS[smooth.gate].format(l=own, f=force)
-    speed = motion.velocity[:, smooth.joint]
-    own_speed = _Range(float(speed.min()), float(speed.max()), f'{own}/s')
-    joint = motion.tree.moving_names[smooth.joint]
-    for text, shape in _texts(smooth):
-        formula = read_formula(text, is_law=True)
-        parameters = [
-            _parameter(name, shape, own_speed if name == 'v1' else seen, force, per)
-            for name in sorted(formula.parameters)
-        ]
-        size = formula.folded(lambda _node: 1.0, lambda _node, parts: 1.0 + sum(parts))
-        words = NEAREST.get(f'{shape} {smooth.gate}'.strip(), NAMELESS)
-        price = PER_UNUSUAL + PER_PIECE * size
-        yield FoundLaw(smooth, formula, joint, parameters, words, price)
+    def starts(self, _motion: SeenMotion, _place: Place) -> np.ndarray:
+        """Return the numbers that follow the data."""
+        return np.array([[self._own[n].start for n in self.shape_names()]])
 
 
-def _texts(smooth: SmoothForce) -> Iterator[tuple[str, str]]:
-    """Yield formulas with their shapes in X.
+def formulas(
+    smooth: SmoothForce, motion: ObservedMotion, curve: Curve, floor: float, count: int
+) -> Iterator[FoundLaw]:
+    """Yield formulas that follow the data of a smooth force best at their price, best first.
 
-    With a factor each shape also comes with a constant, for friction that a place only changes,
-    and the sign of a velocity comes with a smooth form.
+    Args:
+        smooth: with variable and factor.
+        motion: of the recording.
+        curve: of its data, see `curve_of`.
+        floor: sum of squares that errors of signals and filters may leave.
+        count: of texts.
     """
-    x = smooth.variable
-    factors = [smooth.factor]
-    if smooth.gate == 'sign':
-        factors.append(f'tanh({smooth.factor[5:-1]}/v1)')
-    is_friction = smooth.gate == 'sign' and x.kind == 'dq' and x.index == smooth.joint
-    for shape in OF_POSITION if x.kind == 'q' else OF_VELOCITY:
-        plain = shape.replace('X', x.text)
-        if not smooth.factor:
-            yield plain, shape
-            if 'exp(' in shape or 'max(' in shape:  # others have a zero where they need one
-                yield f'{plain} + d', shape
-            continue
-        for factor in factors:
-            yield f'({plain} + d)*{factor}', shape
-            if not is_friction:
-                alone = f'({plain})' if ' + b' in shape else plain
-                yield f'{alone}*{factor}', shape
+    seen = Range.of_variable(smooth, motion)
+    found: list[tuple[float, str, Followed]] = []
+    noise = curve.rest + floor
+    for text in texts(smooth):
+        formula = read_formula(text.replace('X', 'q[X]'), is_law=True)
+        shape = [n for n in formula.parameters if n not in COEFFICIENTS]
+        followed = follow(formula, curve, {n: seen.ends(n)[:2] for n in shape})
+        if followed is not None:
+            left = (followed.left + noise) / (curve.size + noise)
+            freedom = PER_PARAMETER * len(formula.parameters - {'r'})
+            price = freedom + PER_PIECE * _pieces(formula)
+            found.append((0.5 * ROWS * math.log(left) + price, text, followed))
+    found.sort(key=lambda f: f[0])
+    for _, text, followed in found[:count]:
+        yield law(smooth, motion, seen, text, followed.numbers)
 
 
-def _parameter(name: str, shape: str, seen: _Range, force: str, per: str) -> LawParameter:
-    """Return a parameter with its unit, start and range."""
-    if name in {*_ANY, 'd'}:
-        power = 0.0 if name == 'd' else _power(shape, name)
-        return LawParameter(name, _unit(force, per, seen.unit, power))
-    middle, span, size = 0.5 * (seen.low + seen.high), seen.span, seen.size
-    turn = 2.0 * np.pi / span
-    start, low, high, unit = {
-        'x0': (middle, seen.low - 0.25 * span, seen.high + 0.25 * span, seen.unit),
-        'w': (0.3 * span, _NARROWEST * span, _WIDEST * span, seen.unit),
-        'w1': (span, _NARROWEST * span, _WIDEST * span, seen.unit),
-        'v1': (0.05 * size, 1e-3 * size, size, seen.unit),
-        'v0': (0.1 * size, 1e-3 * size, _WIDEST * size, seen.unit),
-        'n': (0.6 * turn, _WAVES[0] * turn, _WAVES[1] * turn, f'1/{seen.unit}'),
-        'm': (2.5 * turn, _WAVES[1] * turn, _WAVES[2] * turn, f'1/{seen.unit}'),
-        'r': (size, 0.0, np.inf, seen.unit),
-        'p': (1.5, 0.05, 6.0, '1'),
-    }[name]
+ROWS = 100.0
+"""Rows that count as independent, as everywhere where models are compared."""
+
+
+def curve_of(model: Model, joint: int) -> Curve:
+    """Return the curve of the smooth force that a model has at a joint.
+
+    Of the joint's own velocity it is one of the force itself, with a jump at rest or without.
+    """
+    placed, smooth = smooth_of(model, joint)
+    equations = model.frame.equations
+    motion = equations.motion
+    own = model.forces[[s is placed for s in model.effects].index(True)][:, joint]
+    factor = np.ones(1) if smooth.is_of_own_speed else smooth.factors(motion)
+
+    def rows(force: np.ndarray) -> np.ndarray:
+        return equations.compact(force * factor[:, None], joint, is_inertial=False)
+
+    nodes = np.unique(smooth.variable.knots(motion, _PIECES))
+    at = smooth.variable.values(motion)
+    return Curve.of(nodes, rows, at, own + model.residual[:, joint])
+
+
+def _pieces(formula: Formula) -> float:
+    return formula.folded(lambda _node: 1.0, lambda _node, parts: 1.0 + sum(parts))
+
+
+def texts(smooth: SmoothForce) -> list[str]:
+    """Return the texts in X for a variable: of an own velocity with what changes at rest."""
+    kind = smooth.variable.kind
+    if not smooth.is_of_own_speed:
+        return list(dict.fromkeys(of_position() if kind == 'q' else of_velocity(is_own=False)))
+    texts = list(dict.fromkeys(of_velocity(is_own=True)))
+    return list(dict.fromkeys([*texts, *(smoothed(t) for t in texts)]))
+
+
+def law(
+    smooth: SmoothForce, motion: ObservedMotion, seen: Range, text: str,
+    numbers: Mapping[str, float],
+) -> FoundLaw:  # fmt: skip
+    """Return a text as a law of the joint of a smooth force."""
+    own = 'm' if motion.tree.is_prismatic[smooth.joint] else 'rad'
+    force = 'N' if own == 'm' else 'N m'
+    per = '1' if smooth.is_of_own_speed else UNITS[smooth.gate].format(l=own, f=force)
+    speed = motion.velocity[:, smooth.joint]
+    own_speed = Range(float(speed.min()), float(speed.max()), f'{own}/s')
+    plain = text.replace('X', smooth.variable.text)
+    whole = _times(plain, '' if smooth.is_of_own_speed else smooth.factor)
+    formula = read_formula(whole, is_law=True)
+    parameters = [
+        LawParameter(name, _unit(force, per, seen.unit, _power(text, name, seen, numbers)))
+        if name in COEFFICIENTS else _shape(name, smooth, seen, own_speed, numbers)
+        for name in sorted(formula.parameters)
+    ]  # fmt: skip
+    gate = '' if smooth.is_of_own_speed else _OF_GATE[smooth.gate]
+    words = NEAREST.get(f'{text.removesuffix(" + d")} {gate}'.strip(), NAMELESS)
+    price = PER_UNUSUAL + PER_PIECE * _pieces(formula)
+    joint = motion.tree.moving_names[smooth.joint]
+    return FoundLaw(smooth, formula, joint, parameters, words, price)
+
+
+def _shape(
+    name: str, smooth: SmoothForce, seen: Range, own_speed: Range, numbers: Mapping[str, float]
+) -> LawParameter:
+    """Return a parameter that is no coefficient, with unit, start and range."""
+    if name == MEMORY:
+        assert smooth.variable.memory is not None
+        kind, start = smooth.variable.memory
+        unit = 's' if kind == 'lag' else seen.unit
+        return LawParameter(name, unit, start / 3.0, start=start, high=3.0 * start)
+    low, high, unit = (own_speed if name == SMOOTHED else seen).ends(name)
+    start = numbers.get(name, smooth.width)
     return LawParameter(name, unit, low, start=start, high=high, is_known=name == 'r')
 
 
-def _power(shape: str, name: str) -> float:
-    """Return the power of the variable that a factor is for."""
-    (part,) = [p for p in shape.split(' + ') if p.startswith((f'{name}*', f'{name}/'))]
-    for text, power in (
-        ('tanh', 0.0), ('exp', 0.0), ('sin', 0.0), ('cos', 0.0), ('1 + ((', 0.0), ('/r)', 0.0),
-        ('sqrt', 0.5), ('**3', 3.0), ('**2', 2.0 if '/v0)**2' not in part else 1.0),
-        ('abs(X)*X', 2.0), ('abs(X - x0)*(', 2.0),
-    ):  # fmt: skip
-        if text in part:
-            return power
-    return 1.0
+def _times(plain: str, factor: str) -> str:
+    if not factor:
+        return plain
+    return f'({plain})*{factor}' if ' + ' in plain else f'{plain}*{factor}'
+
+
+def _power(text: str, name: str, seen: Range, numbers: Mapping[str, float]) -> float:
+    """Return the power of the variable that a coefficient is for: that by which its term scales.
+
+    With twice the unit of the variable, every number of it is half as large, and waves twice.
+    """
+    formula = read_formula(text.replace('X', 'x_'), is_law=True)
+    half = {'1': 1.0, seen.unit: 0.5, f'1/{seen.unit}': 2.0}
+    scaled = {n: v * half[seen.ends(n)[2]] for n, v in numbers.items()}
+    values = dict.fromkeys(COEFFICIENTS, 0.0) | {name: 1.0}
+    for x in np.linspace(-_WIDE * seen.size, _WIDE * seen.size, 24).tolist():
+        whole = formula.value(values | dict(numbers) | {'x_': x})
+        part = formula.value(values | scaled | {'x_': 0.5 * x})
+        if whole and part and math.isfinite(whole / part):
+            return round(math.log2(abs(whole / part)), 3)
+    return 0.0
 
 
 def _unit(force: str, per: str, unit: str, power: float) -> str:

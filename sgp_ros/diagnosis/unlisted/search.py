@@ -22,15 +22,21 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
-from sgp_ros.diagnosis.unlisted.formulas import FoundLaw, formulas
-from sgp_ros.diagnosis.unlisted.shapes import FINE, SmoothForce, smooth_forces
+from sgp_ros.diagnosis.unlisted.beside import is_slight, law_of, own_effects, says_less
+from sgp_ros.diagnosis.unlisted.formulas import FoundLaw, curve_of, formulas
+from sgp_ros.diagnosis.unlisted.shapes import (
+    FINE,
+    SMOOTHED,
+    SmoothForce,
+    Variable,
+    smooth_forces,
+    smooth_of,
+)
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.law import FormulaLaw
-from sgp_ros.physics.parts import JOINT, MOTOR
 
-SMOOTH, SHAPES, FITTED = 3, 4, 6
+SMOOTH, SHAPES, FIRST, FITTED = 3, 4, 12, 5
 """Smooth forces fitted beside each choice of kept effects; of all of these, those for which
-formulas are screened; formulas fitted for each but the best, of which all are."""
+formulas are tried; texts that become formulas for the best one, and for each other."""
 EARNED = 3
 """Best models with a formula in which every listed effect must earn its price again."""
 
@@ -45,6 +51,7 @@ class Searched:
         smooth: best model with a smooth force at the joint.
         laws: models with a formula there, best first.
         fine: model like the first of them, with a spline that follows any law.
+        is_slight: whether listed effects keep their names where no formula is asserted.
     """
 
     joint: int
@@ -52,6 +59,7 @@ class Searched:
     smooth: Model
     laws: tuple[Model, ...]
     fine: Model | None
+    is_slight: bool = False
 
     @property
     def lack_of_fit(self) -> tuple[float, float]:
@@ -68,15 +76,6 @@ class Searched:
         return law / max(fine, 1e-300), float(stats.f.sf(excess, max(more, 1), max(rows, 1.0)))
 
 
-def law_of(model: Model, joint: int) -> EffectAt | None:
-    """Return the formula or the smooth force of a model at a joint; None where there is none."""
-    found = (
-        s for s in model.effects
-        if s.place.joint == joint and isinstance(s.effect, (FormulaLaw, SmoothForce))
-    )  # fmt: skip
-    return next(found, None)
-
-
 def search(equations: Equations, scale: Scale, listed: Model, joint: int) -> Searched | None:
     """Return what explains a joint better than listed effects, at its price; None for nothing.
 
@@ -88,22 +87,38 @@ def search(equations: Equations, scale: Scale, listed: Model, joint: int) -> Sea
     """
     scale = replace(scale, nominal=np.zeros_like(scale.nominal))  # splines have no shape to err in
     look = _Look(Columns(equations), scale, listed, joint)
-    smooth = sorted(look.smooth(), key=lambda m: -scale.worth(m))
+    smooth = look.ranked()
     if not smooth or scale.worth(smooth[0]) < scale.worth(listed) + ALIKE:
         return None
     if smooth[0].mean_square[joint] > NEARLY * listed.mean_square[joint]:
         return None
+    slight = is_slight(listed, smooth[0], joint)
+    if slight and smooth[0].mean_square[joint] > NEARLY**2 * listed.mean_square[joint]:
+        return None
     laws: dict[object, Model] = {}
-    for number, model in enumerate(smooth[:SHAPES]):
-        for law in look.formulas(model, FITTED if number else None):
+    for number, model in enumerate(_unlike(smooth, joint)[:SHAPES]):
+        for law in look.formulas(model, FITTED if number else FIRST):
             key = law.key, law.is_free
             if key not in laws or scale.worth(law) > scale.worth(laws[key]):
                 laws[key] = law
     ranked = sorted(laws.values(), key=lambda m: -scale.worth(m))
     again = [earned(look.columns, scale, m, joint) for m in ranked[:EARNED]]
     ranked = sorted([*again, *ranked[EARNED:]], key=lambda m: -scale.worth(m))
+    first = (i for i, m in enumerate(ranked) if not says_less(equations, m, joint))
+    ranked = ranked[next(first, 0) :]
     fine = look.fine(ranked[0]) if ranked else None
-    return Searched(joint, listed, smooth[0], tuple(ranked), fine)
+    return Searched(joint, listed, smooth[0], tuple(ranked), fine, slight)
+
+
+def _unlike(smooth: list[Model], joint: int) -> list[Model]:
+    """Return the models that are not followed by the same formulas as a better one."""
+    found: dict[object, Model] = {}
+    for model in smooth:
+        placed, force = smooth_of(model, joint)
+        gate = '' if force.is_of_own_speed else force.gate
+        key = force.variable, gate, model.key - {placed.key}, model.is_free
+        found.setdefault(key, model)
+    return list(found.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,15 +130,30 @@ class _Look:
     listed: Model
     joint: int
 
+    def ranked(self) -> list[Model]:
+        """Return models with a smooth force, best first.
+
+        Of two joints together and of what was before only such as are worth more than any other.
+        """
+        found = sorted(self.smooth(), key=lambda m: -self.scale.worth(m))
+        plain = next((m for m in found if self._variable(m).is_plain), None)
+        least = self.scale.worth(plain) + ALIKE if plain is not None else -np.inf
+        return [m for m in found if self._variable(m).is_plain or self.scale.worth(m) > least]
+
+    def _variable(self, model: Model) -> Variable:
+        return smooth_of(model, self.joint)[1].variable
+
     def smooth(self) -> Iterator[Model]:
         """Yield models with a smooth force in place of, and beside, effects of the joint."""
         motion = self.columns.equations(frozenset()).motion
         effects = list(smooth_forces(motion, self.joint))
         for base in self._bases():
             own = own_effects(base, self.joint)
-            others = [e for e in effects if e.gate not in {'', 'sign'}
+            others = [e for e in effects if e.gate not in {'', 'sign', 'soft'}
                       or not any(e.variable.is_of(s) for s in own)]  # fmt: skip
-            yield from self._fitted(base, others, SMOOTH)
+            for is_plain in (True, False):
+                alike = [e for e in others if e.variable.is_plain is is_plain]
+                yield from self._fitted(base, alike, SMOOTH if is_plain else 1)
 
     def fine(self, model: Model) -> Model:
         """Return a model with a fine spline in place of its formula."""
@@ -133,21 +163,23 @@ class _Look:
         motion = self.columns.equations(frozenset()).motion
         coarse = law.effect.smooth
         knots = coarse.variable.knots(motion, FINE)
-        width, name = law.report(motion).get('v1', 0.0), motion.tree.moving_names[self.joint]
+        width, name = law.report(motion).get(SMOOTHED, 0.0), motion.tree.moving_names[self.joint]
         fine = SmoothForce(self.joint, coarse.variable, coarse.gate, knots, name, float(width))
-        effects = tuple(EffectAt(fine, s.place) if s is law else s for s in model.effects)
+        shape = np.array([law.report(motion)[n] for n in fine.shape_names()], dtype=np.float64)
+        effects = tuple(EffectAt(fine, s.place, shape) if s is law else s for s in model.effects)
         return fit(self.columns, effects, model.sigma, is_free=model.is_free, w=model.w, rounds=2,
                    steps=4, still=len(effects))  # fmt: skip
 
-    def formulas(self, smooth: Model, count: int | None) -> Iterator[Model]:
+    def formulas(self, smooth: Model, count: int) -> Iterator[Model]:
         """Yield models with so many formulas in place of the smooth force of a model."""
-        chosen = law_of(smooth, self.joint)
-        assert chosen is not None
-        assert isinstance(chosen.effect, SmoothForce)
-        kept = tuple(s for s in smooth.effects if s is not chosen)
+        placed, chosen = smooth_of(smooth, self.joint)
+        kept = tuple(s for s in smooth.effects if s is not placed)
         base = self._without(kept, is_free=smooth.is_free)
-        motion = self.columns.equations(frozenset()).motion
-        yield from self._fitted(base, list(formulas(chosen.effect, motion)), count)
+        scale, rows = self.scale, len(smooth.residual)
+        floor = rows * scale.power[self.joint] * scale.floor[self.joint]
+        motion = smooth.frame.equations.motion
+        laws = list(formulas(chosen, motion, curve_of(smooth, self.joint), float(floor), count))
+        yield from self._fitted(base, laws, None)
 
     def _fitted(
         self, base: Model, effects: list[SmoothForce] | list[FoundLaw], count: int | None
@@ -206,12 +238,6 @@ def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
     if scale.worth(best) <= scale.worth(model):
         return model
     return earned(columns, scale, best, joint)
-
-
-def own_effects(model: Model, joint: int) -> tuple[EffectAt, ...]:
-    """Return the effects that a model has at a joint alone."""
-    own = {JOINT, MOTOR}
-    return tuple(s for s in model.effects if s.place.joint == joint and s.effect.site in own)
 
 
 def _subsets(effects: tuple[EffectAt, ...]) -> Iterable[tuple[EffectAt, ...]]:

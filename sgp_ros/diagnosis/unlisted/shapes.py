@@ -9,42 +9,82 @@ variable and the factor that explain most.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import BSpline
 
+from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.motion import SeenMotion
+from sgp_ros.physics.law import remembered
+from sgp_ros.physics.motion import SeenMotion, Structure
 from sgp_ros.physics.parts import Place, Placed, Quantity
 from sgp_ros.robots.observed_motion import ObservedMotion
 
+SMOOTHED, SLOWEST = 'v_s', 1e-3
+"""Speed of a soft sign: its name, and its least value in parts of the greatest speed."""
 PIECES, FINE = 8, 16
 """Pieces of a spline: of one to be compared at its price, and of one that follows any law."""
 _DEGREE = 3
-GATES = ('', 'sign', 'speed', 'square', 'effort')
-"""Factors: 1, sign(v), v, |v| v, motor torque."""
+MEMORY = 'T'
+"""Parameter of what remembers."""
+SHORTEST_LAG, LONGEST_LAG = 3.0, 0.1
+"""Lags that are looked for: from so many steps to this part of a recording."""
+LEAST_PLAY, MOST_PLAY = 0.02, 0.9
+"""Play that is looked for, in parts of the range that was seen."""
+_LADDER = 7
+"""Lags and plays that are tried first."""
+GATES = ('', 'sign', 'soft', 'speed', 'square', 'effort')
+"""Factors: 1, sign(v), tanh(v/v_s), v, |v| v, motor torque."""
 _TEXTS = {
-    '': '', 'sign': 'sign({v})', 'speed': '{v}', 'square': 'abs({v})*{v}', 'effort': '{u}',
+    '': '', 'sign': 'sign({v})', 'soft': f'tanh({{v}}/{SMOOTHED})', 'speed': '{v}',
+    'square': 'abs({v})*{v}', 'effort': '{u}',
 }  # fmt: skip
-UNITS = {'': '1', 'sign': '1', 'speed': '{l}/s', 'square': '{l}2/s2', 'effort': '{f}'}
+UNITS = {'': '1', 'sign': '1', 'soft': '1', 'speed': '{l}/s', 'square': '{l}2/s2', 'effort': '{f}'}
 
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """What a force may be a function of: `q` or `dq` of a joint, by index and name."""
+    """What a force may be a function of: `q` or `dq` of a joint, or of two, or what it was.
+
+    Attributes:
+        kind: `q` or `dq`.
+        index, joint: of the joint, and its name.
+        other: index, name and sign of a joint that is added; None for none.
+        memory: `lag` or `play` with its number [s, or unit of q]; None for none.
+    """
 
     kind: str
     index: int
     joint: str
+    other: tuple[int, str, int] | None = None
+    memory: tuple[str, float] | None = None
 
     @property
     def text(self) -> str:
         """As it stands in a formula."""
-        name = self.joint if self.joint.isidentifier() else f'"{self.joint}"'
-        return f'{self.kind}[{name}]'
+        if self.memory:
+            return f'{self.memory[0]}({self._signal(self.joint)}, {MEMORY})'
+        if self.other is None:
+            return self._signal(self.joint)
+        _, name, sign = self.other
+        return f'({self._signal(self.joint)} {"+" if sign > 0 else "-"} {self._signal(name)})'
+
+    def _signal(self, joint: str) -> str:
+        return f'{self.kind}[{joint}]' if joint.isidentifier() else f'{self.kind}["{joint}"]'
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is of one joint, now."""
+        return self.other is None and self.memory is None
+
+    def unit(self, tree: Structure) -> str:
+        """Return its unit."""
+        length = 'm' if tree.is_prismatic[self.index] else 'rad'
+        return length if self.kind == 'q' else f'{length}/s'
 
     def knots(self, motion: SeenMotion, pieces: int) -> np.ndarray:
         """Return the knots of a spline over it, (pieces + 7,).
@@ -64,17 +104,27 @@ class Variable:
     def is_of(self, s: EffectAt) -> bool:
         """Return whether an effect is a function of it, if it is of the effect's own joint."""
         over = {'q': 'position', 'dq': 'velocity'}[self.kind]
-        return s.place.joint == self.index and s.effect.drawn_over == over
+        return self.is_plain and s.place.joint == self.index and s.effect.drawn_over == over
 
     @property
     def words(self) -> str:
         """As it stands in a sentence."""
-        return f'{"position" if self.kind == "q" else "velocity"} of {self.joint}'
+        what = 'position' if self.kind == 'q' else 'velocity'
+        if self.memory:
+            return f'{what} of {self.joint} behind a {self.memory[0]}'
+        if self.other is None:
+            return f'{what} of {self.joint}'
+        _, other, sign = self.other
+        return f'{"sum" if sign > 0 else "difference"} of the {what} of {self.joint} and {other}'
 
     def values(self, motion: SeenMotion) -> np.ndarray:
         """Return it in a motion, (n,)."""
         of = motion.position if self.kind == 'q' else motion.velocity
-        return np.asarray(of[:, self.index])
+        x = np.asarray(of[:, self.index])
+        if self.memory:
+            name, number = self.memory
+            return remembered(name, motion, x, number)
+        return x if self.other is None else x + self.other[2] * of[:, self.other[0]]
 
 
 def force_unit(gate: str, *, is_prismatic: bool) -> str:
@@ -104,9 +154,10 @@ class SmoothForce(Effect):
         width: float = 0.0,
     ) -> None:  # fmt: skip
         self.joint, self.variable, self.gate, self.knots = joint, variable, gate, knots
-        self.width = width
+        self.width, self.joint_name = width, name
         own = Variable('dq', joint, name)
         effort = own.text.replace('dq[', 'tau[', 1)
+        self.is_of_own_speed = variable == own
         self.factor = _TEXTS[gate].format(v=own.text, u=effort)
         self.formula = f'tau_x = f({variable.text}){"*" if gate else ""}{self.factor}'
         count = len(knots) - _DEGREE - 1
@@ -126,9 +177,44 @@ class SmoothForce(Effect):
         """Return True: it has no sign to have."""
         return True
 
+    def shape_names(self, kind: str = '') -> tuple[str, ...]:
+        """Return the parameter of what remembers, or of a soft sign."""
+        return (MEMORY,) if self.variable.memory else (SMOOTHED,) if self.gate == 'soft' else ()
+
+    def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
+        """Return the ends of that parameter."""
+        if self.gate == 'soft':
+            fastest = np.abs(motion.velocity[:, self.joint]).max(keepdims=True)
+            return SLOWEST * fastest, fastest
+        if self.variable.memory is None:
+            return np.zeros(0), np.zeros(0)
+        kind, least = self.variable.memory
+        lag = LONGEST_LAG * motion.step * len(motion.position)
+        most = lag if kind == 'lag' else MOST_PLAY / LEAST_PLAY * least
+        return np.array([least]), np.array([max(most, 2.0 * least)])
+
+    def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
+        """Return even ratios between these."""
+        low, high = self.bounds(motion, place)
+        return np.geomspace(low, high, _LADDER) if len(low) else np.zeros((1, 0))
+
+    def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        """Return the parameter itself."""
+        return np.abs(shape)
+
+    def at(self, shape: np.ndarray) -> SmoothForce:
+        """Return the same with that parameter fixed."""
+        own, width = self.variable, self.width
+        if self.gate == 'soft':
+            width = float(shape[0])
+        elif own.memory is not None:
+            own = replace(own, memory=(own.memory[0], float(shape[0])))
+        return SmoothForce(self.joint, own, self.gate, self.knots, self.joint_name, width)
+
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         """Return the pieces of the spline times the factor, (n, m)."""
-        return self.basis(self.variable.values(motion)) * self.factors(motion)[:, None]
+        at = self.at(shape)
+        return self.basis(at.variable.values(motion)) * at.factors(motion)[:, None]
 
     def basis(self, x: np.ndarray) -> np.ndarray:
         """Return the pieces of the spline at x (n,), (n, m); constant beyond what was seen."""
@@ -139,7 +225,7 @@ class SmoothForce(Effect):
     def factors(self, motion: SeenMotion) -> np.ndarray:
         """Return the factor g, (n,)."""
         v = motion.velocity[:, self.joint]
-        if self.gate == 'sign' and self.width > 0.0:
+        if self.gate in {'sign', 'soft'} and self.width > 0.0:
             return np.tanh(v / self.width)
         if self.gate == 'sign':
             return np.asarray(motion.direction[:, self.joint])
@@ -152,16 +238,42 @@ def smooth_forces(motion: ObservedMotion, joint: int) -> Iterator[SmoothForce]:
     """Yield the smooth forces that may act on a joint.
 
     Of a velocity by itself only odd and even parts with a jump at rest: `f(|v|) sign(v)` is the
-    factor `sign`. Where the effort was measured nothing is explained by it.
+    factor `sign`. Where the effort was measured nothing is explained by it. What two joints do
+    together, and what was before, has no factor.
     """
     names = motion.tree.moving_names
-    for i in motion.moving_joints:
-        for kind in ('q', 'dq'):
-            variable = Variable(kind, i, names[i])
-            knots = variable.knots(motion, PIECES)
-            for gate in GATES:
-                if gate == 'effort' and not motion.is_commanded[joint]:
-                    continue
-                if kind == 'dq' and i == joint and gate not in {'', 'sign'}:
-                    continue  # a function of v with a factor of v is a function of v
-                yield SmoothForce(joint, variable, gate, knots, names[joint])
+    for i, kind in itertools.product(motion.moving_joints, ('q', 'dq')):
+        variable = Variable(kind, i, names[i])
+        knots = variable.knots(motion, PIECES)
+        for gate in GATES:
+            if gate == 'effort' and not motion.is_commanded[joint]:
+                continue
+            if kind == 'dq' and i == joint and gate not in {'', 'sign'}:
+                continue  # a function of v with a factor of v is a function of v
+            yield SmoothForce(joint, variable, gate, knots, names[joint])
+    for variable in (*_of_two(motion, joint), *_remembering(motion, joint)):
+        yield SmoothForce(joint, variable, '', variable.knots(motion, PIECES), names[joint])
+
+
+def _of_two(motion: ObservedMotion, joint: int) -> Iterator[Variable]:
+    """Yield sums and differences of the joint with others of its kind."""
+    names, prismatic = motion.tree.moving_names, motion.tree.is_prismatic
+    alike = [i for i in motion.moving_joints if i != joint and prismatic[i] == prismatic[joint]]
+    for i, kind, sign in itertools.product(alike, ('q', 'dq'), (1, -1)):
+        yield Variable(kind, joint, names[joint], other=(i, names[i], sign))
+
+
+def _remembering(motion: ObservedMotion, joint: int) -> Iterator[Variable]:
+    """Yield lags of the joint's motion, and its position behind play."""
+    name, width = motion.tree.moving_names[joint], float(np.ptp(motion.position[:, joint]))
+    for kind in ('q', 'dq'):
+        yield Variable(kind, joint, name, memory=('lag', SHORTEST_LAG * motion.step))
+    yield Variable('q', joint, name, memory=('play', LEAST_PLAY * width))
+
+
+def smooth_of(model: Model, joint: int) -> tuple[EffectAt, SmoothForce]:
+    """Return the smooth force of a model at a joint, placed and as it is."""
+    return next(
+        (s, s.effect.at(s.shape)) for s in model.effects
+        if s.place.joint == joint and isinstance(s.effect, SmoothForce)
+    )  # fmt: skip

@@ -12,9 +12,10 @@ from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.shown import LawSearch, TriedFormula
 from sgp_ros.diagnosis.unlisted.assertion import Explained, with_laws
+from sgp_ros.diagnosis.unlisted.beside import law_of
 from sgp_ros.diagnosis.unlisted.formulas import FoundLaw
-from sgp_ros.diagnosis.unlisted.search import Searched, law_of
-from sgp_ros.diagnosis.unlisted.shapes import SmoothForce, force_unit
+from sgp_ros.diagnosis.unlisted.search import Searched
+from sgp_ros.diagnosis.unlisted.shapes import SmoothForce, force_unit, smooth_of
 from sgp_ros.physics.effect_at import EffectAt
 
 POINTS = 41
@@ -58,7 +59,7 @@ def told(found: Explained) -> tuple[LawSearch, ...]:
 def shape_of(searched: Searched) -> Shape:
     """Return the smooth force of a joint; its error is that of least squares on coloured rows."""
     model = searched.smooth
-    placed, smooth = _smooth(searched)
+    placed, smooth = smooth_of(searched.smooth, searched.joint)
     knots = smooth.knots
     x = np.linspace(knots[0], knots[-1], POINTS)
     B = smooth.basis(x)
@@ -70,13 +71,6 @@ def shape_of(searched: Searched) -> Shape:
     C = variance * np.linalg.pinv(A.T @ A, rcond=1e-10)
     std = np.sqrt(np.maximum(np.einsum('pi,ij,pj->p', B, C, B), 0.0))
     return Shape(x, B @ placed.coefficients, std)
-
-
-def _smooth(searched: Searched) -> tuple[EffectAt, SmoothForce]:
-    placed = law_of(searched.smooth, searched.joint)
-    assert placed is not None
-    assert isinstance(placed.effect, SmoothForce)
-    return placed, placed.effect
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +90,7 @@ class Seen:
 
 def seen_by(searched: Searched) -> Seen:
     """Return the data beside the shape of a joint, where its factor is not small."""
-    placed, smooth = _smooth(searched)
+    placed, smooth = smooth_of(searched.smooth, searched.joint)
     equations = searched.smooth.frame.equations
     rows = equations.filter.rows
     x = smooth.variable.values(equations.motion)[rows]
@@ -111,17 +105,14 @@ def seen_by(searched: Searched) -> Seen:
 
 def _curve(law: EffectAt, searched: Searched, seen: Seen) -> np.ndarray:
     """Return a formula over its factor at the rows that were seen (s,); NaN if of other kind."""
-    _, smooth = _smooth(searched)
+    _, smooth = smooth_of(searched.smooth, searched.joint)
     assert isinstance(law.effect, FoundLaw)
     own = law.effect.smooth
-    is_speed = smooth.variable.kind == 'dq' and smooth.variable.index == searched.joint
+    is_speed = smooth.is_of_own_speed
     if own.variable != smooth.variable or not (is_speed or own.gate == smooth.gate):
         return np.full(len(seen.x), np.nan)
     motion = searched.smooth.frame.equations.motion
     g = smooth.factors(motion)
-    width = law.report(motion).get('v1', 0.0)
-    if own.gate == 'sign' and smooth.gate == 'sign' and width:  # the smooth form of the factor
-        g = np.tanh(motion.velocity[:, searched.joint] / float(width))
     force, g = law.force(motion)[seen.rows, searched.joint], g[seen.rows]
     return np.divide(
         force, g, out=np.full(len(g), np.nan), where=np.abs(g) > _WEAK * np.abs(g).max()
@@ -129,13 +120,12 @@ def _curve(law: EffectAt, searched: Searched, seen: Seen) -> np.ndarray:
 
 
 def _search(found: Explained, searched: Searched) -> LawSearch:
-    _, smooth = _smooth(searched)
+    _, smooth = smooth_of(searched.smooth, searched.joint)
     shape, motion = shape_of(searched), searched.smooth.frame.equations.motion
     seen = seen_by(searched)
     tree = motion.tree
     prismatic = bool(tree.is_prismatic[searched.joint])
-    length = 'm' if tree.is_prismatic[smooth.variable.index] else 'rad'
-    unit = length if smooth.variable.kind == 'q' else f'{length}/s'
+    unit = smooth.variable.unit(tree)
     per = force_unit(smooth.gate, is_prismatic=prismatic)
     power = searched.smooth.frame.equations.power[searched.joint]
 
@@ -178,8 +168,7 @@ def _why_not(found: Explained, joint: int, more: float) -> str:
 
 def sentence(smooth: SmoothForce, shape: Shape, unit: str, per: str) -> str:
     """Return a smooth force in words, such as `rises to 0.8 N m at 3 rad/s and then falls`."""
-    own = smooth.variable.kind == 'dq' and smooth.variable.index == smooth.joint
-    if not own:
+    if not smooth.is_of_own_speed:
         return _course(shape.x, shape.mean, smooth, unit, per)
     ahead = shape.x > 0.0
     x, force = shape.x[ahead], -shape.mean[ahead]

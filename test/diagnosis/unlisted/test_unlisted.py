@@ -16,8 +16,11 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.unlisted.assertion import with_laws
-from sgp_ros.diagnosis.unlisted.formulas import formulas
-from sgp_ros.diagnosis.unlisted.search import earned, law_of, search
+from sgp_ros.diagnosis.unlisted.beside import law_of
+from sgp_ros.diagnosis.unlisted.formulas import Range, texts
+from sgp_ros.diagnosis.unlisted.formulas import law as a_law
+from sgp_ros.diagnosis.unlisted.search import earned, search
+from sgp_ros.diagnosis.unlisted.sentences import COEFFICIENTS
 from sgp_ros.diagnosis.unlisted.shapes import GATES, smooth_forces
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
@@ -108,7 +111,9 @@ def test_a_listed_effect_beside_a_formula_earns_its_price_again(equations_for, f
     _, equations = equations_for(simulate(CHAINS[1], 11, 10.0, force=force))
     motion, columns = equations.motion, Columns(equations)
     smooth = next(s for s in smooth_forces(motion, 0) if (s.variable.kind, s.gate) == ('dq', ''))
-    law = next(f for f in formulas(smooth, motion) if '/v0)**2)' in f.formula)
+    text, seen = 'a*X/(1 + (X/v0)**2)', Range.of_variable(smooth, motion)
+    assert text in texts(smooth)
+    law = a_law(smooth, motion, seen, text, {'v0': 1.5})
     place = Place(0)
     effects = [EffectAt(law, place, np.array([1.5]))]
     effects += [EffectAt(EFFECTS[n], place) for n in ('torque_gain', 'coulomb_friction')]
@@ -143,9 +148,14 @@ def test_friction_that_is_hardly_different_keeps_its_name(equations_for):
     comparison = compare_models(equations, lambda _share: None)
     decision = decide(equations, comparison)
     assert [s.name for s in decision.model.effects] == ['coulomb_friction']
-    scale = Scale.of(equations, comparison)
-    assert search(equations, scale, decision.model, 0) is not None
+    assert search(equations, Scale.of(equations, comparison), decision.model, 0) is None
     assert with_laws(equations, comparison, decision).decision is decision
+
+
+def _middle(text, seen):
+    names = read_formula(text.replace('X', 'x'), is_law=True).parameters - {*COEFFICIENTS, 'x'}
+    ends = {name: seen.ends(name)[:2] for name in names}
+    return {name: 0.4 * low + 0.6 * high for name, (low, high) in ends.items()}
 
 
 def test_every_formula_has_the_unit_of_a_force(equations_for, perfect):
@@ -155,13 +165,13 @@ def test_every_formula_has_the_unit_of_a_force(equations_for, perfect):
     seen = set()
     for smooth in smooth_forces(motion, 1):
         seen.add((smooth.gate, smooth.variable.kind, smooth.variable.index))
-        for law in formulas(smooth, motion):
+        seen_range = Range.of_variable(smooth, motion)
+        for text in texts(smooth):
+            law = a_law(smooth, motion, seen_range, text, _middle(text, seen_range))
             units = {p.name: p.unit for p in law.quantities}
             again = read_formula(law.formula.partition('=')[2], is_law=True)
             assert unit_of(again, units, lambda _joint: 'rad') == read_unit('N m'), law.formula
             starts = law.starts(motion, law.places(motion)[0])
-            low, high = law.bounds(motion, law.places(motion)[0])
-            assert ((starts >= low) & (starts <= high)).all()
             columns = law.columns(motion, law.places(motion)[0], starts[0])
             assert np.isfinite(columns).all()
     assert {gate for gate, _, _ in seen} == set(GATES)

@@ -1,0 +1,60 @@
+"""What is said of errors of the connection: findings, what cannot be told apart, their price."""
+
+from __future__ import annotations
+
+import math
+
+from sgp_ros.diagnosis.criteria import (
+    ALIKE,
+    MOST_CERTAIN,
+    PER_EFFECT,
+    PER_PARAMETER,
+    PER_UNUSUAL,
+    TEMPER,
+)
+from sgp_ros.diagnosis.result import Equivalent, Finding, Location, Parameter
+from sgp_ros.diagnosis.setup.search import Connection
+
+
+def price_of(found: Connection) -> tuple[float, float]:
+    """Return what errors must be worth, and the part of it for such as are rare [nats]."""
+    numbers = sum(len(e.numbers) for e in found.errors)
+    rare = PER_UNUSUAL * sum(not e.hypothesis.is_of_gains for e in found.errors)
+    return PER_EFFECT * len(found.errors) + PER_PARAMETER * numbers + rare, rare
+
+
+def suspicion(found: Connection) -> str:
+    """Return what to check where errors are not asserted: with them too something is left."""
+    told = ', '.join(
+        f'{e.hypothesis.effect.replace("_", " ")} ({e.hypothesis.joint})' for e in found.errors
+    )
+    return f'Check the set-up: {told} would reduce the residual, but not enough to be asserted.'
+
+
+def error_finding(found: Connection, number: int, gain: float) -> Finding:
+    """Return an error with its probability against its rivals and against none."""
+    e = found.errors[number]
+    rivals = [r.worth - e.worth for r in found.rivals[number]]
+    odds = math.exp(-TEMPER * gain) + math.exp(-TEMPER * e.needed)
+    odds += sum(math.exp(min(TEMPER * r, 50.0)) for r in rivals)
+    numbers: dict[str, Parameter] = {
+        name: Parameter(float(x), float(s) if math.isfinite(s) and s > 0.0 else None, unit)
+        for name, x, s, unit in zip(
+            e.hypothesis.names, e.numbers, e.std, e.hypothesis.units, strict=True
+        )
+    }
+    words = {name: Parameter(word) for name, word in e.hypothesis.words.items()}
+    return Finding(
+        e.hypothesis.joint, e.hypothesis.effect, {**numbers, **words}, Location(), gain,
+        min(1.0 / (1.0 + odds), MOST_CERTAIN), 1.0,
+    )  # fmt: skip
+
+
+def equal_errors(found: Connection) -> tuple[Equivalent, ...]:
+    """Return the errors that a recording cannot tell from those found."""
+    return tuple(
+        Equivalent(((r.hypothesis.joint, r.hypothesis.effect),), '', 1.0)
+        for e, rivals in zip(found.errors, found.rivals, strict=True)
+        for r in rivals
+        if e.worth - r.worth < ALIKE and math.isfinite(r.worth)
+    )

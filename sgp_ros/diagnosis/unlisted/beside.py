@@ -1,0 +1,73 @@
+"""Laws of a joint beside its listed effects: which there are, and what either says."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE
+from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.diagnosis.explain.uncertainty import reported_std
+from sgp_ros.diagnosis.unlisted.shapes import SmoothForce
+from sgp_ros.physics.catalogue import CONSTANT_LOAD, COULOMB_FRICTION, VISCOUS_FRICTION
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.law import FormulaLaw
+from sgp_ros.physics.parts import JOINT, MOTOR
+
+PLAIN = (COULOMB_FRICTION, VISCOUS_FRICTION, CONSTANT_LOAD)
+PLAIN = (COULOMB_FRICTION, VISCOUS_FRICTION, CONSTANT_LOAD)
+_NONE = 2.0
+"""Standard deviations from zero below which a coefficient cannot be told from none."""
+
+
+def law_of(model: Model, joint: int) -> EffectAt | None:
+    """Return the formula or the smooth force of a model at a joint; None where there is none."""
+    found = (
+        s for s in model.effects
+        if s.place.joint == joint and isinstance(s.effect, (FormulaLaw, SmoothForce))
+    )  # fmt: skip
+    return next(found, None)
+
+
+def own_effects(model: Model, joint: int) -> tuple[EffectAt, ...]:
+    """Return the effects that a model has at a joint alone."""
+    own = {JOINT, MOTOR}
+    return tuple(s for s in model.effects if s.place.joint == joint and s.effect.site in own)
+
+
+def says_less(equations: Equations, model: Model, joint: int) -> bool:
+    """Return whether a formula has a coefficient that cannot be told from none.
+
+    It then says what a shorter one says.
+    """
+    law = law_of(model, joint)
+    assert law is not None
+    index = [s is law for s in model.effects].index(True)
+    std = reported_std(model, Columns(equations))[index]
+    numbers = law.report(equations.motion)
+    names = [q.name for q in law.effect.coefficient_quantities(law.kind)]
+    return any(
+        abs(float(numbers[name])) < _NONE * std[name]
+        for name in names
+        if name in numbers and name in std and np.isfinite(std[name])
+    )
+
+
+def is_slight(listed: Model, smooth: Model, joint: int) -> bool:
+    """Return whether a smooth force differs from plain laws by less than counts as physics.
+
+    Friction that creeps a little near rest is friction, a spring that hardens a little a spring.
+    A law with a shape of its own could be bent to stand for another one, and so could several.
+    """
+    own = own_effects(listed, joint)
+    rare = [s for s in own if not (s.effect.is_usual or s.effect in PLAIN or _is_plain_sum(s))]
+    if rare and (len(own) > 1 or len(rare[0].shape)):
+        return False
+    apart = listed.residual[:, joint] - smooth.residual[:, joint]
+    return bool((apart**2).mean() < COUNTED_SHARE * smooth.frame.equations.power[joint])
+
+
+def _is_plain_sum(s: EffectAt) -> bool:
+    """Return whether a law is plain ones added up: it adds to one, and has no shape to bend."""
+    return bool(s.effect.plain) and not len(s.shape)

@@ -1,0 +1,190 @@
+"""How well texts of formulas follow the data of a smooth force, and with which numbers.
+
+A force that is linear between nodes of its variable has filtered columns like any other. Their
+triangular factor says what any formula leaves of all rows from its values at the nodes alone.
+Coefficients follow by least squares, all other parameters from a grid of starts that
+Gauss-Newton steps improve, for all starts at once (variable projection, Golub and Pereyra 1973).
+A thousand texts cost seconds so, and only the best are fitted jointly with everything else.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sgp_ros.diagnosis.unlisted.sentences import COEFFICIENTS
+from sgp_ros.physics.formula import Formula
+
+_STARTS, _KEPT, _STEPS = 5, 4, 12
+"""Starts between the ends of each parameter's range, those that are improved, and their steps."""
+_RIDGE, _MOVE, _LONGEST, _GREATEST, _BLOCK = 1e-10, 1e-4, 0.25, 1e100, 16
+
+Columns = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """What the data say of a force that is linear between nodes of its variable.
+
+    A force with values f at the nodes leaves `|y - R f|^2` of the rows, and what no force of this
+    variable explains.
+
+    Attributes:
+        x: (p,) nodes.
+        R: (p, p) upper triangular.
+        y: (p,).
+        rest: sum of squares that is left in any case.
+    """
+
+    x: np.ndarray
+    R: np.ndarray
+    y: np.ndarray
+    rest: float
+
+    @classmethod
+    def of(
+        cls, x: np.ndarray, rows: Callable[[np.ndarray], np.ndarray], at: np.ndarray,
+        force: np.ndarray,
+    ) -> Curve:  # fmt: skip
+        """Return the curve of a recording.
+
+        Args:
+            x: (p,) nodes, rising.
+            rows: from forces (n, m) in time to the rows (N, m) of the regression.
+            at: (n,) the variable in time.
+            force: (N,) of the law, with what is left.
+        """
+        columns = []
+        for first in range(0, len(x), _BLOCK):
+            hats = [np.interp(at, x, np.eye(1, len(x), i)[0])
+                    for i in range(first, min(first + _BLOCK, len(x)))]  # fmt: skip
+            columns.append(rows(np.column_stack(hats)))
+        L = np.concatenate(columns, axis=1)
+        least = _RIDGE * np.sqrt((L * L).sum(axis=0).max()) * np.eye(len(x))
+        both = np.column_stack([np.concatenate([L, least]), np.append(force, np.zeros(len(x)))])
+        R = np.asarray(np.linalg.qr(both, mode='r'))
+        return cls(x, R[:-1, :-1], R[:-1, -1], float(R[-1, -1] ** 2))
+
+    @property
+    def size(self) -> float:
+        """Sum of squares that forces of the variable explain."""
+        return float(self.y @ self.y)
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """A text as it follows a curve best.
+
+    Attributes:
+        numbers: of its parameters but coefficients.
+        left: sum of squares that it leaves beyond what any force of the variable does.
+    """
+
+    numbers: dict[str, float]
+    left: float
+
+
+def follow(
+    formula: Formula, curve: Curve, ranges: Mapping[str, tuple[float, float]]
+) -> Followed | None:
+    """Return how a formula in `q[X]` follows a curve best; None if nowhere finite.
+
+    Args:
+        formula: text with the variable as `q[X]`.
+        curve: to follow.
+        ranges: ends of its parameters but coefficients, equal where one is known.
+    """
+    free = [n for n in sorted(formula.parameters) if n not in COEFFICIENTS]
+    low, high = np.array([ranges[n] for n in free]).reshape(-1, 2).T
+    columns = _columns(formula, curve.x, free)
+    is_ratio = low > 0.0
+
+    def at(u: np.ndarray) -> np.ndarray:
+        even = low + u * (high - low)
+        if not is_ratio.any():
+            return even
+        safe = np.where(is_ratio, low, 1.0)
+        return np.where(is_ratio, safe * (np.where(is_ratio, high, 1.0) / safe) ** u, even)
+
+    def left(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return _left(columns(at(u)), curve)
+
+    known = high <= low
+    ladder = (np.arange(_STARTS) + 0.5) / _STARTS
+    grid = list(itertools.product(*(np.zeros(1) if k else ladder for k in known)))
+    u = np.array(grid, dtype=np.float64).reshape(len(grid), len(free))
+    _, cost = left(u)
+    u = u[np.argsort(cost)[:_KEPT]]
+    if len(free) > known.sum():
+        u = _improved(u, left, ~known)
+    _, cost = left(u)
+    best = int(np.argmin(cost))
+    if not np.isfinite(cost[best]):
+        return None
+    return Followed(dict(zip(free, at(u)[best].tolist(), strict=True)), float(cost[best]))
+
+
+def _columns(formula: Formula, x: np.ndarray, free: Sequence[str]) -> Callable[..., np.ndarray]:
+    """Return what gives the columns (s, p, m) for parameters (s, len(free))."""
+    linear = [n for n in COEFFICIENTS if n in formula.parameters]
+    force: Callable[[Mapping[str, object]], object] = formula.compiled(
+        lambda name: lambda at: at[name], lambda _kind, _joint: lambda _at: x[None, :]
+    )
+
+    def columns(numbers: np.ndarray) -> np.ndarray:
+        at = {name: numbers[:, i, None] for i, name in enumerate(free)}
+        found = np.empty((len(numbers), len(x), len(linear)))
+        with np.errstate(all='ignore'):
+            for i, chosen in enumerate(linear):
+                chosen_alone = {name: float(name == chosen) for name in linear}
+                found[:, :, i] = np.asarray(force({**at, **chosen_alone}))
+        return found
+
+    return columns
+
+
+def _left(values: np.ndarray, curve: Curve) -> tuple[np.ndarray, np.ndarray]:
+    """Return residuals (s, p) and their sums of squares (s,), infinite if not finite."""
+    bad = ~np.isfinite(values).all(axis=(1, 2))
+    size = np.abs(values).max(axis=1, initial=0.0)
+    bad |= (size > _GREATEST).any(axis=1)
+    values = np.where(bad[:, None, None], 0.0, values)
+    values /= np.where(bad[:, None] | (size <= 0.0), 1.0, size)[:, None, :]
+    X = curve.R @ values
+    norm = np.sqrt((X * X).sum(axis=1))
+    X /= np.where(norm > 0.0, norm, 1.0)[:, None, :]
+    G = X.transpose(0, 2, 1) @ X + _RIDGE * np.eye(X.shape[2])
+    c = np.linalg.solve(G, (X.transpose(0, 2, 1) @ curve.y)[:, :, None])
+    r = curve.y - (X @ c)[:, :, 0]
+    return r, np.where(bad, np.inf, (r * r).sum(axis=1))
+
+
+def _improved(u: np.ndarray, left: Callable[..., tuple[np.ndarray, np.ndarray]],
+              free: np.ndarray) -> np.ndarray:  # fmt: skip
+    """Return places u (s, m) in the unit box after Levenberg-Marquardt steps, each its own."""
+    damping, index = np.full(len(u), 1e-2), np.flatnonzero(free)
+    r, cost = left(u)
+    for _ in range(_STEPS):
+        J = np.empty((*r.shape, len(index)))
+        for i, j in enumerate(index):
+            h = np.where(u[:, j] + _MOVE <= 1.0, _MOVE, -_MOVE)
+            moved = u.copy()
+            moved[:, j] += h
+            J[:, :, i] = (left(moved)[0] - r) / h[:, None]
+        J = np.nan_to_num(J, posinf=0.0, neginf=0.0)
+        G = np.einsum('spi,spj->sij', J, J)
+        scale = np.einsum('sii->si', G) + 1e-12 * (cost[:, None] + 1e-300)
+        G += damping[:, None, None] * scale[:, :, None] * np.eye(len(index))
+        step = np.linalg.solve(G, np.einsum('spi,sp->si', J, r)[:, :, None])[:, :, 0]
+        trial = u.copy()
+        trial[:, index] = np.clip(u[:, index] - np.clip(step, -_LONGEST, _LONGEST), 0.0, 1.0)
+        r_trial, cost_trial = left(trial)
+        better = cost_trial < cost
+        u = np.where(better[:, None], trial, u)
+        r = np.where(better[:, None], r_trial, r)
+        cost = np.where(better, cost_trial, cost)
+        damping = np.where(better, damping / 5.0, damping * 5.0)
+    return u

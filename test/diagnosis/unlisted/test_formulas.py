@@ -1,0 +1,115 @@
+"""Formulas that follow the data of a smooth force, and the laws that a whole search finds."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.decide.decision import decide
+from sgp_ros.diagnosis.explain.comparison import compare_models
+from sgp_ros.diagnosis.unlisted.assertion import with_laws
+from sgp_ros.diagnosis.unlisted.beside import law_of
+from sgp_ros.diagnosis.unlisted.curves import Curve, follow
+from sgp_ros.diagnosis.unlisted.sentences import of_position, of_velocity
+from sgp_ros.physics.formula import read_formula
+from test.diagnosis.worlds import CHAINS, simulate
+
+
+class _Play:
+    """A spring behind play: it holds its place until either end takes it along."""
+
+    half = 0.25
+
+    def __init__(self):
+        self.z = None
+
+    def __call__(self, _t, q, _v):
+        z = q[0] if self.z is None else self.z
+        self.z = min(max(z, q[0] - self.half), q[0] + self.half)
+        return (-1.2 * self.z,)
+
+
+def _log_friction(_t, _q, v):
+    return (-0.5 * math.copysign(math.log1p(abs(v[0]) / 0.4), v[0]),)
+
+
+def _brake_and_friction(_t, _q, v):
+    return (-0.8 * v[0] / (1.0 + (v[0] / 1.5) ** 2) - 0.3 * math.tanh(v[0] / 0.01),)
+
+
+def _contact(_t, q, _v):
+    return (-2.0 * max(q[0] - 0.3, 0.0) ** 1.5,)
+
+
+def _spring_between(_t, q, _v):
+    return (-0.8 * (q[0] - q[1]) ** 3, 0.0)
+
+
+def _found(equations_for, force, links):
+    _, equations = equations_for(simulate(CHAINS[links], 11, 10.0, force=force))
+    comparison = compare_models(equations, lambda _share: None)
+    model = with_laws(equations, comparison, decide(equations, comparison)).decision.model
+    law = law_of(model, 0)
+    assert law is not None, [s.name for s in model.effects]
+    assert model.effects == (law,)
+    return law.effect.formula.partition(' = ')[2], law.report(equations.motion)
+
+
+@pytest.mark.parametrize(
+    ('force', 'links', 'formula', 'numbers'),
+    [
+        (_log_friction, 1, 'a*log(1 + abs(dq[joint0])/v0)*sign(dq[joint0])',
+         {'a': -0.5, 'v0': 0.4}),
+        (_brake_and_friction, 1,
+         'a*dq[joint0]/(1 + (dq[joint0]/v0)**2) + d*tanh(dq[joint0]/v_s)',
+         {'a': -0.8, 'v0': 1.5, 'd': -0.3}),
+        (_contact, 1, 'a*(max(q[joint0] - x0, 0)/r)**p0', {'p0': 1.5, 'x0': 0.3}),
+        (_Play(), 1, 'a*play(q[joint0], T)', {'a': -1.2, 'T': 0.5}),
+        (_spring_between, 2, 'a*(q[joint0] - q[joint1])**3', {'a': -0.8}),
+    ],
+    ids=['log friction', 'brake and friction', 'contact', 'play', 'spring between'],
+)  # fmt: skip
+def test_laws_are_found_with_their_numbers(equations_for, force, links, formula, numbers):
+    """Of one joint, of what it did before, of two joints; alone and in a sum."""
+    found, values = _found(equations_for, force, links)
+    assert found == formula
+    for name, value in numbers.items():
+        assert values[name] == pytest.approx(value, rel=0.02), name
+
+
+@pytest.mark.parametrize('factor', [1.0, 3.0])
+def test_a_curve_says_what_a_formula_leaves_of_all_rows(factor):
+    """As least squares on the rows themselves do, filtered ones too."""
+    rng = np.random.default_rng(0)
+    at = rng.uniform(-1.0, 2.0, 3000)
+    nodes = np.linspace(at.min(), at.max(), 241)
+
+    def rows(force):
+        return factor * (force[:-2] + 2.0 * force[1:-1] + force[2:])[::3]
+
+    true = 0.7 * np.tanh((at - 0.3) / 0.4) + 0.2
+    y = rows(true[:, None])[:, 0] + rng.normal(0.0, 0.01, 1000)
+    curve = Curve.of(nodes, rows, at, y)
+    ranges = {'x0': (-1.0, 2.0), 'w0': (0.05, 5.0)}
+    read = read_formula('a*tanh((q[X] - x0)/w0) + d', is_law=True)
+    right = follow(read, curve, ranges)
+    assert right is not None
+    assert right.numbers['x0'] == pytest.approx(0.3, abs=0.01)
+    assert right.numbers['w0'] == pytest.approx(0.4, abs=0.01)
+    straight = follow(read_formula('a*q[X] + d', is_law=True), curve, {})
+    assert straight is not None
+    X = rows(np.column_stack([at, np.ones_like(at)]))
+    left = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
+    assert straight.left + curve.rest == pytest.approx(left @ left, rel=1e-3)
+    assert right.left + curve.rest == pytest.approx(1000 * 1e-4, rel=0.15)
+
+
+def test_texts_are_told_apart():
+    """None comes twice from its grammar, and each can be read."""
+    for texts in (of_position(), of_velocity(is_own=True), of_velocity(is_own=False)):
+        found = list(texts)
+        assert len(found) < 500
+        for text in found:
+            read_formula(text.replace('X', 'q[X]'), is_law=True)
