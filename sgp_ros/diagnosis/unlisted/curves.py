@@ -18,7 +18,7 @@ import numpy as np
 from sgp_ros.diagnosis.unlisted.sentences import COEFFICIENTS
 from sgp_ros.physics.formula import Formula
 
-_STARTS, _KEPT, _STEPS = 5, 4, 12
+_STARTS, _KEPT, _STEPS = 5, 3, 9
 """Starts between the ends of each parameter's range, those that are improved, and their steps."""
 _RIDGE, _MOVE, _LONGEST, _GREATEST, _BLOCK = 1e-10, 1e-4, 0.25, 1e100, 16
 

@@ -77,7 +77,7 @@ _NARROWEST, _WIDEST = 0.03, 3.0
 """Widths in parts of the range that was seen."""
 _WIDE = 5.0
 """Range in which some part of every formula is not zero, in parts of the greatest value."""
-_PIECES = 120
+_PIECES = 100
 """Of a curve, even."""
 
 

@@ -9,14 +9,14 @@ with the bodies and all other effects, as every other model is.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import stats
 
 from sgp_ros.batch.least_squares import correlation_factor
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import ALIKE, NEARLY
+from sgp_ros.diagnosis.criteria import ALIKE, NEARLY, PER_PARAMETER
 from sgp_ros.diagnosis.decide.decision import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model
@@ -97,6 +97,9 @@ def search(equations: Equations, scale: Scale, listed: Model, joint: int) -> Sea
         return None
     laws: dict[object, Model] = {}
     for number, model in enumerate(_unlike(smooth, joint)[:SHAPES]):
+        best = max(map(scale.worth, laws.values()), default=-np.inf)
+        if scale.worth(model) + look.most_spared(model) < best:
+            continue
         for law in look.formulas(model, FITTED if number else FIRST):
             key = law.key, law.is_free
             if key not in laws or scale.worth(law) > scale.worth(laws[key]):
@@ -129,6 +132,7 @@ class _Look:
     scale: Scale
     listed: Model
     joint: int
+    followed: dict[object, list[FoundLaw]] = field(default_factory=dict)
 
     def ranked(self) -> list[Model]:
         """Return models with a smooth force, best first.
@@ -170,15 +174,23 @@ class _Look:
         return fit(self.columns, effects, model.sigma, is_free=model.is_free, w=model.w, rounds=2,
                    steps=4, still=len(effects))  # fmt: skip
 
+    def most_spared(self, smooth: Model) -> float:
+        """Return by how much a formula may be worth more than a smooth force, by its price."""
+        placed, _ = smooth_of(smooth, self.joint)
+        return PER_PARAMETER * len(placed.coefficients) + ALIKE
+
     def formulas(self, smooth: Model, count: int) -> Iterator[Model]:
         """Yield models with so many formulas in place of the smooth force of a model."""
         placed, chosen = smooth_of(smooth, self.joint)
         kept = tuple(s for s in smooth.effects if s is not placed)
         base = self._without(kept, is_free=smooth.is_free)
-        scale, rows = self.scale, len(smooth.residual)
-        floor = rows * scale.power[self.joint] * scale.floor[self.joint]
-        motion = smooth.frame.equations.motion
-        laws = list(formulas(chosen, motion, curve_of(smooth, self.joint), float(floor), count))
+        known = chosen.key, frozenset(s.key for s in kept)
+        if known not in self.followed:  # other bodies hardly change what follows it
+            scale, rows = self.scale, len(smooth.residual)
+            floor = rows * scale.power[self.joint] * scale.floor[self.joint]
+            motion, curve = smooth.frame.equations.motion, curve_of(smooth, self.joint)
+            self.followed[known] = list(formulas(chosen, motion, curve, float(floor), count))
+        laws = self.followed[known][:count]
         yield from self._fitted(base, laws, None)
 
     def _fitted(

@@ -63,9 +63,9 @@ def of_position() -> Iterator[str]:
     ]
     for term in (*OF_POSITION, *products):
         yield from _with_constant(_sum(term))
-    for plain, term in itertools.product(('X', 'X**2'), (*OF_POSITION, *products)):
+    for term in (*OF_POSITION, *products):
         if term not in POLYNOMIALS and 'a*' not in term:
-            yield from _with_constant(f'a*{plain} + b*{term}')
+            yield from _with_constant(f'a*X + b*{term}')
     yield 'a*X + b*X**2'
     yield 'a*X + b*X**3'
 
