@@ -71,7 +71,13 @@ setup(
         # Many recordings on many processes, and their results as one table: `sgp campaign`.
         'campaign': ['distributed>=2024.5', 'pyarrow>=14'],
         # The rivals of `sgp bench`.
-        'bench': ['scikit-learn>=1.4', 'torch>=2', 'gpytorch>=1.11', 'mujoco[sysid]>=4'],
+        'bench': [
+            'scikit-learn>=1.4',
+            'torch>=2',
+            'gpytorch>=1.11',
+            'mujoco[sysid]>=4',
+            'pysindy>=2',
+        ],
         'test': [
             'mujoco>=3.2',
             'rich>=13',

@@ -10,7 +10,7 @@ from typing import Any
 from sgp_ros.apps.recorded import gains_of, read_events, refuse_moving_base
 from sgp_ros.batch.contradictions import require_sense
 from sgp_ros.batch.recording_check import RecordingCheck, check_recording
-from sgp_ros.diagnosis.connected import Connected, connect
+from sgp_ros.diagnosis.connected import Connected, connect, with_laws
 from sgp_ros.diagnosis.gathered import Knowledge, gather
 from sgp_ros.diagnosis.mapping import finding_content
 from sgp_ros.diagnosis.result import Finding
@@ -66,6 +66,8 @@ def run_check(
         require_sense(Path(bag).name, found.refusals)
         recordings = gather({'': events}, {}, nominal.tree, known, holds_out=False)
         connected = connect(recordings, nominal.tree, lambda x: progress(0.1 + 0.8 * x))
+        if connected.findings:  # a law that no list has may look like one of these
+            connected = with_laws(connected)
     except SgpError as error:
         said = f'The set-up cannot be checked: {error}'
         content |= {'setup': None, 'is_fit': False}
