@@ -75,8 +75,10 @@ def _law_search(s: LawSearch) -> dict[str, Any]:
             **{name: [_finite(x) for x in values]
                for name, values in (('x', s.x), ('mean', s.mean), ('half_band', s.half))},
         },
+        'beyond_x': [_finite(x) for x in s.beyond_x],
         'formulas': [
             {'formula': t.formula, 'nearest': t.words, 'left': _finite(t.left),
+             'fits_as_well': t.is_alike, 'beyond': [_finite(x) for x in t.beyond],
              'parameters': {name: {'value': _finite(x), 'unit': unit}
                             for name, (x, unit) in t.parameters.items()}}
             for t in s.formulas

@@ -138,6 +138,8 @@ class TriedFormula:
         words: the nearest known physics.
         curve: (s,) over the factor of the search at `seen_x` of it; NaN where it is a function
             of something else.
+        beyond: (b,) the same at `beyond_x`.
+        is_alike: whether the recording hardly tells it from the best one.
     """
 
     formula: str
@@ -145,6 +147,8 @@ class TriedFormula:
     left: float
     words: str
     curve: np.ndarray
+    beyond: np.ndarray
+    is_alike: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,6 +171,7 @@ class LawSearch:
         words: the shape as a sentence.
         seen_x: (s,) the variable in the recording, ascending.
         seen: (s,) the data there: the shape, and what is left over the factor.
+        beyond_x: (b,) the variable, half as far again to either side.
     """
 
     joint: str
@@ -184,3 +189,4 @@ class LawSearch:
     words: str
     seen_x: np.ndarray
     seen: np.ndarray
+    beyond_x: np.ndarray

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sgp_ros.diagnosis.result import Diagnosis
-from sgp_ros.diagnosis.shown import LawSearch
+from sgp_ros.diagnosis.shown import LawSearch, TriedFormula
 from sgp_ros.diagnosis.unlisted.formulas import NAMELESS
 from sgp_ros.report.charts import Chart, Series, spoken
 from sgp_ros.report.diagnosis_text import percent
@@ -17,19 +17,22 @@ from sgp_ros.report.figures import BAND, GREY, MEASURED, PREDICTED
 
 _TONES = ('law1', 'law2', 'law3')
 _COLOURS = ('#009E73', '#CC79A7', '#6A51A3')
+_APART = 0.05
+"""Formulas part where they differ by this part of what the shape spans."""
 _SHAPE = 'shape without a formula'
 
 
 def search_chart(search: LawSearch) -> Chart:
     """Return the shape with its 95 % band, the data, and the formulas of the same variable."""
-    x = search.seen_x
-    mean, half = (np.interp(x, search.x, y) for y in (search.mean, search.half))
+    x, order = _with_beyond(search)
+    mean, half = (np.interp(x, search.x, y, np.nan, np.nan) for y in (search.mean, search.half))
+    seen = np.concatenate([search.seen, np.full(len(x) - len(search.seen), np.nan)])[order]
     series = [
-        Series('measured', search.seen, 'measured', 'points'),
+        Series('measured', seen, 'measured', 'points'),
         Series(_SHAPE, mean, 'final', 'line', half),
     ]
     series += [
-        Series(f'formula {i + 1}', t.curve, tone, 'dashed')
+        Series(f'formula {i + 1}', _curve(search, t)[order], tone, 'dashed')
         for i, (t, tone) in enumerate(zip(search.formulas, _TONES, strict=False))
         if np.isfinite(t.curve).any()
     ]
@@ -40,6 +43,41 @@ def search_chart(search: LawSearch) -> Chart:
         f'{search.force_unit} wide.',
         f'{search.variable} [{search.unit}]', _label(search), x, series, limit=_limits(search),
     )  # fmt: skip
+
+
+def _outside(search: LawSearch) -> np.ndarray:
+    """Return which places of `beyond_x` were not seen, (b,)."""
+    return np.asarray((search.beyond_x < search.x[0]) | (search.beyond_x > search.x[-1]))
+
+
+def _with_beyond(search: LawSearch) -> tuple[np.ndarray, np.ndarray]:
+    """Return the variable where it was seen and beyond, ascending, and the order for that."""
+    x = np.concatenate([search.seen_x, search.beyond_x[_outside(search)]])
+    order = np.argsort(x, kind='stable')
+    return x[order], order
+
+
+def _curve(search: LawSearch, tried: TriedFormula) -> np.ndarray:
+    """Return a formula where the variable was seen, then beyond."""
+    return np.concatenate([tried.curve, tried.beyond[_outside(search)]])
+
+
+def beyond_sentence(search: LawSearch) -> str:
+    """Return what formulas say where nothing was seen that the recording hardly tells apart."""
+    alike = [t.beyond for t in search.formulas if t.is_alike and np.isfinite(t.beyond).all()]
+    if not alike:
+        return ''
+    ends = []
+    for at in (0, -1):
+        low, high = min(t[at] for t in alike), max(t[at] for t in alike)
+        apart = high - low > _APART * max(np.ptp(search.mean), 1e-300)
+        said = f'{low:.2g} to {high:.2g}' if apart else f'{0.5 * (low + high):.2g}'
+        ends.append(f'{said} {search.force_unit} at {search.beyond_x[at]:.2g} {search.unit}')
+    which = 'this formula gives' if len(alike) == 1 else 'formulas that fit as well give'
+    return (
+        f'Beyond what was seen ({search.x[0]:.2g} to {search.x[-1]:.2g} {search.unit}) {which} '
+        f'{ends[0]} and {ends[1]}; no data support that.'
+    )
 
 
 def _label(search: LawSearch) -> str:
@@ -62,12 +100,15 @@ def draw_searches(searches: Sequence[LawSearch]) -> Figure:
         axes = figure.add_subplot(1, len(searches), i + 1)
         axes.plot(search.seen_x, search.seen, '.', ms=4, color=MEASURED, label='measured',
                   rasterized=True)  # fmt: skip
+        x, order = _with_beyond(search)
+        for low, high in ((x[0], search.x[0]), (search.x[-1], x[-1])):
+            axes.axvspan(low, high, color=GREY, alpha=0.12, lw=0)
         axes.fill_between(search.x, search.mean - search.half, search.mean + search.half,
                           color=BAND, lw=0, alpha=0.7)  # fmt: skip
         axes.plot(search.x, search.mean, color=PREDICTED, lw=1.6, label=_SHAPE)
         for n, (t, colour) in enumerate(zip(search.formulas, _COLOURS, strict=False)):
             if np.isfinite(t.curve).any():
-                axes.plot(search.seen_x, t.curve, '--', lw=1.2, color=colour,
+                axes.plot(x, _curve(search, t)[order], '--', lw=1.2, color=colour,
                           label=f'formula {n + 1}')  # fmt: skip
         axes.axhline(0.0, color=GREY, lw=0.6)
         axes.set(xlabel=f'{search.variable} [{search.unit}]', ylabel=_label(search),
@@ -87,6 +128,7 @@ def search_rows(found: Diagnosis) -> list[dict[str, Any]]:
             'left': f'This shape leaves {percent(s.left)} of the mean squared effort of '
                     f'{s.joint}; the best listed effects leave {percent(s.left_listed)}.',
             'conclusion': _conclusion(s),
+            'beyond': beyond_sentence(s),
             'has_nearest': any(t.words != NAMELESS for t in s.formulas),
             'formulas': [
                 {

@@ -30,8 +30,8 @@ def test_a_band_is_compared_once(monkeypatch, plain, corrected, times):
         return _of(most_hz)
 
     for name, stub in {
-        'compared': compare, '_gain': lambda *_: 100.0, '_finding': lambda *_: None,
-        '_equal': lambda _: (), '_stands_for_gains': lambda *_: False,
+        'compared': compare, '_gain': lambda *_: 100.0, 'error_finding': lambda *_: None,
+        'equal_errors': lambda _: (), '_stands_for_gains': lambda *_: False,
     }.items():  # fmt: skip
         monkeypatch.setattr(connected, name, stub)
     correction = SimpleNamespace(tree=lambda tree: tree)

@@ -135,12 +135,14 @@ def _overlay(time, position, before, after):
 def search(why_not='the best formula follows the shape only approximately'):
     """Return a search at `elbow` that ended with friction over a place."""
     x = np.linspace(-1.0, 1.0, 41)
-    shape = 0.2 + 0.1 * x**2
+    shape, beyond = 0.2 + 0.1 * x**2, np.linspace(-2.0, 2.0, 82)
     formula = TriedFormula(
         'tau_x[elbow] = (a*q[elbow]**2 + d)*sign(dq[elbow])',
         {'a': (0.1, 'N m/rad^2'), 'd': (0.2, 'N m')}, 0.01, 'a law found from the data', shape,
+        0.2 + 0.1 * beyond**2, is_alike=True,
     )  # fmt: skip
     return LawSearch(
         'elbow', 'q[elbow]', 'sign(dq[elbow])', 'rad', 'N m', x, shape, np.full(41, 0.01), 0.008,
         0.03, (formula,), why_not, 'follows the position of elbow: 0.3 N m at -1 rad', x, shape,
+        beyond,
     )  # fmt: skip

@@ -15,6 +15,7 @@ from hypothesis.extra import numpy as arrays
 from sgp_ros.report.charts import Chart, Series, embedded_data, kept
 from sgp_ros.report.diagnosis import render
 from sgp_ros.report.diagnosis_charts import diagnosis_charts
+from sgp_ros.report.law_search import beyond_sentence, search_chart
 from sgp_ros.report.robot_picture import LEVELS, robot_picture
 from sgp_ros.rigid.tree import read_urdf
 from test.report.diagnoses import COULOMB, LEVEL, OFF, UNKNOWN, diagnosis, search
@@ -125,3 +126,18 @@ def test_the_robot_is_drawn_with_its_joints_and_their_shares():
     assert 'elbow 100 %' in picture
     assert '&lt;shoulder&gt; 0 %' in picture
     assert 'shoulder>' not in picture
+
+
+def test_what_nothing_supports_is_said_as_such():
+    """One value where formulas agree beyond what was seen, their span where they part."""
+    one = search()
+    said = beyond_sentence(one)
+    assert 'this formula gives 0.6 N m at -2 rad and 0.6 N m at 2 rad' in said
+    other = replace(one.formulas[0], beyond=0.2 + 0.1 * np.abs(one.beyond_x))
+    both = replace(one, formulas=(*one.formulas, other))
+    assert 'fit as well give 0.4 to 0.6 N m at -2 rad' in beyond_sentence(both)
+    unlike = replace(one, formulas=(replace(one.formulas[0], is_alike=False),))
+    assert beyond_sentence(unlike) == ''
+    series = {x.label: x.y for x in search_chart(one).series}
+    assert np.isfinite(series['formula 1']).all()
+    assert np.isnan(series['measured']).any()

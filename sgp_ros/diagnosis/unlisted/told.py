@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sgp_ros.batch.least_squares import correlation_factor
-from sgp_ros.diagnosis.criteria import INTERVAL, LEAST_SHARE
+from sgp_ros.diagnosis.criteria import ALIKE, INTERVAL, LEAST_SHARE
+from sgp_ros.diagnosis.decide.decision import Scale
 from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.shown import LawSearch, TriedFormula
@@ -17,11 +19,14 @@ from sgp_ros.diagnosis.unlisted.formulas import FoundLaw
 from sgp_ros.diagnosis.unlisted.search import Searched
 from sgp_ros.diagnosis.unlisted.shapes import SmoothForce, force_unit, smooth_of
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.grammar import MEMORY
 
 POINTS = 41
 _FORMULAS = 3
 _MOST_SEEN, _WEAK = 600, 0.2
 """Rows of the recording beside a shape; the least factor of them, relative to the greatest."""
+_BEYOND = 0.5
+"""Range in which formulas are told, beyond what was seen, in parts of that."""
 _CLEAR = 0.85
 """A curve rises or falls where it leaves this part of its greatest value."""
 
@@ -119,10 +124,44 @@ def _curve(law: EffectAt, searched: Searched, seen: Seen) -> np.ndarray:
     )
 
 
+def _beyond(law: EffectAt, searched: Searched, x: np.ndarray) -> np.ndarray:
+    """Return a formula over its factor at places of its variable (b,); NaN if of other kind.
+
+    A sign is that of a fast motion ahead, a factor that is a speed or an effort is one; what
+    remembers has come to rest.
+    """
+    _, smooth = smooth_of(searched.smooth, searched.joint)
+    assert isinstance(law.effect, FoundLaw)
+    own, numbers = law.effect.smooth, law.report(searched.smooth.frame.equations.motion)
+    gate = '' if own.is_of_own_speed else own.gate
+    if own.variable != smooth.variable or gate != ('' if smooth.is_of_own_speed else smooth.gate):
+        return np.full(len(x), np.nan)
+    variable = own.variable
+    factor = np.inf if gate in {'sign', 'soft'} else 1.0
+
+    def signal(kind: str, joint: str) -> Callable[[object], np.ndarray]:
+        if kind == variable.kind and joint == variable.joint:
+            return lambda _at: x
+        is_other = variable.other is not None and joint == variable.other[1]
+        return lambda _at: np.full(len(x), 0.0 if is_other else factor)
+
+    force: Callable[[object], object] = law.effect.law.compiled(
+        lambda name: lambda _at: float(numbers[name]), signal,
+        lambda name, _signals: (lambda _at, value, _number: value) if name in MEMORY else None,
+    )  # fmt: skip
+    with np.errstate(all='ignore'):
+        found = np.broadcast_to(np.asarray(force(None), dtype=np.float64), (len(x),))
+    side = np.sign(x) if smooth.is_of_own_speed and smooth.gate == 'sign' else 1.0
+    return np.where(np.isfinite(found), found * side, np.nan)
+
+
 def _search(found: Explained, searched: Searched) -> LawSearch:
     _, smooth = smooth_of(searched.smooth, searched.joint)
     shape, motion = shape_of(searched), searched.smooth.frame.equations.motion
     seen = seen_by(searched)
+    reach = _BEYOND * float(np.ptp(shape.x))
+    beyond = np.linspace(shape.x[0] - reach, shape.x[-1] + reach, 2 * POINTS)
+    scale = Scale.of(searched.smooth.frame.equations, found.comparison)
     tree = motion.tree
     prismatic = bool(tree.is_prismatic[searched.joint])
     unit = smooth.variable.unit(tree)
@@ -140,10 +179,11 @@ def _search(found: Explained, searched: Searched) -> LawSearch:
             continue
         units = {q.name: q.unit for q in law.effect.quantities}
         numbers = {n: (float(x), units[n]) for n, x in law.report(motion).items()}
-        curve = _curve(law, searched, seen)
-        tried.append(
-            TriedFormula(law.effect.formula, numbers, left(model), law.effect.words, curve)
-        )
+        tried.append(TriedFormula(
+            law.effect.formula, numbers, left(model), law.effect.words,
+            _curve(law, searched, seen), _beyond(law, searched, beyond),
+            is_alike=scale.fit(searched.laws[0]) - scale.fit(model) < ALIKE,
+        ))  # fmt: skip
     return LawSearch(
         joint=tree.joint_names[searched.joint],
         variable=smooth.variable.text, factor=smooth.factor, unit=unit, force_unit=per,
@@ -153,6 +193,7 @@ def _search(found: Explained, searched: Searched) -> LawSearch:
             found, searched.joint, left(searched.listed) - left(searched.smooth)
         ),
         words=sentence(smooth, shape, unit, per), seen_x=seen.x, seen=seen.y,
+        beyond_x=beyond,
     )  # fmt: skip
 
 
