@@ -149,6 +149,7 @@ def not_carried_over(proofs: Mapping[str, Proof], still: Collection[str]) -> dic
 
     It leaves more than `CARRIED_REST` of what the nominal robot does, more than counts as physics,
     and `CARRIED_ERROR` times what it leaves where it was fitted; by the lower end of the interval.
+    Or it leaves what counts as physics where the nominal robot leaves less, by both intervals.
 
     Args:
         proofs: by stem of the recording; `train` is what was learned from.
@@ -160,6 +161,9 @@ def not_carried_over(proofs: Mapping[str, Proof], still: Collection[str]) -> dic
             before = proof.nmse_before[joint]
             unit = proof.yardsticks['nmse'][joint] / max(train.yardsticks['nmse'][joint], 1e-300)
             is_large = low > max(CARRIED_REST * before, LEAST_SHARE)
+            known = proof.intervals.get('nmse_before', {}).get(joint)
+            is_harm = known is not None and low > known[1]
+            is_large |= is_harm and proof.nmse_after[joint] > LEAST_SHARE
             if stem == 'train' or joint in still or not is_large:
                 continue
             if low * unit**2 > CARRIED_ERROR * train.nmse_after[joint]:

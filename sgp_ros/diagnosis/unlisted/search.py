@@ -29,6 +29,7 @@ from sgp_ros.diagnosis.unlisted.shapes import (
     SMOOTHED,
     SmoothForce,
     Variable,
+    smooth_at_bound,
     smooth_forces,
     smooth_of,
 )
@@ -139,7 +140,12 @@ class _Look:
 
         Of two joints together and of what was before only such as are worth more than any other.
         """
-        found = sorted(self.smooth(), key=lambda m: -self.scale.worth(m))
+        motion = self.columns.equations(frozenset()).motion
+        found = [m for m in self.smooth() if not smooth_at_bound(m, self.joint, motion)]
+        found.sort(key=lambda m: -self.scale.worth(m))
+        if found and not smooth_of(found[0], self.joint)[1].is_of_own_speed:
+            found.append(self._finer(found[0], smooth_of(found[0], self.joint)[1]))
+            found.sort(key=lambda m: -self.scale.worth(m))
         plain = next((m for m in found if self._variable(m).is_plain), None)
         least = self.scale.worth(plain) + ALIKE if plain is not None else -np.inf
         return [m for m in found if self._variable(m).is_plain or self.scale.worth(m) > least]
@@ -164,12 +170,18 @@ class _Look:
         law = law_of(model, self.joint)
         assert law is not None
         assert isinstance(law.effect, FoundLaw)
+        return self._finer(model, law.effect.smooth)
+
+    def _finer(self, model: Model, coarse: SmoothForce) -> Model:
+        """Return a model with a fine spline in the place of the law or smooth force it has."""
         motion = self.columns.equations(frozenset()).motion
-        coarse = law.effect.smooth
-        knots = coarse.variable.knots(motion, FINE)
-        width, name = law.report(motion).get(SMOOTHED, 0.0), motion.tree.moving_names[self.joint]
-        fine = SmoothForce(self.joint, coarse.variable, coarse.gate, knots, name, float(width))
-        shape = np.array([law.report(motion)[n] for n in fine.shape_names()], dtype=np.float64)
+        law = law_of(model, self.joint)
+        assert law is not None
+        numbers = law.report(motion)
+        knots, name = coarse.variable.knots(motion, FINE), motion.tree.moving_names[self.joint]
+        width = float(numbers.get(SMOOTHED, coarse.width))
+        fine = SmoothForce(self.joint, coarse.variable, coarse.gate, knots, name, width)
+        shape = np.array([numbers[n] for n in fine.shape_names()], dtype=np.float64)
         effects = tuple(EffectAt(fine, s.place, shape) if s is law else s for s in model.effects)
         return fit(self.columns, effects, model.sigma, is_free=model.is_free, w=model.w, rounds=2,
                    steps=4, still=len(effects))  # fmt: skip

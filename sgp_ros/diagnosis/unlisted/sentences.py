@@ -27,6 +27,9 @@ OF_POSITION = (
     '(max(X - x0, 0)/r)**p0', '(max(x0 - X, 0)/r)**p0', 'max(abs(X - x0) - w0, 0)*sign(X - x0)',
     'tanh((X - x0)/w0)', 'exp(X/w0)', 'exp(-X/w0)', f'exp(-{_U}**2)', f'1/(1 + {_U}**2)',
     f'(X - x0)*exp(-{_U}**2)', f'(X - x0)/(1 + {_U}**2)', f'(X - x0)/(1 + {_U}**2)**2',
+    f'max(1 - {_U}**2, 0)', 'max(1 - abs(X - x0)/w0, 0)', 'min(max((X - x0)/w0, -1), 1)',
+    'sin(n0*min(max(X - x0, -3.14159/n0), 3.14159/n0))', '1/(1 + e0*cos(n0*(X - x0)))',
+    'a*sin(n0*(X - x0)) + b*sin(2*n0*(X - x0))',
     f'(X - x0)/sqrt(1 + {_U}**2)', '(X - x0)/(1 + abs(X - x0)/w0)', 'log(1 + exp((X - x0)/w0))',
     'sin(n0*(X - x0))', 'a*sin(n0*X) + b*cos(n0*X)', 'sin(n0*(X - x0))/(1 + e0*cos(n0*(X - x0)))',
     'sin(n0*(X - x0))/sqrt(1 + e0*cos(n0*(X - x0)))',
@@ -35,8 +38,10 @@ OF_POSITION = (
 """Terms of a position; those with coefficients of their own are whole sums."""
 OF_VELOCITY = (
     'X', 'abs(X)*X', 'X**3', '(abs(X)/r)**p0*sign(X)', 'X/(1 + (X/v0)**2)', 'X/(1 + abs(X)/v0)',
-    'X/sqrt(1 + (X/v0)**2)', 'tanh(X/v0)', 'log(1 + abs(X)/v0)*sign(X)', 'X*exp(-abs(X)/v0)',
-    'X*exp(-(X/v0)**2)', 'max(abs(X) - v0, 0)*sign(X)', 'max(abs(X) - v0, 0)**2*sign(X)',
+    'X*(1 + (X/v0)**2)**(-p0)', 'log(abs(X)/v0 + sqrt(1 + (X/v0)**2))*sign(X)',
+    'max(X**2 - v0**2, 0)*sign(X)', 'min(max(X, -v0), v0)', 'X/sqrt(1 + (X/v0)**2)',
+    'tanh(X/v0)', 'log(1 + abs(X)/v0)*sign(X)', 'X*exp(-abs(X)/v0)', 'X*exp(-(X/v0)**2)',
+    'max(abs(X) - v0, 0)*sign(X)', 'max(abs(X) - v0, 0)**2*sign(X)',
     '(exp(abs(X)/v0) - 1)*sign(X)', 'X**2', 'max(X, 0)', 'min(X, 0)', 'max(X, 0)**2',
     'min(X, 0)**2', 'exp(X/v0)', 'exp(-X/v0)',
 )  # fmt: skip

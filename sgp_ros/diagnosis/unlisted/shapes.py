@@ -277,3 +277,11 @@ def smooth_of(model: Model, joint: int) -> tuple[EffectAt, SmoothForce]:
         (s, s.effect.at(s.shape)) for s in model.effects
         if s.place.joint == joint and isinstance(s.effect, SmoothForce)
     )  # fmt: skip
+
+
+def smooth_at_bound(model: Model, joint: int, motion: ObservedMotion) -> bool:
+    """Return whether what remembers does so as little, or as much, as is looked for."""
+    placed, _ = smooth_of(model, joint)
+    low, high = placed.effect.bounds(motion, placed.place)
+    has_memory = placed.effect.shape_names() == (MEMORY,)
+    return bool(has_memory and ((placed.shape < 1.02 * low) | (placed.shape > 0.98 * high)).any())

@@ -118,6 +118,16 @@ def test_what_does_not_carry_over_is_told(before, after, interval, still, is_tol
     assert set(reasons_to_doubt(proofs, still)) == set(found.values())
 
 
+@pytest.mark.parametrize(('after', 'low', 'is_told'),
+                         [(0.012, 8e-4, True), (0.003, 8e-4, False), (0.012, 2e-5, False)])  # fmt: skip
+def test_what_does_harm_elsewhere_does_not_carry_over(after, low, is_told):
+    """A force that has gone there, though its few places leave a wide interval."""
+    far = _proof(1e-5, after, (low, 0.2))
+    far.intervals['nmse_before'] = {'elbow': (3e-6, 3e-5)}
+    found = not_carried_over({'train': _proof(0.13, 8e-6, (7e-6, 9e-6)), 'far': far}, ())
+    assert bool(found) is is_told
+
+
 def test_noise_that_was_there_before_is_no_failure():
     """What is left is as large where the model was fitted."""
     noisy = _proof(0.4, 0.1, (0.08, 0.12))
