@@ -178,6 +178,8 @@ class _Look:
         law = law_of(model, self.joint)
         assert law is not None
         numbers = law.report(motion)
+        if isinstance(law.effect, SmoothForce):
+            numbers |= dict(zip(law.effect.shape_names(), law.shape.tolist(), strict=True))
         knots, name = coarse.variable.knots(motion, FINE), motion.tree.moving_names[self.joint]
         width = float(numbers.get(SMOOTHED, coarse.width))
         fine = SmoothForce(self.joint, coarse.variable, coarse.gate, knots, name, width)
@@ -221,7 +223,8 @@ class _Look:
     def _bases(self) -> Iterator[Model]:
         """Yield models of all other joints with some of the effects of this one.
 
-        None, all, and all but one; with bodies as in the robot's file, and free.
+        None, all, all but one, all but those of one variable; with bodies as in the robot's
+        file, and free.
         """
         for is_free in (False, True):
             for kept in _subsets(own_effects(self.listed, self.joint)):
@@ -266,4 +269,8 @@ def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
 
 def _subsets(effects: tuple[EffectAt, ...]) -> Iterable[tuple[EffectAt, ...]]:
     found = [(), effects, *(tuple(s for s in effects if s is not out) for out in effects)]
+    found += [
+        tuple(s for s in effects if s.effect.drawn_over != over)
+        for over in dict.fromkeys(s.effect.drawn_over for s in effects)
+    ]
     return dict.fromkeys(found)

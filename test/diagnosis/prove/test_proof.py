@@ -118,8 +118,10 @@ def test_what_does_not_carry_over_is_told(before, after, interval, still, is_tol
     assert set(reasons_to_doubt(proofs, still)) == set(found.values())
 
 
-@pytest.mark.parametrize(('after', 'low', 'is_told'),
-                         [(0.012, 8e-4, True), (0.003, 8e-4, False), (0.012, 2e-5, False)])  # fmt: skip
+@pytest.mark.parametrize(
+    ('after', 'low', 'is_told'),
+    [(0.012, 8e-4, True), (0.003, 8e-4, False), (0.012, 2e-5, False)],
+)
 def test_what_does_harm_elsewhere_does_not_carry_over(after, low, is_told):
     """A force that has gone there, though its few places leave a wide interval."""
     far = _proof(1e-5, after, (low, 0.2))
