@@ -44,7 +44,7 @@ busy: $(VENV)/.test
 MEASURED := $(patsubst sgp_ros/%/__init__.py,--cov=sgp_ros.%,\
     $(wildcard $(patsubst %,sgp_ros/%/__init__.py,gp engine diagnosis)))
 coverage: $(VENV)/.test
-	$(BIN)/python $(PYTEST) -q test/gp test/rigid test/contracts test/engine $(wildcard test/diagnosis) \
+	$(BIN)/python $(PYTEST) -q -n 2 --dist loadfile test/gp test/rigid test/contracts test/engine $(wildcard test/diagnosis) \
 	    $(MEASURED) --cov-branch --cov-fail-under=95 --cov-report=term:skip-covered
 
 oldest: $(OLDEST)/.made
