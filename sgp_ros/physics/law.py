@@ -180,7 +180,10 @@ class FormulaLaw(Effect):
                                  special)  # fmt: skip
 
     def _holds(self) -> bool:
-        """Return whether it is dry friction: at rest it opposes either direction, mostly."""
+        """Return whether it is dry friction: at rest it opposes either direction, mostly.
+
+        The sign of one whose numbers are not known is not known either.
+        """
         if 'sign' not in self.law.functions:
             return False
         names = sorted({self.joint, *(j for _, j in self.law.signals if j)})
@@ -199,7 +202,10 @@ class FormulaLaw(Effect):
                 np.asarray(force(_Seen(rest, numbers | {'': s})), dtype=np.float64)  # type: ignore[arg-type]
                 for s in (1.0, -1.0)
             )
-        return bool(np.mean((up < 0.0) & (down > 0.0)) > 0.5)
+        holds = (up < 0.0) & (down > 0.0)
+        if self.is_open:
+            holds |= (up > 0.0) & (down < 0.0)
+        return bool(np.mean(holds) > 0.5)
 
 
 def law_variable(text: str) -> str:

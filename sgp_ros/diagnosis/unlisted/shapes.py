@@ -148,13 +148,14 @@ class SmoothForce(Effect):
 
     name = 'smooth_force'
     words = 'a smooth force without a name'
+    has_chosen_form = True
 
     def __init__(
         self, joint: int, variable: Variable, gate: str, knots: np.ndarray, name: str,
         width: float = 0.0,
     ) -> None:  # fmt: skip
         self.joint, self.variable, self.gate, self.knots = joint, variable, gate, knots
-        self.width, self.joint_name = width, name
+        self.width, self.joint_name, self.is_dry = width, name, gate == 'sign'
         own = Variable('dq', joint, name)
         effort = own.text.replace('dq[', 'tau[', 1)
         self.is_of_own_speed = variable == own
@@ -166,8 +167,8 @@ class SmoothForce(Effect):
 
     @property
     def key(self) -> str:
-        """Its joint, variable and factor."""
-        return f'{self.name} {self.joint} {self.formula}'
+        """Its joint, number of pieces, variable and factor."""
+        return f'{self.name} {self.joint} {len(self.linear)} {self.formula}'
 
     def places(self, motion: SeenMotion) -> list[Place]:
         """Return its joint."""

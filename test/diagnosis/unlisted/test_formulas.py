@@ -47,8 +47,12 @@ def _spring_between(_t, q, _v):
     return (-0.8 * (q[0] - q[1]) ** 3, 0.0)
 
 
-def _found(equations_for, force, links):
-    _, equations = equations_for(simulate(CHAINS[links], 11, 10.0, force=force))
+def _cable(_t, q, _s):
+    return 0.3 * math.exp(0.6 * q[0])
+
+
+def _found(equations_for, links, **what):
+    _, equations = equations_for(simulate(CHAINS[links], 11, 10.0, **what))
     comparison = compare_models(equations, lambda _share: None)
     model = with_laws(equations, comparison, decide(equations, comparison)).decision.model
     law = law_of(model, 0)
@@ -73,10 +77,18 @@ def _found(equations_for, force, links):
 )  # fmt: skip
 def test_laws_are_found_with_their_numbers(equations_for, force, links, formula, numbers):
     """Of one joint, of what it did before, of two joints; alone and in a sum."""
-    found, values = _found(equations_for, force, links)
+    found, values = _found(equations_for, links, force=force)
     assert found == formula
     for name, value in numbers.items():
         assert values[name] == pytest.approx(value, rel=0.02), name
+
+
+def test_dry_friction_of_any_form_holds_a_joint_at_rest(equations_for):
+    """Rows in which a cable holds its joint ask nothing of its law, nor of its rivals."""
+    found, values = _found(equations_for, 1, dry=_cable)
+    assert found == 'a*exp(q[joint0]/w0)*sign(dq[joint0])'
+    assert values['a'] == pytest.approx(-0.3, rel=0.01)
+    assert values['w0'] == pytest.approx(1.0 / 0.6, rel=0.01)
 
 
 @pytest.mark.parametrize('factor', [1.0, 3.0])
