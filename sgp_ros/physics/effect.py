@@ -88,6 +88,7 @@ class Effect:
         has_memory: its force at a time depends on other times too, of the motion or the commands.
         is_open: a robot may have it or not, and its numbers are not known.
         is_usual: nearly every joint with a motor has it.
+        has_chosen_form: the data chose its form, not only its numbers.
     """
 
     name: str = ''
@@ -122,6 +123,7 @@ class Effect:
     has_memory: bool = False
     is_open: bool = False
     is_usual: bool = False
+    has_chosen_form: bool = False
 
     @property
     def key(self) -> str:

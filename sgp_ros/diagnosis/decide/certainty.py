@@ -141,6 +141,8 @@ def probabilities(
     as its joint is described; one that acts on all joints, as the least that is.
     """
     scale, asserted = Scale.of(equations, comparison), decision.model
+    if any(s.effect.has_chosen_form for s in asserted.effects):
+        scale = scale.of_forms()
     least = scale.worth(asserted) + math.log(LEAST_ODDS) / TEMPER
     known = (*comparison.singles, *comparison.pairs, *comparison.more)
     models = [

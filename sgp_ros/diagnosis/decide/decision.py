@@ -28,6 +28,7 @@ from sgp_ros.diagnosis.criteria import (
     FLOOR_SHARE,
     INDEPENDENT_ROWS,
     LEAST_SHARE,
+    NEARLY,
     NOTHING_EXPLAINED,
     PER_EFFECT,
     PER_PARAMETER,
@@ -87,6 +88,7 @@ class Scale:
         base: rest of the best model without effects, (k,) shares.
         nominal: discrepancy of the nominal robot, (k,) shares.
         rows: that count as independent.
+        shape_error: part of that discrepancy that the right column may leave.
     """
 
     power: np.ndarray
@@ -94,6 +96,7 @@ class Scale:
     base: np.ndarray
     nominal: np.ndarray
     rows: float
+    shape_error: float = SHAPE_ERROR
 
     @classmethod
     def of(cls, equations: Equations, comparison: Comparison) -> Scale:
@@ -105,7 +108,11 @@ class Scale:
     @property
     def floor(self) -> np.ndarray:
         """What the right model may leave, (k,) shares."""
-        return np.asarray(FLOOR_SHARE + SHAPE_ERROR * self.nominal + self.error / self.power)
+        return np.asarray(FLOOR_SHARE + self.shape_error * self.nominal + self.error / self.power)
+
+    def of_forms(self) -> Scale:
+        """Return the scale for forces whose form the data chose: they have no shape to err in."""
+        return replace(self, shape_error=0.0)
 
     def explained(self, model: Model) -> float:
         """Return the size of what is to explain.
@@ -280,7 +287,9 @@ def _opened(
         others = (best, *rivals)
         return Decision('missing_physics', known, others, excess, unknown[0], unknown,
                         against=base.score)  # fmt: skip
-    if comparison.parameters.left.max() > COUNTED_SHARE:
+    left = comparison.parameters.left
+    is_less = best.left[open_] < NEARLY * left[open_]
+    if left.max() > COUNTED_SHARE or is_less.any():
         unknown = _ordered(np.where(is_open, excess, 0.0), worst)
         return Decision('unexplained', base, (best, *rivals), excess, worst, unknown, best,
                         base.score)  # fmt: skip

@@ -89,10 +89,11 @@ def _decided(equations: Equations, found: Explained, searched: Searched) -> Expl
         return replace(found, comparison=comparison, decision=decide(equations, comparison))
     why = _objection(equations, found.comparison, searched)
     if not why:
-        comparison = replace(
-            found.comparison, more=(*found.comparison.more, *searched.laws[:_RIVALS])
-        )
-        decision = decide(equations, comparison)
+        laws, more = searched.laws[:_RIVALS], found.comparison.more
+        # which formula says it best is known: errors of a column's shape count between names only
+        decision = decide(equations, replace(found.comparison, more=(*more, laws[0])))
+        decision = replace(decision, rivals=(*laws[1:], *decision.rivals))
+        comparison = replace(found.comparison, more=(*more, *laws))
         why = _doubt(equations, comparison, decision, searched)
         if not why:
             return replace(found, comparison=comparison, decision=decision)
@@ -127,7 +128,7 @@ def _objection(equations: Equations, comparison: Comparison, searched: Searched)
     """Return what is wrong with the best formula by itself; empty for nothing."""
     if not searched.laws:
         return 'every formula tried would need impossible parameters'
-    best, scale = searched.laws[0], Scale.of(equations, comparison)
+    best, scale = searched.laws[0], Scale.of(equations, comparison).of_forms()
     if scale.worth(best) < scale.worth(searched.smooth):
         return 'no formula tried stays within the 95 % band of the shape'
     ratio, chance = searched.lack_of_fit

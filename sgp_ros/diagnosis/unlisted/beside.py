@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import COUNTED_SHARE
+from sgp_ros.diagnosis.criteria import ADEQUATE_REST, COUNTED_SHARE
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
@@ -15,7 +15,6 @@ from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.law import FormulaLaw
 from sgp_ros.physics.parts import JOINT, MOTOR
 
-PLAIN = (COULOMB_FRICTION, VISCOUS_FRICTION, CONSTANT_LOAD)
 PLAIN = (COULOMB_FRICTION, VISCOUS_FRICTION, CONSTANT_LOAD)
 _NONE = 2.0
 """Standard deviations from zero below which a coefficient cannot be told from none."""
@@ -66,6 +65,21 @@ def is_slight(listed: Model, smooth: Model, joint: int) -> bool:
         return False
     apart = listed.residual[:, joint] - smooth.residual[:, joint]
     return bool((apart**2).mean() < COUNTED_SHARE * smooth.frame.equations.power[joint])
+
+
+def is_bent(listed: Model, smooth: Model, joint: int) -> bool:
+    """Return whether a listed law was bent to stand for a smooth force.
+
+    It has a shape of its own, and more than an adequate model may leave of what that law adds is
+    what a smooth force says and the law does not.
+    """
+    apart = float(listed.mean_square[joint] - smooth.mean_square[joint])
+    own, power = own_effects(listed, joint), listed.frame.equations.power[joint]
+    added = [
+        share for s, share in zip(listed.effects, listed.filtered_shares, strict=True)
+        if s in own and len(s.shape) and not s.effect.is_usual
+    ]  # fmt: skip
+    return any(apart > ADEQUATE_REST * share * power for share in added)
 
 
 def _is_plain_sum(s: EffectAt) -> bool:

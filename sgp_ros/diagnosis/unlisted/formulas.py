@@ -124,12 +124,16 @@ class Range:
 class FoundLaw(FormulaLaw):
     """A formula in place of a smooth force, with the numbers that a search starts from."""
 
+    has_chosen_form = True
+
     def __init__(
         self, smooth: SmoothForce, formula: Formula, joint: str,
         parameters: Sequence[LawParameter], words: str, price: float,
     ) -> None:  # fmt: skip
         super().__init__(formula, joint, parameters, words, is_open=True, price=price)
         self.smooth = smooth
+        if not smooth.is_of_own_speed:
+            self.is_dry = smooth.is_dry
 
     def starts(self, _motion: SeenMotion, _place: Place) -> np.ndarray:
         """Return the numbers that follow the data."""

@@ -9,7 +9,7 @@ with the bodies and all other effects, as every other model is.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import stats
@@ -22,7 +22,7 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
-from sgp_ros.diagnosis.unlisted.beside import is_slight, law_of, own_effects, says_less
+from sgp_ros.diagnosis.unlisted.beside import is_bent, is_slight, law_of, own_effects, says_less
 from sgp_ros.diagnosis.unlisted.formulas import FoundLaw, curve_of, formulas
 from sgp_ros.diagnosis.unlisted.shapes import (
     FINE,
@@ -52,6 +52,7 @@ class Searched:
         smooth: best model with a smooth force at the joint.
         laws: models with a formula there, best first.
         fine: model like the first of them, with a spline that follows any law.
+        floor: mean square that errors of signals and filters leave.
         is_slight: whether listed effects keep their names where no formula is asserted.
     """
 
@@ -60,6 +61,7 @@ class Searched:
     smooth: Model
     laws: tuple[Model, ...]
     fine: Model | None
+    floor: float
     is_slight: bool = False
 
     @property
@@ -69,12 +71,13 @@ class Searched:
         The chance is that of the F test on as many rows as are independent (Fisher 1922).
         """
         assert self.fine is not None
-        law, fine = (float(m.mean_square[self.joint]) for m in (self.laws[0], self.fine))
+        both = (float(m.mean_square[self.joint]) for m in (self.laws[0], self.fine))
+        law, fine = (left + self.floor for left in both)
         more = self.fine.size - self.laws[0].size
         r = self.fine.residual[:, self.joint]
         rows = len(r) / max(correlation_factor(r), 1.0) - self.fine.size
-        excess = (law - fine) / max(fine, 1e-300) * rows / max(more, 1)
-        return law / max(fine, 1e-300), float(stats.f.sf(excess, max(more, 1), max(rows, 1.0)))
+        excess = (law - fine) / fine * rows / max(more, 1)
+        return law / fine, float(stats.f.sf(excess, max(more, 1), max(rows, 1.0)))
 
 
 def search(equations: Equations, scale: Scale, listed: Model, joint: int) -> Searched | None:
@@ -86,12 +89,13 @@ def search(equations: Equations, scale: Scale, listed: Model, joint: int) -> Sea
         listed: best model of listed effects, adequate or not.
         joint: index.
     """
-    scale = replace(scale, nominal=np.zeros_like(scale.nominal))  # splines have no shape to err in
+    scale = scale.of_forms()
     look = _Look(Columns(equations), scale, listed, joint)
     smooth = look.ranked()
     if not smooth or scale.worth(smooth[0]) < scale.worth(listed) + ALIKE:
         return None
-    if smooth[0].mean_square[joint] > NEARLY * listed.mean_square[joint]:
+    is_near = smooth[0].mean_square[joint] > NEARLY * listed.mean_square[joint]
+    if is_near and not is_bent(listed, smooth[0], joint):
         return None
     slight = is_slight(listed, smooth[0], joint)
     if slight and smooth[0].mean_square[joint] > NEARLY**2 * listed.mean_square[joint]:
@@ -111,7 +115,8 @@ def search(equations: Equations, scale: Scale, listed: Model, joint: int) -> Sea
     first = (i for i, m in enumerate(ranked) if not says_less(equations, m, joint))
     ranked = ranked[next(first, 0) :]
     fine = look.fine(ranked[0]) if ranked else None
-    return Searched(joint, listed, smooth[0], tuple(ranked), fine, slight)
+    floor = float(scale.power[joint] * scale.floor[joint])
+    return Searched(joint, listed, smooth[0], tuple(ranked), fine, floor, slight)
 
 
 def _unlike(smooth: list[Model], joint: int) -> list[Model]:

@@ -16,12 +16,19 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.unlisted.assertion import with_laws
-from sgp_ros.diagnosis.unlisted.beside import law_of
+from sgp_ros.diagnosis.unlisted.beside import is_bent, law_of
 from sgp_ros.diagnosis.unlisted.formulas import Range, texts
 from sgp_ros.diagnosis.unlisted.formulas import law as a_law
 from sgp_ros.diagnosis.unlisted.search import earned, search
 from sgp_ros.diagnosis.unlisted.sentences import COEFFICIENTS
-from sgp_ros.diagnosis.unlisted.shapes import GATES, smooth_forces
+from sgp_ros.diagnosis.unlisted.shapes import (
+    FINE,
+    GATES,
+    PIECES,
+    SmoothForce,
+    Variable,
+    smooth_forces,
+)
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.formula import read_formula
@@ -125,7 +132,7 @@ def test_a_listed_effect_beside_a_formula_earns_its_price_again(equations_for, f
     start = np.sqrt((equations.d**2).mean(axis=0))
     model = fit(columns, tuple(effects), start, is_free=False)
     scale = Scale.of(equations, compare_models(equations, lambda _share: None))
-    scale = replace(scale, nominal=np.zeros_like(scale.nominal))
+    scale = scale.of_forms()
     left = earned(columns, scale, model, 0)
     names = [s.name for s in left.effects]
     assert names == ['law', 'coulomb_friction'][: 1 + (friction > 0.0)]
@@ -155,6 +162,33 @@ def test_friction_that_is_hardly_different_keeps_its_name(equations_for):
     assert [s.name for s in decision.model.effects] == ['coulomb_friction']
     assert search(equations, Scale.of(equations, comparison), decision.model, 0) is None
     assert with_laws(equations, comparison, decision).decision is decision
+
+
+def test_a_listed_law_is_not_bent_to_stand_for_another(equations_for):
+    """Friction at a place says most of what friction behind a cardan joint does, not all."""
+
+    def dry(_t, q, _s):
+        return 0.6 / (1.0 - 0.25 * math.cos(2.7 * q[0]))
+
+    _, equations = equations_for(simulate(CHAINS[1], 11, 10.0, dry=dry))
+    comparison = compare_models(equations, lambda _share: None)
+    listed = decide(equations, comparison).model
+    assert {s.name for s in listed.effects} == {'coulomb_friction', 'position_friction'}
+    found = search(equations, Scale.of(equations, comparison), listed, 0)
+    assert found is not None
+    assert is_bent(listed, found.smooth, 0)
+    assert not is_bent(listed, replace(listed, residual=0.99 * listed.residual), 0)
+
+
+def test_a_finer_spline_has_columns_of_its_own(equations_for):
+    """What is known of a spline is not what one with other pieces has."""
+    _, equations = equations_for(simulate(CHAINS[1], 11, 10.0, force=_brake))
+    columns, motion = Columns(equations), equations.motion
+    for pieces in (PIECES, FINE):
+        variable = Variable('dq', 0, 'joint0')
+        smooth = SmoothForce(0, variable, 'sign', variable.knots(motion, pieces), 'joint0')
+        x = columns.of(EffectAt(smooth, Place(0), np.zeros(0)), equations)
+        assert x.shape[2] == pieces + 3
 
 
 def _middle(text, seen):
