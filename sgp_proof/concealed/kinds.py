@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from sgp_proof.concealed import third_families as third
 from sgp_proof.concealed.concealed_effect import Concealed
 from sgp_proof.concealed.unknown import NAME, UNKNOWN
-from sgp_proof.concealed.unlisted import family_of
+from sgp_proof.concealed.unlisted import constants, family_of
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.drawing import Scene
 from sgp_ros.physics.parts import MOTOR
@@ -56,7 +55,7 @@ def _unknown(scene, family=''):
         'source_v': float(motion.velocity[others].mean()) if others else 1.0,
     }  # fmt: skip
     width = motion.high - motion.low
-    fixed |= third.constants(kind, rng, float(0.5 * width[fixed['source']]))
+    fixed |= constants(kind, rng, float(0.5 * width[fixed['source']]))
     place = {}
     if kind == 'burst':
         place = {

@@ -95,19 +95,19 @@ REMEMBER = {
 
 
 def remembering(start, rate, law):
-    """Return what builds the action of a force of its memory, of this start and rate."""
+    """Return what builds the action of a force with a memory of this start and rate."""
 
     def build(joint, p, _joints):
-        def changing(m):
-            q, v = float(m.position[joint]), float(m.velocity[joint])
-            return (rate(q, v, float(m.state[0]), p),)
+        def state(m):
+            return float(m.position[joint]), float(m.velocity[joint])
 
         return (
             Action(
                 joint,
-                force=lambda m: p['a'] * law(0.0, 0.0, m, p),
+                force=lambda m: p['a'] * law(*state(m), m, p),
                 start=lambda q, v: (start(q, v),),
-                state_rate=changing, substep_s=_STEP_S,
+                state_rate=lambda m: (rate(*state(m), float(m.state[0]), p),),
+                substep_s=_STEP_S,
             ),
         )  # fmt: skip
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
+from sgp_proof.concealed.family_set import FamilySet
 from sgp_ros.physics.catalogue import COULOMB_FRICTION
-from sgp_ros.simulation.effects import Action
 
 _RESIDUAL_GAP, _FASTEST = 0.6, 4.0
 """Air left when a plunger has arrived, as `u`; speed at which a muscle no longer pulls, as `w`."""
@@ -113,37 +113,10 @@ _DRAWN = {
 """Name to the ranges of its constants."""
 
 
-def _whole(kind):
-    smooth, level = (laws.get(kind, lambda *_: 0.0) for laws in (_SMOOTH, _DRY))
-    return lambda *at: smooth(*at) - math.copysign(level(*at), at[1])
-
-
-FAMILIES = {kind: _whole(kind) for kind in _DRAWN}
+SET = FamilySet(_SMOOTH, _DRY, _DRAWN)
+FAMILIES = SET.families
 """Name to force over its size."""
 REMEMBER = {'throttled_balancer': (lambda q, _v: q, lambda q, _v, z, p: (q - z) / p['fill_s'])}
 """The one that remembers to the start of the memory, and its rate."""
 LISTED_PARTS = {'solenoid_with_gland': COULOMB_FRICTION.name}
 """A law that holds an effect of the list may be told as that effect beside the rest."""
-
-
-def constants(kind, rng, source_reach):
-    """Return what is drawn for a world of a family; nothing for those of other sets."""
-    if kind not in FAMILIES:
-        return {}
-    drawn = {name: float(rng.uniform(*ends)) for name, ends in _DRAWN[kind].items()}
-    return {**drawn, 'source_reach': source_reach}
-
-
-def builder(kind):
-    """Return what builds the action of a family without memory."""
-
-    def build(joint, p, _joints):
-        def of(law):
-            return lambda m, *_direction: (
-                p['a'] * law(float(m.position[joint]), float(m.velocity[joint]), m, p)
-            )
-
-        places = {'force': _SMOOTH, 'dry_level': _DRY}
-        return (Action(joint, **{x: of(y[kind]) for x, y in places.items() if kind in y}),)
-
-    return build

@@ -23,8 +23,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from sgp_proof.concealed import fourth_families as fourth
 from sgp_proof.concealed import second_families as second
 from sgp_proof.concealed import third_families as third
+from sgp_proof.concealed.family_set import LISTED
 from sgp_proof.concealed.unknown import OF_TIME, force
 from sgp_proof.result_files import RESULTS, write_result
 from sgp_ros.physics.drawing import UnsuitableError
@@ -78,18 +80,20 @@ FAMILIES = {
     'walk': _walk,
 }
 """Name to force over its size. The last is no function of the motion: nothing is to be found."""
-SECOND_FROM, THIRD_FROM = 20_000, 40_000
-"""Seeds from here on conceal a law of the second set, and of the third."""
+SECOND_FROM, THIRD_FROM, FOURTH_FROM = 20_000, 40_000, 60_000
+"""Seeds from here on conceal a law of the second set, of the third, and of the fourth."""
 _SETS = (
+    (FOURTH_FROM, fourth.FAMILIES, ''),
     (THIRD_FROM, third.FAMILIES, ''),
     (SECOND_FROM, second.FAMILIES, 'air_spring'),
     (0, FAMILIES, 'gas_spring'),
 )
 """First seed, laws, and the law of robots of one joint in place of one of another joint."""
-_LAWS = FAMILIES | second.FAMILIES | third.FAMILIES
-_REMEMBER = second.REMEMBER | third.REMEMBER
+_LAWS = FAMILIES | second.FAMILIES | third.FAMILIES | fourth.FAMILIES
+_REMEMBER = second.REMEMBER | third.REMEMBER | fourth.REMEMBER
+_LISTED_PARTS = third.LISTED_PARTS | fourth.LISTED_PARTS
 BUILDERS = {name: force(law) for name, law in _LAWS.items()}
-BUILDERS |= {name: third.builder(name) for name in third.FAMILIES}
+BUILDERS |= {name: x.SET.builder(name) for x in (third, fourth) for name in x.FAMILIES}
 BUILDERS |= {name: second.remembering(*x, _LAWS[name]) for name, x in _REMEMBER.items()}
 
 
@@ -106,6 +110,12 @@ def family_of(seed, *, has_others):
     if not alone:
         raise UnsuitableError('a robot of one joint')
     return alone
+
+
+def constants(kind, rng, source_reach):
+    """Return what is drawn for a world of a family, beside what all have."""
+    drawn = (x.SET.constants(kind, rng, source_reach) for x in (third, fourth))
+    return {name: value for some in drawn for name, value in some.items()}
 
 
 def true_force(parameters, q, v):
@@ -148,7 +158,7 @@ def _motion(p):
 def law_error(effect, finding, beside=()):
     """Return the error of a found law, relative, over states as in the motion; inf for no law.
 
-    `beside` are findings of dry friction that are part of it.
+    `beside` are findings of listed effects that are part of it.
     """
     p = effect['parameters']
     if p['kind'] in OF_TIME:
@@ -172,7 +182,8 @@ def law_error(effect, finding, beside=()):
         lambda name: lambda _at: numbers[name], signal, lambda name, _signals: special(name)
     )(None)
     for part in beside:
-        found = found - part['parameters']['level']['value'] * np.sign(v[0])
+        told = {name: x['value'] for name, x in part['parameters'].items()}
+        found = found + LISTED[part['effect']](q[0], v[0], told)
     return float(np.sqrt(np.mean((found - true) ** 2) / np.mean(true**2)))
 
 
@@ -201,7 +212,7 @@ def score(answer, diagnosis):
     (effect,) = answer['effects']
     findings = [f for f in diagnosis['findings'] if f['probability'] >= 0.5]
     laws = [f for f in findings if f['effect'] == 'law']
-    part = third.LISTED_PARTS.get(effect['parameters']['kind']), effect['joint']
+    part = _LISTED_PARTS.get(effect['parameters']['kind']), effect['joint']
     parts = [f for f in findings if (f['effect'], f['joint']) == part]
     errors = [law_error(effect, f, parts) for f in laws]
     listed = [[f['effect'], f['joint']] for f in findings if f['effect'] not in {'law', 'unknown'}]

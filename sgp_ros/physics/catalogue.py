@@ -28,6 +28,7 @@ from sgp_ros.physics.law import law_variable
 VISCOUS_FRICTION = friction.ViscousFriction()
 COULOMB_FRICTION = friction.CoulombFriction()
 STRIBECK_FRICTION = friction.StribeckFriction()
+QUADRATIC_DRAG = friction.QuadraticDrag()
 ASYMMETRIC_COULOMB = friction.AsymmetricCoulomb()
 POSITION_FRICTION = confined.PositionFriction()
 LIMIT_FRICTION = confined.LimitFriction()
@@ -50,7 +51,7 @@ EFFECTS: dict[str, Effect] = {
         VISCOUS_FRICTION,
         COULOMB_FRICTION,
         STRIBECK_FRICTION,
-        friction.QuadraticDrag(),
+        QUADRATIC_DRAG,
         POSITION_FRICTION,
         LIMIT_FRICTION,
         ASYMMETRIC_COULOMB,

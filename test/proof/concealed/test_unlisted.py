@@ -10,12 +10,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sgp_proof.concealed import fourth_families as fourth
 from sgp_proof.concealed import second_families as second
 from sgp_proof.concealed import third_families as third
 from sgp_proof.concealed import unlisted
 from sgp_proof.concealed.unknown import OF_TIME, UNKNOWN
 from sgp_proof.concealed.unlisted import (
     FAMILIES,
+    FOURTH_FROM,
     SECOND_FROM,
     THIRD_FROM,
     family_of,
@@ -78,30 +80,68 @@ def test_the_second_set_is_apart_from_all_others():
     assert set(second.KNOWN_SHAPES) <= set(second.FAMILIES)
 
 
-def _third(kind):
-    return {**P, 'kind': kind, **third.constants(kind, np.random.default_rng(1), 0.7)}
+LATER = third.FAMILIES | fourth.FAMILIES
+REMEMBER = third.REMEMBER | fourth.REMEMBER
+EARLIER = set(FAMILIES) | set(second.FAMILIES) | set(UNKNOWN)
 
 
-def test_the_third_set_is_apart_from_all_others():
+def _drawn(kind):
+    return {**P, 'kind': kind, **unlisted.constants(kind, np.random.default_rng(1), 0.7)}
+
+
+@pytest.mark.parametrize(
+    ('known', 'begin', 'earlier'),
+    [
+        (third.FAMILIES, THIRD_FROM, EARLIER),
+        (fourth.FAMILIES, FOURTH_FROM, EARLIER | set(third.FAMILIES)),
+    ],
+)
+def test_a_later_set_is_apart_from_all_others(known, begin, earlier):
     """Each has its share of seeds: no robot of one joint takes the turn of a law of another."""
-    assert not set(third.FAMILIES) & (set(FAMILIES) | set(second.FAMILIES) | set(UNKNOWN))
-    seeds = range(THIRD_FROM, THIRD_FROM + len(third.FAMILIES))
-    assert {family_of(s, has_others=True) for s in seeds} == set(third.FAMILIES)
-    of_other = next(s for s in seeds if family_of(s, has_others=True).endswith('other'))
-    with pytest.raises(UnsuitableError):
-        family_of(of_other, has_others=False)
-    assert not third.constants('air_spring', np.random.default_rng(1), 0.7)
+    assert not set(known) & earlier
+    seeds = range(begin, begin + len(known))
+    assert {family_of(s, has_others=True) for s in seeds} == set(known)
+    of_other = [s for s in seeds if family_of(s, has_others=True).endswith('other')]
+    assert of_other
+    for seed in of_other:
+        with pytest.raises(UnsuitableError):
+            family_of(seed, has_others=False)
 
 
-@pytest.mark.parametrize('kind', third.FAMILIES)
-def test_a_law_of_the_third_set_is_finite(kind):
+def test_the_fourth_set_has_its_seeds_in_order():
+    """Twenty families, from its first seed on."""
+    kinds = [family_of(s, has_others=True) for s in range(FOURTH_FROM, FOURTH_FROM + 20)]
+    assert kinds == list(fourth.FAMILIES)
+
+
+def test_other_sets_draw_no_constants():
+    """Their worlds stay what they were."""
+    assert not unlisted.constants('air_spring', np.random.default_rng(1), 0.7)
+
+
+@pytest.mark.parametrize('kind', LATER)
+def test_constants_are_drawn_within_their_ranges(kind):
+    """And the reach of the source is kept with them."""
+    known = third if kind in third.FAMILIES else fourth
+    for seed in range(5):
+        drawn = known.SET.constants(kind, np.random.default_rng(seed), 0.7)
+        assert drawn.pop('source_reach') == 0.7
+        assert set(drawn) == set(known.SET.ranges[kind])
+        assert all(low <= drawn[x] <= high for x, (low, high) in known.SET.ranges[kind].items())
+
+
+@pytest.mark.parametrize('kind', LATER)
+def test_a_law_of_a_later_set_is_finite(kind):
     """Twice as wide and fast as its motion too, and what is simulated is what is scored."""
-    p, rng = _third(kind), np.random.default_rng(2)
+    p, rng = _drawn(kind), np.random.default_rng(2)
     states = rng.uniform(-2.0, 2.0, (2, 2, 200))
+    if kind in REMEMBER:
+        t = unlisted.STEP_S * np.arange(2000)
+        states = 2.0 * np.array([[np.sin(t)] * 2, [np.cos(t)] * 2])
     force = true_force(p, *states)
     assert np.isfinite(force).all()
     assert force.std() > 0.05
-    if kind in third.REMEMBER:
+    if kind in REMEMBER:
         return
     source = p['source']
     (action,) = unlisted.BUILDERS[kind](0, p, ())
@@ -111,16 +151,34 @@ def test_a_law_of_the_third_set_is_finite(kind):
         exerted = action.force(moment) if action.force else 0.0
         if action.dry_level:
             direction = int(np.sign(v[0]))
-            assert action.dry_level(moment, direction) > 0.0
+            assert action.dry_level(moment, direction) >= 0.0
             exerted -= direction * action.dry_level(moment, direction)
         assert exerted == pytest.approx(told)
+
+
+@pytest.mark.parametrize('kind', REMEMBER)
+def test_a_law_that_remembers_is_simulated_as_it_is_scored(kind):
+    """Along a motion in the steps of the score."""
+    p = _drawn(kind)
+    (action,) = unlisted.BUILDERS[kind](0, p, ())
+    t = unlisted.STEP_S * np.arange(400)
+    q, v = 0.9 * np.sin(2.0 * t), 1.8 * np.cos(2.0 * t)
+    told = true_force(p, np.array([q, q]), np.array([v, v]))
+    state = action.start(q[0], v[0])
+    for at in zip(q, v, told, strict=True):
+        moment = SimpleNamespace(position={0: at[0]}, velocity={0: at[1]}, state=state)
+        assert action.force(moment) == pytest.approx(at[2])
+        state = tuple(
+            z + unlisted.STEP_S * rate
+            for z, rate in zip(state, action.state_rate(moment), strict=True)
+        )
 
 
 @pytest.mark.parametrize('is_apart', [True, False])
 def test_listed_friction_in_a_law_may_be_told_beside_the_rest(is_apart):
     """Or within the formula; elsewhere it is a wrong name."""
     (kind,) = third.LISTED_PARTS
-    p = {name: float(x) if name != 'kind' else x for name, x in _third(kind).items()}
+    p = {name: float(x) if name != 'kind' else x for name, x in _drawn(kind).items()}
     whole = f'-0.35*(g/max(q[elbow] + g, 0.6))**2{"" if is_apart else " - r*sign(dq[elbow])"}'
     numbers = {'g': {'value': p['gap']}, 'r': {'value': 0.5 * p['gland']}}
     law = {**RIGHT, 'formula': f'tau_x[elbow] = {whole}', 'parameters': numbers}
@@ -134,17 +192,72 @@ def test_listed_friction_in_a_law_may_be_told_beside_the_rest(is_apart):
 
 
 @pytest.mark.parametrize(
+    ('kind', 'rest', 'told'),
+    [
+        (
+            'flow_valve', '-0.5*(1 - back)*min(dq[elbow]/1.5, 0)**2',
+            lambda _p: {'c': 0.5 / 1.5**2},
+        ),
+        (
+            'foil_bearing',
+            '-0.25*(1 - film)*(1 - tanh((abs(dq[elbow])/1.5 - lift)/0.2))*sign(dq[elbow])',
+            lambda p: {'level': 0.5 * p['film']},
+        ),
+        (
+            'leaf_pack', '-0.5*rub*abs(q[elbow])*sign(dq[elbow])',
+            lambda _p: {'stiffness': 0.5, 'rest': 0.0},
+        ),
+        (
+            'shorted_winding', '0.25*dq[elbow]*cos(2*(poles*q[elbow] + phase))',
+            lambda _p: {'b': 0.25},
+        ),
+        (
+            'leaf_set_by_other', '0.5*q[elbow]*(1 - 1/max(1 - lever*q[wrist]/0.7, 0.3)**2)',
+            lambda _p: {'stiffness': 0.5, 'rest': 0.0},
+        ),
+    ],
+)  # fmt: skip
+def test_a_listed_part_may_be_told_beside_the_rest(kind, rest, told):
+    """As that effect with its numbers; without it the rest is a wrong law."""
+    p = {**_drawn(kind), 'source': 'wrist'}
+    numbers = {name: {'value': p[name]} for name in fourth.SET.ranges[kind]}
+    law = {**RIGHT, 'formula': f'tau_x[elbow] = {rest}', 'parameters': numbers}
+    values = {name: {'value': x} for name, x in told(p).items()}
+    part = {**LISTED, 'effect': fourth.LISTED_PARTS[kind], 'parameters': values}
+    answer = {'case': 'case_1', 'effects': [{**EFFECT, 'parameters': p}]}
+    for findings, right in (([law, part], True), ([law], False)):
+        row = score(answer, {'verdict': 'missing_physics', 'findings': findings, 'fit': {}})
+        assert (row['found'], row['wrong']) == (right, not right)
+
+
+def test_every_listed_part_of_a_law_can_be_scored():
+    """The scorer knows the force of each."""
+    parts = third.LISTED_PARTS | fourth.LISTED_PARTS
+    assert set(parts) <= set(LATER)
+    assert set(parts.values()) <= set(unlisted.LISTED)
+
+
+@pytest.mark.parametrize(
     ('kind', 'formula', 'numbers'),
     [
         ('one_way_damper', 'a*max(dq[elbow], 0)', {'a': -0.5 / 1.5}),
         ('lagged_damper', '-a*lag(dq[elbow], T)', {'a': 0.5 / 1.5, 'T': second.LAG_S}),
         ('throttled_balancer', '-a*lag(q[elbow], T)', {'a': 0.5, 'T': 0.25}),
         ('play_spring', '-a*play(q[elbow], w)', {'a': 0.5, 'w': 2.0 * second.HALF_PLAY}),
+        (
+            'warming_grease', '-a*dq[elbow]*exp(-h*lag(dq[elbow]**2, T))',
+            {'a': 1.0 / 1.5, 'h': 0.9 / 1.5**2, 'T': 2.0},
+        ),
+        (
+            'preload_behind_play', '-a*tanh(play(q[elbow], w)/d)',
+            {'a': 0.5, 'w': 0.5, 'd': 0.3},
+        ),
     ],
-)
+)  # fmt: skip
 def test_laws_that_remember_are_compared_along_a_motion(kind, formula, numbers):
     """But for the steps of that motion; without its memory none of them is right."""
-    effect = {'joint': 'elbow', 'parameters': {**P, 'kind': kind, 'fill_s': 0.25}}
+    chosen = {'fill_s': 0.25, 'heat': 0.9, 'warm_s': 2.0, 'slack': 0.25, 'knee': 0.3}
+    effect = {'joint': 'elbow', 'parameters': {**P, **chosen, 'kind': kind}}
     finding = {'formula': f'tau_x[elbow] = {formula}',
                'parameters': {name: {'value': x} for name, x in numbers.items()}}  # fmt: skip
     assert law_error(effect, finding) < 0.01
