@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
@@ -15,7 +16,13 @@ from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.diagnosis.compare.velocity_sensor import sensor_lags
 from sgp_ros.diagnosis.connected import Connected, compared, connect, with_laws
 from sgp_ros.diagnosis.criteria import DOUBTED
-from sgp_ros.diagnosis.decide.certainty import Probabilities, certainty_of, probabilities, settled
+from sgp_ros.diagnosis.decide.certainty import (
+    Probabilities,
+    certainty_of,
+    doubted,
+    rests_on,
+    settled_of,
+)
 from sgp_ros.diagnosis.decide.differences import Several, without_laws_of
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, equivalents
 from sgp_ros.diagnosis.decide.visibility import visibility
@@ -36,7 +43,7 @@ from sgp_ros.diagnosis.locate.remainder import Remainder
 from sgp_ros.diagnosis.prove.held_out import HELD_OUT
 from sgp_ros.diagnosis.prove.overlay import overlays
 from sgp_ros.diagnosis.prove.prediction import FinalModel, diagnosed_bodies
-from sgp_ros.diagnosis.prove.processes import harm, kept_processes, learned_processes
+from sgp_ros.diagnosis.prove.processes import final_model, harm
 from sgp_ros.diagnosis.prove.proof import not_carried_over, prove, reasons_to_doubt
 from sgp_ros.diagnosis.reference import (
     Reference,
@@ -149,14 +156,16 @@ def _diagnosed(
     findings, differ = tuple(map(connected.against_rivals, findings)), differences(several, names)
     progress(1.0)
     certainty = certainty_of((*findings, *differ), comparison, connected.trust)
-    if reasons_to_doubt({'train': proofs['train']}, recordings.still):
-        findings = tuple(replace(f, probability=min(f.probability, DOUBTED)) for f in findings)
+    vain = reasons_to_doubt({'train': proofs['train']}, recordings.still)
+    findings = doubted(findings, vain, tree.moving_names)
+    is_doubted = rests_on(doubts, findings, tree.moving_names)
+    remarks = (*bound_remarks(decision), *on_z, *chain(*doubts.values()))
     return Diagnosis(
         robot=robot,
         joints=tree.moving_names,
         units=tuple('N' if p else 'N m' for p in tree.is_prismatic[: tree.size]),
         verdict=verdict_of(decision, wrong, connected.findings, *connected.left, lags or differ),
-        certainty=_certainty(certainty, connected, is_doubted=bool(doubts)),
+        certainty=_certainty(certainty, connected, is_doubted=is_doubted),
         findings=findings,
         alternatives=alternatives(decision, chances),
         parameter_errors=wrong,
@@ -169,7 +178,7 @@ def _diagnosed(
         rate_hz=1.0 / (raw.step * equations.filter.decimation),
         rows=len(equations.d),
         refused={reason: count for reason, count in raw.refused.items() if count},
-        remarks=(*connected.remarks, *raw.remarks, *bound_remarks(decision), *on_z, *doubts),
+        remarks=(*connected.remarks, *raw.remarks, *remarks),
         bodies=diagnosed_bodies(whole, model, recordings.unstated),
         equivalents=(*equivalents(equations, comparison, decision, sides), *connected.equivalents),
         recordings=names if len(names) > 1 else (),
@@ -189,8 +198,8 @@ def _proven(connected: Connected, parts: Mapping[str, RawTrajectory]) -> _Proven
     """Return what is asserted with its proofs; a law that fails on another recording is none."""
     several = connected.several
     while True:
-        several, sides, chances = _settled(several)
-        final, learned, on_z = _final(several, connected.equations)
+        several, sides, chances = settled_of(several)
+        final, learned, on_z = final_model(several, connected.equations)
         tree = connected.equations.motion.tree
         proofs = {stem: prove(final, part, tree, stem) for stem, part in parts.items()}
         others = {stem: proof for stem, proof in proofs.items() if stem != HELD_OUT}
@@ -237,26 +246,6 @@ def _certainty(certainty: float, connected: Connected, *, is_doubted: bool) -> f
     """Return the least of what the verdict rests on."""
     rests_on = [certainty, *(f.probability for f in connected.findings)]
     return min([*rests_on, DOUBTED] if is_doubted else rests_on)
-
-
-def _settled(several: Several) -> tuple[Several, Contrasts, Probabilities]:
-    """Return what is asserted, of one recording without what is improbable, and how certain."""
-    equations, comparison, decision = several.equations, several.comparison, several.decision
-    if several.chances:
-        contrasts = Contrasts(equations, decision.model)
-        return several, contrasts, probabilities(equations, comparison, decision, contrasts)
-    decision, contrasts, chances = settled(equations, comparison, decision)
-    return replace(several, decision=decision, model=decision.model), contrasts, chances
-
-
-def _final(
-    several: Several, equations: Equations
-) -> tuple[FinalModel, tuple[Remainder, ...], tuple[str, ...]]:
-    """Return the final model, all processes that were learned, and what is to be said of them."""
-    learned = learned_processes(several.equations, several.decision)
-    final = FinalModel(several.model, several.comparison.nominal, equations, learned)
-    kept, remarks = kept_processes(final)
-    return replace(final, remainders=kept), learned, remarks
 
 
 def _predictions(final: FinalModel, connected: Connected, tree: Tree) -> dict[str, Predictions]:

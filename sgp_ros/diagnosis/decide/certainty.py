@@ -8,7 +8,7 @@ the number of rows. `sgp_proof/concealed` measures how the probabilities keep wh
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from sgp_ros.diagnosis.criteria import (
     ALIKE,
     CALM_SHARE,
     COUNTED_SHARE,
+    DOUBTED,
     LEAST_ASSERTED,
     LEAST_ODDS,
     LEAST_SHARE,
@@ -26,6 +27,7 @@ from sgp_ros.diagnosis.criteria import (
 )
 from sgp_ros.diagnosis.decide.cross_validation import without
 from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision, Scale, calm
+from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
@@ -98,6 +100,16 @@ def settled(
             return decision, contrasts, chances
         why = f'{weakest.effect.words} is improbable in it (probability {min(p):.2g})'
         decision = replace(decision.without(why), model=best, rivals=rivals)
+
+
+def settled_of(several: Several) -> tuple[Several, Contrasts, Probabilities]:
+    """Return what is asserted, of one recording without what is improbable, and how certain."""
+    equations, comparison, decision = several.equations, several.comparison, several.decision
+    if several.chances:
+        contrasts = Contrasts(equations, decision.model)
+        return several, contrasts, probabilities(equations, comparison, decision, contrasts)
+    decision, contrasts, chances = settled(equations, comparison, decision)
+    return replace(several, decision=decision, model=decision.model), contrasts, chances
 
 
 def _is_probable(model: Model, chances: Probabilities) -> bool:
@@ -189,3 +201,31 @@ def certainty_of(
         return max(f.probability for f in findings)
     left = float(comparison.parameters.left.max())
     return min(trust, float(np.clip(1.0 / (1.0 + (left / CALM_SHARE) ** 2), 0.5, MOST_CERTAIN)))
+
+
+def rests_on(
+    in_doubt: Collection[str], findings: Sequence[Finding], joints: Collection[str]
+) -> bool:
+    """Return whether a verdict rests on joints that are doubted.
+
+    One that names physics rests on the joints of that alone, and on all for what acts on several.
+
+    Args:
+        in_doubt: joints of which nothing is certain.
+        findings: of the verdict; unknown ones name nothing.
+        joints: that move.
+    """
+    named = {f.joint for f in findings if f.effect != UNKNOWN}
+    is_of_several = any(place not in joints for place in named)
+    return bool(in_doubt if is_of_several or not named else named & set(in_doubt))
+
+
+def doubted(
+    findings: Iterable[Finding], in_doubt: Collection[str], joints: Collection[str]
+) -> tuple[Finding, ...]:
+    """Return findings, those that rest on joints in doubt with no more than `DOUBTED`."""
+    return tuple(
+        replace(f, probability=min(f.probability, DOUBTED))
+        if f.joint in in_doubt or rests_on(in_doubt, (f,), joints) else f
+        for f in findings
+    )  # fmt: skip

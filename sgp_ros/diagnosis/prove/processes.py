@@ -16,6 +16,7 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import REMAINDER_SHARE
 from sgp_ros.diagnosis.decide.decision import Decision
+from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.decide.reasons import apart
 from sgp_ros.diagnosis.locate.remainder import PARTS, Remainder, learn_remainder, parts_of
 from sgp_ros.diagnosis.prove.prediction import FinalModel
@@ -100,6 +101,16 @@ def left_out_errors(
         errors = (there.squared(q) / yardstick).sum(axis=1)
         found[part == i] = np.where(ended, errors, np.inf)
     return found
+
+
+def final_model(
+    several: Several, equations: Equations
+) -> tuple[FinalModel, tuple[Remainder, ...], tuple[str, ...]]:
+    """Return the final model, all processes that were learned, and what is to be said of them."""
+    learned = learned_processes(several.equations, several.decision)
+    final = FinalModel(several.model, several.comparison.nominal, equations, learned)
+    kept, remarks = kept_processes(final)
+    return replace(final, remainders=kept), learned, remarks
 
 
 def harm(

@@ -119,29 +119,33 @@ def _ratio(error: float, yardstick: float) -> float:
     return math.inf if error > 0.0 else 0.0
 
 
-def reasons_to_doubt(proofs: Mapping[str, Proof], still: Collection[str]) -> tuple[str, ...]:
-    """Return why a diagnosis is not certain: joints of which the model knows less than a constant.
+def reasons_to_doubt(
+    proofs: Mapping[str, Proof], still: Collection[str]
+) -> dict[str, tuple[str, ...]]:
+    """Return by joint why nothing is certain of it: a constant says no less than the model.
 
     Args:
         proofs: by stem of the recording; `train` is what was learned from.
         still: joints that do not move, of which nothing is claimed.
     """
-    found = []
+    found: dict[str, list[str]] = {}
     for stem, proof in proofs.items():
         for joint, error in proof.nmse_after.items():
             if joint in still or error <= 1.0:
                 continue
             if math.isfinite(error):
-                found.append(
+                found.setdefault(joint, []).append(
                     f'The final model explains the effort of {joint} in {stem} no better than a '
-                    f'constant would (nMSE {error:.2g}): no verdict is certain.'
+                    f'constant would (nMSE {error:.2g}): nothing is certain of this joint.'
                 )
             elif stem == 'train':
-                found.append(
+                found.setdefault(joint, []).append(
                     f'The effort of {joint} in {stem} is constant, so no model explains more than '
-                    'a constant does: no verdict is certain.'
+                    'a constant does: nothing is certain of this joint.'
                 )
-    return (*found, *not_carried_over(proofs, still).values())
+    for joint, reason in not_carried_over(proofs, still).items():
+        found.setdefault(joint, []).append(reason)
+    return {joint: tuple(reasons) for joint, reasons in found.items()}
 
 
 def not_carried_over(proofs: Mapping[str, Proof], still: Collection[str]) -> dict[str, str]:

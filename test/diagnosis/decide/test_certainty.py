@@ -15,7 +15,13 @@ from sgp_ros.diagnosis.criteria import (
     LEAST_SHARE,
 )
 from sgp_ros.diagnosis.decide import certainty
-from sgp_ros.diagnosis.decide.certainty import Probabilities, certainty_of, settled
+from sgp_ros.diagnosis.decide.certainty import (
+    Probabilities,
+    certainty_of,
+    doubted,
+    rests_on,
+    settled,
+)
 from sgp_ros.diagnosis.decide.decision import UNKNOWN, Scale, decide
 from sgp_ros.diagnosis.decide.reasons import why_not
 from sgp_ros.diagnosis.explain.comparison import Comparison
@@ -152,3 +158,23 @@ def test_a_gain_is_none_at_one():
         found = {'gain': Parameter(gain, 0.05)}
         finding = Finding('elbow', law.name, found, Location(), 30.0, 0.9, 0.1, law.formula)
         assert doubted_if_none(finding, EffectAt(law, Place(0))).probability == expected
+
+
+@pytest.mark.parametrize(
+    ('in_doubt', 'named', 'is_doubted'),
+    [
+        (('wrist',), ('elbow',), False),
+        (('wrist',), ('elbow', 'wrist'), True),
+        (('wrist',), (), True),  # that nothing is missing says something of all joints
+        (('wrist',), ('base',), True),
+        ((), ('elbow', 'base'), False),
+    ],
+)
+def test_a_verdict_rests_on_the_joints_it_names(in_doubt, named, is_doubted):
+    """And only findings there are doubted."""
+    findings = [Finding(j, 'spring', {}, Location(), 0.0, 0.99, 0.1) for j in named]
+    findings.append(Finding('wrist', UNKNOWN, {}, Location(), 0.0, 0.3, 0.1))
+    assert rests_on(in_doubt, findings, ('elbow', 'wrist')) is is_doubted
+    for f in doubted(findings[:-1], in_doubt, ('elbow', 'wrist')):
+        rests = f.joint in in_doubt or (f.joint == 'base' and in_doubt)
+        assert f.probability == (DOUBTED if rests else 0.99)
