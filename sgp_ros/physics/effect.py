@@ -87,8 +87,7 @@ class Effect:
         is_of_command: it lies before the motor's current: a measured effort is behind it.
         has_memory: its force at a time depends on other times too, of the motion or the commands.
         is_open: a robot may have it or not, and its numbers are not known.
-        is_usual: nearly every joint with a motor has it.
-        has_chosen_form: the data chose its form, not only its numbers.
+        is_usual, has_chosen_form: nearly every joint with a motor has it; the data chose its form.
     """
 
     name: str = ''

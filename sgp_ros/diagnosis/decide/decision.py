@@ -88,7 +88,7 @@ class Scale:
         base: rest of the best model without effects, (k,) shares.
         nominal: discrepancy of the nominal robot, (k,) shares.
         rows: that count as independent.
-        shape_error: part of that discrepancy that the right column may leave.
+        shape_error: part of `nominal` that the right column may leave.
     """
 
     power: np.ndarray
@@ -284,12 +284,10 @@ def _opened(
     is_open = np.isin(np.arange(len(named)), open_)
     if known.effects and is_credible(known) and named[~is_open].sum() > named[is_open].sum():
         unknown = _ordered(np.where(is_open, excess, 0.0), int(np.argmax(excess)))
-        others = (best, *rivals)
-        return Decision('missing_physics', known, others, excess, unknown[0], unknown,
+        return Decision('missing_physics', known, (best, *rivals), excess, unknown[0], unknown,
                         against=base.score)  # fmt: skip
     left = comparison.parameters.left
-    is_less = best.left[open_] < NEARLY * left[open_]
-    if left.max() > COUNTED_SHARE or is_less.any():
+    if left.max() > COUNTED_SHARE or (best.left < NEARLY * left)[open_].any():
         unknown = _ordered(np.where(is_open, excess, 0.0), worst)
         return Decision('unexplained', base, (best, *rivals), excess, worst, unknown, best,
                         base.score)  # fmt: skip

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE
 from sgp_ros.diagnosis.decide.decision import Decision, Scale, decide, refused
 from sgp_ros.diagnosis.decide.reasons import apart, why_not
 from sgp_ros.diagnosis.explain.comparison import Comparison
@@ -78,6 +79,21 @@ def test_a_good_fit_that_is_refused_is_given_the_true_reason(damped, models):
     assert said.endswith(f'; {why}')
     assert 'the asserted model' not in said  # nothing is asserted
     assert base.key == after.model.key
+
+
+@pytest.mark.parametrize(('left', 'is_calm'), [(0.1, False), (0.6, True)])
+def test_what_bodies_explain_much_worse_is_not_explained_by_them(damped, models, left, is_calm):
+    """Though they leave less than counts as physics: they stand for what is refused."""
+    right = models[0]
+    comparison = _comparison(damped, right)
+    decision = decide(damped, comparison)
+    bodies = comparison.parameters
+    small = np.sqrt(0.8 * COUNTED_SHARE / bodies.left.max()) * bodies.residual
+    comparison = replace(comparison, parameters=replace(bodies, residual=small))
+    refusable = replace(decision, model=replace(right, residual=np.sqrt(left) * small))
+    after = refused(damped, comparison, refusable, 0, 'it fails elsewhere')
+    assert (after.verdict in {'parameters_only', 'no_mismatch'}) is is_calm
+    assert is_calm or after.verdict == 'unexplained'
 
 
 def test_what_leaves_more_than_noise_is_told_by_how_much(damped, models):
