@@ -38,6 +38,8 @@ SAME = 0.02
 STATES = 2000
 STEP_S = 0.005
 """Steps of a motion along which laws that remember are compared [s]."""
+FAILED = {'verdict': 'failed', 'findings': [], 'fit': {}}
+"""Of a diagnosis that ended without an answer: a miss."""
 _REMEMBERS = re.compile(r'\b(lag|play|delay)\(').search
 
 
@@ -274,9 +276,10 @@ def main():
         out = outputs / path.stem
         if not (out / 'outcome.json').exists() and not arguments.diagnosed:
             diagnose_case(arguments.worlds / 'cases' / path.stem, out)
-        if not (out / 'diagnosis.json').exists():
+        if not (out / 'outcome.json').exists():
             continue
-        diagnosis = json.loads((out / 'diagnosis.json').read_text(encoding='utf-8'))
+        said = out / 'diagnosis.json'
+        diagnosis = json.loads(said.read_text(encoding='utf-8')) if said.exists() else FAILED
         rows.append(score(json.loads(path.read_text(encoding='utf-8')), diagnosis))
         print(json.dumps(rows[-1]), flush=True)
     report = {'sealed': len(answers), 'summary': summary(rows), 'cases': rows}

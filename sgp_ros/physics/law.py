@@ -33,6 +33,8 @@ from sgp_ros.physics.term import Motion
 NAME = 'law'
 _DRAWN = {'dq': 'velocity', 'q': 'position', 'ddq': 'acceleration', 'tau': 'effort', TIME: 'time'}
 _PROBES = 64
+_GREATEST = 1e60
+"""Force per factor beyond which a formula is taken as so large: its square is finite."""
 _BETWEEN = 4
 """Starts between the ends of a range, beside the stated one."""
 
@@ -165,7 +167,8 @@ class FormulaLaw(Effect):
             with np.errstate(all='ignore'):
                 x = force(_Seen(motion, numbers | ones))
             found.append(np.broadcast_to(np.asarray(x, dtype=np.float64), (n,)))
-        return np.nan_to_num(np.column_stack(found), nan=0.0, posinf=0.0, neginf=0.0)
+        x = np.nan_to_num(np.column_stack(found), nan=0.0, posinf=0.0, neginf=0.0)
+        return np.clip(x, -_GREATEST, _GREATEST)
 
     def _compiled(self, names: Sequence[str], sign: _Signs) -> Callable[[_Seen], object]:
         """Return the force of a motion, given what stands for the sign of velocities."""

@@ -84,6 +84,16 @@ def test_factors_are_coefficients_and_all_else_is_shape():
     assert not at.with_shape(np.array([4.0])).is_possible(MOTION)
 
 
+@pytest.mark.parametrize('w0', [1e-3, 1e-9])
+def test_what_grows_beyond_all_bounds_can_be_squared(w0):
+    """A search passes through widths at which a formula is no force."""
+    number = {'start': 1.0, 'unit': 'N m', 'range': [-9, 9]}
+    width = {'start': 0.5, 'unit': 'rad', 'range': [1e-9, 3]}
+    law = law_at('a*exp(abs(q[j1])/w0)', {'a': number, 'w0': width}).effect
+    x = law.columns(MOTION, Place(1), np.array([w0]))
+    assert np.isfinite((x * x).sum())
+
+
 def test_what_remembers_runs_over_the_grid():
     """A lag against its differential equation, play against its two edges, a delay."""
     q = MOTION.position[:, 1]
