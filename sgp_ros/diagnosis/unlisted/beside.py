@@ -6,6 +6,8 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import ADEQUATE_REST, COUNTED_SHARE
+from sgp_ros.diagnosis.decide.decision import Scale
+from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
@@ -33,6 +35,34 @@ def own_effects(model: Model, joint: int) -> tuple[EffectAt, ...]:
     """Return the effects that a model has at a joint alone."""
     own = {JOINT, MOTOR}
     return tuple(s for s in model.effects if s.place.joint == joint and s.effect.site in own)
+
+
+def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
+    """Return a model without the listed effects that are not worth their price beside its formula.
+
+    They were chosen before the formula was known, and may have stood for a part of it. One after
+    the other goes, and the formula and all others are fitted again, as long as that is worth more.
+
+    Args:
+        columns: of the recording.
+        scale: of mean squares.
+        model: with a formula at the joint.
+        joint: index.
+    """
+    law = law_of(model, joint)
+    trials = []
+    for out in model.effects:
+        left = tuple(s for s in model.effects if s is not out)
+        if out is not law:
+            trials += [
+                fit(columns, left, model.sigma, is_free=is_free, rounds=2, steps=10)
+                for is_free in dict.fromkeys((False, model.is_free))
+            ]
+    possible = [t for t in trials if t.is_possible() and np.isfinite(t.score)]
+    best = max(possible, key=scale.worth, default=model)
+    if scale.worth(best) <= scale.worth(model):
+        return model
+    return earned(columns, scale, best, joint)
 
 
 def says_less(equations: Equations, model: Model, joint: int) -> bool:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from sgp_ros.diagnosis.unlisted.sentences import (
 )
 from sgp_ros.diagnosis.unlisted.shapes import (
     MEMORY,
+    RATIO,
     SLOWEST,
     SMOOTHED,
     UNITS,
@@ -223,6 +224,10 @@ def law(
         if name in COEFFICIENTS else _shape(name, smooth, seen, own_speed, numbers)
         for name in sorted(formula.parameters)
     ]  # fmt: skip
+    parameters = [
+        replace(p, unit=smooth.variable.ratio_unit(motion.tree)) if p.name == RATIO else p
+        for p in parameters
+    ]
     gate = '' if smooth.is_of_own_speed else _OF_GATE[smooth.gate]
     words = NEAREST.get(f'{text.removesuffix(" + d")} {gate}'.strip(), NAMELESS)
     price = PER_UNUSUAL + PER_PIECE * _pieces(formula)
@@ -239,6 +244,11 @@ def _shape(
         kind, start = smooth.variable.memory
         unit = 's' if kind == 'lag' else seen.unit
         return LawParameter(name, unit, start / 3.0, start=start, high=3.0 * start)
+    if name == RATIO:
+        assert smooth.variable.other is not None
+        weight = smooth.variable.other[2]
+        low, high = sorted((weight / 3.0, 3.0 * weight))
+        return LawParameter(name, '1', low, start=weight, high=high)
     low, high, unit = (own_speed if name == SMOOTHED else seen).ends(name)
     start = numbers.get(name, smooth.width)
     return LawParameter(name, unit, low, start=start, high=high, is_known=name == 'r')

@@ -16,13 +16,20 @@ from scipy import stats
 
 from sgp_ros.batch.least_squares import correlation_factor
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import ALIKE, NEARLY, PER_PARAMETER
+from sgp_ros.diagnosis.criteria import ALIKE, CLEARER, NEARLY, PER_PARAMETER
 from sgp_ros.diagnosis.decide.decision import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
-from sgp_ros.diagnosis.unlisted.beside import is_bent, is_slight, law_of, own_effects, says_less
+from sgp_ros.diagnosis.unlisted.beside import (
+    earned,
+    is_bent,
+    is_slight,
+    law_of,
+    own_effects,
+    says_less,
+)
 from sgp_ros.diagnosis.unlisted.formulas import FoundLaw, curve_of, formulas
 from sgp_ros.diagnosis.unlisted.shapes import (
     FINE,
@@ -30,14 +37,16 @@ from sgp_ros.diagnosis.unlisted.shapes import (
     SmoothForce,
     Variable,
     smooth_at_bound,
-    smooth_forces,
     smooth_of,
 )
+from sgp_ros.diagnosis.unlisted.tried import more_forces, smooth_forces, weighted
 from sgp_ros.physics.effect_at import EffectAt
 
 SMOOTH, SHAPES, FIRST, FITTED = 3, 4, 12, 5
 """Smooth forces fitted beside each choice of kept effects; of all of these, those for which
 formulas are tried; texts that become formulas for the best one, and for each other."""
+WEIGHT_STEPS = (0.25, 0.12, 0.06, 0.03, 0.015)
+"""By which the weight of a joint that is added is refined, in parts of itself."""
 EARNED = 3
 """Best models with a formula in which every listed effect must earn its price again."""
 
@@ -148,6 +157,8 @@ class _Look:
         motion = self.columns.equations(frozenset()).motion
         found = [m for m in self.smooth() if not smooth_at_bound(m, self.joint, motion)]
         found.sort(key=lambda m: -self.scale.worth(m))
+        found += self.more(found[0]) if found else ()
+        found.sort(key=lambda m: -self.scale.worth(m))
         if found and not smooth_of(found[0], self.joint)[1].is_of_own_speed:
             found.append(self._finer(found[0], smooth_of(found[0], self.joint)[1]))
             found.sort(key=lambda m: -self.scale.worth(m))
@@ -169,6 +180,41 @@ class _Look:
             for is_plain in (True, False):
                 alike = [e for e in others if e.variable.is_plain is is_plain]
                 yield from self._fitted(base, alike, SMOOTH if is_plain else 1)
+
+    def more(self, best: Model) -> Iterator[Model]:
+        """Yield models with smooth forces that are tried where the best of others leaves much."""
+        floor = float(self.scale.power[self.joint] * self.scale.floor[self.joint])
+        if best.mean_square[self.joint] < CLEARER * floor:
+            return
+        placed, _ = smooth_of(best, self.joint)
+        bases = [tuple(s for s in best.effects if s is not placed), self._others()]
+        effects = list(more_forces(self.columns.equations(frozenset()).motion, self.joint))
+        for kept in dict.fromkeys(bases):
+            base = self._without(kept, is_free=best.is_free)
+            own = own_effects(base, self.joint)
+            alike = [e for e in effects if e.gate or not any(e.variable.is_of(s) for s in own)]
+            for model in list(self._fitted(base, alike, SMOOTH)):
+                yield self._with_weight(base, model)
+
+    def _with_weight(self, base: Model, model: Model) -> Model:
+        """Return a model with the best weight of a joint that is added in its smooth force."""
+        motion = self.columns.equations(frozenset()).motion
+        _, force = smooth_of(model, self.joint)
+        variable = force.variable
+        if not variable.is_weighted:
+            return model
+        assert variable.other is not None
+        best, (other, _, weight) = model, variable.other
+        for step in WEIGHT_STEPS:
+            near = [weighted(motion, self.joint, other, variable.kind, weight * x, force.gate)
+                    for x in (1.0 - step, 1.0 + step)]  # fmt: skip
+            for found in self._fitted(base, near, None):
+                if self.scale.worth(found) > self.scale.worth(best):
+                    best = found
+            chosen = smooth_of(best, self.joint)[1].variable.other
+            assert chosen is not None
+            weight = chosen[2]
+        return best
 
     def fine(self, model: Model) -> Model:
         """Return a model with a fine spline in place of its formula."""
@@ -242,34 +288,6 @@ class _Look:
     def _without(self, kept: tuple[EffectAt, ...], *, is_free: bool) -> Model:
         return fit(self.columns, kept, self.listed.sigma, is_free=is_free, rounds=2, steps=4,
                    still=len(kept))  # fmt: skip
-
-
-def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
-    """Return a model without the listed effects that are not worth their price beside its formula.
-
-    They were chosen before the formula was known, and may have stood for a part of it. One after
-    the other goes, and the formula and all others are fitted again, as long as that is worth more.
-
-    Args:
-        columns: of the recording.
-        scale: of mean squares.
-        model: with a formula at the joint.
-        joint: index.
-    """
-    law = law_of(model, joint)
-    trials = []
-    for out in model.effects:
-        left = tuple(s for s in model.effects if s is not out)
-        if out is not law:
-            trials += [
-                fit(columns, left, model.sigma, is_free=is_free, rounds=2, steps=10)
-                for is_free in dict.fromkeys((False, model.is_free))
-            ]
-    possible = [t for t in trials if t.is_possible() and np.isfinite(t.score)]
-    best = max(possible, key=scale.worth, default=model)
-    if scale.worth(best) <= scale.worth(model):
-        return model
-    return earned(columns, scale, best, joint)
 
 
 def _subsets(effects: tuple[EffectAt, ...]) -> Iterable[tuple[EffectAt, ...]]:

@@ -31,6 +31,7 @@ OF_POSITION = (
     'sin(n0*min(max(X - x0, -3.14159/n0), 3.14159/n0))', '1/(1 + e0*cos(n0*(X - x0)))',
     'a*sin(n0*(X - x0)) + b*sin(2*n0*(X - x0))',
     f'(X - x0)/sqrt(1 + {_U}**2)', '(X - x0)/(1 + abs(X - x0)/w0)', 'log(1 + exp((X - x0)/w0))',
+    'max(X - x0, 0)*exp(-(X - x0)/w0)', 'max(x0 - X, 0)*exp((X - x0)/w0)',
     'sin(n0*(X - x0))', 'a*sin(n0*X) + b*cos(n0*X)', 'sin(n0*(X - x0))/(1 + e0*cos(n0*(X - x0)))',
     'sin(n0*(X - x0))/sqrt(1 + e0*cos(n0*(X - x0)))',
     'a*sin(n0*(X - x0)) + b*sin(n0*(X - x0))/sqrt(1 + e0*cos(n0*(X - x0)))',
@@ -43,7 +44,8 @@ OF_VELOCITY = (
     'tanh(X/v0)', 'log(1 + abs(X)/v0)*sign(X)', 'X*exp(-abs(X)/v0)', 'X*exp(-(X/v0)**2)',
     'max(abs(X) - v0, 0)*sign(X)', 'max(abs(X) - v0, 0)**2*sign(X)',
     '(exp(abs(X)/v0) - 1)*sign(X)', 'X**2', 'max(X, 0)', 'min(X, 0)', 'max(X, 0)**2',
-    'min(X, 0)**2', 'exp(X/v0)', 'exp(-X/v0)',
+    'min(X, 0)**2', 'a*max(X, 0)**2 + b*min(X, 0)**2', 'exp(X/v0)', 'exp(-X/v0)',
+    'tanh((X - x0)/w0)',
 )  # fmt: skip
 """Terms of a velocity."""
 OF_SPEED = ('abs(X)', '(abs(X)/r)**p0', 'tanh(abs(X)/v0)', 'exp(-abs(X)/v0)', 'exp(-(X/v0)**2)',
@@ -51,7 +53,7 @@ OF_SPEED = ('abs(X)', '(abs(X)/r)**p0', 'tanh(abs(X)/v0)', 'exp(-abs(X)/v0)', 'e
 """Terms of another velocity, whichever its direction."""
 OF_FRICTION = (
     'sign(X)', 'exp(-abs(X)/v0)*sign(X)', 'exp(-(X/v0)**2)*sign(X)', 'sign(X)/(1 + abs(X)/v0)',
-    'sqrt(abs(X))*sign(X)',
+    'sqrt(abs(X))*sign(X)', 'tanh((abs(X) - v0)/w0)*sign(X)',
 )  # fmt: skip
 """Terms of the joint's own velocity that jump, or nearly so, at rest."""
 FACTORS = ('X', 'X**2', 'exp(X/w0)', 'exp(-X/w0)', 'tanh((X - x0)/w0)', f'exp(-{_U}**2)',
@@ -79,7 +81,8 @@ def of_velocity(*, is_own: bool) -> Iterator[str]:
     """Yield texts in a velocity; of a joint's own those with dry friction too."""
     terms = (*OF_VELOCITY, *(OF_FRICTION if is_own else OF_SPEED))
     for term in terms:
-        for text in (f'a*{term}', *(f'a*X + b*{term}' for _ in '1' if term != 'X')):
+        plain = [_sum(term)] if term == 'X' or 'a*' in term else [_sum(term), f'a*X + b*{term}']
+        for text in plain:
             yield text
             if not is_own:
                 yield f'{text} + d'

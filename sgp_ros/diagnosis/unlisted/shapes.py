@@ -9,8 +9,6 @@ variable and the factor that explain most.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,13 +35,19 @@ LEAST_PLAY, MOST_PLAY = 0.02, 0.9
 """Play that is looked for, in parts of the range that was seen."""
 _LADDER = 7
 """Lags and plays that are tried first."""
+RATIO = 'R'
+"""Parameter of a sum of two joints."""
 GATES = ('', 'sign', 'soft', 'speed', 'square', 'effort')
 """Factors: 1, sign(v), tanh(v/v_s), v, |v| v, motor torque."""
+MORE_GATES = ('ahead', 'back', 'place')
+"""Factors that are tried where these leave something: v ahead, v back, q."""
 _TEXTS = {
     '': '', 'sign': 'sign({v})', 'soft': f'tanh({{v}}/{SMOOTHED})', 'speed': '{v}',
-    'square': 'abs({v})*{v}', 'effort': '{u}',
+    'square': 'abs({v})*{v}', 'effort': '{u}', 'ahead': 'max({v}, 0)', 'back': 'min({v}, 0)',
+    'place': '{q}',
 }  # fmt: skip
-UNITS = {'': '1', 'sign': '1', 'soft': '1', 'speed': '{l}/s', 'square': '{l}2/s2', 'effort': '{f}'}
+UNITS = {'': '1', 'sign': '1', 'soft': '1', 'speed': '{l}/s', 'square': '{l}2/s2', 'effort': '{f}',
+         'ahead': '{l}/s', 'back': '{l}/s', 'place': '{l}'}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,14 +57,14 @@ class Variable:
     Attributes:
         kind: `q` or `dq`.
         index, joint: of the joint, and its name.
-        other: index, name and sign of a joint that is added; None for none.
+        other: index, name and weight of a joint that is added; None for none.
         memory: `lag` or `play` with its number [s, or unit of q]; None for none.
     """
 
     kind: str
     index: int
     joint: str
-    other: tuple[int, str, int] | None = None
+    other: tuple[int, str, float] | None = None
     memory: tuple[str, float] | None = None
 
     @property
@@ -70,8 +74,14 @@ class Variable:
             return f'{self.memory[0]}({self._signal(self.joint)}, {MEMORY})'
         if self.other is None:
             return self._signal(self.joint)
-        _, name, sign = self.other
-        return f'({self._signal(self.joint)} {"+" if sign > 0 else "-"} {self._signal(name)})'
+        _, name, weight = self.other
+        sign, times = ('+', f'{RATIO}*') if self.is_weighted else ('+' if weight > 0 else '-', '')
+        return f'({self._signal(self.joint)} {sign} {times}{self._signal(name)})'
+
+    @property
+    def is_weighted(self) -> bool:
+        """Whether the other joint is added with a weight that is sought."""
+        return self.other is not None and abs(self.other[2]) != 1.0
 
     def _signal(self, joint: str) -> str:
         return f'{self.kind}[{joint}]' if joint.isidentifier() else f'{self.kind}["{joint}"]'
@@ -85,6 +95,12 @@ class Variable:
         """Return its unit."""
         length = 'm' if tree.is_prismatic[self.index] else 'rad'
         return length if self.kind == 'q' else f'{length}/s'
+
+    def ratio_unit(self, tree: Structure) -> str:
+        """Return the unit of the weight of another joint that is added."""
+        assert self.other is not None
+        lengths = ['m' if tree.is_prismatic[i] else 'rad' for i in (self.index, self.other[0])]
+        return '1' if lengths[0] == lengths[1] else '/'.join(lengths)
 
     def knots(self, motion: SeenMotion, pieces: int) -> np.ndarray:
         """Return the knots of a spline over it, (pieces + 7,).
@@ -114,8 +130,10 @@ class Variable:
             return f'{what} of {self.joint} behind a {self.memory[0]}'
         if self.other is None:
             return f'{what} of {self.joint}'
-        _, other, sign = self.other
-        return f'{"sum" if sign > 0 else "difference"} of the {what} of {self.joint} and {other}'
+        _, other, weight = self.other
+        if self.is_weighted:
+            return f'{what} of {self.joint} plus {weight:.2g} times that of {other}'
+        return f'{"sum" if weight > 0 else "difference"} of the {what} of {self.joint} and {other}'
 
     def values(self, motion: SeenMotion) -> np.ndarray:
         """Return it in a motion, (n,)."""
@@ -157,9 +175,9 @@ class SmoothForce(Effect):
         self.joint, self.variable, self.gate, self.knots = joint, variable, gate, knots
         self.width, self.joint_name, self.is_dry = width, name, gate == 'sign'
         own = Variable('dq', joint, name)
-        effort = own.text.replace('dq[', 'tau[', 1)
+        effort, place = (own.text.replace('dq[', f'{kind}[', 1) for kind in ('tau', 'q'))
         self.is_of_own_speed = variable == own
-        self.factor = _TEXTS[gate].format(v=own.text, u=effort)
+        self.factor = _TEXTS[gate].format(v=own.text, u=effort, q=place)
         self.formula = f'tau_x = f({variable.text}){"*" if gate else ""}{self.factor}'
         count = len(knots) - _DEGREE - 1
         self.linear = tuple(f'c{i}' for i in range(count))
@@ -167,8 +185,9 @@ class SmoothForce(Effect):
 
     @property
     def key(self) -> str:
-        """Its joint, number of pieces, variable and factor."""
-        return f'{self.name} {self.joint} {len(self.linear)} {self.formula}'
+        """Its joint, number of pieces, variable with its weight, and factor."""
+        weight = f'{self.variable.other[2]:.9g}' if self.variable.other else ''
+        return f'{self.name} {self.joint} {len(self.linear)} {weight} {self.formula}'
 
     def places(self, motion: SeenMotion) -> list[Place]:
         """Return its joint."""
@@ -232,44 +251,10 @@ class SmoothForce(Effect):
             return np.asarray(motion.direction[:, self.joint])
         if self.gate == 'effort':
             return np.asarray(motion.effort[:, self.joint])
-        return np.asarray({'': np.ones(len(v)), 'speed': v, 'square': np.abs(v) * v}[self.gate])
-
-
-def smooth_forces(motion: ObservedMotion, joint: int) -> Iterator[SmoothForce]:
-    """Yield the smooth forces that may act on a joint.
-
-    Of a velocity by itself only odd and even parts with a jump at rest: `f(|v|) sign(v)` is the
-    factor `sign`. Where the effort was measured nothing is explained by it. What two joints do
-    together, and what was before, has no factor.
-    """
-    names = motion.tree.moving_names
-    for i, kind in itertools.product(motion.moving_joints, ('q', 'dq')):
-        variable = Variable(kind, i, names[i])
-        knots = variable.knots(motion, PIECES)
-        for gate in GATES:
-            if gate == 'effort' and not motion.is_commanded[joint]:
-                continue
-            if kind == 'dq' and i == joint and gate not in {'', 'sign'}:
-                continue  # a function of v with a factor of v is a function of v
-            yield SmoothForce(joint, variable, gate, knots, names[joint])
-    for variable in (*_of_two(motion, joint), *_remembering(motion, joint)):
-        yield SmoothForce(joint, variable, '', variable.knots(motion, PIECES), names[joint])
-
-
-def _of_two(motion: ObservedMotion, joint: int) -> Iterator[Variable]:
-    """Yield sums and differences of the joint with others of its kind."""
-    names, prismatic = motion.tree.moving_names, motion.tree.is_prismatic
-    alike = [i for i in motion.moving_joints if i != joint and prismatic[i] == prismatic[joint]]
-    for i, kind, sign in itertools.product(alike, ('q', 'dq'), (1, -1)):
-        yield Variable(kind, joint, names[joint], other=(i, names[i], sign))
-
-
-def _remembering(motion: ObservedMotion, joint: int) -> Iterator[Variable]:
-    """Yield lags of the joint's motion, and its position behind play."""
-    name, width = motion.tree.moving_names[joint], float(np.ptp(motion.position[:, joint]))
-    for kind in ('q', 'dq'):
-        yield Variable(kind, joint, name, memory=('lag', SHORTEST_LAG * motion.step))
-    yield Variable('q', joint, name, memory=('play', LEAST_PLAY * width))
+        return np.asarray({
+            '': np.ones(len(v)), 'speed': v, 'square': np.abs(v) * v, 'ahead': np.maximum(v, 0.0),
+            'back': np.minimum(v, 0.0), 'place': motion.position[:, self.joint],
+        }[self.gate])  # fmt: skip
 
 
 def smooth_of(model: Model, joint: int) -> tuple[EffectAt, SmoothForce]:

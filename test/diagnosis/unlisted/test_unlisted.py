@@ -16,19 +16,20 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.unlisted.assertion import with_laws
-from sgp_ros.diagnosis.unlisted.beside import is_bent, law_of
+from sgp_ros.diagnosis.unlisted.beside import earned, is_bent, law_of
 from sgp_ros.diagnosis.unlisted.formulas import Range, texts
 from sgp_ros.diagnosis.unlisted.formulas import law as a_law
-from sgp_ros.diagnosis.unlisted.search import earned, search
+from sgp_ros.diagnosis.unlisted.search import search
 from sgp_ros.diagnosis.unlisted.sentences import COEFFICIENTS
 from sgp_ros.diagnosis.unlisted.shapes import (
     FINE,
     GATES,
+    MORE_GATES,
     PIECES,
     SmoothForce,
     Variable,
-    smooth_forces,
 )
+from sgp_ros.diagnosis.unlisted.tried import more_forces, smooth_forces
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.formula import read_formula
@@ -202,7 +203,8 @@ def test_every_formula_has_the_unit_of_a_force(equations_for, perfect):
     _, equations = equations_for(perfect[2])
     motion = equations.motion
     seen = set()
-    for smooth in smooth_forces(motion, 1):
+    more = {(s.gate, s.variable.kind, s.variable.index): s for s in more_forces(motion, 1)}
+    for smooth in (*smooth_forces(motion, 1), *more.values()):
         seen.add((smooth.gate, smooth.variable.kind, smooth.variable.index))
         seen_range = Range.of_variable(smooth, motion)
         for text in texts(smooth):
@@ -213,5 +215,5 @@ def test_every_formula_has_the_unit_of_a_force(equations_for, perfect):
             starts = law.starts(motion, law.places(motion)[0])
             columns = law.columns(motion, law.places(motion)[0], starts[0])
             assert np.isfinite(columns).all()
-    assert {gate for gate, _, _ in seen} == set(GATES)
+    assert {gate for gate, _, _ in seen} == {*GATES, *MORE_GATES}
     assert ('', 'q', 0) in seen

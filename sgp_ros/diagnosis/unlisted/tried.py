@@ -1,0 +1,88 @@
+"""The smooth forces that are tried at a joint, and those that are tried where they leave much."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+
+from sgp_ros.diagnosis.unlisted.shapes import (
+    GATES,
+    LEAST_PLAY,
+    MORE_GATES,
+    PIECES,
+    SHORTEST_LAG,
+    SmoothForce,
+    Variable,
+)
+from sgp_ros.robots.observed_motion import ObservedMotion
+
+_WEIGHTS = np.geomspace(0.17, 6.0, 9)
+"""Of another joint in a sum, relative to what makes both parts equally large."""
+
+
+def smooth_forces(motion: ObservedMotion, joint: int) -> Iterator[SmoothForce]:
+    """Yield the smooth forces that may act on a joint.
+
+    Of a velocity by itself only odd and even parts with a jump at rest: `f(|v|) sign(v)` is the
+    factor `sign`. Where the effort was measured nothing is explained by it. What two joints do
+    together, and what was before, has no factor.
+    """
+    names = motion.tree.moving_names
+    for i, kind in itertools.product(motion.moving_joints, ('q', 'dq')):
+        variable = Variable(kind, i, names[i])
+        knots = variable.knots(motion, PIECES)
+        for gate in GATES:
+            if gate == 'effort' and not motion.is_commanded[joint]:
+                continue
+            if kind == 'dq' and i == joint and gate not in {'', 'sign'}:
+                continue  # a function of v with a factor of v is a function of v
+            yield SmoothForce(joint, variable, gate, knots, names[joint])
+    for variable in (*_of_two(motion, joint), *_remembering(motion, joint)):
+        yield SmoothForce(joint, variable, '', variable.knots(motion, PIECES), names[joint])
+
+
+def more_forces(motion: ObservedMotion, joint: int) -> Iterator[SmoothForce]:
+    """Yield those that are tried where all of these leave something.
+
+    With a factor that acts one way, or is the joint's own position; and of the joint's motion plus
+    a part of another's, as a tendon or a hose over both sees it.
+    """
+    names, own = motion.tree.moving_names, {'q': motion.position, 'dq': motion.velocity}
+    for i, kind in itertools.product(motion.moving_joints, own):
+        if (i, kind) != (joint, 'dq'):
+            variable = Variable(kind, i, names[i])
+            knots = variable.knots(motion, PIECES)
+            for gate in MORE_GATES if i != joint else MORE_GATES[:2]:
+                yield SmoothForce(joint, variable, gate, knots, names[joint])
+        if i != joint:
+            size = np.ptp(own[kind][:, joint]) / np.ptp(own[kind][:, i])
+            for weight, sign in itertools.product(size * _WEIGHTS, (1.0, -1.0)):
+                for gate in ('', 'sign') if kind == 'q' else ('',):
+                    yield weighted(motion, joint, i, kind, sign * float(weight), gate)
+
+
+def weighted(
+    motion: ObservedMotion, joint: int, other: int, kind: str, weight: float, gate: str
+) -> SmoothForce:  # fmt: skip
+    """Return the smooth force of a joint's motion plus a part of another's."""
+    names = motion.tree.moving_names
+    variable = Variable(kind, joint, names[joint], other=(other, names[other], weight))
+    return SmoothForce(joint, variable, gate, variable.knots(motion, PIECES), names[joint])
+
+
+def _of_two(motion: ObservedMotion, joint: int) -> Iterator[Variable]:
+    """Yield sums and differences of the joint with others of its kind."""
+    names, prismatic = motion.tree.moving_names, motion.tree.is_prismatic
+    alike = [i for i in motion.moving_joints if i != joint and prismatic[i] == prismatic[joint]]
+    for i, kind, sign in itertools.product(alike, ('q', 'dq'), (1.0, -1.0)):
+        yield Variable(kind, joint, names[joint], other=(i, names[i], sign))
+
+
+def _remembering(motion: ObservedMotion, joint: int) -> Iterator[Variable]:
+    """Yield lags of the joint's motion, and its position behind play."""
+    name, width = motion.tree.moving_names[joint], float(np.ptp(motion.position[:, joint]))
+    for kind in ('q', 'dq'):
+        yield Variable(kind, joint, name, memory=('lag', SHORTEST_LAG * motion.step))
+    yield Variable('q', joint, name, memory=('play', LEAST_PLAY * width))
