@@ -47,6 +47,14 @@ def _spring_between(_t, q, _v):
     return (-0.8 * (q[0] - q[1]) ** 3, 0.0)
 
 
+def _hose(_t, q, _v):
+    return (-0.8 * (q[0] + 0.6 * q[1]) ** 3, 0.0)
+
+
+def _cushion(_t, q, v):
+    return (-1.5 * max(q[0] - 0.3, 0.0) * max(v[0], 0.0),)
+
+
 def _cable(_t, q, _s):
     return 0.3 * math.exp(0.6 * q[0])
 
@@ -72,8 +80,11 @@ def _found(equations_for, links, **what):
         (_contact, 1, 'a*(max(q[joint0] - x0, 0)/r)**p0', {'p0': 1.5, 'x0': 0.3}),
         (_Play(), 1, 'a*play(q[joint0], T)', {'a': -1.2, 'T': 0.5}),
         (_spring_between, 2, 'a*(q[joint0] - q[joint1])**3', {'a': -0.8}),
+        (_hose, 2, 'a*(q[joint0] + R*q[joint1])**3', {'a': -0.8, 'R': 0.6}),
+        (_cushion, 1, 'a*max(q[joint0] - x0, 0)*max(dq[joint0], 0)', {'a': -1.5, 'x0': 0.3}),
     ],
-    ids=['log friction', 'brake and friction', 'contact', 'play', 'spring between'],
+    ids=['log friction', 'brake and friction', 'contact', 'play', 'spring between', 'hose',
+         'cushion'],
 )  # fmt: skip
 def test_laws_are_found_with_their_numbers(equations_for, force, links, formula, numbers):
     """Of one joint, of what it did before, of two joints; alone and in a sum."""
