@@ -61,7 +61,8 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
     found = Explained(comparison, decision, (), {})
     for joint in _joints(equations, comparison, decision):
         listed = found.decision.tentative or found.decision.model
-        searched = search(equations, Scale.of(equations, comparison), listed, joint)
+        scale, is_open = Scale.of(equations, comparison), joint in decision.unknown
+        searched = search(equations, scale, listed, joint, is_open=is_open)
         if searched is None:
             continue
         more = replace(found, searched=(*found.searched, searched))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
@@ -115,3 +117,13 @@ def is_bent(listed: Model, smooth: Model, joint: int) -> bool:
 def _is_plain_sum(s: EffectAt) -> bool:
     """Return whether a law is plain ones added up: it adds to one, and has no shape to bend."""
     return bool(s.effect.plain) and not len(s.shape)
+
+
+def subsets(effects: tuple[EffectAt, ...]) -> Iterable[tuple[EffectAt, ...]]:
+    """Return none of some effects, all, all but one, and all but those of one variable."""
+    found = [(), effects, *(tuple(s for s in effects if s is not out) for out in effects)]
+    found += [
+        tuple(s for s in effects if s.effect.drawn_over != over)
+        for over in dict.fromkeys(s.effect.drawn_over for s in effects)
+    ]
+    return dict.fromkeys(found)

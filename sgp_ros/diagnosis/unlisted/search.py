@@ -8,7 +8,7 @@ with the bodies and all other effects, as every other model is.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,6 +29,7 @@ from sgp_ros.diagnosis.unlisted.beside import (
     law_of,
     own_effects,
     says_less,
+    subsets,
 )
 from sgp_ros.diagnosis.unlisted.formulas import FoundLaw, curve_of, formulas
 from sgp_ros.diagnosis.unlisted.shapes import (
@@ -89,7 +90,9 @@ class Searched:
         return law / fine, float(stats.f.sf(excess, max(more, 1), max(rows, 1.0)))
 
 
-def search(equations: Equations, scale: Scale, listed: Model, joint: int) -> Searched | None:
+def search(
+    equations: Equations, scale: Scale, listed: Model, joint: int, *, is_open: bool = False
+) -> Searched | None:
     """Return what explains a joint better than listed effects, at its price; None for nothing.
 
     Args:
@@ -97,9 +100,10 @@ def search(equations: Equations, scale: Scale, listed: Model, joint: int) -> Sea
         scale: of mean squares.
         listed: best model of listed effects, adequate or not.
         joint: index.
+        is_open: whether listed effects leave it unexplained.
     """
     scale = scale.of_forms()
-    look = _Look(Columns(equations), scale, listed, joint)
+    look = _Look(Columns(equations), scale, listed, joint, is_open)
     smooth = look.ranked()
     if not smooth or scale.worth(smooth[0]) < scale.worth(listed) + ALIKE:
         return None
@@ -147,6 +151,7 @@ class _Look:
     scale: Scale
     listed: Model
     joint: int
+    is_open: bool
     followed: dict[object, list[FoundLaw]] = field(default_factory=dict)
 
     def ranked(self) -> list[Model]:
@@ -182,9 +187,14 @@ class _Look:
                 yield from self._fitted(base, alike, SMOOTH if is_plain else 1)
 
     def more(self, best: Model) -> Iterator[Model]:
-        """Yield models with smooth forces that are tried where the best of others leaves much."""
+        """Yield models with smooth forces that are tried where the best of others leaves much.
+
+        And only where listed effects are beaten, or leave the joint unexplained.
+        """
         floor = float(self.scale.power[self.joint] * self.scale.floor[self.joint])
-        if best.mean_square[self.joint] < CLEARER * floor:
+        is_beaten = self.scale.worth(best) > self.scale.worth(self.listed) + ALIKE
+        is_left = best.mean_square[self.joint] > CLEARER * floor
+        if not (is_left and (self.is_open or is_beaten)):
             return
         placed, _ = smooth_of(best, self.joint)
         bases = [tuple(s for s in best.effects if s is not placed), self._others()]
@@ -278,7 +288,7 @@ class _Look:
         file, and free.
         """
         for is_free in (False, True):
-            for kept in _subsets(own_effects(self.listed, self.joint)):
+            for kept in subsets(own_effects(self.listed, self.joint)):
                 yield self._without((*self._others(), *kept), is_free=is_free)
 
     def _others(self) -> tuple[EffectAt, ...]:
@@ -288,12 +298,3 @@ class _Look:
     def _without(self, kept: tuple[EffectAt, ...], *, is_free: bool) -> Model:
         return fit(self.columns, kept, self.listed.sigma, is_free=is_free, rounds=2, steps=4,
                    still=len(kept))  # fmt: skip
-
-
-def _subsets(effects: tuple[EffectAt, ...]) -> Iterable[tuple[EffectAt, ...]]:
-    found = [(), effects, *(tuple(s for s in effects if s is not out) for out in effects)]
-    found += [
-        tuple(s for s in effects if s.effect.drawn_over != over)
-        for over in dict.fromkeys(s.effect.drawn_over for s in effects)
-    ]
-    return dict.fromkeys(found)
