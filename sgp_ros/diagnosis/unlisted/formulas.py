@@ -174,8 +174,8 @@ ROWS = 100.0
 """Rows that count as independent, as everywhere where models are compared."""
 
 
-def curve_of(model: Model, joint: int) -> Curve:
-    """Return the curve of the smooth force that a model has at a joint.
+def curve_of(model: Model, joint: int) -> tuple[Curve, np.ndarray]:
+    """Return the curve of the smooth force that a model has at a joint, and what is left (N,).
 
     Of the joint's own velocity it is one of the force itself, with a jump at rest or without.
     """
@@ -189,8 +189,10 @@ def curve_of(model: Model, joint: int) -> Curve:
         return equations.compact(force * factor[:, None], joint, is_inertial=False)
 
     nodes = np.unique(smooth.variable.knots(motion, _PIECES))
-    at = smooth.variable.values(motion)
-    return Curve.of(nodes, rows, at, own + model.residual[:, joint])
+    at, target = smooth.variable.values(motion), own + model.residual[:, joint]
+    curve = Curve.of(nodes, rows, at, target)
+    force = np.interp(at, nodes, np.linalg.lstsq(curve.R, curve.y, rcond=None)[0])
+    return curve, target - rows(force[:, None])[:, 0]
 
 
 def _pieces(formula: Formula) -> float:

@@ -39,6 +39,7 @@ from sgp_ros.diagnosis.unlisted.shapes import (
     Variable,
     smooth_at_bound,
     smooth_of,
+    unlike,
 )
 from sgp_ros.diagnosis.unlisted.tried import more_forces, smooth_forces, weighted
 from sgp_ros.physics.effect_at import EffectAt
@@ -61,7 +62,8 @@ class Searched:
         listed: best model of listed effects.
         smooth: best model with a smooth force at the joint.
         laws: models with a formula there, best first.
-        fine: model like the first of them, with a spline that follows any law.
+        free: what a force of any form leaves in the place of the first formula (N,), and the
+            numbers of that model.
         floor: mean square that errors of signals and filters leave.
         is_slight: whether listed effects keep their names where no formula is asserted.
     """
@@ -70,24 +72,23 @@ class Searched:
     listed: Model
     smooth: Model
     laws: tuple[Model, ...]
-    fine: Model | None
+    free: tuple[np.ndarray, int]
     floor: float
     is_slight: bool = False
 
     @property
     def lack_of_fit(self) -> tuple[float, float]:
-        """Ratio of what the first formula leaves to what the fine spline does, and its chance.
+        """Ratio of what the first formula leaves to what any form does, and its chance.
 
         The chance is that of the F test on as many rows as are independent (Fisher 1922).
         """
-        assert self.fine is not None
-        both = (float(m.mean_square[self.joint]) for m in (self.laws[0], self.fine))
-        law, fine = (left + self.floor for left in both)
-        more = self.fine.size - self.laws[0].size
-        r = self.fine.residual[:, self.joint]
-        rows = len(r) / max(correlation_factor(r), 1.0) - self.fine.size
-        excess = (law - fine) / fine * rows / max(more, 1)
-        return law / fine, float(stats.f.sf(excess, max(more, 1), max(rows, 1.0)))
+        r, size = self.free
+        both = (self.laws[0].residual[:, self.joint], r)
+        law, free = (float(x @ x) / len(x) + self.floor for x in both)
+        more = max(size - self.laws[0].size, 1)
+        rows = max(len(r) / max(correlation_factor(r), 1.0) - size, 1.0)
+        excess = (law - free) / free * rows / more
+        return law / free, float(stats.f.sf(excess, more, rows))
 
 
 def search(
@@ -114,7 +115,7 @@ def search(
     if slight and smooth[0].mean_square[joint] > NEARLY**2 * listed.mean_square[joint]:
         return None
     laws: dict[object, Model] = {}
-    for number, model in enumerate(_unlike(smooth, joint)[:SHAPES]):
+    for number, model in enumerate(unlike(smooth, joint)[:SHAPES]):
         best = max(map(scale.worth, laws.values()), default=-np.inf)
         if scale.worth(model) + look.most_spared(model) < best:
             continue
@@ -127,20 +128,9 @@ def search(
     ranked = sorted([*again, *ranked[EARNED:]], key=lambda m: -scale.worth(m))
     first = (i for i, m in enumerate(ranked) if not says_less(equations, m, joint))
     ranked = ranked[next(first, 0) :]
-    fine = look.fine(ranked[0]) if ranked else None
+    free = look.free(ranked[0]) if ranked else (np.zeros(0), 0)
     floor = float(scale.power[joint] * scale.floor[joint])
-    return Searched(joint, listed, smooth[0], tuple(ranked), fine, floor, slight)
-
-
-def _unlike(smooth: list[Model], joint: int) -> list[Model]:
-    """Return the models that are not followed by the same formulas as a better one."""
-    found: dict[object, Model] = {}
-    for model in smooth:
-        placed, force = smooth_of(model, joint)
-        gate = '' if force.is_of_own_speed else force.gate
-        key = force.variable, gate, model.key - {placed.key}, model.is_free
-        found.setdefault(key, model)
-    return list(found.values())
+    return Searched(joint, listed, smooth[0], tuple(ranked), free, floor, slight)
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,12 +216,21 @@ class _Look:
             weight = chosen[2]
         return best
 
-    def fine(self, model: Model) -> Model:
-        """Return a model with a fine spline in place of its formula."""
+    def free(self, model: Model) -> tuple[np.ndarray, int]:
+        """Return what any form leaves in the place of a formula (N,), and the numbers it takes.
+
+        A fine spline, fitted with all else, or then a force that is linear between many nodes.
+        """
         law = law_of(model, self.joint)
         assert law is not None
         assert isinstance(law.effect, FoundLaw)
-        return self._finer(model, law.effect.smooth)
+        fine = self._finer(model, law.effect.smooth)
+        curve, left = curve_of(fine, self.joint)
+        spline = fine.residual[:, self.joint]
+        if left @ left > spline @ spline:
+            return spline, fine.size
+        placed, _ = smooth_of(fine, self.joint)
+        return left, fine.size - len(placed.coefficients) + len(curve.x)
 
     def _finer(self, model: Model, coarse: SmoothForce) -> Model:
         """Return a model with a fine spline in the place of the law or smooth force it has."""
@@ -263,7 +262,7 @@ class _Look:
         if known not in self.followed:  # other bodies hardly change what follows it
             scale, rows = self.scale, len(smooth.residual)
             floor = rows * scale.power[self.joint] * scale.floor[self.joint]
-            motion, curve = smooth.frame.equations.motion, curve_of(smooth, self.joint)
+            motion, (curve, _) = smooth.frame.equations.motion, curve_of(smooth, self.joint)
             self.followed[known] = list(formulas(chosen, motion, curve, float(floor), count))
         laws = self.followed[known][:count]
         yield from self._fitted(base, laws, None)

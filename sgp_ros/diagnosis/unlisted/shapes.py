@@ -271,3 +271,14 @@ def smooth_at_bound(model: Model, joint: int, motion: ObservedMotion) -> bool:
     low, high = placed.effect.bounds(motion, placed.place)
     has_memory = placed.effect.shape_names() == (MEMORY,)
     return bool(has_memory and ((placed.shape < 1.02 * low) | (placed.shape > 0.98 * high)).any())
+
+
+def unlike(smooth: list[Model], joint: int) -> list[Model]:
+    """Return the models that are not followed by the same formulas as a better one."""
+    found: dict[object, Model] = {}
+    for model in smooth:
+        placed, force = smooth_of(model, joint)
+        gate = '' if force.is_of_own_speed else force.gate
+        key = force.variable, gate, model.key - {placed.key}, model.is_free
+        found.setdefault(key, model)
+    return list(found.values())

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis.criteria import LACKING, SIGNIFICANT
 from sgp_ros.diagnosis.decide.decision import Scale, decide
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import compare_models
@@ -179,6 +180,28 @@ def test_a_listed_law_is_not_bent_to_stand_for_another(equations_for):
     assert found is not None
     assert is_bent(listed, found.smooth, 0)
     assert not is_bent(listed, replace(listed, residual=0.99 * listed.residual), 0)
+
+
+def test_a_formula_is_held_against_any_form(equations_for):
+    """A shaft that shakes at one speed: no text says so, and splines are too coarse to show it."""
+
+    def force(_t, _q, v):
+        r = v[0] / 1.6
+        return (-0.3 * r**5 / ((1.0 - r * r) ** 2 + 0.25 * r * r),)
+
+    _, equations = equations_for(simulate(CHAINS[1], 11, 10.0, force=force))
+    comparison = compare_models(equations, lambda _share: None)
+    decision = decide(equations, comparison)
+    scale, listed = Scale.of(equations, comparison), decision.tentative or decision.model
+    found = search(equations, scale, listed, 0, is_open=True)
+    assert found is not None
+    left, size = found.free
+    assert size > 3 * FINE
+    assert left @ left < 0.2 * (found.smooth.residual[:, 0] ** 2).sum()
+    ratio, chance = found.lack_of_fit
+    assert ratio > LACKING
+    assert chance < SIGNIFICANT
+    assert law_of(with_laws(equations, comparison, decision).decision.model, 0) is None
 
 
 def test_a_finer_spline_has_columns_of_its_own(equations_for):
