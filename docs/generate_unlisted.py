@@ -14,6 +14,7 @@ TARGET = Path(__file__).parent / 'unlisted.md'
 RESULTS = ROOT / 'sgp_proof/results/unlisted_fourth.json'
 THIRD = ROOT / 'sgp_proof/results/unlisted_third.json'
 AGAIN = ROOT / 'sgp_proof/results/unlisted_third_again.json'
+FOURTH_AGAIN = ROOT / 'sgp_proof/results/unlisted_fourth_again.json'
 FIRST = ROOT / 'sgp_proof/results/unlisted.json'
 BASELINES = ROOT / 'sgp_proof/results/unlisted_baselines.json'
 WITHHELD = ROOT / 'sgp_proof/results/withheld.json'
@@ -29,7 +30,7 @@ def text():
 
     result = json.loads(RESULTS.read_text(encoding='utf-8'))
     rows, summary = result['cases'], result['summary']
-    earlier = {'first': FIRST, 'third': THIRD, 'again': AGAIN}
+    earlier = {'first': FIRST, 'third': THIRD, 'again': AGAIN, 'fourth_again': FOURTH_AGAIN}
     known = {f'{name}_{key}': value for name, path in earlier.items()
              for key, value in _rates(path).items()}  # fmt: skip
     numbers = sorted(int(r['case'].rpartition('_')[2]) for r in rows)
