@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from sgp_ros.diagnosis.unlisted.shapes import (
     SMOOTHED,
     UNITS,
     SmoothForce,
+    Variable,
     smooth_of,
 )
 from sgp_ros.physics.formula import Formula, read_formula
@@ -91,10 +92,10 @@ class Range:
     unit: str
 
     @classmethod
-    def of_variable(cls, smooth: SmoothForce, motion: ObservedMotion) -> Range:
-        """Return that of the variable of a smooth force."""
-        x = smooth.variable.values(motion)
-        return cls(float(x.min()), float(x.max()), smooth.variable.unit(motion.tree))
+    def of_variable(cls, variable: Variable, motion: ObservedMotion) -> Range:
+        """Return that of a variable in a motion."""
+        x = variable.values(motion)
+        return cls(float(x.min()), float(x.max()), variable.unit(motion.tree))
 
     @property
     def span(self) -> float:
@@ -153,7 +154,7 @@ def formulas(
         floor: sum of squares that errors of signals and filters may leave.
         count: of texts.
     """
-    seen = Range.of_variable(smooth, motion)
+    seen = Range.of_variable(smooth.variable, motion)
     found: list[tuple[float, str, Followed]] = []
     noise = curve.rest + floor
     for text in texts(smooth):
@@ -216,20 +217,14 @@ def law(
     own = 'm' if motion.tree.is_prismatic[smooth.joint] else 'rad'
     force = 'N' if own == 'm' else 'N m'
     per = '1' if smooth.is_of_own_speed else UNITS[smooth.gate].format(l=own, f=force)
-    speed = motion.velocity[:, smooth.joint]
-    own_speed = Range(float(speed.min()), float(speed.max()), f'{own}/s')
     plain = text.replace('X', smooth.variable.text)
     whole = _times(plain, '' if smooth.is_of_own_speed else smooth.factor)
     formula = read_formula(whole, is_law=True)
     parameters = [
         LawParameter(name, _unit(force, per, seen.unit, _power(text, name, seen, numbers)))
-        if name in COEFFICIENTS else _shape(name, smooth, seen, own_speed, numbers)
+        if name in COEFFICIENTS else _shape(name, smooth, motion, seen, numbers)
         for name in sorted(formula.parameters)
     ]  # fmt: skip
-    parameters = [
-        replace(p, unit=smooth.variable.ratio_unit(motion.tree)) if p.name == RATIO else p
-        for p in parameters
-    ]
     gate = '' if smooth.is_of_own_speed else _OF_GATE[smooth.gate]
     words = NEAREST.get(f'{text.removesuffix(" + d")} {gate}'.strip(), NAMELESS)
     price = PER_UNUSUAL + PER_PIECE * _pieces(formula)
@@ -238,8 +233,9 @@ def law(
 
 
 def _shape(
-    name: str, smooth: SmoothForce, seen: Range, own_speed: Range, numbers: Mapping[str, float]
-) -> LawParameter:
+    name: str, smooth: SmoothForce, motion: ObservedMotion, seen: Range,
+    numbers: Mapping[str, float],
+) -> LawParameter:  # fmt: skip
     """Return a parameter that is no coefficient, with unit, start and range."""
     if name == MEMORY:
         assert smooth.variable.memory is not None
@@ -250,8 +246,12 @@ def _shape(
         assert smooth.variable.other is not None
         weight = smooth.variable.other[2]
         low, high = sorted((weight / 3.0, 3.0 * weight))
-        return LawParameter(name, '1', low, start=weight, high=high)
-    low, high, unit = (own_speed if name == SMOOTHED else seen).ends(name)
+        unit = smooth.variable.ratio_unit(motion.tree)
+        return LawParameter(name, unit, low, start=weight, high=high)
+    if name == SMOOTHED:
+        own_speed = Variable('dq', smooth.joint, smooth.joint_name)
+        seen = Range.of_variable(own_speed, motion)
+    low, high, unit = seen.ends(name)
     start = numbers.get(name, smooth.width)
     return LawParameter(name, unit, low, start=start, high=high, is_known=name == 'r')
 

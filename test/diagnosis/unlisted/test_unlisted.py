@@ -125,7 +125,7 @@ def test_a_listed_effect_beside_a_formula_earns_its_price_again(equations_for, f
     _, equations = equations_for(simulate(CHAINS[1], 11, 10.0, force=force))
     motion, columns = equations.motion, Columns(equations)
     smooth = next(s for s in smooth_forces(motion, 0) if (s.variable.kind, s.gate) == ('dq', ''))
-    text, seen = 'a*X/(1 + (X/v0)**2)', Range.of_variable(smooth, motion)
+    text, seen = 'a*X/(1 + (X/v0)**2)', Range.of_variable(smooth.variable, motion)
     assert text in texts(smooth)
     law = a_law(smooth, motion, seen, text, {'v0': 1.5})
     place = Place(0)
@@ -228,7 +228,7 @@ def test_every_formula_has_the_unit_of_a_force(equations_for, perfect):
     more = {(s.gate, s.variable.is_weighted): s for s in more_forces(motion, 1)}
     for smooth in (*smooth_forces(motion, 1), *more.values()):
         seen.add((smooth.gate, smooth.variable.kind, smooth.variable.index))
-        seen_range = Range.of_variable(smooth, motion)
+        seen_range = Range.of_variable(smooth.variable, motion)
         for text in texts(smooth):
             law = a_law(smooth, motion, seen_range, text, _middle(text, seen_range))
             units = {p.name: p.unit for p in law.quantities}
