@@ -6,6 +6,11 @@ as attributes, so that a command can print them as they are.
 
 from __future__ import annotations
 
+import re
+
+_ENDLESS = re.compile(r'(\S{80})(\S{920,})')
+"""A word that only a damaged file has, longer than a path: its beginning and the rest."""
+
 
 class SgpError(Exception):
     """Base of every error raised on purpose.
@@ -25,7 +30,8 @@ class SgpError(Exception):
             parts.append(f'expected {expected}')
         if remedy:
             parts.append(remedy)
-        super().__init__('; '.join(parts).replace('\n', ' '))
+        text = '; '.join(parts).replace('\n', ' ')
+        super().__init__(_ENDLESS.sub(lambda m: f'{m[1]}... ({len(m[0])} characters)', text))
 
     def __reduce__(self) -> tuple[type[SgpError], tuple[str, str, str]]:
         """Keep the three parts when the error crosses a process boundary."""

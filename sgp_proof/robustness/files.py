@@ -45,7 +45,21 @@ MAP = {
     'time': {'column': 't', 'unit': 's'},
     'joints': {'hinge': {'position': {'column': 'q', 'unit': 'rad'}}},
 }
-APART = ('mat', 'h5', 'parquet', 'json')
+MJCF = (
+    '<mujoco><compiler angle="radian"/><worldbody><body><joint name="hinge" axis="0 1 0" '
+    'damping="0.1" frictionloss="0.2" armature="0.01" range="-1 1"/><inertial pos="0 0 -0.3" '
+    'mass="1" diaginertia="0.1 0.1 0.02"/><geom size="0.1"/></body></worldbody><actuator>'
+    '<motor name="drive" joint="hinge" gear="2" ctrlrange="-5 5"/></actuator></mujoco>'
+)
+SDF = (
+    '<sdf version="1.9"><model name="m"><link name="base"/><link name="arm"><pose>0 0 0.1 0 0 0'
+    '</pose><inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.02</izz></inertia>'
+    '</inertial></link><joint name="hinge" type="revolute"><parent>base</parent><child>arm</child>'
+    '<axis><xyz>0 1 0</xyz><limit><lower>-1</lower><upper>1</upper></limit><dynamics><damping>0.1'
+    '</damping><friction>0.2</friction></dynamics></axis></joint></model></sdf>'
+)
+TABLES_APART = ('mat', 'h5', 'parquet', 'json')
+APART = (*TABLES_APART, 'xml', 'xacro')
 WEIGHTS = dict.fromkeys(APART, 0.1)
 """Share of seeds of a format that takes a process of its own."""
 
@@ -72,13 +86,20 @@ def make_samples(folder: Path) -> dict[str, Path]:
     _write_db3(folder / 'x.db3', folder / 'x.mcap')
     _write_ros1(folder / 'x.bag', q)
     (folder / 'x.urdf').write_bytes((ROOT / 'config/robots/panda.urdf').read_bytes())
+    (folder / 'x.xml').write_text(MJCF)
+    (folder / 'x.sdf').write_text(SDF)
+    (folder / 'x.xacro').write_text(
+        (ROOT / 'config/robots/panda.urdf')
+        .read_text()
+        .replace('<robot ', '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ', 1)
+    )
     (folder / 'x.yaml').write_bytes((ROOT / 'config/robots/linear_axis.yaml').read_bytes())
     (folder / 'params.yaml').write_bytes((ROOT / 'config/reaction_wheel.yaml').read_bytes())
     (folder / 'map.yaml').write_text(json.dumps(MAP))
     engine = Engine(robot, EngineConfig.from_mapping({}, robot))
     save_model(folder / 'model.npz', take_snapshot(engine))
     names = ('x.csv', 'x.npz', 'x.mat', 'x.mcap', 'x.db3', 'x.bag', 'x.urdf', 'x.yaml', 'x.h5',
-             'x.parquet', 'x.json')  # fmt: skip
+             'x.parquet', 'x.json', 'x.xml', 'x.sdf', 'x.xacro')  # fmt: skip
     found = {name[2:]: folder / name for name in names}
     found |= {'params': folder / 'params.yaml', 'map': folder / 'map.yaml'}
     return found | {'model': folder / 'model.npz'}
@@ -154,14 +175,14 @@ def damaged(content: bytes, rng: np.random.Generator) -> bytes:
 
 def read(kind: str, path: Path) -> None:
     """Read a file as the commands do."""
-    if kind in ('csv', 'npz', 'json', *APART):
+    if kind in ('csv', 'npz', *TABLES_APART):
         remarks: list[str] = []
         load_columns(path, remarks)
         if kind == 'csv':
             read_table(path, MAP)
     elif kind in ('mcap', 'db3', 'bag'):
         list(open_recording(path).events(None, 'none'))
-    elif kind in ('urdf', 'yaml'):
+    elif kind in ('urdf', 'yaml', 'xml', 'sdf', 'xacro'):
         load_robot(str(path))
     elif kind == 'params':
         EngineConfig.from_mapping(load_parameters(path), load_robot('reaction_wheel'))

@@ -185,6 +185,10 @@ def test_sdf_names_what_it_leaves_out(tmp_path):
         _robot(tmp_path, SDF % '<include/>', 'arm.sdf')
     with pytest.raises(ConfigError, match="of type 'ball'"):
         _robot(tmp_path, (SDF % '').replace('"revolute"', '"ball"'), 'arm.sdf')
+    digits = '9' * 5000
+    with pytest.raises(ConfigError, match='expected finite numbers') as caught:
+        _robot(tmp_path, (SDF % '').replace('<pose>0 0 1', f'<pose>{digits} 0 1'), 'arm.sdf')
+    assert len(str(caught.value)) < 500, 'digits of a damaged file fill the line'
 
 
 XACRO = """<robot name="axis" xmlns:xacro="http://www.ros.org/wiki/xacro">

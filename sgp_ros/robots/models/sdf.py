@@ -294,6 +294,7 @@ class _Reading:
             numbers = tuple(float(word) for word in words)
         except ValueError:
             raise self.error(f'{where}: {" ".join(words)!r}', 'numbers') from None
-        if any(math.isnan(x) for x in numbers):
-            raise self.error(f'{where}: {" ".join(words)!r}', 'numbers')
+        bounded = np.isfinite(default).all()  # a limit may be infinite
+        if any(math.isnan(x) or (bounded and math.isinf(x)) for x in numbers):
+            raise self.error(f'{where}: {" ".join(words)!r}', 'finite numbers')
         return numbers or default
