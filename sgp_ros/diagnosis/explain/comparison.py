@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import COUNTED_SHARE
+from sgp_ros.diagnosis.criteria import ADEQUATE_REST, COUNTED_SHARE, PER_EFFECT, SLIGHT_REST
 from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
 from sgp_ros.diagnosis.explain.joint_search import by_joint, uncoupled, usual
 from sgp_ros.diagnosis.explain.regression import Columns
@@ -77,9 +78,8 @@ def compare_models(equations: Equations, progress: Callable[[float], None]) -> C
         progress(0.45 + 0.55 * (number + 1) / len(parents))
     ranked = _ranked([*pairs, *_exchanged(columns, _ranked(pairs))])
     ranked = _ranked([*ranked, *_plain(columns, (*singles[:1], *ranked[:1]))])
-    best = max([*singles, *ranked], key=lambda m: m.score, default=None)
-    more = _more(columns, best) if best is not None else []
-    return Comparison(bases[0], bases[1], tuple(singles), tuple(ranked), tuple(more))
+    found = Comparison(bases[0], bases[1], tuple(singles), tuple(ranked))
+    return replace(found, more=tuple(_more(columns, found)))
 
 
 def _plain(columns: Columns, models: Iterable[Model]) -> Iterator[Model]:
@@ -92,18 +92,22 @@ def _plain(columns: Columns, models: Iterable[Model]) -> Iterator[Model]:
                 yield from uncoupled(columns, without, s)
 
 
-def _more(columns: Columns, best: Model) -> list[Model]:
-    """Return models of a search joint by joint, where the best model leaves physics.
+def _more(columns: Columns, found: Comparison) -> list[Model]:
+    """Return models of a search joint by joint, where the best credible model is not adequate.
 
-    From that model, and from what nearly every joint has, with bodies that may differ.
+    From that model, and from what nearly every joint has, with bodies that may differ. Bodies that
+    are unlikely may stand for what is missing.
     """
-    if best.left.max() < COUNTED_SHARE:
+    by_score = _ranked([found.base, *found.singles, *found.pairs])
+    best = next(m for m in by_score if not m.effects or is_credible(m))
+    limit = np.maximum(ADEQUATE_REST * found.base.left, SLIGHT_REST)
+    if (best.left < limit).all() and 0.5 * float(best.w @ best.w) < PER_EFFECT:
         return []
     starts = [best, usual(columns, fit(columns, (), best.sigma, is_free=True))]
     if isinstance(best.frame.equations.motion.drive, Servo):
         starts += _late(columns, best.sigma)
-    found = [model for start in starts for model in by_joint(columns, start)]
-    return _ranked(m for m in found if len(m.effects) > 2)
+    models = [model for start in starts for model in by_joint(columns, start)]
+    return _ranked(m for m in models if len(m.effects) > 2)
 
 
 def _late(columns: Columns, sigma: np.ndarray) -> Iterator[Model]:
