@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from io import BytesIO
 from typing import IO, NamedTuple
 
+import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -29,10 +30,15 @@ DAMAGE = (
 """What reading damaged records raises."""
 
 _LOOSE_BYTES, _BLOCK_BYTES = 1 << 20, 1 << 16
-_MANY = 4096
-"""Records that are counted at once."""
+_LEAST_RUN, _MANY = 8, 4096
+"""Records that are looked at, and counted, at once."""
 _RECORD_HEAD, _MESSAGE_HEAD = struct.Struct('<BQ'), struct.Struct('<H4xQ8x')
 SOUND, DAMAGED, MISSING = 'sound', 'damaged', 'missing'
+_HEADS = np.dtype({
+    'names': ['channel', 'log_ns'], 'formats': ['<u2', '<u8'], 'itemsize': 31,
+    'offsets': [_RECORD_HEAD.size, _RECORD_HEAD.size + 6],
+})  # fmt: skip
+"""Of a message and its record."""
 _FOOTER = struct.Struct('<BQQQI')
 _DATA_END = struct.Struct('<BQI')
 
@@ -45,10 +51,40 @@ class Message(NamedTuple):
     data: bytes
 
 
+class Stamps(NamedTuple):
+    """What the heads of some messages say: channels and log times [ns], (n,)."""
+
+    channels: np.ndarray
+    log_ns: np.ndarray
+
+
 Record = Schema | Channel | Message
-_READERS: dict[int, Callable[[ReadDataStream], Record]] = {
+_READERS: dict[int, Callable[[ReadDataStream], Schema | Channel]] = {
     Opcode.SCHEMA: Schema.read, Opcode.CHANNEL: Channel.read,
 }  # fmt: skip
+
+
+class _Run:
+    """Finds how many messages of one length stand one after the other."""
+
+    def __init__(self) -> None:
+        self._before, self._look = (0, 0), _LEAST_RUN
+
+    def length(self, head: tuple[int, int], data: bytes, begin: int) -> int:
+        """Return how many records from a byte on have the kind and length of `head`; at least 1.
+
+        They are looked at once two of them were seen, the more the longer the run is.
+        """
+        is_second, self._before = head == self._before, head
+        size = _RECORD_HEAD.size + head[1]
+        most = min((len(data) - begin) // size, self._look)
+        if head[0] != Opcode.MESSAGE or not is_second or most < 2:
+            return 1
+        heads = np.frombuffer(data, np.uint8, most * size, begin).reshape(most, size)
+        is_other = (heads[:, : _RECORD_HEAD.size] != heads[0, : _RECORD_HEAD.size]).any(axis=1)
+        count = int(is_other.argmax()) if is_other.any() else most
+        self._look = min(2 * self._look, _MANY) if count >= self._look else _LEAST_RUN
+        return count
 
 
 class Walk:
@@ -69,10 +105,12 @@ class Walk:
         Afterwards `is_complete` tells whether the data had an end, `offset` where they break off.
         """
         offset = start = len(MAGIC)
+        run = _Run()
         while True:
             self.offset = offset
             opcode, length = self._head(offset)
-            end = offset + _RECORD_HEAD.size + length
+            count = run.length((opcode, length), self._block, offset - self._start)
+            end = offset + count * (_RECORD_HEAD.size + length)
             is_end = opcode in {0, Opcode.DATA_END, Opcode.FOOTER} or end > self._size
             if start < offset and (is_end or opcode == Opcode.CHUNK or end - start > _LOOSE_BYTES):
                 yield start, self._read(start, offset)
@@ -136,36 +174,68 @@ def state_of_summary(stream: IO[bytes]) -> str:
     return SOUND if start else MISSING
 
 
-def read_records(data: bytes, unpacking: Unpacking, *, is_chunk: bool = False) -> Iterator[Record]:
+def read_records(data: bytes, unpacking: Unpacking) -> Iterator[Record]:
     """Yield schemas, channels and messages of complete records, those in chunks included.
 
     Args:
         data: of one segment.
         unpacking: bounds what chunks unpack to, and the number of records.
-        is_chunk: whether they are the content of a chunk, where there are no others.
 
     Raises:
         TooMuchError: beyond `CHUNK_MB`, `MESSAGES` or `RATIO`.
         McapError: a wrong checksum, or what is no record; others of `DAMAGE`.
     """
-    end = number = 0
+    for found, begin, size, number in _runs(data, unpacking):
+        if isinstance(found, bytes):
+            for start in range(begin, begin + number * size, size):
+                channel, log_ns = _MESSAGE_HEAD.unpack_from(found, start + _RECORD_HEAD.size)
+                content = found[start + _RECORD_HEAD.size + _MESSAGE_HEAD.size : start + size]
+                yield Message(channel, log_ns, content)
+        else:
+            yield found
+
+
+def read_stamps(data: bytes, unpacking: Unpacking) -> Iterator[Schema | Channel | Stamps]:
+    """Yield the same, of messages only what their heads say, many at once."""
+    for found, begin, size, number in _runs(data, unpacking):
+        if isinstance(found, bytes):
+            rows = np.frombuffer(found, np.uint8, number * size, begin).reshape(number, size)
+            heads = np.ascontiguousarray(rows[:, : _HEADS.itemsize]).view(_HEADS)[:, 0]
+            yield Stamps(heads['channel'], heads['log_ns'])
+        else:
+            yield found
+
+
+def _runs(
+    data: bytes, unpacking: Unpacking, *, is_chunk: bool = False
+) -> Iterator[tuple[bytes | Schema | Channel, int, int, int]]:
+    """Yield runs of messages of one length, or a schema or channel.
+
+    Of a run the bytes that hold it, its first byte, the length of a record, the number of them.
+    """
+    end, number, run = 0, 0, _Run()
     while end < len(data):
-        number += 1
-        if number == _MANY:
+        head = _RECORD_HEAD.unpack_from(data, end)
+        opcode, length = head
+        begin, size = end, _RECORD_HEAD.size + length
+        if opcode == 0 or begin + size > len(data):
+            raise McapError(f'no record at byte {begin} of it')
+        count = run.length(head, data, begin)
+        end = begin + count * size
+        if opcode == Opcode.MESSAGE:
+            if length < _MESSAGE_HEAD.size:
+                raise McapError(f'a message of {length} bytes at byte {begin} of it')
+            yield data, begin, size, count
+        elif opcode in _READERS:
+            content = data[begin + _RECORD_HEAD.size : end]
+            yield _READERS[opcode](ReadDataStream(BytesIO(content))), 0, 0, 1
+        elif opcode == Opcode.CHUNK and not is_chunk:
+            chunk = Chunk.read(ReadDataStream(BytesIO(data[begin + _RECORD_HEAD.size : end])))
+            yield from _runs(_plain(chunk, unpacking), unpacking, is_chunk=True)
+        number += count
+        if number >= _MANY:
             unpacking.count_messages(number)
             number = 0
-        opcode, length = _RECORD_HEAD.unpack_from(data, end)
-        start, end = end + _RECORD_HEAD.size, end + _RECORD_HEAD.size + length
-        if opcode == 0 or end > len(data):
-            raise McapError(f'no record at byte {start - _RECORD_HEAD.size} of it')
-        if opcode == Opcode.MESSAGE:
-            channel, log_ns = _MESSAGE_HEAD.unpack_from(data, start)
-            yield Message(channel, log_ns, data[start + _MESSAGE_HEAD.size : end])
-        elif opcode in _READERS:
-            yield _READERS[opcode](ReadDataStream(BytesIO(data[start:end])))
-        elif opcode == Opcode.CHUNK and not is_chunk:
-            chunk = Chunk.read(ReadDataStream(BytesIO(data[start:end])))
-            yield from read_records(_plain(chunk, unpacking), unpacking, is_chunk=True)
     unpacking.count_messages(number)
 
 

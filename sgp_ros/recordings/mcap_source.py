@@ -16,6 +16,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import IO, NamedTuple
 
+import numpy as np
 from mcap.reader import make_reader
 from mcap.records import Channel, Schema
 from mcap.summary import Summary
@@ -27,8 +28,10 @@ from sgp_ros.recordings.mcap_records import (
     MAGIC,
     SOUND,
     Message,
+    Stamps,
     Walk,
     read_records,
+    read_stamps,
     state_of_summary,
 )
 from sgp_ros.recordings.topics import RawMessage, Topic
@@ -229,13 +232,13 @@ def _scan(stream: IO[bytes], path: Path, number: int, unpacking: Unpacking) -> _
     try:
         for offset, data in walk.segments():
             counts, first_ns, last_ns = Counter[int](), 0, 0
-            for record in read_records(data, unpacking):
-                if isinstance(record, Message):
-                    channel, log_ns, _ = record
-                    if log_ns < first_ns or not counts:
-                        first_ns = log_ns
-                    last_ns = max(last_ns, log_ns)
-                    counts[channel] += 1
+            for record in read_stamps(data, unpacking):
+                if isinstance(record, Stamps):
+                    least, most = int(record.log_ns.min()), int(record.log_ns.max())
+                    first_ns = min(first_ns, least) if counts else least
+                    last_ns = max(last_ns, most)
+                    numbers, found = np.unique(record.channels, return_counts=True)
+                    counts.update(dict(zip(numbers.tolist(), found.tolist(), strict=True)))
                 elif isinstance(record, Schema):
                     schemas[record.id] = record
                 else:

@@ -6,6 +6,7 @@ import re
 import shutil
 import sqlite3
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -173,6 +174,30 @@ def test_file_that_lacks_only_its_index_is_whole(tmp_path):
     recording = open_recording(path)
     assert worlds.everything(recording) == EXPECTED
     assert recording.remarks == ()
+
+
+@pytest.mark.parametrize('unchunked', [False, True])
+@pytest.mark.parametrize('seed', range(3))
+def test_messages_of_any_lengths_are_found_without_an_index(seed, unchunked, tmp_path):
+    """Runs of messages of one length are read at once, single ones between them as well."""
+    rng, path, written = np.random.default_rng(seed), tmp_path / 'x.mcap', []
+    with path.open('wb') as stream:
+        writer = McapWriter(
+            stream, chunk_size=1 << 16, use_chunking=not unchunked, use_statistics=False
+        )
+        writer.start()
+        schema = writer.register_schema('std_msgs/msg/String', 'ros2msg', b'')
+        channels = [writer.register_channel(f'/{name}', 'cdr', schema) for name in 'ab']
+        for run in 2 ** rng.integers(0, 14, size=12) - 1:
+            size, order = int(rng.integers(1, 90)), rng.integers(2, size=run)
+            for number in order:
+                stamp, content = 10**18 + int(rng.integers(10**9)), rng.bytes(size)
+                writer.add_message(channels[number], stamp, content, stamp)
+                written.append((stamp, ('/a', '/b')[number], content))
+        writer.finish()
+    source = mcap_source.McapSource([path])
+    assert sum(topic.count for topic in source.topics) == len(written)
+    assert sorted(source.messages(source.topics)) == sorted(written)
 
 
 def test_file_with_garbage_after_a_crash_gives_its_complete_chunks(tmp_path):
