@@ -286,8 +286,8 @@ def _opened(
         unknown = _ordered(np.where(is_open, excess, 0.0), int(np.argmax(excess)))
         return Decision('missing_physics', known, (best, *rivals), excess, unknown[0], unknown,
                         against=base.score)  # fmt: skip
-    left = comparison.parameters.left
-    if left.max() > COUNTED_SHARE or (best.left < NEARLY * left)[open_].any():
+    left, is_seen = comparison.parameters.left, max(best.filtered_shares) > COUNTED_SHARE
+    if left.max() > COUNTED_SHARE or (is_seen and (best.left < NEARLY * left)[open_].any()):
         unknown = _ordered(np.where(is_open, excess, 0.0), worst)
         return Decision('unexplained', base, (best, *rivals), excess, worst, unknown, best,
                         base.score)  # fmt: skip
