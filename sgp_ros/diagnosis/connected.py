@@ -52,6 +52,7 @@ class Connected:
         remarks: what is to be done about them.
         rivals: joints with an error of the connection that would explain as much, not asserted.
         trust: probability of the physics against these.
+        common: names and joints of physics that is found whether they are there or not.
         has_rival_gains: whether these are gains of drives.
         delay_std: what errors of the connection add to the uncertainty of a delay [s].
         laws: what a search for laws that no list has said.
@@ -68,6 +69,7 @@ class Connected:
     remarks: tuple[str, ...] = ()
     rivals: tuple[str, ...] = ()
     trust: float = 1.0
+    common: frozenset[tuple[str, str]] = frozenset()
     has_rival_gains: bool = False
     delay_std: float = 0.0
     laws: tuple[LawSearch, ...] = ()
@@ -86,7 +88,8 @@ class Connected:
             delay = replace(delay, std=math.hypot(delay.std or 0.0, self.delay_std))
             finding = replace(finding, parameters={**finding.parameters, 'delay': delay})
         is_one_law = not self.has_rival_gains or finding.effect == TORQUE_GAIN.name
-        if not self.rivals or (self.rivals == (finding.joint,) and is_one_law):
+        is_common = (finding.effect, finding.joint) in self.common
+        if not self.rivals or is_common or (self.rivals == (finding.joint,) and is_one_law):
             return finding
         return replace(finding, probability=finding.probability * self.trust)
 
@@ -217,7 +220,7 @@ def _connected(
             gain = _gain(on_band, corrected) - price
     least = -ALIKE if _stands_for_gains(plain, found) else PER_EFFECT
     if gain < least:
-        return plain if gain + rare < -ALIKE else _beside(plain, found, gain)
+        return plain if gain + rare < -ALIKE else _beside(plain, found, gain, _named(corrected))
     return replace(
         corrected,
         findings=tuple(error_finding(found, i, gain) for i in range(len(found.errors))),
@@ -235,9 +238,7 @@ def _stands_for_gains(plain: Connected, found: Connection) -> bool:
     Where commands are position targets, the motor that multiplies them is the drive.
     """
     named = {e.hypothesis.joint for e in found.errors if 'kp' in e.hypothesis.names}
-    motion = plain.equations.motion
-    scaled = {joint_name(motion, s.place.joint) for s in plain.several.decision.model.effects
-              if s.name == TORQUE_GAIN.name}  # fmt: skip
+    scaled = {joint for effect, joint in _named(plain) if effect == TORQUE_GAIN.name}
     return plain.recordings.learned.gains is not None and bool(named & scaled)
 
 
@@ -247,14 +248,25 @@ def _gain(plain: Connected, corrected: Connected) -> float:
     return corrected.worth(nominal, recorded) - plain.worth(nominal, recorded)
 
 
-def _beside(plain: Connected, found: Connection, gain: float) -> Connected:
+def _named(connected: Connected) -> frozenset[tuple[str, str]]:
+    """Return the names and joints of the effects that are asserted."""
+    motion, model = connected.equations.motion, connected.several.decision.model
+    return frozenset((s.name, joint_name(motion, s.place.joint)) for s in model.effects)
+
+
+def _beside(
+    plain: Connected,
+    found: Connection,
+    gain: float,
+    common: frozenset[tuple[str, str]] = frozenset(),
+) -> Connected:
     """Return the recording as it is, with errors of the connection that explain as much."""
     told = tuple((e.hypothesis.joint, e.hypothesis.effect) for e in found.errors)
     return replace(
         plain, equivalents=(Equivalent(told, '', 1.0),),
         rivals=tuple(joint for joint, _ in told),
         has_rival_gains=any(e.hypothesis.is_of_gains for e in found.errors),
-        trust=1.0 / (1.0 + math.exp(TEMPER * gain)),
+        trust=1.0 / (1.0 + math.exp(TEMPER * gain)), common=common,
     )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from sgp_ros.diagnosis import connected
 from sgp_ros.diagnosis.connected import Connected
+from sgp_ros.diagnosis.result import Finding, Location
 
 
 def _of(cutoff):
@@ -77,3 +78,15 @@ def test_gains_are_asserted_only_where_bodies_do_not_explain_as_much(
     assert bool(one.findings) == asserted
     assert one.trust == (1.0 if asserted else 0.5)
     assert bool(one.equivalents) != asserted
+
+
+def test_what_is_found_with_an_error_of_the_connection_too_is_as_certain():
+    """Efforts in another unit or heavier bodies: either way there is friction."""
+    beside = Connected(
+        None, None, None, rivals=('all',), trust=0.5, common=frozenset({('spring', 'knee')})
+    )
+    friction = Finding('knee', 'viscous_friction', {}, Location(), 9.0, 0.9, 1.0)
+    assert beside.against_rivals(friction).probability == pytest.approx(0.45)
+    assert beside.against_rivals(replace(friction, effect='spring')).probability == 0.9
+    elsewhere = replace(friction, effect='spring', joint='hip')
+    assert beside.against_rivals(elsewhere).probability == pytest.approx(0.45)
