@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE
 from sgp_ros.diagnosis.explain import comparison, joint_search
+from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
 
@@ -45,6 +51,31 @@ def test_a_pair_that_leaves_nothing_is_not_exchanged(equations_for, viscous):
     pair = fitted(equations, 'viscous_friction', 'spring')
     assert comparison._exchanged(Columns(equations), [pair]) == []
     assert comparison._exchanged(Columns(equations), []) == []
+
+
+@pytest.mark.parametrize(
+    ('amplitude', 'drag', 'is_credible', 'is_searched'),
+    [(2.0, 0.01, True, False), (0.6, 0.025, True, True), (2.0, 0.01, False, True)],
+)
+def test_what_is_not_adequate_is_searched_joint_by_joint(
+    equations_for, monkeypatch, amplitude, drag, is_credible, is_searched
+):
+    """Though it leaves less than counts as physics, or where no model that leaves less can be."""
+    world = simulate(
+        CHAINS[1], 7, 10.0,
+        force=lambda t, q, v: (amplitude * np.sin(5.0 * q[0]) - drag * v[0],),
+    )  # fmt: skip
+    columns = Columns(equations_for(world)[1])
+    nominal, bodies = (fitted(equations_for(world)[1], is_free=f) for f in (False, True))
+    wave = EffectAt(EFFECTS['cogging'], Place(0), np.array([5.0]))
+    best = fit(columns, (wave,), nominal.sigma)
+    assert best.left.max() < COUNTED_SHARE
+    starts = []
+    monkeypatch.setattr(comparison, 'is_credible', lambda _: is_credible)
+    monkeypatch.setattr(comparison, 'by_joint', lambda _, start: starts.append(start) or [])
+    comparison._more(columns, Comparison(nominal, bodies, (best,), ()))
+    assert bool(starts) is is_searched
+    assert not starts or (starts[0] is best) is is_credible
 
 
 def test_a_law_of_one_number_is_tried_in_place_of_a_richer_one(equations_for):
