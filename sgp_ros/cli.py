@@ -65,12 +65,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ConfigError as error:
         sys.stderr.write(f'{_hint(given) or error}\n')
         return BAD_INPUT
+    name, before = arguments['_name'], signal.signal(signal.SIGTERM, _interrupt)
     try:
         return _run(arguments)
     except BrokenPipeError:  # a reader such as `head` has seen enough
         with suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except KeyboardInterrupt:  # also while it cleans up
+        sys.stderr.write(f'sgp {name}: interrupted\n')
+        return INTERRUPTED
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _run(arguments: dict[str, Any]) -> int:
@@ -78,7 +84,6 @@ def _run(arguments: dict[str, Any]) -> int:
     name, function, prints_json, is_quiet, is_forced = (
         arguments.pop(f'_{k}') for k in ('name', 'function', 'json', 'quiet', 'force')
     )
-    signal.signal(signal.SIGTERM, _interrupt)
     warnings.filterwarnings('ignore', category=RuntimeWarning, module=r'scipy\.')
     out = arguments['out']
     is_new = out is not None and not out.exists()
@@ -102,9 +107,6 @@ def _run(arguments: dict[str, Any]) -> int:
         text = ' '.join(str(error).split())
         sys.stderr.write(f'sgp {name}: {text}\n')
         return BAD_INPUT
-    except KeyboardInterrupt:
-        sys.stderr.write(f'sgp {name}: interrupted\n')
-        return INTERRUPTED
     finally:
         if is_new:
             with suppress(OSError):  # there is none, or there are results in it

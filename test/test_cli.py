@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sgp_ros.cli import Progress, main
+from sgp_ros.cli import INTERRUPTED, Progress, main
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.writer import RecordingWriter
@@ -409,6 +410,20 @@ def test_help_comes_without_what_computes(words, yaml, said):
     )
     assert done.returncode == 0, done.stderr
     assert said in done.stdout
+
+
+def test_an_interrupt_while_a_command_cleans_up_is_one_too(tmp_path, monkeypatch, capsys):
+    """The second of two; later ones do what they did before."""
+    before = signal.getsignal(signal.SIGTERM)
+
+    def end(*_):
+        signal.raise_signal(signal.SIGTERM)
+
+    monkeypatch.setattr('sgp_ros.cli.require_own_folder', end)
+    monkeypatch.setattr(Path, 'rmdir', end)
+    assert main(['effects', '--out', str(tmp_path / 'out')]) == INTERRUPTED
+    assert capsys.readouterr().err == 'sgp effects: interrupted\n'
+    assert signal.getsignal(signal.SIGTERM) is before
 
 
 def test_the_list_of_robots_is_that_of_the_robots_themselves():
