@@ -158,9 +158,9 @@ class Scale:
 
     @staticmethod
     def is_large(model: Model) -> bool:
-        """Return whether effects count as physics, those few joints have each by itself."""
-        sized = zip(model.effects, model.shares, strict=True)
-        small = [s.effect for s, share in sized if share <= COUNTED_SHARE]
+        """Return whether effects count and are seen, those few joints have each by itself."""
+        counted = zip(model.effects, model.shares, model.filtered_shares, strict=True)
+        small = [s.effect for s, x, seen in counted if x <= COUNTED_SHARE or seen <= SLIGHT_REST]
         return len(small) < len(model.effects) and all(e.is_usual for e in small)
 
     def fit(self, model: Model) -> float:

@@ -10,7 +10,13 @@ import pytest
 
 from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
-from sgp_ros.diagnosis.criteria import COUNTED_SHARE, EVIDENCE, LEAST_SHARE, SHARE_TOLERANCE
+from sgp_ros.diagnosis.criteria import (
+    COUNTED_SHARE,
+    EVIDENCE,
+    LEAST_SHARE,
+    SHARE_TOLERANCE,
+    SLIGHT_REST,
+)
 from sgp_ros.diagnosis.decide.decision import Scale, decide
 from sgp_ros.diagnosis.explain.candidates import added_inertia, fit
 from sgp_ros.diagnosis.explain.comparison import Comparison, compare_models
@@ -49,6 +55,16 @@ def test_among_equal_fits_the_simpler_is_asserted(damped):
     rich = fitted(damped, 'viscous_friction', 'quadratic_drag')
     assert rich.mean_square[0] <= simple.mean_square[0] * (1.0 + 1e-9)
     assert decide(damped, _comparison(damped, rich, simple)).model is simple
+
+
+@pytest.mark.parametrize(('seen', 'counts'), [(2.0, True), (0.5, False)])
+def test_a_force_above_the_band_counts_only_as_far_as_it_is_seen(damped, seen, counts):
+    """A ripple that is filtered away but for what is adequate in any case (2 and half of it)."""
+    model = fitted(damped, 'cogging')
+    part = np.sqrt(seen * SLIGHT_REST / model.filtered_shares[0])
+    model = replace(model, forces=tuple(part * force for force in model.forces))
+    model.__dict__['shares'] = [2.0 * COUNTED_SHARE]
+    assert Scale.is_large(model) is counts
 
 
 def test_what_leaves_much_is_not_asserted(damped):
