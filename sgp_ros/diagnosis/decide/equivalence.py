@@ -111,7 +111,8 @@ class Contrasts:
         own = [s for s in self._asserted.effects if s.place == effect.place]
         if joint < 0 or other.place != effect.place or len(own) < 2:
             return False
-        x = np.concatenate([s.columns(motion) for s in own], axis=1)
+        columns = [s.columns(motion) for s in own]
+        x = np.concatenate([a if a.ndim == 2 else a[:, joint] for a in columns], axis=1)
         c = np.linalg.lstsq(x, other.force(motion)[:, joint], rcond=1e-9)[0]
         ends = np.cumsum([len(s.coefficients) for s in own])[:-1]
         parts = [replace(s, coefficients=a) for s, a in zip(own, np.split(c, ends), strict=True)]

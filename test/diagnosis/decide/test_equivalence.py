@@ -10,7 +10,9 @@ import pytest
 from sgp_ros.diagnosis.criteria import CLEARER
 from sgp_ros.diagnosis.decide.decision import Decision, decide
 from sgp_ros.diagnosis.decide.equivalence import MOTIONS, Contrasts, equivalents, moved
+from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison, compare_models
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
@@ -135,3 +137,14 @@ def test_a_law_that_says_what_two_say_counts_for_both(equations_for):
     assert all(contrasts.stands_for(richer, s) for s in asserted.effects)
     load = next(s for s in asserted.effects if s.name == 'constant_load')
     assert not contrasts.stands_for(fitted(equations, 'coulomb_friction'), load)
+
+
+def test_a_law_that_moves_all_joints_is_compared_at_its_own(equations_for, viscous):
+    """An encoder's error shifts the whole equation; beside it friction is told from a drift."""
+    equations = equations_for(viscous)[1]
+    friction = fitted(equations, 'viscous_friction')
+    error = EffectAt(EFFECTS['encoder_eccentricity'], Place(0), np.array([1.0, 0.01, 0.01]))
+    asserted = fit(Columns(equations), (*friction.effects, error), friction.sigma)
+    assert {s.columns(equations.motion).ndim for s in asserted.effects} == {2, 3}
+    rival = fitted(equations, 'asymmetric_coulomb')
+    assert not Contrasts(equations, asserted).stands_for(rival, asserted.effects[0])
