@@ -93,14 +93,15 @@ def _plain(columns: Columns, models: Iterable[Model]) -> Iterator[Model]:
 
 
 def _more(columns: Columns, found: Comparison) -> list[Model]:
-    """Return models of a search joint by joint, where the best credible model is not adequate.
+    """Return models of a search joint by joint, where the best credible model is not enough.
 
-    From that model, and from what nearly every joint has, with bodies that may differ. Bodies that
-    are unlikely may stand for what is missing.
+    It leaves what counts as physics, or is not adequate, or has unlikely bodies that may stand for
+    what is missing. From that model, and from what nearly every joint has, with bodies that may
+    differ.
     """
     by_score = _ranked([found.base, *found.singles, *found.pairs])
     best = next(m for m in by_score if not m.effects or is_credible(m))
-    limit = np.maximum(ADEQUATE_REST * found.base.left, SLIGHT_REST)
+    limit = np.clip(ADEQUATE_REST * found.base.left, SLIGHT_REST, COUNTED_SHARE)
     if (best.left < limit).all() and 0.5 * float(best.w @ best.w) < PER_EFFECT:
         return []
     starts = [best, usual(columns, fit(columns, (), best.sigma, is_free=True))]

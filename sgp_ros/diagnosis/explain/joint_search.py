@@ -26,7 +26,7 @@ from sgp_ros.diagnosis.criteria import (
 )
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import is_credible
-from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.fitted_model import Model, adds_to_usual
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import Trial, screen
 from sgp_ros.physics.catalogue import EFFECTS
@@ -173,13 +173,13 @@ def _grown(columns: Columns, model: Model, block: _Block) -> Model:
     """Add the effects of a block that are worth their price, as long as something is left.
 
     That is a residual, or bodies so unlikely that they may stand for what is missing. What nearly
-    every joint has may be small, and is looked for in all that is more than slight.
+    every joint has, or adds to that, may be small, and is looked for in all that is not slight.
     """
     while True:
         left, strain = block.left(model), 0.5 * float(model.w @ model.w)
         laws = block.effects
         if left < COUNTED_SHARE and strain < PER_EFFECT:
-            laws = tuple(e for e in laws if e.is_usual)
+            laws = tuple(e for e in laws if adds_to_usual(e))
         if not laws or (left < SLIGHT_REST and strain < PER_EFFECT):
             break
         found = _distinct(screen(columns, model, laws, block.joints), TRIALS)

@@ -54,7 +54,7 @@ def test_a_rival_beside_what_is_asserted_is_told_from_one_in_its_place(damped, m
 def test_a_rival_that_leaves_less_is_told_what_is_wrong_with_it(damped, models):
     """Its price, the size of its effects, or bodies that are not likely."""
     right, more, _, _ = models
-    more = replace(more, residual=0.9 * right.residual)
+    more = replace(more, residual=0.9 * right.residual, forces=2 * right.forces)
     more.__dict__['shares'] = [1.0, 1e-6]
     assert 'too small' in _said(more, right, damped)
     more.__dict__['shares'] = [1.0, 1.0]
