@@ -90,6 +90,16 @@ def _disk(result):
     return f'{names}: faults: {"; ".join(result["faults"]) or "none"}.'
 
 
+def _harm(faults):
+    """Return what went wrong with which file, and with how many of its commands."""
+    found = {}
+    for title, texts in faults.items():
+        for text in texts:
+            found.setdefault((title.partition(': ')[0], text), []).append(title)
+    said = (f'{name}: {text} ({len(titles)} commands)' for (name, text), titles in found.items())
+    return '; '.join(said) or 'none'
+
+
 def _readers(cases):
     """Return the commands, with the option by which they were given a file."""
     found = set()
@@ -142,7 +152,7 @@ def text() -> str:
         MESSAGE_FAULTS=_faults(messages), MESSAGE_MB=messages['peak_megabytes'],
         HARM=harm['number'], HARM_S=harm['most_seconds'], HARM_MB=harm['most_megabytes'],
         HARM_FILES=len({name.partition(':')[0] for name in harm['cases']}),
-        HARM_FAULTS='; '.join(f'{x}: {", ".join(y)}' for x, y in harm['faults'].items()) or 'none',
+        HARM_FAULTS=_harm(harm['faults']),
         HARM_LIMIT=LONGEST_S, HARM_COMMANDS=_readers(harm['cases']), GATE_TIME=_gate_time(gate_time), KILLS=kills['number'], KILL_FAULTS=_faults(kills), KILL_COUNTS=_kills(kills),
         KEPT='; '.join(f'{n} {kept}' for kept, n in kills['kept'].items()),
         LOST=f'{kills["most_lost_s"]:.2f}', DISK=_disk(disk),

@@ -2,6 +2,7 @@
 
     python -m sgp_proof.robustness.harmful              # all files through all commands
     python -m sgp_proof.robustness.harmful --turn 0     # each file through one command
+    python -m sgp_proof.robustness.harmful --again      # what had a fault, once more
 
 Each file of `harmful_files` and `harmful_recordings` is given to every command that reads one of
 its kind. Anything else than status 2 with one line within ten seconds of the processor and one
@@ -120,10 +121,14 @@ def main() -> None:
     """Run all cases of the named kinds and add what came of them to the result."""
     parser = make_parser(__doc__, 'robust_harmful', KINDS)
     parser.add_argument('--turn', type=int, help='give each file to one command, from that on')
+    parser.add_argument('--again', action='store_true', help='only what had a fault')
     arguments = parser.parse_args()
     rows = read_result(arguments.out).get('cases', {})
+    at_fault = {title for title, row in rows.items() if row['faults']}
     with tempfile.TemporaryDirectory() as name:
         for title, command in cases(arguments.names, Path(name), arguments.turn):
+            if arguments.again and title not in at_fault:
+                continue
             found = measure(command, Path(name))
             if found['faults']:
                 print(title, found, flush=True)
