@@ -234,7 +234,7 @@ def test_a_file_that_ends_its_reader_ends_nothing_else(samples, monkeypatch, kin
     """It is read in a process of its own, here by one that is killed at once."""
     monkeypatch.setattr(sys, 'executable', '/bin/false')
     with pytest.raises(SgpError, match='the reader stopped with status'):
-        load_columns(samples[kind], [])
+        files.read(kind, samples[kind])
 
 
 def test_quoted_numbers_are_read(tmp_path):
