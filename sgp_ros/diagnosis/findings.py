@@ -116,7 +116,7 @@ def doubted_if_none(finding: Finding, effect: EffectAt) -> Finding:
     """Return a finding that is doubted where it may be none, or is too small to count as physics.
 
     The 95 % interval of its size includes none at all; of several numbers that say how large it is
-    one is enough, and none where a bound hides them all.
+    one is enough, of a form that data chose all of them, and none where a bound hides them all.
     """
     chance = min(finding.probability, DOUBTED)
     if finding.share <= COUNTED_SHARE:
@@ -124,7 +124,7 @@ def doubted_if_none(finding: Finding, effect: EffectAt) -> Finding:
     known = [(finding.parameters[q.name], q.neutral) for q in effect.sizes]
     away = [abs(float(p.value) - neutral) > INTERVAL * p.std
             for p, neutral in known if p.std is not None]  # fmt: skip
-    if any(away) or not away:
+    if all(away) if effect.effect.has_chosen_form else any(away) or not away:
         return finding
     return replace(finding, probability=chance, why='the 95 % interval of its size includes zero')
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -149,6 +150,18 @@ def test_an_encoder_that_may_be_centred_is_doubted(std, is_doubted):
     finding = Finding('elbow', law.name, found, Location(), 30.0, 0.9, 0.1, law.formula)
     told = doubted_if_none(finding, EffectAt(law, Place(0)))
     assert (told.probability, bool(told.why)) == ((0.4, True) if is_doubted else (0.9, False))
+
+
+@pytest.mark.parametrize(('is_chosen', 'std', 'expected'), [
+    (False, 0.3, 0.9), (True, 0.3, 0.4), (True, 0.1, 0.9),
+])  # fmt: skip
+def test_a_form_of_which_a_part_may_be_none_is_doubted(is_chosen, std, expected):
+    """A shorter one would do; of a listed law one number is enough."""
+    law = copy(EFFECTS['asymmetric_coulomb'])
+    law.has_chosen_form = is_chosen
+    found = {'level_pos': Parameter(5.0, 0.1), 'level_neg': Parameter(0.4, std)}
+    finding = Finding('elbow', law.name, found, Location(), 30.0, 0.9, 0.1, law.formula)
+    assert doubted_if_none(finding, EffectAt(law, Place(0))).probability == expected
 
 
 def test_a_gain_is_none_at_one():
