@@ -100,7 +100,7 @@ def _more(columns: Columns, found: Comparison) -> list[Model]:
     differ.
     """
     by_score = _ranked([found.base, *found.singles, *found.pairs])
-    best = next(m for m in by_score if not m.effects or is_credible(m))
+    best = next((m for m in by_score if not m.effects or is_credible(m)), found.base)
     limit = np.clip(ADEQUATE_REST * found.base.left, SLIGHT_REST, COUNTED_SHARE)
     if (best.left < limit).all() and 0.5 * float(best.w @ best.w) < PER_EFFECT:
         return []
