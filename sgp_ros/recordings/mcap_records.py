@@ -43,12 +43,12 @@ _FOOTER = struct.Struct('<BQQQI')
 _DATA_END = struct.Struct('<BQI')
 
 
-class Message(NamedTuple):
-    """What a record of a message says: its channel, its log time [ns], its content."""
+class Messages(NamedTuple):
+    """Messages one after the other: their channels, their log times [ns], their contents."""
 
-    channel_id: int
-    log_time: int
-    data: bytes
+    channels: list[int]
+    log_ns: list[int]
+    contents: list[bytes]
 
 
 class Stamps(NamedTuple):
@@ -58,7 +58,6 @@ class Stamps(NamedTuple):
     log_ns: np.ndarray
 
 
-Record = Schema | Channel | Message
 _READERS: dict[int, Callable[[ReadDataStream], Schema | Channel]] = {
     Opcode.SCHEMA: Schema.read, Opcode.CHANNEL: Channel.read,
 }  # fmt: skip
@@ -174,7 +173,7 @@ def state_of_summary(stream: IO[bytes]) -> str:
     return SOUND if start else MISSING
 
 
-def read_records(data: bytes, unpacking: Unpacking) -> Iterator[Record]:
+def read_records(data: bytes, unpacking: Unpacking) -> Iterator[Schema | Channel | Messages]:
     """Yield schemas, channels and messages of complete records, those in chunks included.
 
     Args:
@@ -186,11 +185,14 @@ def read_records(data: bytes, unpacking: Unpacking) -> Iterator[Record]:
         McapError: a wrong checksum, or what is no record; others of `DAMAGE`.
     """
     for found, begin, size, number in _runs(data, unpacking):
-        if isinstance(found, bytes):
-            for start in range(begin, begin + number * size, size):
-                channel, log_ns = _MESSAGE_HEAD.unpack_from(found, start + _RECORD_HEAD.size)
-                content = found[start + _RECORD_HEAD.size + _MESSAGE_HEAD.size : start + size]
-                yield Message(channel, log_ns, content)
+        if isinstance(found, bytes) and number == 1:
+            channel, log_ns = _MESSAGE_HEAD.unpack_from(found, begin + _RECORD_HEAD.size)
+            yield Messages([channel], [log_ns], [found[begin + _HEADS.itemsize : begin + size]])
+        elif isinstance(found, bytes):
+            stamps = _stamps(found, begin, size, number)
+            starts = range(begin, begin + number * size, size)
+            contents = [found[start + _HEADS.itemsize : start + size] for start in starts]
+            yield Messages(stamps.channels.tolist(), stamps.log_ns.tolist(), contents)
         else:
             yield found
 
@@ -199,11 +201,15 @@ def read_stamps(data: bytes, unpacking: Unpacking) -> Iterator[Schema | Channel 
     """Yield the same, of messages only what their heads say, many at once."""
     for found, begin, size, number in _runs(data, unpacking):
         if isinstance(found, bytes):
-            rows = np.frombuffer(found, np.uint8, number * size, begin).reshape(number, size)
-            heads = np.ascontiguousarray(rows[:, : _HEADS.itemsize]).view(_HEADS)[:, 0]
-            yield Stamps(heads['channel'], heads['log_ns'])
+            yield _stamps(found, begin, size, number)
         else:
             yield found
+
+
+def _stamps(data: bytes, begin: int, size: int, number: int) -> Stamps:
+    rows = np.frombuffer(data, np.uint8, number * size, begin).reshape(number, size)
+    heads = np.ascontiguousarray(rows[:, : _HEADS.itemsize]).view(_HEADS)[:, 0]
+    return Stamps(heads['channel'], heads['log_ns'])
 
 
 def _runs(

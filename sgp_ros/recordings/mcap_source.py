@@ -13,6 +13,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from itertools import pairwise
+from operator import itemgetter
 from pathlib import Path
 from typing import IO, NamedTuple
 
@@ -27,7 +28,7 @@ from sgp_ros.recordings.mcap_records import (
     DAMAGED,
     MAGIC,
     SOUND,
-    Message,
+    Messages,
     Stamps,
     Walk,
     read_records,
@@ -41,6 +42,9 @@ from sgp_ros.strangers import bound, require_within
 
 _OBJECT = 256
 """Bytes that a message takes beside its content."""
+_Stretch = list[tuple[int, str, bytes]]
+"""Messages: log time [ns], topic, content."""
+_log_ns = itemgetter(0)
 _LISTED = 5
 """Damaged places that are listed one by one."""
 
@@ -97,23 +101,26 @@ class McapSource:
         segments = [segment for file in self._files for segment in file.segments]
         order = sorted(range(len(segments)), key=lambda place: segments[place].start_ns)
         following = [segments[place].start_ns for place in order[1:]]
-        pending: list[tuple[int, int, int, RawMessage]] = []
+        pending: list[tuple[int, int, _Stretch]] = []
         unpacking, held, most = Unpacking(self._size), 0, bound('HELD_MB') << 20
         for place, until in zip(order, (*following, None), strict=True):
-            read = self._segment_messages(segments[place], wanted, unpacking)
-            for number, message in enumerate(read):
-                heappush(pending, (message.log_ns, place, number, message))
-                held += len(message.data) + _OBJECT
+            stretch: _Stretch = []
+            for some in self._read(segments[place], wanted, unpacking):
+                stretch += some
+                held += sum(len(data) + _OBJECT for _, _, data in some)
                 if held > most:
                     require_within(held / (1 << 20), 'HELD_MB', 'size of overlapping chunks in MB')
-            while pending and (until is None or pending[0][0] < until):
-                message = heappop(pending)[-1]
+            if stretch:
+                stretch.reverse()  # so that messages of one time, too, are in order from the end
+                stretch.sort(key=_log_ns, reverse=True)
+                heappush(pending, (stretch[-1][0], place, stretch))
+            for message in _merged(pending, until):
                 held -= len(message.data) + _OBJECT
                 yield message
 
-    def _segment_messages(
+    def _read(
         self, segment: _Segment, wanted: Collection[tuple[str, str, str]], unpacking: Unpacking
-    ) -> Iterator[RawMessage]:
+    ) -> Iterator[_Stretch]:
         path = self._paths[segment.file]
         channels = self._files[segment.file].channels
         names = {number: channel[0] for number, channel in channels.items() if channel in wanted}
@@ -122,8 +129,12 @@ class McapSource:
             data = stream.read(segment.length)
         try:
             for record in read_records(data, unpacking):
-                if isinstance(record, Message) and record.channel_id in names:
-                    yield RawMessage(record.log_time, names[record.channel_id], record.data)
+                if isinstance(record, Messages):
+                    yield [
+                        (t, names[n], data)
+                        for n, t, data in zip(*record, strict=True)
+                        if n in names
+                    ]
         except DAMAGE as error:
             place = path.name, segment.offset
             self._damage[segment.file, segment.offset] = (
@@ -131,6 +142,21 @@ class McapSource:
                 f'{segment.offset + segment.length} ({" ".join(str(error).split())[:80]}); '
                 'the intact data before and after it were used'
             )
+
+
+def _merged(
+    pending: list[tuple[int, int, _Stretch]], until_ns: int | None
+) -> Iterator[RawMessage]:
+    """Take from stretches, each from its end on, what is before a time, by time and place."""
+    while pending and (until_ns is None or pending[0][0] < until_ns):
+        _, place, stretch = heappop(pending)
+        end = pending[0][:2] if pending else None
+        while stretch and (until_ns is None or stretch[-1][0] < until_ns):
+            if end is not None and (stretch[-1][0], place) > end:
+                break
+            yield RawMessage(*stretch.pop())
+        if stretch:
+            heappush(pending, (stretch[-1][0], place, stretch))
 
 
 class _Segment(NamedTuple):
