@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from sgp_ros.apps.recorded import gains_of, read_events, refuse_moving_base
+from sgp_ros.apps.recorded import gains_of, read_events
 from sgp_ros.batch.contradictions import require_sense
 from sgp_ros.batch.recording_check import RecordingCheck, check_recording
 from sgp_ros.diagnosis.connected import Connected, connect, with_laws
@@ -50,7 +50,6 @@ def run_check(
     """
     model = load_robot(robot)
     remarks: list[str] = []
-    refuse_moving_base(bag)
     events = read_events(bag, joint_states, command, remarks)
     nominal, known, unknown = _known(model, gains, events, effort, remarks)
     found = check_recording(events, model, None if known is None else known.gains)

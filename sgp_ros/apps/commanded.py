@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sgp_ros.apps.recorded import checked, gains_of, read_events, refuse_moving_base
+from sgp_ros.apps.recorded import checked, gains_of, read_events
 from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory, choose_bandwidth
 from sgp_ros.diagnosis.explain.candidates import fit
@@ -59,7 +59,6 @@ def run_commanded(
     sides = {SIMULATED: model}
     if nominal is not None:
         sides[NOMINAL] = nominal_model(load_robot(nominal))
-    refuse_moving_base(commands)
     remarks: list[str] = []
     events = read_events(commands, None, None, remarks)
     stem, found, raw = Path(commands).stem, dict[str, Overlay](), None

@@ -11,7 +11,7 @@ from typing import Any
 from sgp_ros.apps.diagnosed_robot import replayed, write_diagnosed
 from sgp_ros.apps.finding_file import write_viewed
 from sgp_ros.apps.finding_rerun import rerun_package, write_rerun
-from sgp_ros.apps.recorded import checked, gains_of, read_events, refuse_moving_base
+from sgp_ros.apps.recorded import checked, gains_of, read_events
 from sgp_ros.apps.terminal import strong, warned
 from sgp_ros.batch.acceptance import USUAL, require_joints
 from sgp_ros.batch.recording_check import RecordingCheck
@@ -292,7 +292,6 @@ def _print_proof(stem: str, proof: Proof) -> None:
 
 def _events(bag: str, robot: Robot, options: DiagnoseOptions, remarks: list[str]) -> list[Event]:
     """Return what a recording holds of a robot."""
-    refuse_moving_base(bag)
     events = read_events(bag, options.joint_states, options.command, remarks)
     require_joints(events, robot, Path(bag).name)
     return events

@@ -12,7 +12,7 @@ import numpy as np
 
 from sgp_ros.apps.held_rollouts import best_coefficients, roll_out_held
 from sgp_ros.apps.identified_robot import nominal_coefficients, write_identified
-from sgp_ros.apps.recorded import checked, gains_of, read_events, refuse_moving_base
+from sgp_ros.apps.recorded import checked, gains_of, read_events
 from sgp_ros.apps.terminal import strong, warned
 from sgp_ros.batch.identification import HELD_OUT, Identification, IdentificationOptions, identify
 from sgp_ros.batch.signals import Signals, collect_signals
@@ -218,7 +218,6 @@ def read_signals(
     Raises:
         RecordingError: nothing can be used, or the recording contradicts itself.
     """
-    refuse_moving_base(bag)
     said: list[str] = []
     events = read_events(bag, options.joint_states, options.command, said)
     config = EngineConfig(effort_source=EFFORT_SOURCES[options.effort])

@@ -30,8 +30,13 @@ _FAR_M, _FAR_TURN = 0.02, 0.02
 def read_events(
     bag: str, joint_states: str | None, command: str | None, remarks: list[str]
 ) -> list[Event]:
-    """Return the events of a recording; what is wrong with it is appended to `remarks`."""
+    """Return the events of a recording; what is wrong with it is appended to `remarks`.
+
+    Raises:
+        RecordingError: it cannot be read, or the base of the robot moves in it.
+    """
     recording = open_recording(bag)
+    _refuse_moving_base(recording)
     events = _with_gains(recording, list(recording.events(joint_states, command)))
     remarks += recording.remarks
     remarks += [
@@ -130,13 +135,12 @@ def gains_of(
     return found
 
 
-def refuse_moving_base(bag: str) -> None:
+def _refuse_moving_base(recording: Recording) -> None:
     """Refuse a recording whose odometry moves: the base is taken to be fixed to the ground.
 
     Raises:
         RecordingError: with the topic and how far it moves.
     """
-    recording = open_recording(bag)
     for topic in recording.topics:
         plain = topic.type.replace('/msg/', '/')
         if plain not in _ODOMETRY or not any(word in topic.name for word in _BASE_TOPICS):

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sgp_ros.apps.recorded import refuse_moving_base
+from sgp_ros.apps.recorded import read_events
 from sgp_ros.batch.command_kinds import hold_targets
 from sgp_ros.batch.recording_check import check_recording
 from sgp_ros.cli import main
@@ -122,9 +122,9 @@ def test_a_moving_base_is_refused(tmp_path, way):
                           _odometry(way * i / 50))  # fmt: skip
     if way:
         with pytest.raises(RecordingError, match=r'the base moves 0\.49 m in /base_pose'):
-            refuse_moving_base(str(path))
+            read_events(str(path), None, None, [])
     else:
-        refuse_moving_base(str(path))
+        read_events(str(path), None, None, [])
 
 
 def test_the_command_writes_json_with_the_set_up(tmp_path, capsys):
