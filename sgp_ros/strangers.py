@@ -24,7 +24,7 @@ DEFAULTS = {
     'TEXT_MB': 16, 'TABLE_MB': 512, 'UNPACKED_MB': 768, 'CHUNK_MB': 256, 'RATIO': 200,
     'HELD_MB': 256, 'MESSAGES': 5_000_000, 'ROWS': 5_000_000, 'CELLS': 20_000_000,
     'DEPTH': 100, 'ENTRIES': 200_000, 'ALIASES': 100, 'LINKS': 250, 'LINE': 100_000,
-    'SECONDS': 7,
+    'SECONDS': 5,
 }  # fmt: skip
 """Bound to its default: sizes of robot and settings files, of tables, of what a table unpacks to,
 of one chunk of a recording [MB]; how many times its own size a recording unpacks to; messages of
