@@ -41,7 +41,7 @@ _WRONG = (
     MemoryError,
 )
 """What the decoding of a damaged message raises, beside `MessageError`."""
-_HOPELESS, _MOST, _LONGEST = 100_000, 0.9, 200
+_HOPELESS, _MOST, _LONGEST = 20_000, 0.9, 200
 """Unreadable messages, and their share, beyond which no more are tried; length of a reason."""
 _KINDS = 'an .mcap file, a rosbag2 directory or a ROS 1 .bag'
 
