@@ -100,9 +100,16 @@ class Connected:
 
     @property
     def left(self) -> tuple[np.ndarray, np.ndarray]:
-        """What the nominal robot leaves beyond errors of signals, and how much less bodies do."""
+        """What the nominal robot leaves beyond errors of signals, and how much less bodies do.
+
+        (k,) shares. The first is at least what bodies gain of the variance of the effort, for a
+        weight that is held makes the mean square large and tells nothing of the motion.
+        """
         nominal, bodies = self.several.comparison.nominal, self.several.comparison.parameters
-        return nominal.left, nominal.left - bodies.left
+        gained, power = nominal.left - bodies.left, self.equations.power
+        variance = np.minimum(self.equations.motion.effort.var(axis=0), power)
+        moving = gained * power / np.where(variance > 0.0, variance, power)
+        return np.maximum(nominal.left, moving), gained
 
     def worth(self, nominal: np.ndarray, recorded: np.ndarray) -> float:
         """Return the worth of what is decided, as the density of the recorded motion [nats].

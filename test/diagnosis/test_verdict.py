@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis.connected import Connected
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, SLIGHT_REST
 from sgp_ros.diagnosis.findings import verdict_of
 
@@ -34,3 +35,17 @@ def test_bodies_are_wrong_where_one_is_or_where_all_together_count(
     decision = SimpleNamespace(verdict=said)
     shares = (np.array([0.0, nominal]), np.array([0.0, gained]))
     assert verdict_of(decision, wrong, setup, *shares, beside) == verdict
+
+
+def test_a_weight_that_is_held_hides_no_wrong_mass():
+    """A hundredth of a weight is nothing of the mean square, and much of what varies."""
+    effort = 100.0 + np.sin(np.linspace(0.0, 60.0, 3000))[:, np.newaxis]
+    power = (effort**2).mean(axis=0)
+    nominal, bodies = (SimpleNamespace(left=x**2 / power) for x in (np.ones(1), np.zeros(1)))
+    several = SimpleNamespace(comparison=SimpleNamespace(nominal=nominal, parameters=bodies))
+    equations = SimpleNamespace(power=power, motion=SimpleNamespace(effort=effort))
+    left, gained = Connected.left.fget(SimpleNamespace(several=several, equations=equations))
+    assert gained < SLIGHT_REST < COUNTED_SHARE < left
+    calm = SimpleNamespace(verdict='parameters_only')
+    assert verdict_of(calm, (), (), left, gained, ()) == 'parameters_only'
+    assert verdict_of(calm, (), (), nominal.left, gained, ()) == 'no_mismatch'
