@@ -131,7 +131,7 @@ class CommandKills:
 
     def kill(self, rng: np.random.Generator, number: signal.Signals) -> dict[str, object]:
         """Kill a run; return what came of it, with `faults`."""
-        before, faults = results_in(self._out), []
+        before, litter, faults = results_in(self._out), set(litter_in(self._out)), []
         moment = str(rng.choice(['anywhere', 'writing', 'renaming'], p=[0.4, 0.4, 0.2]))
         process = self._start()
         try:
@@ -158,7 +158,7 @@ class CommandKills:
         elif kept == 'new' and (set(listing) != set(after) or self._is_mixed(before, after)):
             faults.append('old results beside new ones')
         faults += [f'half a file: {name}' for name in broken_in(self._out)]
-        if number != signal.SIGKILL and status == 130 and litter_in(self._out):
+        if number != signal.SIGKILL and status == 130 and set(litter_in(self._out)) - litter:
             faults.append('an interrupted run leaves files behind')
         if is_cut or self._turn % NEXT_RUN == 0:
             self._undisturbed()
