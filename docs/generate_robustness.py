@@ -96,7 +96,7 @@ def _harm(faults):
     for title, texts in faults.items():
         for text in texts:
             found.setdefault((title.partition(': ')[0], text), []).append(title)
-    said = (f'{name}: {text} ({len(titles)} commands)' for (name, text), titles in found.items())
+    said = (f'{name}: {text} (commands: {len(titles)})' for (name, text), titles in found.items())
     return '; '.join(said) or 'none'
 
 
