@@ -59,7 +59,11 @@ def _still(rows):
         of = [row for row in rows if row['robot'] == robot]
         beyond, lost = (sum(row[name] > WITHIN for row in of) for name in ('ratio', 'ratio_lost'))
         found.append(f'`{robot}`: {beyond} of {len(of)} with garbage, {lost} with losses')
-    return 'Beyond 10 %: ' + '; '.join(found) + '.'
+    kept = sum(min(row['ratio'], row['ratio'] / row['ratio_lost']) <= WITHIN for row in rows)
+    return (
+        f'Beyond 10 %: {"; ".join(found)}. Within 10 % of the clean stream, or of the one that lost '
+        f'the same messages: {kept} of {len(rows)}.'
+    )
 
 
 def _many(result):
