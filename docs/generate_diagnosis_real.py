@@ -148,7 +148,12 @@ def settings(machine):
 
 
 def nearest(machine):
-    """Return the best model that was not asserted, and the share of the effort that it leaves."""
+    """Return the best model that was not asserted, and the share of the effort that it leaves.
+
+    Beside what is asserted no other model is of interest.
+    """
+    if machine['verdict'] == 'missing_physics':
+        return 'asserted', ''
     top = machine['alternatives'][0]
     together = [
         f'{plain_name(f["effect"])} on {f["joint"]}'

@@ -19,7 +19,7 @@ from scipy.signal import savgol_filter
 from sgp_proof.real.diagnosis import execute, inside, read
 from sgp_proof.real.recordings import DATA, DOUBLE
 from sgp_proof.result_files import make_parser, write_result
-from sgp_ros.diagnosis import pipeline
+from sgp_ros.diagnosis import connected
 from sgp_ros.report.metrics import versions
 
 DAY = 'A.0__20220815'
@@ -40,16 +40,16 @@ _WINDOW, _ORDER = 51, 3
 @contextlib.contextmanager
 def low_pass(cutoff):
     """Set the low-pass of diagnoses [Hz]; None leaves the choice to the recording."""
-    choose = pipeline.choose_bandwidth
+    choose = connected.choose_bandwidth
 
     def fixed(raw, tree):
         return replace(choose(raw, tree), cutoff=cutoff, state_cutoff=2.5 * cutoff)
 
-    pipeline.choose_bandwidth = choose if cutoff is None else fixed
+    connected.choose_bandwidth = choose if cutoff is None else fixed
     try:
         yield
     finally:
-        pipeline.choose_bandwidth = choose
+        connected.choose_bandwidth = choose
 
 
 def diagnosed(runs, robot, cutoff):
