@@ -186,9 +186,9 @@ def tally(machines):
 
 def pages():
     """Return the text of each page by its path."""
-    result, double = (
+    result, double, rest = (
         json.loads((RESULTS / f'{name}.json').read_text(encoding='utf-8'))
-        for name in ('real_diagnosis', 'double_pendulum_diagnosis')
+        for name in ('real_diagnosis', 'double_pendulum_diagnosis', 'double_pendulum_rest')
     )
     templates = Environment(  # noqa: S701 - Markdown, and nothing in it is from outside
         loader=FileSystemLoader(DOCS / 'templates' / 'real_machines'), undefined=StrictUndefined,
@@ -204,7 +204,8 @@ def pages():
     versions = ', '.join(f'{k} {v}' for k, v in result['versions'].items())
     place, machines = result['environment'], result['machines']
     environment = f'{place["cores"]} cores of {place["processor"]}, {versions}'
-    context = {'environment': environment, 'machines': machines, 'double': double}
+    context = {'environment': environment, 'machines': machines, 'double': double,
+               'rest': rest}  # fmt: skip
     paths = {'overview': DOCS / 'diagnosis_real.md'}
     paths |= {name: DOCS / 'real_machines' / f'{name}.md' for name in machines}
     return {

@@ -7,7 +7,7 @@ from sgp_ros.diagnosis import connected
 from sgp_ros.diagnosis.compare.trajectory import Bandwidth
 
 
-class _Reached(Exception):
+class _ReachedError(Exception):
     """The diagnosis has chosen its filters."""
 
 
@@ -17,11 +17,11 @@ def test_a_diagnosis_uses_the_low_pass_that_was_set(monkeypatch, cutoff, used):
 
     def require(_raw, bandwidth):
         chosen.append(bandwidth)
-        raise _Reached
+        raise _ReachedError
 
     monkeypatch.setattr(connected, 'choose_bandwidth', lambda *_: Bandwidth(5.0, 12.5))
     monkeypatch.setattr(connected, 'require_rows', require)
     recordings = type('Recordings', (), {'learned': None})
-    with low_pass(cutoff), pytest.raises(_Reached):
+    with low_pass(cutoff), pytest.raises(_ReachedError):
         connected.compared(recordings, None, lambda _share: None)
     assert chosen == [Bandwidth(used, 2.5 * used)]
