@@ -163,6 +163,17 @@ def nearest(machine):
     return ', '.join(together), top['why'].removeprefix('leaves ').partition(' of ')[0]
 
 
+def best_family(design):
+    """Return the columns with which least is left of the runs left out, and how much less, (k,)."""
+    known = design['known']['left_out']
+    ratios = {
+        family: [x / y for x, y in zip(shares['left_out'], known, strict=True)]
+        for family, shares in design['families'].items()
+    }
+    best = min(ratios, key=lambda family: sum(ratios[family]))
+    return best, [1.0 - ratio for ratio in ratios[best]]
+
+
 def of(machine, joint, effect, kind='findings'):
     """Return the parameters of an effect on a joint."""
     return next(
@@ -198,7 +209,7 @@ def pages():
         f.__name__: f
         for f in (percent, quantity, parts, worst, named, effects, bodies, equivalents, scores,
                   settings,
-                  nearest, of, judgement, tally)
+                  best_family, nearest, of, judgement, tally)
     }  # fmt: skip
     templates.globals |= {'titles': TITLES, 'captions': CAPTIONS, 'least_share': LEAST_SHARE}
     versions = ', '.join(f'{k} {v}' for k, v in result['versions'].items())

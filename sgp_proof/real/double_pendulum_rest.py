@@ -23,6 +23,7 @@ from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies, with_open_bodies
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.report.metrics import versions
+from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.registry import load_robot
 
@@ -74,8 +75,25 @@ def columns(family, motion, j):
     return found[family]()
 
 
+def fit(y, X, bodies, sigma):
+    """Return the coefficients (p + c,) of columns X (N, k, p + c), p of bodies of unit variance.
+
+    Args:
+        y: (N, k).
+        X: columns of the bodies first.
+        bodies: p.
+        sigma: (k,) standard deviation of what is left.
+    """
+    unit = np.sqrt((X**2).mean(axis=(0, 1)))
+    unit[(np.arange(len(unit)) < bodies) | (unit == 0.0)] = 1.0
+    A, b = X / unit / sigma[:, None], y / sigma
+    G = np.tensordot(A, A, ((0, 1), (0, 1)))
+    G += np.diag((np.arange(len(G)) < bodies).astype(float))
+    return np.linalg.lstsq(G, np.tensordot(A, b, ((0, 1), (0, 1))), rcond=1e-13)[0] / unit
+
+
 def left(y, bodies, extra, run):
-    """Return the mean squares that a fit leaves, of all rows and of runs left out, (k,) each.
+    """Return what a fit leaves in mean squares, of all rows and of runs left out, and the fit.
 
     Least squares weighted by what is left of each joint, with bodies of unit variance.
 
@@ -84,28 +102,21 @@ def left(y, bodies, extra, run):
         bodies: (N, k, p).
         extra: (N, k, c).
         run: (N,) labels.
+
+    Returns:
+        (k,), (k,) and (p + c,).
     """
     X, p = np.concatenate([bodies, extra], axis=2), bodies.shape[2]
-    unit = np.ones(X.shape[2])
-    unit[p:] = np.sqrt((extra**2).mean(axis=(0, 1)))
-    unit[unit == 0.0] = 1.0  # a joint that no motor drives has no effort
-    X = X / unit
-    prior = np.diag((np.arange(X.shape[2]) < p).astype(float))
-
-    def fitted(rows, sigma):
-        A, b = X[rows] / sigma[:, None], y[rows] / sigma
-        G = np.tensordot(A, A, ((0, 1), (0, 1))) + prior
-        return np.linalg.lstsq(G, np.tensordot(A, b, ((0, 1), (0, 1))), rcond=1e-13)[0]
-
-    everything, sigma = np.ones(len(y), bool), y.std(axis=0)
+    sigma = y.std(axis=0)
     for _ in range(_ROUNDS):
-        inside_ = ((y - X @ fitted(everything, sigma)) ** 2).mean(axis=0)
-        sigma = np.sqrt(inside_)
+        coefficients = fit(y, X, p, sigma)
+        learned = ((y - X @ coefficients) ** 2).mean(axis=0)
+        sigma = np.sqrt(learned)
     outside = np.zeros(y.shape)
     for r in np.unique(run):
         out = run == r
-        outside[out] = (y[out] - X[out] @ fitted(~out, sigma)) ** 2
-    return inside_, outside.mean(axis=0)
+        outside[out] = (y[out] - X[out] @ fit(y[~out], X[~out], p, sigma)) ** 2
+    return learned, outside.mean(axis=0), coefficients
 
 
 def measured(design):
@@ -137,11 +148,14 @@ def measured(design):
         return np.stack(found, axis=2)
 
     def shares(families):
-        each = left(equations.d, equations.base, extra(families), run)
+        *each, _ = left(equations.d, equations.base, extra(families), run)
         return dict(zip(('learned', 'left_out'), (x / equations.power for x in each), strict=True))
 
     known = shares(KNOWN)
-    inertial = (low(motion.mass_diagonal * motion.acceleration) ** 2).mean(axis=0)
+    w = left(equations.d, equations.base, extra(KNOWN), run)[2][: equations.size]
+    parameters = tree.parameters + (w @ equations.directions).reshape(tree.parameters.shape)
+    inertia = np.diagonal(mass_matrix(tree, parameters, motion.position), 0, 1, 2)
+    inertial = (low(inertia * motion.acceleration) ** 2).mean(axis=0)
     return {
         'rows': len(equations.d), 'runs': runs, 'cutoff_hz': low.cutoff,
         'joints': tree.joint_names,
