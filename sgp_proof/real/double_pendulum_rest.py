@@ -14,9 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sgp_proof.real.diagnosis import execute, inside
-from sgp_proof.real.double_pendulum_low_pass import LEARNED, MAP
-from sgp_proof.real.recordings import DOUBLE
+from sgp_proof.real.diagnosis import MACHINES, execute, inside
 from sgp_proof.result_files import make_parser, write_result
 from sgp_ros.apps.recorded import read_events
 from sgp_ros.diagnosis.compare.equations import make_equations
@@ -28,10 +26,10 @@ from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.registry import load_robot
 
 DESIGNS = {
-    'A.0': ('A.0__20220815', LEARNED, 'double_pendulum_a0.urdf'),
-    'C.0': ('C.0__20220914', ('00', '02', '04', '06', '13'), 'double_pendulum_c0.urdf'),
+    'A.0': ('double_pendulum', 'double_pendulum_a0.urdf'),
+    'C.0': ('double_pendulum_c0', 'double_pendulum_c0.urdf'),
 }
-"""Day of the recordings, runs, nominal robot."""
+"""Machine of `MACHINES`, from whose runs a diagnosis learns, and its nominal robot."""
 KNOWN = ('dry friction', 'viscous friction', 'rotor')
 FAMILIES = (
     'constant load', 'stiffness', 'quadratic drag', 'friction that grows with the load',
@@ -121,13 +119,12 @@ def left(y, bodies, extra, run):
 
 def measured(design):
     """Return the size of the rest of a design, and what families of columns leave of it."""
-    day, runs, robot = DESIGNS[design]
+    machine, robot = DESIGNS[design]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         with inside(folder):
-            sources = ' '.join(f'data/{DOUBLE.format(day, run)}' for run in runs)
-            execute(f'python -m sgp_proof.real.recordings join out/learn.npz {sources}', folder)
-            execute(f'sgp import out/learn.npz --map {MAP} --out out', folder)
+            for command in MACHINES[machine][:-1]:  # all but the diagnosis
+                execute(command, folder)
             nominal = nominal_model(load_robot(f'config/robots/{robot}'))
             events = list(read_events('out/learn.mcap', None, None, []))
     raw = collect(events, nominal.robot, nominal.stated)
@@ -148,21 +145,21 @@ def measured(design):
         return np.stack(found, axis=2)
 
     def shares(families):
-        *each, _ = left(equations.d, equations.base, extra(families), run)
-        return dict(zip(('learned', 'left_out'), (x / equations.power for x in each), strict=True))
+        learned, left_out, found = left(equations.d, equations.base, extra(families), run)
+        power, w = equations.power, found[: equations.size]
+        return {'learned': learned / power, 'left_out': left_out / power}, w
 
-    known = shares(KNOWN)
-    w = left(equations.d, equations.base, extra(KNOWN), run)[2][: equations.size]
+    known, w = shares(KNOWN)
     parameters = tree.parameters + (w @ equations.directions).reshape(tree.parameters.shape)
     inertia = np.diagonal(mass_matrix(tree, parameters, motion.position), 0, 1, 2)
     inertial = (low(inertia * motion.acceleration) ** 2).mean(axis=0)
     return {
-        'rows': len(equations.d), 'runs': runs, 'cutoff_hz': low.cutoff,
+        'rows': len(equations.d), 'runs': len(low.segments), 'cutoff_hz': low.cutoff,
         'joints': tree.joint_names,
         'refused': {k: n for k, n in raw.refused.items() if n},
         'effort_rms': np.sqrt(equations.power), 'inertial_rms': np.sqrt(inertial),
         'rest_rms': np.sqrt(known['learned'] * equations.power),
-        'known': known, 'families': {f: shares((*KNOWN, f)) for f in FAMILIES},
+        'known': known, 'families': {f: shares((*KNOWN, f))[0] for f in FAMILIES},
     }  # fmt: skip
 
 
