@@ -4,8 +4,8 @@ One worker serves one request at a time. It starts when the node does, because i
 longer than most fits; it is killed when the node ends, and ends by itself when the node vanishes.
 It has a low weight: where another process wants the same core, it gets about a tenth of it, so a
 fit takes longer on a busy computer, and still comes. It stands still while the node has a message
-in hand, because cores share caches and memory. This module imports nothing of ROS: the worker
-loads it.
+in hand, because cores share caches and memory, but only for the first seconds of a fit: a node that
+always has one would never get it. This module imports nothing of ROS: the worker loads it.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
@@ -27,6 +28,8 @@ from sgp_ros.engine.fitting import FitRequest, FitResult, fit
 _NICENESS = 10
 """On Linux a weight of 110, where a process of niceness 0 has 1024."""
 _SET_PARENT_DEATH_SIGNAL = 1
+MOST_HELD_S = 20.0
+"""Age of a request from which its fit is no longer held [s]."""
 _READY = 'ready'
 _STOP = getattr(signal, 'SIGSTOP', None)
 
@@ -53,6 +56,7 @@ class FitProcess:
         self._waiting: FitRequest | None = None
         self._sender: threading.Thread | None = None
         self._is_ready = False
+        self._asked_s = 0.0
         self.is_free = True
         self._start()
 
@@ -64,6 +68,7 @@ class FitProcess:
         if self._process is None:
             self._start()
         self.is_free = False
+        self._asked_s = time.monotonic()
         self._waiting = request
         self._send_waiting()
 
@@ -86,9 +91,10 @@ class FitProcess:
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
-        """Keep a fit that runs from computing meanwhile (POSIX); two calls of the kernel."""
+        """Keep a fit from computing meanwhile (POSIX), up to an age of `MOST_HELD_S`."""
         process = self._process
-        if self.is_free or process is None or process.pid is None or _STOP is None:
+        is_old = time.monotonic() - self._asked_s > MOST_HELD_S
+        if self.is_free or is_old or process is None or process.pid is None or _STOP is None:
             yield
             return
         with contextlib.suppress(ProcessLookupError):

@@ -208,6 +208,17 @@ def test_a_fit_stands_still_while_it_is_held(fits: FitProcess) -> None:
     assert isinstance(_await(fits), FitResult)
 
 
+def test_a_fit_that_was_asked_for_long_ago_is_not_held(
+    fits: FitProcess, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A node that always has a message in hand gets its fit too."""
+    request = _too_large_for_a_pipe(fits)
+    monkeypatch.setattr('sgp_ros.ros.fit_process.MOST_HELD_S', -1.0)
+    fits.submit(request)
+    with fits.held():
+        assert isinstance(_await(fits), FitResult)
+
+
 _HOLDS_AND_DIES = """
 import os, signal, sys
 sys.path.insert(0, {root!r})
