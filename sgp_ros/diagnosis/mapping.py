@@ -18,7 +18,7 @@ def diagnosis_mapping(found: Diagnosis) -> dict[str, Any]:
     return {
         'schema': 2,
         'verdict': found.verdict,
-        'certainty': _finite(found.certainty),
+        'certainty': found.certainty,
         'reference': found.reference,
         'setup': [finding_content(f) for f in found.setup],
         'shared': [finding_content(f) for f in found.shared],

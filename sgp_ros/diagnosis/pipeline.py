@@ -15,7 +15,6 @@ from sgp_ros.diagnosis.compare.sufficiency import require_signed
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.diagnosis.compare.velocity_sensor import sensor_lags
 from sgp_ros.diagnosis.connected import Connected, compared, connect, with_laws
-from sgp_ros.diagnosis.criteria import DOUBTED
 from sgp_ros.diagnosis.decide.certainty import (
     Probabilities,
     certainty_of,
@@ -165,7 +164,7 @@ def _diagnosed(
         joints=tree.moving_names,
         units=tuple('N' if p else 'N m' for p in tree.is_prismatic[: tree.size]),
         verdict=verdict_of(decision, wrong, connected.findings, *connected.left, lags or differ),
-        certainty=_certainty(certainty, connected, is_doubted=is_doubted),
+        certainty=None if is_doubted else _certainty(certainty, connected),
         findings=findings,
         alternatives=alternatives(decision, chances),
         parameter_errors=wrong,
@@ -237,15 +236,14 @@ def _compared(
     return replace(
         found, reference='simulation', findings=reference.findings, shared=reference.shared,
         verdict='setup_error' if is_calm and connected.findings else reference.verdict,
-        certainty=_certainty(reference.certainty, connected, is_doubted=False),
+        certainty=_certainty(reference.certainty, connected),
         traces=replace(found.traces, forces=()), remarks=(*said, *found.remarks),
     )  # fmt: skip
 
 
-def _certainty(certainty: float, connected: Connected, *, is_doubted: bool) -> float:
+def _certainty(certainty: float, connected: Connected) -> float:
     """Return the least of what the verdict rests on."""
-    rests_on = [certainty, *(f.probability for f in connected.findings)]
-    return min([*rests_on, DOUBTED] if is_doubted else rests_on)
+    return min([certainty, *(f.probability for f in connected.findings)])
 
 
 def _predictions(final: FinalModel, connected: Connected, tree: Tree) -> dict[str, Predictions]:

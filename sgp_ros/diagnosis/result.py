@@ -205,7 +205,8 @@ class Diagnosis:
         joints: (k,) names.
         units: (k,) of the efforts.
         verdict: one of `VERDICTS`.
-        certainty: probability that the verdict is right.
+        certainty: probability that the verdict is right; None where it rests on a joint that the
+            model explains no better than a constant.
         findings: asserted, most probable first.
         alternatives: not asserted, best first.
         parameter_errors: of the final model; those beyond two standard deviations.
@@ -236,7 +237,7 @@ class Diagnosis:
     joints: tuple[str, ...]
     units: tuple[str, ...]
     verdict: str
-    certainty: float
+    certainty: float | None
     findings: tuple[Finding, ...]
     alternatives: tuple[Finding, ...]
     parameter_errors: tuple[ParameterError, ...]

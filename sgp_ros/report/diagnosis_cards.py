@@ -17,7 +17,10 @@ _SHORT = {'less than': '<', 'more than': '>'}
 
 def cards(found: Diagnosis) -> list[dict[str, str]]:
     """Return certainty, what is explained, and errors on what was held out, before and after."""
-    shown = [{'value': f'{found.certainty:.2f}', 'label': 'probability that the verdict is right'}]
+    shown = []
+    if found.certainty is not None:
+        label = 'probability that the verdict is right'
+        shown.append({'value': f'{found.certainty:.2f}', 'label': label})
     if found.traces.forces or found.verdict in _WITHOUT_FORCES:
         by = {
             'unexplained': 'the final model, without a law',

@@ -44,12 +44,17 @@ def verdict_sentence(found: Diagnosis) -> str:
     if found.verdict == 'parameters_only':
         return (
             'No physics is missing, only inertial parameters are wrong: '
-            f'{parameter_errors_text(found.parameter_errors)} (certainty {found.certainty:.2f}); '
+            f'{parameter_errors_text(found.parameter_errors)} ({certainty_text(found.certainty)}); '
             f'{gain_text("correcting them explains", found)}.'
         )
     if found.verdict == 'no_mismatch':
         return _calm(found)
     return _unexplained(found)
+
+
+def certainty_text(certainty: float | None) -> str:
+    """Return a certainty [1] in words; None is none, of a model no better than a constant."""
+    return 'no certainty, see the remarks' if certainty is None else f'certainty {certainty:.2f}'
 
 
 def held_out_sentence(found: Diagnosis) -> str:
@@ -108,17 +113,17 @@ def _calm(found: Diagnosis) -> str:
         small = proof.nmse_before[name] < LEAST_SHARE
         part = '' if small else 'of which the part that is not noise is '
         text += f', {part}too little to count as missing physics'
-    return f'{text} (certainty {found.certainty:.2f}).'
+    return f'{text} ({certainty_text(found.certainty)}).'
 
 
 def _unexplained(found: Diagnosis) -> str:
     named = [f for f in found.findings if f.effect == UNKNOWN]
     joint = named[0].joint if named else found.joints[0]
-    certainty = named[0].probability if named else found.certainty
+    certainty = named[0].probability if named and found.certainty else found.certainty
     share = named[0].share if named else explained(found)
     text = (
         f'Unexplained on {joint}: {percent(share)} of the mean squared effort '
-        f'(certainty {certainty:.2f})'
+        f'({certainty_text(certainty)})'
     )
     of = next((d for d in found.dependences if d.joint == joint), None)
     scores = {} if of is None else {n: s for n, s in of.scores.items() if of.is_significant(n)}
@@ -156,11 +161,11 @@ def _against_simulation(found: Diagnosis) -> str:
     if found.verdict == 'parameters_only':
         return (
             'The machine has the physics of its simulation, only inertial parameters differ '
-            f'(certainty {found.certainty:.2f}).{both}'
+            f'({certainty_text(found.certainty)}).{both}'
         )
     return (
         'No mismatch: machine and simulation differ by too little to be missing physics '
-        f'(certainty {found.certainty:.2f}).{both}'
+        f'({certainty_text(found.certainty)}).{both}'
     )
 
 
