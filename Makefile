@@ -22,8 +22,9 @@ demo: venv
 
 # One process a core; a file's tests stay together, so that they share what they prepare. A process
 # that dies is named and not replaced: pytest-xdist 3.8 may wait for ever on the one that takes over.
+# With MEASURE=1 it fails where less than 95 % of the branches of the layers below are entered.
 test: $(VENV)/.test
-	$(BIN)/python $(PYTEST) -n auto --dist loadfile --max-worker-restart 0
+	$(BIN)/python $(PYTEST) -n auto --dist loadfile --max-worker-restart 0 $(if $(MEASURE),$(COVERAGE))
 
 lint: $(VENV)/.lint
 	$(BIN)/ruff format --check .
@@ -40,12 +41,11 @@ busy: $(VENV)/.test
 	@while :; do :; done & one=$$!; while :; do :; done & two=$$!; \
 	    trap 'kill $$one $$two' EXIT; $(BIN)/python $(PYTEST) -q test/ros; exit $$?
 
-# Layers whose branches the tests must enter; the pattern keeps those that exist.
-MEASURED := $(patsubst sgp_ros/%/__init__.py,--cov=sgp_ros.%,\
-    $(wildcard $(patsubst %,sgp_ros/%/__init__.py,gp engine diagnosis)))
-coverage: $(VENV)/.test
-	$(BIN)/python $(PYTEST) -q -n 2 --dist loadfile test/gp test/rigid test/contracts test/engine $(wildcard test/diagnosis) \
-	    $(MEASURED) --cov-branch --cov-fail-under=95 --cov-report=term:skip-covered
+# Layers whose branches the tests must enter.
+COVERAGE := $(patsubst %,--cov=sgp_ros.%,gp engine diagnosis) \
+    --cov-branch --cov-fail-under=95 --cov-report=term:skip-covered
+coverage:
+	$(MAKE) test MEASURE=1
 
 oldest: $(OLDEST)/.made
 	$(OLDEST)/bin/python -c 'import numpy, scipy; print("numpy", numpy.__version__, "scipy", scipy.__version__)'
