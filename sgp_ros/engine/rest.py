@@ -4,25 +4,28 @@ While a joint rests, dry friction is anything between what it is in sliding one 
 The equation of a window is then an inequality: it holds for some force within that band, and only
 what lies outside the band is an error.
 
-A joint rests while its positions over `SPAN_S` tell no direction of motion: their range is less
-than what the width of velocities over which the model lets dry friction change its sign makes of
-it, or than their noise. The range of a quick reversal is larger.
+A joint rests while its positions tell no direction of motion: their range is less than that of
+motion at the width, the velocity over which the model lets dry friction change its sign, or than
+their noise. It is taken over the time in which a motion of certain direction leaves the noise, and
+over two intervals at least. The range of a quick reversal is larger.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Protocol
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
 
 import numpy as np
+from numba import njit
 
 from sgp_ros.gp.regression import OnlinePrediction, Regression
 from sgp_ros.physics.term import Motion
 from sgp_ros.robots.robot import Robot
 
-SPAN_S = 0.03
-"""Time over which positions tell whether a joint moves [s]."""
+_compiled: Callable[[Any], Any] = njit(cache=True, error_model='numpy')
 _DEVIATIONS = 4.0
+CERTAIN = 2.0
+"""Velocity, over the width, at which dry friction has 96 % (tanh 2) of its level."""
 _POINTS = 5
 _PATIENCE = 10
 
@@ -60,19 +63,38 @@ def resting(times: np.ndarray, position: np.ndarray, width: float) -> np.ndarray
         position: measured, (m, k) [rad or m].
         width: velocity below which dry friction has no certain direction [rad/s or m/s].
     """
-    m = len(times)
     noise = np.zeros(position.shape[1])
-    if m >= _POINTS:
-        noise = np.sqrt(2.0 * white_variance(times, position).mean(axis=0))
-    first = np.searchsorted(times, times - 0.5 * SPAN_S)
-    last = np.searchsorted(times, times + 0.5 * SPAN_S, side='right')
+    if len(times) >= _POINTS:
+        noise = _DEVIATIONS * np.sqrt(2.0 * white_variance(times, position).mean(axis=0))
     rests = np.zeros(position.shape, dtype=bool)
-    for i in range(1, m - 1):
-        part = slice(min(first[i], i - 1), max(last[i], i + 2))
-        near = position[part]
-        span = times[part][-1] - times[part][0]
-        rests[part] |= np.ptp(near, axis=0) < np.maximum(width * span, _DEVIATIONS * noise)
+    _mark(times, position, width, noise, clear_spans(noise, width), rests)
     return rests
+
+
+def clear_spans(noise: np.ndarray, width: float) -> np.ndarray:
+    """Return how long motion of certain direction takes to leave ranges of noise, (k,) [s]."""
+    return noise / max(CERTAIN * width, np.finfo(float).tiny)
+
+
+@_compiled
+def _mark(
+    times: np.ndarray, position: np.ndarray, width: float, noise: np.ndarray, spans: np.ndarray,
+    rests: np.ndarray,
+) -> None:  # fmt: skip
+    """Mark stretches (m, k) about each sample, of `spans` (k,), in which a joint does not move."""
+    m, k = position.shape
+    for j in range(k):
+        for i in range(1, m - 1):
+            first, last = i - 1, i + 1
+            while first > 0 and times[i] - times[first - 1] <= 0.5 * spans[j]:
+                first -= 1
+            while last < m - 1 and times[last + 1] - times[i] <= 0.5 * spans[j]:
+                last += 1
+            low = high = position[first, j]
+            for x in position[first : last + 1, j]:
+                low, high = min(low, x), max(high, x)
+            if high - low < max(width * (times[last] - times[first]), noise[j]):
+                rests[first : last + 1, j] = True
 
 
 def friction_slack(

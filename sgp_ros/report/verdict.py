@@ -44,7 +44,8 @@ def verdict_sentence(found: Diagnosis) -> str:
     if found.verdict == 'parameters_only':
         return (
             'No physics is missing, only inertial parameters are wrong: '
-            f'{parameter_errors_text(found.parameter_errors)} ({certainty_text(found.certainty)}); '
+            f'{parameter_errors_text(found.parameter_errors)} '
+            f'({certainty_text(found.certainty)}); '
             f'{gain_text("correcting them explains", found)}.'
         )
     if found.verdict == 'no_mismatch':

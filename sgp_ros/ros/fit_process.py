@@ -4,8 +4,8 @@ One worker serves one request at a time. It starts when the node does, because i
 longer than most fits; it is killed when the node ends, and ends by itself when the node vanishes.
 It has a low weight: where another process wants the same core, it gets about a tenth of it, so a
 fit takes longer on a busy computer, and still comes. It stands still while the node has a message
-in hand, because cores share caches and memory, but only for the first seconds of a fit: a node that
-always has one would never get it. This module imports nothing of ROS: the worker loads it.
+in hand, because cores share caches and memory, but only for the first seconds of a fit: a node
+that always has one would never get it. This module imports nothing of ROS: the worker loads it.
 """
 
 from __future__ import annotations
