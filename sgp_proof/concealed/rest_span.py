@@ -1,4 +1,4 @@
-"""What the online engine leaves of the effort for each time over which joints are taken to rest.
+"""Effort left by the online engine for each time over which joints are taken to rest.
 
     python -m sgp_proof.concealed.rest_span WORLDS [--out FILE]
 

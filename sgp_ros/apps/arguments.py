@@ -296,4 +296,4 @@ COMMANDS = (
     _add_demo, _add_simulate, _add_replay, _add_identify, _add_diagnose, _add_effects,
     _add_without_arguments, _add_import, _add_export, _add_watch, _add_check, _add_campaign,
 )  # fmt: skip
-"""What adds each command of the package, in the order of its help."""
+"""Functions that add each command of the package, in the order of its help."""

@@ -42,7 +42,7 @@ _SCHEMA = 1
 
 @dataclass(frozen=True, slots=True)
 class CampaignOptions:
-    """What is made of each recording, and of all.
+    """Options of a campaign: the task for each recording, and the table of all.
 
     Attributes:
         task: of `TASKS`.

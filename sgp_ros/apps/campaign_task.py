@@ -1,4 +1,4 @@
-"""What a worker does with one recording of a campaign."""
+"""Task of a worker for one recording of a campaign."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ _RIVALS = 3
 
 @dataclass(frozen=True, slots=True)
 class DiagnoseOptions:
-    """What is read.
+    """Inputs of a diagnosis.
 
     Attributes:
         sim: recording or model file of the simulation that the machine is compared with; None

@@ -81,7 +81,7 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis, gains: Gains | No
 
 @dataclass(frozen=True, slots=True)
 class Online:
-    """What a node leaves of the efforts with a diagnosed robot that does not hold all findings.
+    """Effort error of a node with a diagnosed robot that does not hold all findings.
 
     Attributes:
         left_out: the findings that a node does not model.

@@ -68,7 +68,7 @@ class IdentifyOptions:
 
     @property
     def identification(self) -> IdentificationOptions:
-        """What is fitted and held out."""
+        """Options of the fit and of the held-out part."""
         return IdentificationOptions(
             residual_inputs=None if self.inputs is None else tuple(self.inputs),
             holdout=self.holdout,

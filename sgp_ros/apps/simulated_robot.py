@@ -22,7 +22,7 @@ from sgp_ros.strangers import read_text
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedRobot:
-    """What is simulated.
+    """Robot to simulate, with its stated effects.
 
     Attributes:
         simulator: of the robot without the effects.

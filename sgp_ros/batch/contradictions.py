@@ -1,4 +1,4 @@
-"""What a recording says that its robot, or its own numbers, contradict: units and targets.
+"""Contradictions of a recording with its robot or within its own numbers: units and targets.
 
 Only numbers that no robot can have are refused. What a diagnosis can name, such as a recording in
 degrees or a drive in saturation, is said and goes on.

@@ -1,4 +1,4 @@
-"""What a robot can show of its parameters, beside what a recording showed.
+"""Parameters that a robot can show, beside those that a recording showed.
 
 Some directions of the parameters never reach a torque: the rank over random motions tells. Others
 would, had this recording moved the right joint in the right pose: see `suggestions`.
@@ -68,7 +68,7 @@ IDENTIFIABLE, NOT_EXCITED, STRUCTURAL = 'identifiable', 'not_excited', 'structur
 
 @dataclass(frozen=True, slots=True)
 class JointRange:
-    """What a joint may do; metres in place of radians for a prismatic one.
+    """Limits of the motion of a joint; metres in place of radians for a prismatic one.
 
     Attributes:
         lower: least position [rad].

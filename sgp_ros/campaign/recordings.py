@@ -24,7 +24,7 @@ _EXPECTED = f'a folder, a recording ({", ".join(_ENDINGS)}, rosbag2 directory) o
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What a table tells of one recording.
+    """Entry of the table of covariates for one recording.
 
     Attributes:
         robot: which machine it is of; empty where the table does not say.

@@ -69,7 +69,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trend:
-    """What was found of one quantity.
+    """Trend and changes of one quantity.
 
     Attributes:
         key: which one.

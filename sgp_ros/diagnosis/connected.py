@@ -100,7 +100,7 @@ class Connected:
 
     @property
     def left(self) -> tuple[np.ndarray, np.ndarray]:
-        """What the nominal robot leaves beyond errors of signals, and how much less bodies do.
+        """Rest of the nominal robot beyond errors of signals, and how much less bodies leave.
 
         (k,) shares. The first is at least what bodies gain of the variance of the effort, for a
         weight that is held makes the mean square large and tells nothing of the motion.

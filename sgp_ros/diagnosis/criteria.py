@@ -76,7 +76,7 @@ The shape of a column is only nearly right, and what is wrong with it repeats in
 SHAPE_ERROR = 0.001
 """Part of the discrepancy that the right column may leave for the same reason [1]. Nulls."""
 PER_EFFECT, PER_PARAMETER = 10.0, 3.0
-"""What an effect, and each number that the data determine, must be worth [nats]. Nulls."""
+"""Least worth of an effect, and of each number that the data determine [nats]. Nulls."""
 MOST_OPPOSED = 5.0
 """Greatest ratio of the effects' mean squares, added up, to that of their sum [1]. Nulls.
 
@@ -106,7 +106,7 @@ LEAST_ODDS = 0.01
 ALIKE = math.log(20.0) / TEMPER
 """Difference of the fits below which a recording prefers neither model [nats]. Convention."""
 PER_UNUSUAL = ALIKE
-"""What a law that few joints have must be worth beyond the price of an effect [nats]. Convention.
+"""Least worth of a law that few joints have, beyond the price of an effect [nats]. Convention.
 
 Odds of one to twenty against laws that nearly every joint with a motor has, or that add to them.
 """
@@ -125,7 +125,7 @@ DOUBTED = 0.4
 So too of a finding whose size may be none.
 """
 CARRIED_REST = 0.1
-"""What a model may leave of the discrepancy where it was not fitted [1]. Convention.
+"""Largest rest of a model, as part of the discrepancy, where it was not fitted [1]. Convention.
 
 Friction that is a third larger or smaller than it was leaves that.
 """

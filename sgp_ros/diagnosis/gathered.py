@@ -34,7 +34,7 @@ from sgp_ros.robots.robot import Robot
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Knowledge:
-    """What is known of the machine beside its bodies.
+    """Prior knowledge of the machine beside its bodies.
 
     Attributes:
         robot: names, actuated joints and gains.
@@ -61,7 +61,7 @@ class Knowledge:
 
 @dataclass(frozen=True, eq=False)
 class Recordings:
-    """What is learned from, kept back and held out.
+    """Recordings to learn from, kept-back blocks and held-out recordings.
 
     Attributes:
         names: stems of what is learned from.

@@ -30,7 +30,7 @@ SHORTEST_ROUND = 16
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What becomes of an event and of those that waited for it.
+    """Decision on an event and on those that waited for it.
 
     Attributes:
         events: to be ordered now.

@@ -131,7 +131,7 @@ class Gate:
 
 @dataclass(slots=True)
 class Before:
-    """What was learned before equations that persist were implausible to it.
+    """Copy of the model from before persistent equations were implausible to it.
 
     Attributes:
         regression, baseline: as `Estimator` has them.

@@ -16,7 +16,7 @@ RARE = 10
 
 
 class Limits:
-    """What the joints of a robot cannot do: far more than its model file permits.
+    """Impossible motions of a robot's joints: far more than its model file permits.
 
     Limits of model files are those of controllers, and often conservative; so `LIMIT_MARGIN` times
     them is impossible, and a position as far beyond its range as the range is long. Those of many

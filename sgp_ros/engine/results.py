@@ -1,4 +1,4 @@
-"""What the engine gives back: values only, read by nodes, commands and reports."""
+"""Results of the engine: values only, read by nodes, commands and reports."""
 
 from __future__ import annotations
 
@@ -184,7 +184,7 @@ class Counts:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What one `push` set free.
+    """Result of one `push`.
 
     Attributes:
         released: events in the order in which they took effect; a record of these reproduces
@@ -205,7 +205,7 @@ class Step:
 
 
 NOTHING = Step()
-"""What an event sets free that waits, or is refused."""
+"""Result of an event that waits, or is refused."""
 
 
 def read_parameters(

@@ -1,4 +1,4 @@
-"""What the errors of one-step predictions tell: scores, drift, intervals, the weight of Z.
+"""Statistics of the errors of one-step predictions: scores, drift, intervals, the weight of Z.
 
 Everything here sees an error after the prediction it belongs to. Scores and drift are of one
 stream; the scales of the intervals and the weights of Z belong to the model and stay with it.

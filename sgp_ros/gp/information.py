@@ -208,12 +208,12 @@ class _Solved:
 
     @cached_property
     def echelon(self) -> Echelon:
-        """What tells determined rows apart where that is beyond doubt."""
+        """Echelon form, which separates determined rows where that is beyond doubt."""
         return Echelon(self._A, self._z, self.scale)
 
     @cached_property
     def decomposition(self) -> _Decomposition:
-        """What tells them apart in every case."""
+        """Pivoted decomposition, which separates them in every case."""
         return _Decomposition(self._A, self._z, self.scale)
 
 

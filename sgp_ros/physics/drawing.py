@@ -41,7 +41,7 @@ class Body(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PilotRun:
-    """What a pilot run of the nominal robot showed: rms and extremes, (k,) each."""
+    """Statistics of a pilot run of the nominal robot: rms and extremes, (k,) each."""
 
     effort: np.ndarray
     velocity: np.ndarray

@@ -126,7 +126,7 @@ class Effect:
 
     @property
     def key(self) -> str:
-        """What tells it from all others."""
+        """Unique name."""
         return self.name
 
     @property

@@ -38,7 +38,7 @@ from sgp_ros.physics.grammar import (
 from sgp_ros.physics.term import Motion
 
 Place = TypeVar('Place')
-"""What a formula is evaluated on, such as a motion or a mapping of values."""
+"""Point at which a formula is evaluated, such as a motion or a mapping of values."""
 T = TypeVar('T')
 Special = Callable[[str, frozenset[tuple[str, str]]], Callable[..., object] | None]
 """From a function and the signals in its arguments to what takes a place and these arguments."""

@@ -22,7 +22,7 @@ SIDES = {'lower': -1, 'upper': 1}
 
 
 class Site(Enum):
-    """What an effect may be put on."""
+    """Part of a robot that an effect may be put on."""
 
     JOINT = 'a joint'
     MOTOR = 'a motor'

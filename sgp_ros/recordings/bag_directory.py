@@ -105,7 +105,7 @@ def _size(files: Sequence[Path]) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _Metadata:
-    """What metadata.yaml says; a missing or broken one, as after a crash, says nothing.
+    """Contents of metadata.yaml; empty if it is missing or broken, as after a crash.
 
     Attributes:
         files: names of the files.

@@ -27,7 +27,7 @@ DAMAGE = (
     McapError, struct.error, ValueError, RuntimeError, KeyError, TypeError, AttributeError,
     IndexError, OverflowError, MemoryError, EOFError, zstandard.ZstdError,
 )  # fmt: skip
-"""What reading damaged records raises."""
+"""Exceptions from reading damaged records."""
 
 _LOOSE_BYTES, _BLOCK_BYTES = 1 << 20, 1 << 16
 _LEAST_RUN, _MANY = 8, 4096
@@ -52,7 +52,7 @@ class Messages(NamedTuple):
 
 
 class Stamps(NamedTuple):
-    """What the heads of some messages say: channels and log times [ns], (n,)."""
+    """Heads of some messages: channels and log times [ns], (n,)."""
 
     channels: np.ndarray
     log_ns: np.ndarray

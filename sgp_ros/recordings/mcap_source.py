@@ -86,7 +86,7 @@ class McapSource:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What was wrong with the files, one sentence each."""
+        """Damage of the files, one sentence each."""
         damage = [*self._damage.values()]
         if len(damage) > _LISTED:
             damage[_LISTED:] = [f'{len(damage) - _LISTED} more places are damaged']
@@ -177,7 +177,7 @@ class _Segment(NamedTuple):
 
 @dataclass(slots=True)
 class _FileIndex:
-    """What is known of one file.
+    """Index of one file.
 
     Attributes:
         channels: channel number to (topic, type, encoding).

@@ -1,4 +1,4 @@
-"""What is published and recorded of one estimate, before it is a message of any library.
+"""Published and recorded values of one estimate, before it is a message of any library.
 
 The same values go to the topics, into a record and into the result of a replay.
 """
@@ -21,7 +21,7 @@ INTERVAL_95 = 1.959963984540054
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outputs:
-    """What is published of one estimate.
+    """Published values of one estimate.
 
     Attributes:
         stamp_ns: of the sample predicted [ns].

@@ -36,7 +36,7 @@ _TIME = re.compile(r'\d{4}-\d\d-\d\d[T ]\d')
 _BLOCK = 1 << 22
 """Characters of a block: its rows times its longest line."""
 _DIGITS, _FINE = 15, 1e6
-"""What a float keeps: that many digits, or below that magnitude 1e-10 of a unit."""
+"""Precision of a float: that many digits, or below that magnitude 1e-10 of a unit."""
 _RAGGED = '[lists of different lengths]'
 
 

@@ -1,4 +1,4 @@
-"""What a diagnosis found, in plain sentences for the terminal and the top of the page."""
+"""Results of a diagnosis in plain sentences, for the terminal and the top of the page."""
 
 from __future__ import annotations
 

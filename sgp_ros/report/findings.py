@@ -1,4 +1,4 @@
-"""What was found in a whole recording, as data for JSON: `identification.json`."""
+"""Results of an identification, as data for JSON: `identification.json`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an identification found, in plain sentences for the terminal and its page."""
+"""Results of an identification in plain sentences, for the terminal and its page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a search for a law that no list has found: its shape beside the data, formulas, words."""
+"""Result of a search for an unlisted law: its shape beside the data, formulas, words."""
 
 from __future__ import annotations
 

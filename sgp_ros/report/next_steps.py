@@ -1,4 +1,4 @@
-"""What to do after a command: a sentence and the command to copy."""
+"""Next steps after a command: a sentence and the command to copy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _HANDED_BACK = {'.xml': 'mjcf', '.mjcf': 'mjcf', '.sdf': 'sdf'}
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """What a command was given.
+    """Inputs of a command.
 
     Attributes:
         bag: the recording.

@@ -1,4 +1,4 @@
-"""What a robot is to the estimator: joints, and physics that is linear in its coefficients.
+"""Robot as the estimator sees it: joints, and physics that is linear in its coefficients.
 
 `X(u) = f(u) W + Z(u)` (Wu and Movellan, equation 2). A `Term` contributes columns of `f`; a
 `Robot` is a tuple of terms. Its target says which side of the equation of motion is predicted:
@@ -36,7 +36,7 @@ class ActingEffort(Protocol):
 
 
 class RestForce(Protocol):
-    """What dry friction may do where joints rest."""
+    """Range of dry friction where joints rest."""
 
     @property
     def joints(self) -> frozenset[int]:

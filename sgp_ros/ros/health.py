@@ -25,7 +25,7 @@ _LONGEST_DELAY_S = 60.0
 
 
 class Health:
-    """What happened since the node started, as far as the engine does not know it.
+    """Health of the node since its start, as far as the engine does not know it.
 
     Args:
         merger: of the joint states, which counts what came and what is missing.

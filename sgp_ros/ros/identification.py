@@ -1,4 +1,4 @@
-"""What identifies a robot on a node: topics, services, timers and parameters around a session.
+"""Identification on a node: topics, services, timers and parameters around a session.
 
 A node has one `Identification` or none, so that a plain node and one with a lifecycle are the same
 beneath. Everything it makes on its node is gone after `close`.

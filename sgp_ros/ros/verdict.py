@@ -16,7 +16,7 @@ _LOST_SHARE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Arrivals:
-    """What came between two diagnostics, and from where.
+    """Messages received between two diagnostics, and their sources.
 
     Attributes:
         joint_states, command: full topic names.

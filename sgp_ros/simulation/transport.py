@@ -1,4 +1,4 @@
-"""What happens to measurements and commands on their way into a recording.
+"""Transport of measurements and commands into a recording.
 
 Stamps have noise, logs are late, messages get lost, joints stand in another order. A message is
 dated by its stamp. A command without a header has no other time than that of its log, so that one

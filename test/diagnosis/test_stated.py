@@ -1,4 +1,4 @@
-"""What the nominal robot states is no discrepancy, in a diagnosis from end to end."""
+"""Effects stated by the nominal robot are no discrepancy, in a diagnosis from end to end."""
 
 from __future__ import annotations
 

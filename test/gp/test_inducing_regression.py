@@ -191,7 +191,7 @@ def test_the_kept_samples_and_what_is_gone_add_up():
 
 
 def test_without_memory_only_the_kept_samples_count_under_new_hyperparameters():
-    """What is gone is then left to the past, and a fit begins from the prior."""
+    """Dropped samples are then left to the past, and a fit begins from the prior."""
     model, data = random_problem(11, n=60, k=1)
     other = model.with_log_parameters(model.log_parameters + 0.1)
     online = _learn(

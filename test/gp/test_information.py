@@ -119,7 +119,7 @@ def test_without_memory_only_the_buffer_counts_faded():
 
 @pytest.mark.parametrize('way', WAYS)
 def test_a_change_of_noise_keeps_the_weights(way):
-    """What is rebuilt under other hyper-parameters is as faded as it was."""
+    """Information rebuilt under other hyper-parameters is as faded as it was."""
     model, data = random_problem(6, n=40, noise_like='parametric')
     online = _learn(way(model, FLAT, forgetting=7.0), data)
     before = online.information

@@ -135,7 +135,7 @@ def test_stop_save_restore_continue_equals_never_stopped(policy):
 
 @pytest.mark.parametrize('policy', RETENTIONS)
 def test_a_policy_taken_later_goes_on_from_the_buffer(policy):
-    """What a change rebuilds is what would have grown sample by sample."""
+    """A change rebuilds the state that would have grown sample by sample."""
     model, data = random_problem(9, n=40)
     changed = OnlineRegression(model, FLAT, Memory(8))
     for i in range(8):

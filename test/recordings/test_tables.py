@@ -364,7 +364,7 @@ def test_a_table_without_header_says_so(tmp_path):
 
 
 def test_a_list_in_a_cell_is_a_row_of_a_matrix(tmp_path):
-    """Whatever separates the cells, in quotes or not."""
+    """For any separator of the cells, in quotes or not."""
     content = _map(index=1)
     for text in ('t,q\n1,"[0.1, 0.2]"\n2,"[0.3, 0.4]"\n', 't,q\n1,[0.1, 0.2]\n2,[0.3, 0.4]\n',
                  't q\n1 [0.1, 0.2]\n2 [0.3, 0.4]\n'):  # fmt: skip

@@ -170,7 +170,7 @@ def test_what_cannot_be_told_is_said_with_the_motion_that_would(tmp_path):
 
 
 def test_without_held_out_recordings_the_page_promises_nothing(tmp_path):
-    """What was learned from proves little."""
+    """Data that were learned from prove little."""
     found = diagnosis('missing_physics', [COULOMB], held=False)
     write_diagnosis(tmp_path, found)
     assert held_out_sentence(found) in (tmp_path / 'report.html').read_text()
@@ -322,7 +322,7 @@ def test_each_row_over_time_names_the_forces_it_shows():
 
 
 def test_no_line_joins_rows_with_a_pause_between_them():
-    """What was not recorded is not drawn."""
+    """Nothing is drawn where nothing was recorded."""
     found = diagnosis('missing_physics', [COULOMB])
     later = found.traces.time + 5.0 * (np.arange(N) >= N // 2)
     found = replace(found, traces=replace(found.traces, time=later))

@@ -1,4 +1,4 @@
-"""What the comparison of models lets us assert.
+"""Model that the comparison of models allows to assert.
 
 Statistical significance is not enough: the schema calls physics what makes at least 0.4 % of the
 mean squared effort of some joint. Among models of nearly the same residual the one with the fewest
@@ -80,7 +80,7 @@ class Decision:
 
 @dataclass(frozen=True, eq=False)
 class Scale:
-    """What mean squares are measured against.
+    """Reference powers for mean squares.
 
     Attributes:
         power: (k,) mean squared efforts.
@@ -107,7 +107,7 @@ class Scale:
 
     @property
     def floor(self) -> np.ndarray:
-        """What the right model may leave, (k,) shares."""
+        """Largest rest that the right model may leave, (k,) shares."""
         return np.asarray(FLOOR_SHARE + self.shape_error * self.nominal + self.error / self.power)
 
     def of_forms(self) -> Scale:

@@ -1,4 +1,4 @@
-"""What differs between several recordings of one robot: a load taken up, friction, a mount.
+"""Differences between several recordings of one robot: a load taken up, friction, a mount.
 
 All recordings share one model. A difference is a law that acts in one recording alone, on top of
 what is common, fitted together with it. Laws that may differ are those without a shape to search,
@@ -44,7 +44,7 @@ ALIKE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Several:
-    """What is common to several recordings, and what differs.
+    """Common model of several recordings, and their differences.
 
     Attributes:
         equations: with what differs taken off.

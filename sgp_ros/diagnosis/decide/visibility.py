@@ -1,4 +1,4 @@
-"""What a recording could not have shown: the least size of effects that it would show.
+"""Visibility: the least size of an effect that a recording would have shown.
 
 An effect is found when the evidence for it pays for its freedom, and when it makes enough of the
 squared effort to count as physics. Both are asked of the force that it would exert in the motion

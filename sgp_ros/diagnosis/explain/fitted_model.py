@@ -81,7 +81,7 @@ class Model:
 
     @property
     def law_price(self) -> float:
-        """What laws must be worth, the more where few joints have them [nats].
+        """Price of the laws, higher where few joints have them [nats].
 
         Those of which the prior says how unlikely their numbers are have paid by that, and further
         waves of one law with the first.
@@ -94,7 +94,7 @@ class Model:
 
     @property
     def cost(self) -> float:
-        """What the freedom of the model costs [nats]."""
+        """Price of the freedom of the model [nats]."""
         return price_of(self.frame, self.size)
 
     @property

@@ -69,7 +69,7 @@ class Frame:
 
     @cached_property
     def y(self) -> np.ndarray:
-        """What is left of the target, (N k + p,)."""
+        """Rest of the target, (N k + p,)."""
         if self.given is not None:
             return self.given
         return self.projected(self.equations.d[:, :, None])[:, 0]
@@ -122,7 +122,7 @@ class Frame:
 
     @property
     def occam(self) -> float:
-        """What free inertial parameters cost in evidence, `log det R / sqrt(weight)` [nats]."""
+        """Cost of free inertial parameters in evidence, `log det R / sqrt(weight)` [nats]."""
         return float(np.log(np.abs(np.diag(self.R)) / math.sqrt(self.weight)).sum())
 
     @property

@@ -63,7 +63,7 @@ def gain(trial: Model, model: Model, *, is_whole: bool = True) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """What is chosen together: the laws of one joint, or those of no joint.
+    """Laws that are chosen together: those of one joint, or those of no joint.
 
     Attributes:
         effects: laws.

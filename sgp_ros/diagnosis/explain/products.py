@@ -26,7 +26,7 @@ _UNSEEN = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """What a model leaves, in one frame, with products of the basis B of what it explains.
+    """Residual of a model in one frame, with products of the basis B of the model's columns.
 
     B has the P columns `[Q, own]`, Q that of the bodies.
 

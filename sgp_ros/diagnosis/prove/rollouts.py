@@ -188,7 +188,7 @@ class _Set:
 
     @property
     def loads(self) -> np.ndarray:
-        """What acts during each step, (m, n, 2 k + 2), see `DiagnosedDynamics`."""
+        """Loads during each step, (m, n, 2 k + 2), see `DiagnosedDynamics`."""
         motion = self.windows.motion
         recording = -np.ones(len(motion.time)) if motion.recording is None else motion.recording
         signals = self._effort, self._force, motion.time[:, None], recording[:, None]

@@ -95,7 +95,7 @@ class Hypothesis:
 
     @property
     def key(self) -> tuple[str, str, tuple[str, ...]]:
-        """What is asserted, without numbers."""
+        """Assertion without its numbers."""
         return self.effect, self.joint, tuple(self.words.values())
 
 

@@ -1,4 +1,4 @@
-"""What is said of errors of the connection: findings, what cannot be told apart, their price."""
+"""Statements on errors of the connection: findings, equivalents, price."""
 
 from __future__ import annotations
 

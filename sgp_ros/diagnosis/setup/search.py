@@ -46,7 +46,7 @@ class Tried:
 
     @property
     def remedy(self) -> str:
-        """What to do about the error."""
+        """Remedy for the error."""
         values = dict(zip(self.hypothesis.names, map(float, self.numbers), strict=True))
         return self.hypothesis.remedy(values)
 
@@ -58,7 +58,7 @@ class Tried:
 
 @dataclass(frozen=True, eq=False)
 class Connection:
-    """What is wrong with the connection.
+    """Errors of the connection, with their rivals.
 
     Attributes:
         errors: in the order in which they were found.

@@ -35,7 +35,7 @@ _STEPS = 8
 
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """What is decided once laws were looked for.
+    """Decision after the search for unlisted laws.
 
     Attributes:
         comparison: with the models of formulas.

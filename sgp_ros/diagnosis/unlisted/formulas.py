@@ -42,7 +42,7 @@ from sgp_ros.physics.parts import LawParameter, Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 PER_PIECE = 0.5
-"""What each number, name and operation of a formula takes [nats]."""
+"""Price of each number, name and operation of a formula [nats]."""
 NAMELESS = 'a law found from the data'
 NEAREST = {
     'a*X/(1 + (X/v0)**2)': 'an eddy-current brake',
@@ -85,7 +85,7 @@ _PIECES = 100
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """What was seen of a variable."""
+    """Observed range of a variable."""
 
     low: float
     high: float

@@ -55,7 +55,7 @@ EARNED = 3
 
 @dataclass(frozen=True, eq=False)
 class Searched:
-    """What a search at one joint ended with.
+    """Result of a search at one joint.
 
     Attributes:
         joint: index.

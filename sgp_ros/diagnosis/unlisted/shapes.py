@@ -52,7 +52,7 @@ UNITS = {'': '1', 'sign': '1', 'soft': '1', 'speed': '{l}/s', 'square': '{l}2/s2
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """What a force may be a function of: `q` or `dq` of a joint, or of two, or what it was.
+    """Variable of a force: `q` or `dq` of a joint, of two joints, or an earlier value of it.
 
     Attributes:
         kind: `q` or `dq`.

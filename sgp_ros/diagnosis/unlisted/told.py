@@ -1,4 +1,4 @@
-"""What a search for a law says: the shape with its band, the formulas, one sentence in words."""
+"""Statement of an unlisted law: its shape with a band, formulas, one sentence in words."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a robot has, sorted by what other programs have a place for.
+"""Physics of a robot, sorted by the places that other programs have for it.
 
 Bodies, damping and dry friction of joints, rotor inertia, springs, delay, lag, gains and limits
 are numbers of joints that most formats know. Every other effect is named where a format is

@@ -40,7 +40,7 @@ READ = (
     ('fixed tendon under an actuator, on one joint and its followers', 'its transmission'),
     ('option gravity', 'how the base stands'),
 )
-"""What is read, and what it becomes."""
+"""Elements that are read, and their meaning here."""
 LEFT = {
     'contact': 'Contacts are not modelled; none acts where the robot starts; solid bodies',
     'off': 'Constraints that are not active in the file, ignored',

@@ -33,7 +33,7 @@ READ = (
     ('axis mimic', 'joint that follows another'),
     ('plugin joint-position-controller; p_gain, d_gain', 'gains of drives that hold targets'),
 )
-"""What is read, and what it becomes."""
+"""Elements that are read, and their meaning here."""
 LEFT = {
     'root': 'The root is assumed to be fixed to the ground',
     'mass': 'Links without <inertial>, 1 kg by default in SDF, are assumed to have no mass',

@@ -44,7 +44,7 @@ ENCODERS = {
 @pytest.mark.parametrize('effort', [0.0, 0.5])
 @pytest.mark.parametrize('kind', ENCODERS)
 def test_nothing_is_said_of_a_robot_that_never_moved(robots, kind, effort):
-    """Whatever its encoders show, and whether or not it is pushed against a stop."""
+    """No matter what its encoders show, and whether or not it is pushed against a stop."""
     world = _at_rest(1, ENCODERS[kind](np.random.default_rng(0)), effort)
     with pytest.raises(RecordingError, match='no joint of chain moves'):
         diagnose(events_of(world, quantum=0), *robots[1], {})

@@ -1,4 +1,4 @@
-"""What is said of models that were not asserted, and how certain the rest is."""
+"""Statements on models that were not asserted, and the certainty of the rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a motion cannot tell apart is said, with the motion that would."""
+"""Effects that a motion cannot tell apart are named, with the motion that would."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_what_contains_the_finding_is_no_other_explanation(narrow):
 
 
 def test_the_diagnosis_says_what_it_cannot_tell(robots):
-    """Whatever it asserts of a spring at small angles, the other explanation is named."""
+    """Beside the asserted explanation of a spring at small angles, the other one is named."""
     world = simulate(CHAINS[1], 5, 10.0, force=lambda t, q, v: (-0.6 * q[0],), reach=0.2)
     robot, tree = robots[1]
     found = diagnose(events_of(world), robot, tree, {})

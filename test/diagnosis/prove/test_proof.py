@@ -131,6 +131,6 @@ def test_what_does_harm_elsewhere_does_not_carry_over(after, low, is_told):
 
 
 def test_noise_that_was_there_before_is_no_failure():
-    """What is left is as large where the model was fitted."""
+    """The rest is as large where the model was fitted."""
     noisy = _proof(0.4, 0.1, (0.08, 0.12))
     assert not not_carried_over({'train': noisy, 'test': noisy}, ())

@@ -204,7 +204,7 @@ def test_a_formula_is_held_against_any_form(equations_for):
 
 
 def test_a_finer_spline_has_columns_of_its_own(equations_for):
-    """What is known of a spline is not what one with other pieces has."""
+    """Columns known for a spline are not those of one with other pieces."""
     _, equations = equations_for(simulate(CHAINS[1], 11, 10.0, force=_brake))
     columns, motion = Columns(equations), equations.motion
     for pieces in (PIECES, FINE):
