@@ -74,7 +74,7 @@ def test_simulation_is_a_function_of_its_seed(wheel, tmp_path):
 
 
 def test_left_out_effects_reach_the_recording_and_the_truth(tmp_path):
-    """--effect and --physical change the machine and are told in truth.json."""
+    """--effect and --physical change the machine and are written to truth.json."""
     command = ['simulate', 'reaction_wheel', '--duration', '2', '--out', str(tmp_path)]
     effect = 'coulomb_friction:joint=pole,level=0.02'
     assert main([*command, '--effect', effect, '--physical', 'pole_viscosity=0']) == 0

@@ -39,7 +39,7 @@ _ROUNDING = 1e-10
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PivotedBasis:
-    """Basis functions of one kernel.
+    """Basis functions of one kernel; the pivots are its inducing points.
 
     Attributes:
         kernel: the kernel.
@@ -183,8 +183,8 @@ class BatchPosterior:
         ]
         rows = np.vstack([part.rows for part in self._parts])
         target = np.concatenate([part.target for part in self._parts])
-        told = Observations(np.zeros((len(rows), 1)), rows[:, None, :], target[:, None])
-        self._physics = Posterior(Model((None,), (1.0,)), told, prior)
+        whitened = Observations(np.zeros((len(rows), 1)), rows[:, None, :], target[:, None])
+        self._physics = Posterior(Model((None,), (1.0,)), whitened, prior)
         self._weights = [
             _back(part.factor, part.data - part.coupling @ self.coefficients)
             for part in self._parts

@@ -175,7 +175,7 @@ def driven(events: Iterable[Event], tree: Tree, known: Knowledge) -> list[Event]
     ]
 
 
-def suspected(events: Iterable[Event], tree: Tree, known: Knowledge) -> tuple[str, ...]:
+def setup_remarks(events: Iterable[Event], tree: Tree, known: Knowledge) -> tuple[str, ...]:
     """Return what to check of how a robot is connected before its bodies are estimated.
 
     Looked for only where bodies and everyday friction leave what counts as physics. What cannot

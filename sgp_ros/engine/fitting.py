@@ -112,15 +112,15 @@ def _fit_in_turn(request: FitRequest) -> FitResult:
     k = len(model.noise)
     some = min(k, max(1, ROWS // len(data.U)))
     turn = [(request.number * some + i) % k for i in range(some)]
-    told = [_told(model, data, j) for j in range(k)]
+    information = [_information(model, data, j) for j in range(k)]
     base = np.column_stack([request.base_root, request.base_target])
-    rest = np.vstack([base, *(told[j] for j in range(k) if j not in turn)])
+    rest = np.vstack([base, *(information[j] for j in range(k) if j not in turn)])
     rest = np.asarray(np.linalg.qr(rest, mode='r'))
     before = after = 0.0
     evaluations, refusals = 0, []
     for j in turn:
         columns = np.flatnonzero(np.any(data.F[:, j] != 0.0, axis=0))
-        others = np.vstack([rest, *(told[i] for i in turn if i != j)])
+        others = np.vstack([rest, *(information[i] for i in turn if i != j)])
         known = marginal_equations(others, [*columns, p])
         F, root = _determined(data.F[:, j, columns], known[:, :-1])
         found = _fit_together(replace(
@@ -134,7 +134,7 @@ def _fit_in_turn(request: FitRequest) -> FitResult:
         before, after = before + found.log_evidence_before, after + found.log_evidence
         assert found.model is not None
         model = model.with_output(j, found.model)
-        told[j] = _told(model, data, j)
+        information[j] = _information(model, data, j)
     return FitResult(request.number, model, after, before, evaluations, all(refusals))
 
 
@@ -151,15 +151,15 @@ def _determined(F: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return combined[: len(F)], combined[len(F) :]
 
 
-def _told(model: Model, data: Observations, j: int) -> np.ndarray:
-    """Return equations of unit noise in which output j tells of W all it does, (r, p + 1)."""
+def _information(model: Model, data: Observations, j: int) -> np.ndarray:
+    """Return all that output j tells of W, as equations of unit noise, (r, p + 1)."""
     p = data.F.shape[2]
     columns = np.flatnonzero(np.any(data.F[:, j] != 0.0, axis=0))
     own = Observations(data.U, data.F[:, [j]][:, :, columns], data.y[:, [j]])
     block = build_blocks(model.output(j), own)[0]
-    told = np.asarray(np.linalg.qr(np.column_stack([block.A, block.b]), mode='r'))
-    rows = np.zeros((len(told), p + 1))
-    rows[:, [*columns, p]] = told
+    known = np.asarray(np.linalg.qr(np.column_stack([block.A, block.b]), mode='r'))
+    rows = np.zeros((len(known), p + 1))
+    rows[:, [*columns, p]] = known
     return rows
 
 
@@ -258,8 +258,8 @@ def left_out_errors(
             found = Posterior(model, others, prior).predict(data.U[part], data.F[part])
         except NumericalError:
             continue
-        is_told = np.isfinite(found.variance)
-        errors[part] = np.where(is_told, data.y[part] - found.mean, np.nan)
+        is_determined = np.isfinite(found.variance)
+        errors[part] = np.where(is_determined, data.y[part] - found.mean, np.nan)
     return errors
 
 

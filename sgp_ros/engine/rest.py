@@ -127,10 +127,10 @@ def free_targets(y: np.ndarray, held: np.ndarray) -> np.ndarray:
     return targets
 
 
-def told(
+def learnable(
     regression: Regression, prediction: OnlinePrediction, y: np.ndarray, held: np.ndarray
 ) -> tuple[OnlinePrediction, np.ndarray] | None:
-    """Return the sample that an equation tells, in which rows of held joints are zero.
+    """Return the sample to learn from an equation, in which rows of held joints are zero.
 
     Such a row tells W nothing where the joint has no Z. One that Z enters cannot be left out
     alone: outputs share their samples.

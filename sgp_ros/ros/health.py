@@ -117,7 +117,7 @@ class Health:
         """Return the statuses since the last call.
 
         Args:
-            engine: whose counts and scores are told.
+            engine: whose counts and scores are reported.
             node: name of the node, the prefix of every status.
             elapsed_s: since the last call [s].
             sources: full topic name and names of the publishers of joint_states and command.

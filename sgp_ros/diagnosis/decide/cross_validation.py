@@ -77,8 +77,8 @@ def repeatable(equations: Equations, residual: np.ndarray, asked: np.ndarray) ->
         return found
     for j in np.flatnonzero(asked):
         r = residual[:, j]
-        told = np.array([_by_motion(equations, r, int(j)), _by_past(equations, r)])
-        found[:, j] = np.minimum(1.0, np.maximum(told, 0.0) + 1.0 / np.sqrt(N))
+        explained = np.array([_by_motion(equations, r, int(j)), _by_past(equations, r)])
+        found[:, j] = np.minimum(1.0, np.maximum(explained, 0.0) + 1.0 / np.sqrt(N))
     return found
 
 
@@ -207,11 +207,11 @@ def supported(
     for model in ranked:
         found = model
         while found.effects and is_credible(found):
-            told = support(columns, found, floor, rows)
-            if told.min() > EVIDENCE:
+            evidence = support(columns, found, floor, rows)
+            if evidence.min() > EVIDENCE:
                 return found
             if len(found.effects) <= 2:
                 break
-            weakest = found.effects[int(np.argmin(told))]
+            weakest = found.effects[int(np.argmin(evidence))]
             found = without(equations, found, lambda s, out=weakest: s is out)  # type: ignore[misc]
     return None

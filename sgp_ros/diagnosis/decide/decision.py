@@ -133,7 +133,7 @@ class Scale:
         effects = np.minimum((net**2).mean(axis=0) / self.power, self.nominal)
         return np.asarray(np.maximum(self.base, effects))
 
-    def excess(self, model: Model, told: np.ndarray | None = None) -> np.ndarray:
+    def excess(self, model: Model, predictable: np.ndarray | None = None) -> np.ndarray:
         """Return what a model leaves at each joint, relative to what an adequate one may, (k,).
 
         A joint that has effects of its own is measured by what is explained there; of others all
@@ -141,16 +141,16 @@ class Scale:
 
         Args:
             model: fitted.
-            told: (2, k) share of the rest that motion and earlier rows predict, see `repeatable`;
-                None for all of it.
+            predictable: (2, k) share of the rest that motion and earlier rows predict, see
+                `repeatable`; None for all of it.
         """
-        told = np.ones((2, len(self.power))) if told is None else told
+        predictable = np.ones((2, len(self.power))) if predictable is None else predictable
         owned = [s.place.joint for s in model.effects if s.effect.site in {JOINT, MOTOR}]
         is_own = np.isin(np.arange(len(self.power)), owned)
         explained = np.where(is_own, self.found(model), self.explained(model))
         slight = np.where(is_own, SLIGHT_REST, LEAST_SHARE)
         limits = np.maximum(np.multiply.outer([ADEQUATE_REST, COLOURED_REST], explained), slight)
-        return np.asarray((told * model.left / limits).max(axis=0))
+        return np.asarray((predictable * model.left / limits).max(axis=0))
 
     def counts(self, model: Model) -> bool:
         """Return whether effects are large enough, credible, and do not cancel each other."""
@@ -240,8 +240,8 @@ def _judged(
 ) -> Decision:
     """Return the verdict on the best model: which joints it describes, and whether most."""
     base = comparison.base
-    told = repeatable(equations, best.residual, scale.excess(best) >= 1.0)
-    excess = scale.excess(best, told)
+    predictable = repeatable(equations, best.residual, scale.excess(best) >= 1.0)
+    excess = scale.excess(best, predictable)
     if not (excess >= 1.0).any():
         worst = int(np.argmax(scale.base))
         return Decision('missing_physics', best, rivals, excess, worst, against=base.score)

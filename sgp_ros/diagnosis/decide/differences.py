@@ -257,8 +257,10 @@ class _Search:
         there = recording[equations.filter.rows] == last.effect.recording
         share = (model.forces[-1][there] ** 2).mean(axis=0) / equations.power
         floor = self.scale.floor * self.scale.power
-        told = support(self.columns, model, floor, self.scale.rows)[-1]
-        return bool(share.max() > COUNTED_SHARE) and told > EVIDENCE and math.isfinite(told)
+        evidence = support(self.columns, model, floor, self.scale.rows)[-1]
+        return (
+            bool(share.max() > COUNTED_SHARE) and evidence > EVIDENCE and math.isfinite(evidence)
+        )
 
 
 def _same(law: Effect) -> Effect:

@@ -176,7 +176,7 @@ def equivalents(
         if is_other and scale.fit(rival) + prior > least:
             known.append(rival)
             if not contrasts.is_same_law(rival):
-                found.append(_told(equations, rival, contrasts.of(rival)))
+                found.append(_equivalent(equations, rival, contrasts.of(rival)))
     return tuple(found)
 
 
@@ -203,7 +203,7 @@ def _contains(rival: Model, model: Model) -> bool:
     return model.key <= rival.key and (rival.is_free or not model.is_free)
 
 
-def _told(equations: Equations, rival: Model, contrasts: Mapping[str, float]) -> Equivalent:
+def _equivalent(equations: Equations, rival: Model, contrasts: Mapping[str, float]) -> Equivalent:
     """Return a rival with the motion that would tell it from the asserted model."""
     name = max(MOTIONS, key=lambda n: contrasts[n])
     effects = tuple(

@@ -104,7 +104,7 @@ def _joint(
 def _unsupported(model: Model, scale: Scale) -> str:
     """Return what is wrong with a model that is worth no less than the asserted one."""
     columns = Columns(model.frame.equations)
-    told = support(columns, model, scale.floor * scale.power, scale.rows)
-    if told.min() > EVIDENCE:
+    evidence = support(columns, model, scale.floor * scale.power, scale.rows)
+    if evidence.min() > EVIDENCE:
         return 'this recording prefers neither of the two clearly'
     return 'it does not help to predict parts of the recording that were left out'

@@ -23,12 +23,12 @@ def price_of(found: Connection) -> tuple[float, float]:
     return PER_EFFECT * len(found.errors) + PER_PARAMETER * numbers + rare, rare
 
 
-def suspicion(found: Connection) -> str:
-    """Return what to check where errors are not asserted: with them too something is left."""
-    told = ', '.join(
+def setup_advice(found: Connection) -> str:
+    """Return what to check where errors are not asserted: even with them too much is left."""
+    errors = ', '.join(
         f'{e.hypothesis.effect.replace("_", " ")} ({e.hypothesis.joint})' for e in found.errors
     )
-    return f'Check the set-up: {told} would reduce the residual, but not enough to be asserted.'
+    return f'Check the set-up: {errors} would reduce the residual, but not enough to be asserted.'
 
 
 def error_finding(found: Connection, number: int, gain: float) -> Finding:

@@ -21,7 +21,7 @@ from sgp_ros.physics.parts import JOINT, MOTOR
 
 PLAIN = (COULOMB_FRICTION, VISCOUS_FRICTION, CONSTANT_LOAD)
 _NONE = 2.0
-"""Standard deviations from zero below which a coefficient cannot be told from none."""
+"""Standard deviations from zero below which a coefficient is not distinguished from zero."""
 
 
 def law_of(model: Model, joint: int) -> EffectAt | None:
@@ -68,7 +68,7 @@ def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
 
 
 def says_less(equations: Equations, model: Model, joint: int) -> bool:
-    """Return whether a formula has a coefficient that cannot be told from none.
+    """Return whether a formula has a coefficient that is not distinguished from zero.
 
     It then says what a shorter one says.
     """

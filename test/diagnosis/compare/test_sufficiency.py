@@ -66,7 +66,7 @@ def test_a_held_out_recording_of_no_rows_is_refused_by_its_name(robots, perfect)
 
 
 def test_the_noise_of_a_still_joint_explains_nothing(robots):
-    """Beside one that moves it is told, and no effect, body or doubt is found at it."""
+    """Beside one that moves it is reported, and no effect, body or doubt is found at it."""
     world = simulate(CHAINS[2], 11, 6.0, held=(1,))
     noise = np.random.default_rng(0).normal(0.0, 1e-4, len(world.time))
     shown = np.column_stack([world.position[:, 0], noise])

@@ -67,7 +67,7 @@ def test_a_law_is_found_with_its_numbers(braked):
     assert braked.proofs['held_out'].nmse_after['joint0'] < 1e-3
 
 
-def test_the_shape_is_told_in_words_and_numbers(braked):
+def test_the_shape_is_described_in_words_and_numbers(braked):
     """With a band, in the file too."""
     (search,) = braked.law_searches
     assert search.why_not == ''

@@ -26,7 +26,7 @@ _FORMULAS = 3
 _MOST_SEEN, _WEAK = 600, 0.2
 """Rows of the recording beside a shape; the least factor of them, relative to the greatest."""
 _BEYOND = 0.5
-"""Range in which formulas are told, beyond what was seen, in parts of that."""
+"""Range in which formulas are reported, beyond what was seen, in parts of that."""
 _CLEAR = 0.85
 """A curve rises or falls where it leaves this part of its greatest value."""
 
@@ -53,11 +53,11 @@ def extended(several: Several) -> tuple[Several, tuple[LawSearch, ...]]:
     several = replace(
         several, comparison=found.comparison, decision=found.decision, model=found.decision.model
     )
-    return several, told(found)
+    return several, law_searches(found)
 
 
-def told(found: Explained) -> tuple[LawSearch, ...]:
-    """Return what is said of each joint at which a law was looked for."""
+def law_searches(found: Explained) -> tuple[LawSearch, ...]:
+    """Return the result at each joint where a law was looked for."""
     return tuple(_search(found, s) for s in found.searched)
 
 
