@@ -161,7 +161,7 @@ def _slope_of_velocity(states: Sequence[JointSample], name: str) -> float:
 def target_contradictions(
     events: Sequence[Event], robot: Robot, gains: Gains | None
 ) -> tuple[list[str], list[str]]:
-    """Return what is odd about targets of position, and what no diagnosis could stand on.
+    """Return oddities of the position targets, and errors that rule out a diagnosis.
 
     Args:
         events: of a recording whose commands are targets of position.

@@ -27,7 +27,7 @@ is sampled often enough to be differentiated has nearly 1, white noise 0."""
 def require_motion(signals: Signals, robot: Robot) -> None:
     """Refuse a recording of a robot that stands still or has no effort. O(n k).
 
-    A joint that stands still beside others that move is no reason; an effort that is one number
+    A joint at rest beside others that move is not a reason; an effort that is one number
     throughout is, where it is what f(u) W predicts: its joint is not measured.
 
     Args:

@@ -106,7 +106,7 @@ class _JointPart:
         weight: (n,) inverse variance of noise and remainder.
         factor: (r, r) upper, `factor^T factor = I + phi^T diag(weight) phi`.
         coupling: (r, p) and data: (r,), so that `factor v = data - coupling W`.
-        rows: (m, p) and target: (m,) what the joint tells of W.
+        rows: (m, p) and target: (m,) information of the joint on W.
     """
 
     basis: PivotedBasis | None

@@ -253,7 +253,7 @@ def _units(states: Sequence[JointSample], found: RecordingCheck, robot: Robot) -
 def _followed(
     events: Sequence[Event], robot: Robot, gains: Gains | None
 ) -> tuple[list[str], list[str]]:
-    """Return what is odd about targets of position, and what is refused."""
+    """Return oddities of the position targets, and errors that are refused."""
     if not has_targets(events, gains):
         return [], []
     try:

@@ -80,8 +80,8 @@ class Trend:
         terms: `level` first.
         tau_s: of the warm-up [s]; None without one.
         scatter: standard deviations beyond the intervals: of recordings, sessions, robots.
-        changes: steps that are no chance, in the order in which they were found.
-        is_drift: whether the level drifts with time, which a slope says better than steps.
+        changes: steps beyond chance, in the order in which they were found.
+        is_drift: whether the level drifts with time, which a slope describes better than steps.
         chance: bound on the probability that chance alone shows as much change of the level.
         remarks: what could not be determined.
     """

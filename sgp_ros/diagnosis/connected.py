@@ -240,7 +240,7 @@ def _connected(
 
 
 def _stands_for_gains(plain: Connected, found: Connection) -> bool:
-    """Return whether the gain of a motor stands for the gains of its drive, which are both scaled.
+    """Return whether the gain of a motor imitates those of its drive, both scaled alike.
 
     Where commands are position targets, the motor that multiplies them is the drive.
     """

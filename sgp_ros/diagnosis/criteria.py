@@ -52,9 +52,9 @@ SIGNIFICANT = 0.05
 REGION_ENERGY = 0.95
 """Share of the energy of a discrepancy that the region it is confined to holds [1]. Simulation."""
 REGION_ROWS = 0.5
-"""Greatest share of the rows that a region may hold; larger ones are none [1]. Simulation."""
+"""Greatest share of the rows of a region; larger ones are not reported [1]. Simulation."""
 REGION_LEAST_ROWS = 100
-"""Rows below which nothing is said of regions [rows]. Simulation."""
+"""Rows below which no regions are reported [rows]. Simulation."""
 REMAINDER_SHARE = 0.2
 """A joint has its own Z where it leaves this part of what the worst one leaves [1]. Convention."""
 
@@ -122,7 +122,7 @@ MOST_CERTAIN = 0.99
 DOUBTED = 0.4
 """Greatest probability where the final model is worse than a constant [1]. Convention.
 
-So too of a finding whose size may be none.
+The same holds for a finding whose size may be zero.
 """
 CARRIED_REST = 0.1
 """Largest rest of a model, as part of the discrepancy, where it was not fitted [1]. Convention.

@@ -178,8 +178,8 @@ def driven(events: Iterable[Event], tree: Tree, known: Knowledge) -> list[Event]
 def setup_remarks(events: Iterable[Event], tree: Tree, known: Knowledge) -> tuple[str, ...]:
     """Return what to check of how a robot is connected before its bodies are estimated.
 
-    Looked for only where bodies and everyday friction leave what counts as physics. What cannot
-    be looked at is refused by those who need it.
+    Searched only where bodies and everyday friction leave a residual that counts as physics.
+    Recordings that cannot be used are refused by the later stages.
 
     Args:
         events: of a recording.

@@ -58,7 +58,7 @@ class StreamClock:
         self.configure(config)
 
     def configure(self, config: EngineConfig) -> None:
-        """Take new settings: a pause or a delay that they permit is no jump."""
+        """Take new settings: a pause or a delay that they permit is not a jump."""
         jump_s = max(LEAST_JUMP_S, 2.0 * config.max_gap) + config.reorder_window
         self._jump_ns = round(1e9 * jump_s)
 

@@ -1,12 +1,13 @@
 """Fits hyper-parameters to a snapshot of the buffer: a pure function, for any process.
 
 The evidence trusts the model. Samples that repeat each other, as those of a robot at rest, raise
-it without bound where the noise falls to nothing and Z to a length at which nothing is alike: such
-a model knows them by heart and nothing else. So a fit has to predict too, each stretch of the
-buffer from the others: fits that do it worse, or worse than a constant, and yet claim less noise
-are no choice for an output, which takes the next best one or keeps what it has. Where they claim
-more, the model before was too sure of itself. Stretches, for neighbours in time know each other:
-their windows overlap, and a robot that stands still repeats itself.
+it without bound as the noise falls to zero and Z to a length scale at which no two inputs are
+correlated: such a model memorises the samples and predicts nothing else. So a fit has to predict
+too, each stretch of the buffer from the others. If it predicts an output worse than before, or
+worse than a constant, and yet claims less noise, the output takes the next best fit or keeps its
+hyper-parameters. If it claims more noise, the earlier model was overconfident. Whole stretches are
+left out because neighbours in time are correlated: their windows overlap, and a robot at rest
+repeats itself.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ class FitRequest:
     Attributes:
         number: how many were asked for before.
         data: the buffer.
-        base_root, base_target: what prior and dropped samples tell of W, (p, p) and (p,).
+        base_root, base_target: information of prior and dropped samples on W, (p, p) and (p,).
         model: hyper-parameters in force, the warm start.
         restarts: starts beside it: the values from the data, then random ones.
         seed: of the random ones.

@@ -28,8 +28,8 @@ from sgp_ros.robots.gains import Gains, stated_gains
 from sgp_ros.robots.robot import Robot
 
 GREATEST = 1e30
-"""From here on a number is no measurement: products of what follows from it, such as accelerations
-over nanoseconds, would not be finite."""
+"""Numbers from here on are not measurements: products of quantities derived from them, such as
+accelerations over nanoseconds, would not be finite."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -294,5 +294,5 @@ def _are_numbers(values: np.ndarray) -> bool:
 
 
 def _may_count(values: np.ndarray) -> bool:
-    """Return whether all numbers are smaller than `GREATEST`, or NaN, which is none."""
+    """Return whether all numbers are smaller than `GREATEST`, or missing (NaN)."""
     return not (np.abs(values) >= GREATEST).any()

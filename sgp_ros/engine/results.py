@@ -29,9 +29,9 @@ CHANGE_REFUSALS = ('late', 'clock', 'invalid', 'no_factor', 'reset', 'error')
 """Reasons for which a change of settings or a reset in a stream is refused."""
 
 REFIT_REFUSALS = ('diverged', 'no_better', 'no_factor', 'outdated')
-"""Reasons for which a fit is refused: it found nothing that has an evidence; it found none higher
-than the one in force; the buffer of by then has no factor under what it found; what it was fitted
-to is forgotten."""
+"""Reasons for which a fit is refused: no hyper-parameters with a finite evidence were found; none
+with a higher evidence than those in force; the covariance of the present buffer has no factor
+under them; the samples that they were fitted to are forgotten."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -52,7 +52,7 @@ class Scoring:
 
         Args:
             channel: key of `CHANNELS`.
-            raw: variances of the model, (k,); what is no variance stays as it is.
+            raw: variances of the model, (k,); other numbers stay as they are.
         """
         return np.array([
             scale.variance(v) if 0.0 < v < math.inf else v

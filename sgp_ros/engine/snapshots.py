@@ -61,7 +61,7 @@ def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
 
 
 def _plain(engine: Engine) -> dict[str, Any]:
-    """Return what is no array, as JSON holds it."""
+    """Return everything but arrays, as JSON holds it."""
     estimator, intake, order = engine.estimator, engine.intake, engine.order
     return {
         'version': VERSION,

@@ -73,7 +73,7 @@ class WeakForm:
         return areas[index] + inside * (self.left[index] + 0.5 * slope * inside)
 
     def nodes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return three samples that stand for all in an average of what changes slowly.
+        """Return three samples that represent all in an average of slowly changing quantities.
 
         Returns:
             indices (3,) and shares (3,), which average a quadratic as the kernel does.

@@ -244,7 +244,7 @@ class _Decomposition:
 
 
 def marginal_equations(rows: np.ndarray, kept: Sequence[int]) -> np.ndarray:
-    """Return what equations of unit noise tell of some unknowns, whatever the others, (r, c).
+    """Return the information of equations of unit noise on some unknowns, for any others, (r, c).
 
     What is orthogonal to all columns of the others is free of them, which a QR with pivoting finds
     also where they depend on each other (Golub and Van Loan, section 5.4.2). O(m p^2).

@@ -144,7 +144,7 @@ def whiten_vector(
         start: first live row of both.
         scales: (k,) of the outputs.
         v: covariances of an input with the samples.
-        explained: (k w,), becomes what the samples tell of the data there.
+        explained: (k w,), becomes the prediction of the data there by the samples.
     """
     n = len(v)
     solve_lower(U, start, v)
@@ -185,7 +185,7 @@ def whiten_input(
         scales: (k,) of the outputs.
         s: becomes the scaled input.
         v: (n,), becomes the whitened covariances.
-        explained: (k w,), becomes what the samples tell of the data there.
+        explained: (k w,), becomes the prediction of the data there by the samples.
     """
     for j in range(len(s)):
         s[j] = u[columns[j]] / lengths[j]

@@ -62,7 +62,7 @@ class Drawn:
         largest: greatest size.
         power: of the size, with which its share of the squared effort grows.
         index: joint it acts on, -1 for none; None for the one that was drawn.
-        place: word for a place that is no joint; empty for the joint itself.
+        place: word for a place other than a joint; empty for the joint itself.
         interval: of the position it is confined to.
     """
 

@@ -1,4 +1,4 @@
-"""Directories of rosbag2: their files, what metadata.yaml says of them, their compression."""
+"""Directories of rosbag2: their files, their metadata.yaml, their compression."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def read_directory(path: Path) -> tuple[Source, tuple[str, ...]]:
 
     Raises:
         RecordingError: no file of a recording in it, or a damaged one.
-        TooMuchError: a file that is none, or that unpacks to more than `RATIO`.
+        TooMuchError: not a regular file, or one that unpacks to more than `RATIO`.
     """
     metadata = _read_metadata(path)
     missing = [name for name in metadata.files if not (path / name).exists()]

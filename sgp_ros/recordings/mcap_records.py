@@ -182,7 +182,7 @@ def read_records(data: bytes, unpacking: Unpacking) -> Iterator[Schema | Channel
 
     Raises:
         TooMuchError: beyond `CHUNK_MB`, `MESSAGES` or `RATIO`.
-        McapError: a wrong checksum, or what is no record; others of `DAMAGE`.
+        McapError: a wrong checksum, or bytes that are not a record; others of `DAMAGE`.
     """
     for found, begin, size, number in _runs(data, unpacking):
         if isinstance(found, bytes) and number == 1:

@@ -70,7 +70,7 @@ def outputs(estimate: Estimate) -> Outputs | None:
 def _error(
     estimate: Estimate,
 ) -> tuple[JointSample | None, tuple[JointSample, JointSample] | None]:
-    """Return residual and band of the effort; NaN where there is none of a joint."""
+    """Return residual and band of the effort; NaN for joints without one."""
     effort = estimate.effort
     if np.all(np.isnan(effort.mean)):
         return None, None

@@ -62,7 +62,7 @@ def explained(found: Diagnosis) -> float:
 
 
 def gain_text(subject: str, found: Diagnosis) -> str:
-    """Say how much of what the nominal robot leaves is explained; or that it is none."""
+    """Say which share of the nominal robot's residual is explained, or that nothing is."""
     share = explained(found)
     if share <= 0.0:
         return 'the residual of the nominal robot does not become smaller by it'

@@ -119,7 +119,7 @@ def draw_searches(searches: Sequence[LawSearch]) -> Figure:
 
 
 def search_rows(found: Diagnosis) -> list[dict[str, Any]]:
-    """Return what a page says of each search."""
+    """Return the content of a page for each search."""
     return [
         {
             'joint': s.joint,

@@ -68,7 +68,7 @@ def typeset(text: str) -> str:
 
 
 def robot_styles() -> str:
-    """Return the styles of a picture of a robot, for pages that are none of ours."""
+    """Return the styles of a picture of a robot, for pages of other programs."""
     return f'<style>{_asset("robot.css")}</style>'
 
 

@@ -103,7 +103,7 @@ class Health:
         self.note_failure(f'internal error in {place.strip("_")} ({text})')
 
     def note_unreadable(self, error: MessageError) -> None:
-        """Note a message that is no sample."""
+        """Note a message that is not a sample."""
         self._unreadable += 1
         self._unreadable_reason = str(error)[:_MOST_TEXT]
 

@@ -38,7 +38,7 @@ class Transport:
         """Return this transport if its numbers make sense.
 
         Raises:
-            ConfigError: negative or infinite times, a share that is none.
+            ConfigError: negative or infinite times, a share outside 0 to 1.
         """
         times = (self.stamp_noise_s, self.log_latency_s)
         if not all(0.0 <= x < math.inf for x in times) or not 0.0 <= self.drop < 1.0:

@@ -127,7 +127,7 @@ def read_tree(text: str, part: TreePart | None = None) -> TreeText:
         part: says what of it is simulated; None leaves it to the file.
 
     Raises:
-        ConfigError: no URDF, or joints that are no single degree of freedom.
+        ConfigError: no URDF, or joints without exactly one degree of freedom.
     """
     urdf = parse_urdf(text)
     locked = {} if part is None else part.locked

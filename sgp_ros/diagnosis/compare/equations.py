@@ -161,7 +161,7 @@ class Equations:
         Their sum is the mean of log det(M / M nominal) for changed bodies and what is added to M;
         joints differ by the diagonal of M. What is measured is the motion: a model of other
         inertia must not gain from residuals in smaller units of effort. That holds as far as they
-        are no noise of measured efforts, which no inertia changes. Minus infinity where the mass
+        are not noise of measured efforts, which no inertia changes. Minus infinity where the mass
         matrix is not positive, infinity where the nominal one has none.
 
         Args:

@@ -79,7 +79,7 @@ def effort_noise(
     """Return the mean square that noise of measured efforts may have below a cut-off, (k,).
 
     It is taken for white, at the lowest level that the spectra have in a quarter of what lies
-    above: motion, ripple and what a current loop adds there are no noise of the measurement.
+    above: motion, ripple and what a current loop adds there are not noise of the measurement.
     Two standard deviations of that, and of what so many rows have by chance, are added.
 
     Args:

@@ -79,7 +79,7 @@ def collect_settled(
 def approaches(position: np.ndarray) -> np.ndarray:
     """Return the direction from which each position was approached, (n,) of -1 and 1.
 
-    A flicker of the encoder is no change of direction: the position must turn back by
+    A flicker of the encoder is not a change of direction: the position must turn back by
     `COUNTS_BACK` of its least steps.
 
     Args:

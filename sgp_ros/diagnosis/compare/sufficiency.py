@@ -32,7 +32,7 @@ from sgp_ros.errors import RecordingError
 _FEW = 16
 """Positions below which no spectrum is taken."""
 _ROUNDING = 1e-9
-"""Steps that are smaller, relative to the range, are no counts of an encoder."""
+"""Least step of an encoder's counts, relative to the range."""
 _LOWEST = 0.2
 """Part of what is near zero that a fold is in for at least half of this share of the time."""
 

@@ -29,8 +29,8 @@ its gain is 1 but for a millionth."""
 def every_row_needed(raw: RawTrajectory) -> int:
     """Return the distance of the rows that stay; 1 where all do.
 
-    All do of settled points, which are no motion, and of position targets: what a drive makes of
-    them depends on the rows between which it holds.
+    All do of settled points, which are not a motion, and of position targets: the effort that a
+    drive makes of them depends on the rows between which it holds.
     """
     if raw.approach is not None or raw.gains is not None:
         return 1

@@ -37,7 +37,7 @@ NOISE_SHARE = 3e-6
 """Share of the mean square of the effort that noise may take below the cut-off."""
 _COMMON_SHARE = 0.5
 _NO_EFFORTS = (
-    'The commands are no efforts: the measured effort does not follow them. It is taken as the '
+    'The commands are not efforts: the measured effort does not follow them. It is taken as the '
     'effort that acts: nothing can be said of delay, dead zone, saturation and lag of the drive.'
 )
 VANISHING = 1e-9

@@ -149,8 +149,8 @@ def probabilities(
 ) -> Probabilities:
     """Return the tempered probabilities of all effects.
 
-    A richer law whose numbers make it the asserted one is no rival to it. An effect is as certain
-    as its joint is described; one that acts on all joints, as the least that is.
+    A richer law whose numbers reduce it to the asserted one is not a rival. An effect is only as
+    certain as its joint is well described; one that acts on all joints, as the worst of them.
     """
     scale, asserted = Scale.of(equations, comparison), decision.model
     if any(s.effect.has_chosen_form for s in asserted.effects):

@@ -39,7 +39,7 @@ from sgp_ros.gp.model import CoefficientPrior
 from sgp_ros.physics.effect_at import EffectAt
 
 LEAST_ROWS = 5 * PARTS
-"""Rows below which nothing can be said of structure."""
+"""Rows below which structure cannot be tested."""
 ORDER = 8
 """Rows before that may predict one."""
 LEARNED = 200
@@ -157,7 +157,7 @@ def left_out(
 def support(columns: Columns, model: Model, floor: np.ndarray, rows: float) -> np.ndarray:
     """Return how much better parts left out are predicted with each effect than without it.
 
-    Bodies that could stand for an effect, as for the inertia of a rotor, predict as much: then it
+    Bodies that could imitate an effect, such as the inertia of a rotor, predict as much: then it
     counts how unlikely they are.
 
     Args:

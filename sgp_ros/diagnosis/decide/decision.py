@@ -137,7 +137,7 @@ class Scale:
         """Return what a model leaves at each joint, relative to what an adequate one may, (k,).
 
         A joint that has effects of its own is measured by what is explained there; of others all
-        that is explained counts, and what is no physics.
+        that is explained counts, and what is not physics.
 
         Args:
             model: fitted.
@@ -225,7 +225,7 @@ def decide(equations: Equations, comparison: Comparison) -> Decision:
 
 
 def calm(base: Model, rivals: tuple[Model, ...], scale: Scale) -> Decision:
-    """Return the decision that no physics is missing."""
+    """Return the decision that physics is not missing."""
     verdict = 'parameters_only' if base.is_free else 'no_mismatch'
     excess = np.full(len(scale.base), NOTHING_EXPLAINED)
     return Decision(verdict, base, rivals, excess, int(np.argmax(scale.base)), against=base.score)

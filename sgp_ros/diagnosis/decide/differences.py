@@ -247,7 +247,7 @@ class _Search:
     def _holds(self, model: Model) -> bool:
         """Return whether the last effect counts as physics and predicts what was left out.
 
-        Anything is said of effects in one recording alone.
+        Only effects that act in one recording are tested.
         """
         equations, last = model.frame.equations, model.effects[-1]
         if not isinstance(last.effect, InRecording):

@@ -1,7 +1,7 @@
 """Rivals that explain a recording as well as the asserted model, and a motion that would tell.
 
 Two models are told apart by what they leave. Where the likelihoods differ by less than the odds
-of one to twenty, the recording prefers none; only their size does. Such rivals are carried over
+of one to twenty, the recording prefers neither; only their size does. Such rivals are carried over
 to other motions, and the one on which their efforts differ most is the excitation to ask for.
 """
 

@@ -116,7 +116,7 @@ class _Beside:
 
 
 def _least(beside: _Beside, effect: Effect, quantity: Quantity, place: Place) -> float:
-    """Return the least size that shows; infinite where none does."""
+    """Return the least size that shows; infinite where no size does."""
     low, high = _range(beside, effect, quantity, place)
 
     def shows(size: float) -> bool:

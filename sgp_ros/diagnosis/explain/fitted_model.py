@@ -156,9 +156,9 @@ def _extra_laws(s: EffectAt) -> int:
 
 
 def beyond_plain(s: EffectAt, force: np.ndarray, equations: Equations) -> np.ndarray:
-    """Return what plain laws of one joint do not say of a force, (n, k) or (n,) as given.
+    """Return the rest of a force that plain laws of one joint leave, (n, k) or (n,) as given.
 
-    Nothing is said of a joint while dry friction holds it: that takes up any force.
+    Rows in which dry friction holds the joint are left out: it takes up any force.
     """
     if not s.effect.plain:
         return force

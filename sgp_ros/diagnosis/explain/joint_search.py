@@ -172,8 +172,9 @@ def _best(model: Model, trials: Iterable[Model], *, is_whole: bool = True) -> Mo
 def _grown(columns: Columns, model: Model, block: _Block) -> Model:
     """Add the effects of a block that are worth their price, as long as something is left.
 
-    That is a residual, or bodies so unlikely that they may stand for what is missing. What nearly
-    every joint has, or adds to that, may be small, and is looked for in all that is not slight.
+    That is a residual, or bodies so unlikely that they may imitate the missing physics. Laws that
+    nearly every joint has, or that add to these, may be small and are sought in any residual that
+    is not slight.
     """
     while True:
         left, strain = block.left(model), 0.5 * float(model.w @ model.w)
@@ -210,7 +211,7 @@ def _changes(
 ) -> Iterator[Model]:
     """Yield the model without each effect of a block, and with the best other law in its place.
 
-    Of simple ones, a law of one number stands for one of several.
+    Among simple laws, one with one number replaces one with several.
     """
     for s in model.effects:
         if not block.holds(s):
@@ -254,7 +255,7 @@ def uncoupled(columns: Columns, without: Model, coupled: EffectAt) -> Iterator[M
 
 
 def coupled(columns: Columns, model: Model) -> Iterator[Model]:
-    """Yield models with a law that couples two joints in place of what stands for it there.
+    """Yield models with a law that couples two joints in place of the laws that imitate it there.
 
     The inverse of `uncoupled`: several laws, none of which could go alone, make room for one.
     """
@@ -276,7 +277,7 @@ def coupled(columns: Columns, model: Model) -> Iterator[Model]:
 
 
 def _is_part(other: EffectAt, coupled: EffectAt, ends: set[int]) -> bool:
-    """Return whether a law could stand for a part of one that couples two joints.
+    """Return whether a law could imitate a part of one that couples two joints.
 
     Couplings of the two, and what it says of its own joint; the source may have that beside it.
     """

@@ -19,7 +19,7 @@ from sgp_ros.robots.observed_motion import ObservedMotion
 TRIALS = 2
 """Shapes per effect and place that are worth a fit."""
 WIDEST = 0.75
-"""Widest interval of position, as a share of the range: wider ones are no region."""
+"""Widest interval of position, as a share of the range, that is a region."""
 
 Trial = tuple[float, EffectAt]
 

@@ -148,8 +148,9 @@ def process_inputs(
 def learn_remainder(equations: Equations, residual: np.ndarray, joint: int) -> Remainder | None:
     """Return Z of a joint learned from a residual (N, k).
 
-    None where there is none, or where it predicts nothing of parts left out: what happens once,
-    such as a burst, is no function of the motion, and predictions elsewhere are better without.
+    None where there is none, or where it does not predict parts that were left out: an event that
+    happens once, such as a burst, is not a function of the motion, and predictions elsewhere are
+    better without it.
     """
     sees_effort = bool(equations.motion.is_commanded[joint])
     full, names = process_inputs(equations.motion, joint, sees_effort=sees_effort)

@@ -1,4 +1,4 @@
-"""Whether Z is worth having beside the physics: it stays only where predictions are no worse.
+"""Decision on Z beside the physics: it stays only where predictions are not worse.
 
 Z is learned from one-step errors, and a small error of a force that pushes the wrong way adds up
 along a motion. So each process is learned again without each part of the recording in turn, and

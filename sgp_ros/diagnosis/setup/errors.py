@@ -57,10 +57,10 @@ class Hypothesis:
         starts: (s, m) numbers to start from; m = 0 where there is nothing to estimate.
         steps: (m,) first steps of a search [units]; of scales and delays relative to these.
         applied: returns a correction with the error of these numbers (m,) undone too.
-        words: parameters that are no numbers.
+        words: parameters that are words.
         is_possible: whether it can have these numbers (m,).
         canonical: returns the one of several equal sets of numbers (m,) that is reported.
-        is_physics: whether it is none, but hides errors of the connection as long as it is there.
+        is_physics: whether it is physics, which hides errors of the connection while present.
     """
 
     effect: str

@@ -32,7 +32,7 @@ def setup_advice(found: Connection) -> str:
 
 
 def error_finding(found: Connection, number: int, gain: float) -> Finding:
-    """Return an error with its probability against its rivals and against none."""
+    """Return an error with its probability against its rivals and against no error."""
     e = found.errors[number]
     rivals = [r.worth - e.worth for r in found.rivals[number]]
     odds = math.exp(-TEMPER * gain) + math.exp(-TEMPER * e.needed)

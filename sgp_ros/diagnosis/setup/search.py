@@ -83,9 +83,9 @@ class Connection:
 def search(probe: Probe) -> Connection:
     """Return the errors that explain what bodies and everyday friction do not.
 
-    A delay of targets looks like other gains of every drive, so that a search one by one would
-    not come back to it: where it is worth its price, a search begins with it. Another one that
-    begins with nothing follows where that leaves what counts as physics.
+    A delay of targets looks like other gains of every drive, so a search that adds errors one by
+    one would not return to it: where a delay is worth its price, the search begins with it. If
+    the result leaves a residual that counts as physics, a second search begins without it.
     """
     none = Correction.none(probe.motion.tree.size)
     start = probe.agreement(none)
@@ -209,7 +209,7 @@ def _ranked(
 ) -> list[Tried]:  # fmt: skip
     """Return the hypotheses that are worth most on top of a correction, best first.
 
-    What makes less than counts as physics is none.
+    Those that change the residual by less than the share that counts as physics are left out.
     """
     known = [e.hypothesis.key for e in errors]
     screened = []

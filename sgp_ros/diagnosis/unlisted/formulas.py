@@ -108,7 +108,7 @@ class Range:
         return max(abs(self.low), abs(self.high))
 
     def ends(self, name: str) -> tuple[float, float, str]:
-        """Return the ends of a parameter that is no coefficient, and its unit."""
+        """Return the ends of a parameter that is not a coefficient, and its unit."""
         span, turn = self.span, 2.0 * np.pi / self.span
         return {
             'x': (self.low - 0.25 * span, self.high + 0.25 * span, self.unit),
@@ -236,7 +236,7 @@ def _shape(
     name: str, smooth: SmoothForce, motion: ObservedMotion, seen: Range,
     numbers: Mapping[str, float],
 ) -> LawParameter:  # fmt: skip
-    """Return a parameter that is no coefficient, with unit, start and range."""
+    """Return a parameter that is not a coefficient, with unit, start and range."""
     if name == MEMORY:
         assert smooth.variable.memory is not None
         kind, start = smooth.variable.memory

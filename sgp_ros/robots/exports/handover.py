@@ -93,7 +93,7 @@ class Handover:
         nominal: the robot.
         urdf: with its bodies, damping and dry friction.
         joints: numbers by name of the joint.
-        others: effects that are no numbers of a joint, in words.
+        others: effects that are not numbers of a joint, in words.
         holds_gravity: whether drives of positions hold gravity.
     """
 

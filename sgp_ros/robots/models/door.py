@@ -180,7 +180,7 @@ def write_compiled(path: Path, stream: BinaryIO) -> None:
 
 
 def _remarks(text: str) -> Mapping[str, list[str]]:
-    """Say what a URDF says of dynamics that has no place here."""
+    """Report dynamics of a URDF that have no place here."""
     try:
         root = parse_xml(text)
     except ET.ParseError:

@@ -174,7 +174,7 @@ def test_commands_of_another_kind_never_replace_a_measured_effort(robots, perfec
     events = events_of(replace(world, command=given), effort=world.command)
     raw = collect(events, robots[1][0])
     assert raw.drive is None
-    assert 'no efforts' in raw.remarks[0]
+    assert 'are not efforts' in raw.remarks[0]
     motion = observe(raw, robots[1][1], choose_bandwidth(raw, robots[1][1]))
     np.testing.assert_array_equal(motion.effort, raw.effort)
 
