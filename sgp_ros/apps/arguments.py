@@ -61,7 +61,7 @@ def _count(text: str) -> int:
 def _add_recording(
     parser: argparse.ArgumentParser, metavar: str = 'BAG', several: str | None = None
 ) -> None:
-    """Add what is read of a robot; `several` says what more than one recording means."""
+    """Add the inputs of a robot; `several` states the meaning of several recordings."""
     parser.add_argument('bag', metavar=metavar, nargs=None if several is None else '+',
                         help=f'.mcap file, rosbag2 directory or ROS 1 .bag{several or ""}'
                         )  # fmt: skip

@@ -95,7 +95,7 @@ class Engine(Fold):
         return SettingsChange(self._now_ns, {name: values[name] for name in settings})
 
     def reset(self) -> Reset:
-        """Forget everything that was learned and what waits for its order, keep the settings.
+        """Forget everything that was learned and all waiting events; keep the settings.
 
         Returns:
             The event to record.

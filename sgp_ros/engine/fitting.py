@@ -106,8 +106,8 @@ def _fit_in_turn(request: FitRequest) -> FitResult:
     """Fit some outputs one after the other: ascent of the same evidence by coordinates.
 
     `p(y) = p(y_others) p(y_j | y_others)`, and only the second factor depends on the
-    hyper-parameters of output j. In it the others enter by what they tell of the columns of W that
-    j has, of which a joint of a tree has those of the bodies that it carries.
+    hyper-parameters of output j. The others enter it by their information on the columns of W that
+    j has; a joint of a tree has those of the bodies that it carries.
     """
     data, model, p = request.data, request.model, request.data.F.shape[2]
     k = len(model.noise)
@@ -142,7 +142,7 @@ def _fit_in_turn(request: FitRequest) -> FitResult:
 def _determined(F: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return regressor (n, r) and prior (m, r) of the combinations of W that they determine.
 
-    From regressor (n, p) and prior (m, p); nothing enters them of what is left out.
+    From regressor (n, p) and prior (m, p); directions that are left out do not enter.
     """
     rows = np.vstack([F, root])
     size = np.linalg.norm(rows, axis=0)

@@ -1,12 +1,12 @@
 """Rest of joints in a window, where dry friction takes up what is needed.
 
-While a joint rests, dry friction is anything between what it is in sliding one way and the other.
+While a joint rests, dry friction takes any value between those of sliding one way and the other.
 The equation of a window is then an inequality: it holds for some force within that band, and only
 what lies outside the band is an error.
 
-A joint rests while its positions over `SPAN_S` tell no direction of motion: their range is less
-than what the width of velocities over which the model lets dry friction change its sign makes of
-it, or than their noise. The range of a quick reversal is larger.
+A joint rests while its positions over `SPAN_S` show no direction of motion: their range is less
+than their noise, or than the way at the velocity over which the model lets dry friction change its
+sign. The range of a quick reversal is larger.
 """
 
 from __future__ import annotations
@@ -132,8 +132,8 @@ def learnable(
 ) -> tuple[OnlinePrediction, np.ndarray] | None:
     """Return the sample to learn from an equation, in which rows of held joints are zero.
 
-    Such a row tells W nothing where the joint has no Z. One that Z enters cannot be left out
-    alone: outputs share their samples.
+    Such a row holds no information on W where the joint has no Z. A row that Z enters cannot be
+    left out alone, because outputs share their samples.
 
     Args:
         regression: that made the prediction.

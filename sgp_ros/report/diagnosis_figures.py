@@ -1,4 +1,4 @@
-"""Figures of a diagnosis: when and after which law it acts, on what it depends, what is gained."""
+"""Figures of a diagnosis: times and law of each effect, its variables, the gain."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ def _curve(search: LawSearch, tried: TriedFormula) -> np.ndarray:
 
 
 def beyond_sentence(search: LawSearch) -> str:
-    """Return what formulas say where nothing was seen that the recording hardly tells apart."""
+    """Return the predictions, beyond the data, of formulas that the recording hardly separates."""
     alike = [t.beyond for t in search.formulas if t.is_alike and np.isfinite(t.beyond).all()]
     if not alike:
         return ''

@@ -143,7 +143,7 @@ def after_campaign(out: Path) -> Steps:
 
 
 def ending(out: Path, steps: Steps) -> str:
-    """Return the last lines of a command: what its signs mean, its page, what to do next."""
+    """Return the last lines of a command: legend, its page, the next steps."""
     return f'{PLUS_MINUS}\nreport: {out / "report.html"}\n{next_lines(steps)}'
 
 

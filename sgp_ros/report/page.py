@@ -1,6 +1,6 @@
 """Pages in one file: text, styles, charts as data, and the script that draws them.
 
-A page opens from disk and asks nobody for anything. Without scripts, and on paper, the same
+A page opens from disk and makes no request. Without scripts, and on paper, the same
 figures stand there as pictures.
 """
 

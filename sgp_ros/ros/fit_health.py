@@ -46,7 +46,7 @@ class FitHealth:
     def take(self, estimates: Iterable[Estimate], robot: Robot) -> bool:
         """Take estimates; return whether an alarm began or ended.
 
-        What the model refuses as implausible counts here: a collision is.
+        Errors that the model refuses as implausible count here, because a collision is one.
         """
         has_changed = False
         for estimate in estimates:

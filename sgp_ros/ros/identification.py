@@ -163,7 +163,7 @@ class Identification:
             self._timers.append(self._node.create_timer(save_s, save, clock=self._steady))
 
     def _guarded(self, action: Callable[..., None], *given: Any) -> None:
-        """Do what a message or a timer asks for; what only a bug can cause ends nothing."""
+        """Do what a message or a timer asks for; an error by a bug does not end the node."""
         try:
             action(*given)
         except Exception as error:  # noqa: BLE001 - the edge of the node: it must go on

@@ -1,4 +1,4 @@
-"""Says in one sentence whether what arrives can be used, and what to do when it cannot."""
+"""Verdict on the messages that arrive: whether they can be used, and what to do if not."""
 
 from __future__ import annotations
 

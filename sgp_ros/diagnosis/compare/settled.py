@@ -116,7 +116,7 @@ def _poses(raw: RawTrajectory, which: np.ndarray) -> RawTrajectory:
 
 
 def shows(effect: Effect, place: Place, motion: ObservedMotion) -> bool:
-    """Return whether a recording can show an effect: of settled points, what is at rest.
+    """Return whether a recording can show an effect; settled points show only static ones.
 
     Its force must neither vanish nor change when poses are approached faster and later.
     """

@@ -103,7 +103,7 @@ def require_motion(events: Iterable[Event], robot: str, names: Sequence[str]) ->
 def at_rest(raw: RawTrajectory, is_still: np.ndarray) -> RawTrajectory:
     """Return a trajectory in which still joints (k,) of bool rest at the median position.
 
-    What their encoders show is noise, and nothing is to be explained by it.
+    What their encoders show is noise, and it explains nothing.
     """
     rest = np.median(raw.position, axis=0)
     return replace(raw, position=np.where(is_still, rest, raw.position))

@@ -49,7 +49,8 @@ LEARNED = 200
 def structure(equations: Equations, residual: np.ndarray) -> np.ndarray:
     """Return the share of each joint's rest that is not noise, (k,), with its uncertainty.
 
-    The greater of what Z and what earlier rows explain, of joints that leave most; 1 of others.
+    The greater of the shares that Z and earlier rows explain, at joints with a large residual;
+    1 at others.
 
     Args:
         equations: of the recording.
@@ -61,10 +62,10 @@ def structure(equations: Equations, residual: np.ndarray) -> np.ndarray:
 
 
 def repeatable(equations: Equations, residual: np.ndarray, asked: np.ndarray) -> np.ndarray:
-    """Return what the motion, and what earlier rows, explain of each joint's rest, (2, k).
+    """Return the shares of each joint's rest that the motion and earlier rows explain, (2, k).
 
-    Shares on parts left out, plus `1/sqrt(N)` for N rows; 1 where no opinion was asked or can be
-    had. What only earlier rows explain is slow, and does not come back with the motion.
+    Shares on parts left out, plus `1/sqrt(N)` for N rows; 1 where none was asked for or can be
+    computed. A part that only earlier rows explain is slow and does not repeat with the motion.
 
     Args:
         equations: of the recording.
@@ -83,7 +84,7 @@ def repeatable(equations: Equations, residual: np.ndarray, asked: np.ndarray) ->
 
 
 def _by_past(equations: Equations, r: np.ndarray) -> float:
-    """Return the share of r (N,) that rows before explain, beyond what they do of white noise."""
+    """Return the share of r (N,) that earlier rows explain, beyond their share of white noise."""
     order = min(ORDER, len(r) // 10)
     rows = len(r) - order
     past = np.column_stack([r[order - i - 1 : order - i - 1 + rows] for i in range(order)])
@@ -195,7 +196,7 @@ def supported(
 ) -> Model | None:
     """Return the first model whose effects all predict parts of the recording left out.
 
-    Of more than two effects those that do not are taken out.
+    From models of more than two effects, those that do not are removed.
 
     Args:
         equations: of the recording.

@@ -83,8 +83,8 @@ class Model:
     def law_price(self) -> float:
         """Price of the laws, higher where few joints have them [nats].
 
-        Those of which the prior says how unlikely their numbers are have paid by that, and further
-        waves of one law with the first.
+        Laws with a prior on their numbers have paid by that, and further waves of one law with the
+        first.
         """
         unusual = sum(
             type(e).surprise is Effect.surprise and not (e.is_open or adds_to_usual(e))

@@ -1,4 +1,4 @@
-"""Products that tell what a trial adds to a model, without a fit.
+"""Products that give the gain of a trial over a model, without a fit.
 
 With B an orthonormal basis of what bodies and effects explain, r what they leave, and x the
 columns of a trial, of which only the rows of one joint differ from zero,

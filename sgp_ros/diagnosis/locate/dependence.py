@@ -81,7 +81,7 @@ class _Look:
     count: np.ndarray
 
     def score(self, r: np.ndarray) -> float:
-        """Return the share of r (N,) that is explained; negative where that is worse than none.
+        """Return the share of r (N,) that is explained; negative where the averages do harm.
 
         From the sums of each part and bin alone: O(N) with a small constant.
         """

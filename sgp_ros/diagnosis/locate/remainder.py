@@ -58,7 +58,7 @@ def region(equations: Equations, r: np.ndarray, joint: int) -> Location:
 
 
 def confined(x: np.ndarray, r: np.ndarray) -> tuple[float, float, float]:
-    """Return the interval of x (N,) with the fewest rows that holds most of r (N,), and these.
+    """Return the interval of x (N,) with the fewest rows that holds most of r (N,).
 
     That is `REGION_ENERGY` of its energy.
 

@@ -1,4 +1,4 @@
-"""Errors of how a robot was connected: what each is called, and the correction that undoes it.
+"""Errors of how a robot was connected: the name of each, and the correction that undoes it.
 
 An entry proposes its hypotheses for a robot: numbers to start from, and how numbers become a
 correction on top of another. Names, parameters and signs are those of the schema.
@@ -222,7 +222,7 @@ def _clock(*, has_commands: bool) -> Hypothesis:
 
 
 def _late_targets() -> Hypothesis:
-    """Return the delay of targets, beside which gains are another law than without."""
+    """Return the delay of targets, which changes the fitted gains."""
     return Hypothesis(
         COMMAND_DELAY.name, ALL, ('delay',), ('s',), _column(_DELAYS), np.array([0.05]),
         lambda c, x: replace(c, clock=c.clock - float(x[0])),

@@ -17,14 +17,14 @@ from sgp_ros.diagnosis.setup.search import Connection
 
 
 def price_of(found: Connection) -> tuple[float, float]:
-    """Return what errors must be worth, and the part of it for such as are rare [nats]."""
+    """Return the price of errors, and the part of it that is for rare ones [nats]."""
     numbers = sum(len(e.numbers) for e in found.errors)
     rare = PER_UNUSUAL * sum(not e.hypothesis.is_of_gains for e in found.errors)
     return PER_EFFECT * len(found.errors) + PER_PARAMETER * numbers + rare, rare
 
 
 def setup_advice(found: Connection) -> str:
-    """Return what to check where errors are not asserted: even with them too much is left."""
+    """Return what to check where errors are not asserted because too much is left with them."""
     errors = ', '.join(
         f'{e.hypothesis.effect.replace("_", " ")} ({e.hypothesis.joint})' for e in found.errors
     )

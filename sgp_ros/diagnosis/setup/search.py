@@ -76,7 +76,7 @@ class Connection:
 
     @property
     def is_enough(self) -> bool:
-        """Whether nothing is wrong, and what is left does not count as physics at any joint."""
+        """Whether no error was found, and no residual counts as physics at any joint."""
         return not self.errors and float(self.end.left.max()) <= COUNTED_SHARE
 
 
@@ -107,9 +107,9 @@ def search(probe: Probe) -> Connection:
 
 
 def _physics(probe: Probe, h: Hypothesis) -> Tried:
-    """Return physics of one number, searched from where it leaves least of each joint.
+    """Return an effect of one number, searched from the starts with the least rest at each joint.
 
-    With wrong gains at another joint the evidence of all has its best elsewhere.
+    With wrong gains at another joint, the evidence of all joints has its maximum elsewhere.
     """
     none = Correction.none(probe.motion.tree.size)
     left = np.array([probe.agreement(h.applied(none, x)).left for x in h.starts])  # (s, k)
@@ -162,7 +162,7 @@ def _beside(probe: Probe, errors: Sequence[Tried], ranked: Sequence[Tried]) -> l
 def _together(probe: Probe, errors: Sequence[Tried]) -> list[Tried]:
     """Return errors with all their numbers searched at once; the last one undoes all.
 
-    One that the others, with their numbers searched anew, make superfluous is left out.
+    An error is left out if the others, with their numbers searched anew, make it superfluous.
     """
     found = _joint(probe, errors).best()
     while True:
@@ -254,7 +254,7 @@ def _parabola(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> n
 
 
 def _refined(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> Tried:
-    """Return a hypothesis with the numbers that agree best; one that changes nothing is 0."""
+    """Return a hypothesis with its best numbers; 0 for numbers that change nothing."""
     m = len(x)
     std = np.zeros(m)
     if m:

@@ -1,4 +1,4 @@
-"""Laws of a joint beside its listed effects: which there are, and what either says."""
+"""Unlisted laws of a joint beside its listed effects: which there are, and what each explains."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def own_effects(model: Model, joint: int) -> tuple[EffectAt, ...]:
 def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
     """Return a model without the listed effects that are not worth their price beside its formula.
 
-    They were chosen before the formula was known, and may have stood for a part of it. One after
+    They were chosen before the formula was known, and may have imitated a part of it. One after
     the other goes, and the formula and all others are fitted again, as long as that is worth more.
 
     Args:
@@ -115,7 +115,7 @@ def is_bent(listed: Model, smooth: Model, joint: int) -> bool:
 
 
 def _is_plain_sum(s: EffectAt) -> bool:
-    """Return whether a law is plain ones added up: it adds to one, and has no shape to bend."""
+    """Return whether a law is a sum of plain ones: it adds to one, and has no shape."""
     return bool(s.effect.plain) and not len(s.shape)
 
 

@@ -29,8 +29,8 @@ Columns = Callable[[np.ndarray, np.ndarray], np.ndarray]
 class Curve:
     """Least-squares statistics of a force that is linear between nodes of its variable.
 
-    A force with values f at the nodes leaves `|y - R f|^2` of the rows, and what no force of this
-    variable explains.
+    A force with values f at the nodes leaves `|y - R f|^2` of the rows, plus `rest`, which no
+    force of this variable explains.
 
     Attributes:
         x: (p,) nodes.

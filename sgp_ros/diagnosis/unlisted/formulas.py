@@ -1,4 +1,4 @@
-"""Formulas that a smooth force may have, those that follow its data best.
+"""Formulas for a smooth force, those that fit its data best first.
 
 A formula is a text of `sentences` in the variable of the smooth force, times its factor:
 

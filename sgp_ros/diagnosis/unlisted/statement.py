@@ -46,7 +46,7 @@ class Shape:
 
 
 def extended(several: Several) -> tuple[Several, tuple[LawSearch, ...]]:
-    """Return what is decided where laws that no list has are looked for, in one recording."""
+    """Return the decision with a search for unlisted laws, in one recording."""
     if several.chances or several.equations.motion.is_static:
         return several, ()
     found = with_laws(several.equations, several.comparison, several.decision)
@@ -127,8 +127,8 @@ def _curve(law: EffectAt, searched: Searched, seen: Seen) -> np.ndarray:
 def _beyond(law: EffectAt, searched: Searched, x: np.ndarray) -> np.ndarray:
     """Return a formula over its factor at places of its variable (b,); NaN if of other kind.
 
-    A sign is that of a fast motion ahead, a factor that is a speed or an effort is one; what
-    remembers has come to rest.
+    A sign is that of a fast motion ahead, a factor that is a speed or an effort is one; signals
+    with memory have settled.
     """
     _, smooth = smooth_of(searched.smooth, searched.joint)
     assert isinstance(law.effect, FoundLaw)
