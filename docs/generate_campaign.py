@@ -24,9 +24,9 @@ def _detection(found):
     ]
     for name, x in found.items():
         each = ' | '.join(str(x['found_after'][look]) for look in looks)
-        told = x['told_at_the_last_look']
+        named = x['told_at_the_last_look']
         lines.append(
-            f'| {name} | {each} | {x["place_held"]} of {told} | {x["size_held"]} of {told} | '
+            f'| {name} | {each} | {x["place_held"]} of {named} | {x["size_held"]} of {named} | '
             f'{x["looks_with_a_false_one"]} of {x["looks"]} |'
         )
     return '\n'.join(lines)

@@ -21,7 +21,7 @@ python -m sgp_proof.connection.closed --seeds {seeds}
 ```
 Driven robots follow smooth targets under proportional and derivative gains, at 50 to 500 Hz; the log holds positions,
 mostly velocities, and targets, and no effort. Each world conceals one or two of: gains other than stated, a delay of the target,
-rotor inertia, dry friction; or nothing. What makes less than 0.4 % of an effort counts as no physics and is drawn again. The
+rotor inertia, dry friction; or nothing. An effect that makes less than 0.4 % of an effort is drawn again. The
 truth moves in MuJoCo, whose own drives act within the stages of the Runge-Kutta method. A component is named where effect and
 joint are right and every number is to 15 % or within three standard deviations.
 

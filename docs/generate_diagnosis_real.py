@@ -39,7 +39,7 @@ CAPTIONS = {
     'time': 'The discrepancy over time (grey), what was found of it, and the residual (orange).',
     'bands': 'The process Z over each variable, with its band of 95 %.',
     'dependence': 'The share of the discrepancy that each variable predicts on held-out stretches.',
-    'law': 'The laws that were found, over what they depend on, and what was measured.',
+    'law': 'The laws that were found, over their variables, beside the data.',
     'shape': 'What other inertial parameters alone leave.',
     'proof': 'Errors of efforts and roll-outs before and after.',
 }

@@ -67,7 +67,7 @@ positions, 3 to 5 velocities, 12 to 14 directions of the joints:
 
 The physics that was left out is viscous friction and back-EMF, linear in the two velocities; in the
 third experiment it is friction that depends on the angle of the pole and its direction; in the last
-one it is friction that depends on position and direction of joint 3. The selection was told none of this. A direction
+one it is friction that depends on position and direction of joint 3. The selection was given none of this. A direction
 is `tanh(velocity / width)`: dry friction jumps with it, and a smooth function of the velocity can follow
 a jump only with length scales too short to generalise elsewhere.
 

@@ -1,4 +1,4 @@
-"""What the site adds to the pages: the version in its header, the changelog, links to files.
+"""Additions of the site to the pages: version in the header, changelog, links to files.
 
 Links to files of the repository that are no pages lead to the repository where mkdocs.yml names one
 (`repo_url`); else their text stands alone.

@@ -23,7 +23,7 @@ from sgp_ros.cli import main as sgp
 
 SHARED = ROOT.parent / 'shared'
 PASSING = ('seconds', 'versions', 'timing', 'environment')
-"""What differs from run to run, and says nothing of the numbers."""
+"""Keys that differ from run to run, and say nothing of the numbers."""
 HELD_OUT = ('real_test.mcap', 'real_far.mcap')
 CHOICES = ('practice', 'replay_wheel', 'identify_emps', 'toy')
 

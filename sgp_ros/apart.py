@@ -67,7 +67,7 @@ def read_apart(reader: str, path: Path, kind: type[SgpError], expected: str) -> 
 
 
 def write(reader: str, seconds: int) -> None:
-    """Write what a function says of a file to stdout; what it raises, as one line to stderr."""
+    """Write the result of a function of a file to stdout; its exception, as one line to stderr."""
     _, path, expected = sys.argv
     most = bound('UNPACKED_MB') << 20
     for limit, value, last in (

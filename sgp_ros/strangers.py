@@ -67,7 +67,7 @@ def require_within(value: float, name: str, what: str) -> None:
 
 
 def require_file(path: Path, name: str = '') -> None:
-    """Refuse what is no plain file, such as a pipe that never ends, and what is too large.
+    """Refuse anything but plain files, such as a pipe that never ends, and files too large.
 
     Args:
         path: that exists.

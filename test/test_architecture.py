@@ -282,8 +282,21 @@ def test_every_module_says_what_it_is_for(path):
     assert docstring.split('\n\n')[0].rstrip().endswith(('.', '?')), docstring
 
 
+@pytest.mark.parametrize('folder', ['sgp_ros', 'sgp_proof', 'docs', 'test'])
+def test_docstrings_begin_with_the_thing_itself(folder):
+    """No text that stands alone begins with "What": neither a docstring nor one of a constant."""
+    found = [
+        (path.name, node.lineno)
+        for path in sorted((PACKAGE.parent / folder).rglob('*.py'))
+        for node in ast.walk(_tree(path))
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+        and str(node.value.value).startswith('What')
+    ]  # fmt: skip
+    assert not found
+
+
 def test_no_effect_is_named_outside_physics_and_simulation():
-    """What follows from a law follows from its value, so that a new one is one value.
+    """All facts about a law follow from its value, so that a new law is one value.
 
     `payload` is also a key of a robot YAML.
     """

@@ -74,7 +74,7 @@ def test_simulation_is_a_function_of_its_seed(wheel, tmp_path):
 
 
 def test_left_out_effects_reach_the_recording_and_the_truth(tmp_path):
-    """--effect and --physical change the machine and are told in truth.json."""
+    """--effect and --physical change the machine and are written to truth.json."""
     command = ['simulate', 'reaction_wheel', '--duration', '2', '--out', str(tmp_path)]
     effect = 'coulomb_friction:joint=pole,level=0.02'
     assert main([*command, '--effect', effect, '--physical', 'pole_viscosity=0']) == 0
@@ -177,7 +177,7 @@ def test_a_recording_without_its_commands_says_what_to_do(wheel, tmp_path, capsy
 
 
 def test_a_truncated_recording_is_used_as_far_as_it_goes(wheel, tmp_path):
-    """What the writer completed is read, and the report says how much."""
+    """The completed part is read, and the report says how much."""
     whole = (wheel / 'reaction_wheel.mcap').read_bytes()
     (tmp_path / 'cut.mcap').write_bytes(whole[: int(0.9 * len(whole))])
     with RecordingWriter(tmp_path / 'long.mcap') as writer:
@@ -279,7 +279,7 @@ def test_help_shows_an_example(capsys):
     ],
 )
 def test_a_number_that_makes_no_sense_is_refused_as_it_was_given(arguments, said, capsys):
-    """What was found is what the user wrote, and what was expected stands beside it."""
+    """The message quotes the input as the user wrote it, beside the expected one."""
     assert said in _refused(arguments.split(), capsys)
 
 
@@ -338,7 +338,7 @@ def test_files_of_somebody_else_are_not_mixed_with_results(wheel, tmp_path, caps
     ],
 )  # fmt: skip
 def test_a_used_folder_is_replaced_whole(first, second, gone, tmp_path):
-    """What the command wrote before and does not write now would be taken for its result."""
+    """Files of an earlier command that this one does not write would be taken for its result."""
     for command in (first, second):
         assert main([*command.split(), '--out', str(tmp_path), '--quiet']) == 0
         assert (tmp_path / gone).exists() == (command == first)

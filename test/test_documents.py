@@ -13,6 +13,7 @@ import pytest
 import sgp_ros
 from sgp_proof.concealed.promises import FACTOR
 from sgp_ros.cli import _parser
+from sgp_ros.diagnosis.result import VERDICTS
 from sgp_ros.physics.catalogue import EFFECTS
 
 ROOT = Path(__file__).parents[1]
@@ -53,6 +54,13 @@ def test_modules_named_in_documents_exist(path):
     for name in re.findall(r'python -m (sgp_proof[\w.]*)', text):
         file = ROOT / name.replace('.', '/')
         assert file.with_suffix('.py').is_file(), f'{path.name}: {name}'
+
+
+def test_the_glossary_explains_every_verdict():
+    """The table has the verdicts of a diagnosis, in their order."""
+    text = (ROOT / 'docs/glossary.md').read_text(encoding='utf-8')
+    table = text.split('The verdict is one of')[1].split('##')[0]
+    assert tuple(re.findall(r'^\| `(\w+)`', table, re.MULTILINE)) == VERDICTS
 
 
 def test_numbers_in_the_filter_page_are_the_measured_ones():

@@ -41,25 +41,25 @@ def test_entry_points_exist():
         assert callable(getattr(import_module(module), function))
 
 
-def _told_to_setuptools(folder, monkeypatch):
+def _given_to_setuptools(folder, monkeypatch):
     """Return what setup.py in `folder` tells setuptools."""
-    told = {}
+    given = {}
     monkeypatch.chdir(folder)
-    monkeypatch.setattr('setuptools.setup', told.update)
+    monkeypatch.setattr('setuptools.setup', given.update)
     runpy.run_path(str(folder / 'setup.py'))
-    return told
+    return given
 
 
 def test_experiments_bring_their_commands_and_are_not_needed(tmp_path, monkeypatch):
     """With the folder `sgp_proof` there are entry points for its commands, without it none."""
-    told = _told_to_setuptools(ROOT, monkeypatch)
-    (entry,) = told['entry_points']['sgp_ros.commands']
+    given = _given_to_setuptools(ROOT, monkeypatch)
+    (entry,) = given['entry_points']['sgp_ros.commands']
     module, function = entry.split(' = ')[1].split(':')
     assert callable(getattr(import_module(module), function))
     for name in ('setup.py', 'README.md', 'package.xml'):
         shutil.copy(ROOT / name, tmp_path)
     shutil.copytree(ROOT / 'sgp_ros', tmp_path / 'sgp_ros')
-    alone = _told_to_setuptools(tmp_path, monkeypatch)
+    alone = _given_to_setuptools(tmp_path, monkeypatch)
     assert not alone['entry_points']['sgp_ros.commands']
     assert {name.split('.')[0] for name in alone['packages']} == {'sgp_ros'}
 
@@ -75,7 +75,7 @@ def test_every_requirement_stands_in_the_manifest(monkeypatch):
     present = {entry.text for entry in manifest.findall('exec_depend')}
     required = {
         re.split('[<>=]', text)[0]
-        for text in _told_to_setuptools(ROOT, monkeypatch)['install_requires']
+        for text in _given_to_setuptools(ROOT, monkeypatch)['install_requires']
     }
     assert {keys.get(name, f'python3-{name}-pip') for name in required} <= present
 

@@ -27,7 +27,7 @@ _LIMITS = (1e-8, 1e8)
 
 
 class Rival(Protocol):
-    """What a rival offers."""
+    """Common interface of the rivals."""
 
     def step(self, problem: Problem) -> Callable[[], object]:
         """Return the work of one step at the last sample of a problem."""

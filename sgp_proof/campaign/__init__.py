@@ -1,1 +1,1 @@
-"""What `sgp campaign` promises, measured: wear found under warm-up, false alarms, lost workers."""
+"""Measured promises of `sgp campaign`: wear found under warm-up, false alarms, lost workers."""

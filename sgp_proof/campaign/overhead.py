@@ -1,4 +1,4 @@
-"""What the spreading of tasks costs: `python -m sgp_proof.campaign.overhead`.
+"""Cost of spreading tasks over workers: `python -m sgp_proof.campaign.overhead`.
 
 Tasks that only wait need no processor, so any number of workers can be tried on any computer: what
 they take beyond waiting is what Dask takes. Real recordings follow on one and two workers, then

@@ -2,7 +2,7 @@
 
 A robot is switched on each day, warms up and is recorded some times. Every friction is higher when
 cold, differs from day to day and scatters beyond its interval; one of them may grow from some
-recording on. Nothing of this is told to the fit but what a real campaign would have.
+recording on. The fit is given only what a real campaign would have.
 """
 
 from __future__ import annotations

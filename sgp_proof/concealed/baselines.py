@@ -1,4 +1,4 @@
-"""What other tools make of the worlds with laws that no list has.
+"""Results of other tools on the worlds with unlisted laws.
 
     python -m sgp_proof.concealed.baselines DIR [--name unlisted_baselines]
 

@@ -1,4 +1,4 @@
-"""What recordings of real machines suffer from, from the sensors to the file.
+"""Flaws of recordings of real machines, from the sensors to the file.
 
 Efforts are currents times a constant, with noise and bias. Encoders stand behind gears. Velocities
 are differences or missing. Stamps jitter, some come twice, stretches are missing, and a file may

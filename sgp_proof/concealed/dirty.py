@@ -34,7 +34,7 @@ from sgp_ros.simulation.tree_simulator import tree_simulator
 
 HIDDEN, NOTHING, PARAMETERS, UNLISTED = 'hidden', 'none', 'parameters', 'unlisted'
 PLAN = (HIDDEN, HIDDEN, PARAMETERS, HIDDEN, UNLISTED, HIDDEN, NOTHING, HIDDEN)
-"""What is concealed, by seed."""
+"""Kind of the concealed defect, by seed."""
 _TRIES = 30
 _SLOWEST_SERVO_HZ = 250.0
 _PILOT_S, _TEST_S = 12.0, 15.0

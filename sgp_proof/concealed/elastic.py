@@ -31,7 +31,7 @@ from sgp_ros.robots.urdf_robot import nominal_tree
 
 RESULT = {JointElasticity.name: 'elastic.json', MountElasticity.name: 'mount.json'}
 NUMBER = {JointElasticity.name: 'stiffness', MountElasticity.name: 'frequency'}
-"""What is compared with the truth."""
+"""Parameter that is compared with the truth."""
 LEAST = 0.5
 """Probability from which a finding is asserted."""
 

@@ -20,7 +20,7 @@ LISTED = {
     QUADRATIC_DRAG.name: lambda _q, v, p: -p['c'] * np.abs(v) * v,
     SPRING.name: lambda q, _v, p: -p['stiffness'] * (q - p['rest']),
 }
-"""Effects that may be told beside a law that holds them, to their force."""
+"""Effects that may be named beside a law that contains them, to their force."""
 
 
 class FamilySet:

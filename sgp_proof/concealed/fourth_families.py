@@ -193,4 +193,4 @@ LISTED_PARTS = {
     'shorted_winding': VISCOUS_FRICTION.name,
     'leaf_set_by_other': SPRING.name,
 }
-"""A law that holds an effect of the list may be told as that effect beside the rest."""
+"""A law that contains an effect of the list may be named as that effect beside the rest."""

@@ -1,4 +1,4 @@
-"""What too little motion, or too few rows, do to a diagnosis.
+"""Effect of too little motion, or too few rows, on a diagnosis.
 
     python -m sgp_proof.concealed.guards
 

@@ -1,4 +1,4 @@
-"""What is concealed in a machine at once: friction and rotors at every joint, and a few extras."""
+"""Effects concealed together in one machine: friction and rotors at every joint, a few extras."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ FAMILIES = {'arm': 0.7, 'gantry': 0.15, 'pendulum': 0.15}
 
 @dataclass(frozen=True)
 class Gear:
-    """What drives a joint.
+    """Drive of a joint: gear, rotor and usual motion.
 
     Attributes:
         ratio: of the gear [1].

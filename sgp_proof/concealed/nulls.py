@@ -43,7 +43,7 @@ NOTHING, PARAMETERS, SLIGHT = 'nothing', 'wrong parameters', 'slight unlisted ef
 LISTED, UNLISTED = 'one effect of the list', 'unlisted effect'
 KINDS = (NOTHING, PARAMETERS, SLIGHT, LISTED, UNLISTED)
 NAMES = tuple(name for name in draw.FIRST_LAWS if name != VELOCITY_FILTER_LAG.name)
-"""What is concealed as one effect; the lag of a sensor's velocity is no force."""
+"""Effects that are concealed alone; the lag of a sensor's velocity is no force."""
 _CONCEALED = {SLIGHT: (2e-4, 3e-3), LISTED: (0.006, 0.2), UNLISTED: (0.006, 0.2)}
 """Range of the share of the squared effort that a concealed effect makes."""
 _TRIES = 40

@@ -1,4 +1,4 @@
-"""What a diagnosis promises and what `sgp replay` delivers with the robot that it leaves.
+"""Error promised by a diagnosis, beside that of `sgp replay` with the diagnosed robot.
 
     python -m sgp_proof.concealed.promises CASES DIAGNOSES [--out FILE]
 

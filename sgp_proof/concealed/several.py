@@ -32,7 +32,7 @@ ASSERTED = 0.5
 """Least probability of what counts as asserted, as the schema of diagnosis.json has it [1]."""
 _CALM = ('no_mismatch', 'parameters_only')
 _HALVES = (COULOMB_FRICTION.name, CONSTANT_LOAD.name)
-"""What friction that differs with direction is made of."""
+"""Effects that make up friction that differs with direction."""
 
 
 def answer(wanted, machine, effects, parts, urdf_path, noise=0.0):

@@ -119,4 +119,4 @@ FAMILIES = SET.families
 REMEMBER = {'throttled_balancer': (lambda q, _v: q, lambda q, _v, z, p: (q - z) / p['fill_s'])}
 """The one that remembers to the start of the memory, and its rate."""
 LISTED_PARTS = {'solenoid_with_gland': COULOMB_FRICTION.name}
-"""A law that holds an effect of the list may be told as that effect beside the rest."""
+"""A law that contains an effect of the list may be named as that effect beside the rest."""

@@ -88,7 +88,7 @@ def force_of(effect, simulator, motion):
 
 
 class Explained:
-    """What bodies and effects so far explain, in units of each joint's rms effort.
+    """Forces that bodies and effects so far explain, in units of each joint's rms effort.
 
     Args:
         tree: of the nominal robot.

@@ -184,8 +184,8 @@ def law_error(effect, finding, beside=()):
         lambda name: lambda _at: numbers[name], signal, lambda name, _signals: special(name)
     )(None)
     for part in beside:
-        told = {name: x['value'] for name, x in part['parameters'].items()}
-        found = found + LISTED[part['effect']](q[0], v[0], told)
+        values = {name: x['value'] for name, x in part['parameters'].items()}
+        found = found + LISTED[part['effect']](q[0], v[0], values)
     return float(np.sqrt(np.mean((found - true) ** 2) / np.mean(true**2)))
 
 

@@ -1,4 +1,4 @@
-"""What a recording shows through an error of its connection, and how a robot really stands."""
+"""Recordings as seen through an error of the connection, and how a robot really stands."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the proofs of connections do by seed: draw a world until one is suitable, score, write."""
+"""Steps of the proofs of connections for a seed: draw a suitable world, score, write."""
 
 from __future__ import annotations
 

@@ -124,7 +124,9 @@ def judged(answer, diagnosis):
     outcome = 'wrong' if others else 'right' if exact and calm else 'missed'
     shared = {(f['effect'], f['joint']) for f in diagnosis.get('shared', [])}
     return {
-        'said': [diagnosis['verdict'], *([f['effect'], f['joint'], _told(f)] for f in found)],
+        'said': [
+            diagnosis['verdict'], *([f['effect'], f['joint'], _difference(f)] for f in found)
+        ],
         'outcome': outcome, 'shared_named': sum(tuple(s) in shared for s in answer['shared']),
     }  # fmt: skip
 
@@ -133,7 +135,7 @@ def _is_there(wanted, found):
     return (wanted['effect'], wanted['joint']) == (found['effect'], found['joint'])
 
 
-def _told(found):
+def _difference(found):
     """Return value and standard deviation of the size that differs, where it is said."""
     said = (found.get('difference') or {}).get(_SIZES.get(found['effect']), {})
     return [said.get('value'), said.get('std')]
@@ -143,7 +145,7 @@ def _is(wanted, found):
     """Return whether a difference is named with its joint and size."""
     if not _is_there(wanted, found):
         return False
-    value, std = _told(found)
+    value, std = _difference(found)
     true = wanted[_SIZES[wanted['effect']]]
     return value is not None and abs(value - true) <= max(_CLOSE * abs(true), _STD * (std or 0.0))
 

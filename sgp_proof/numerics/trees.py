@@ -33,7 +33,7 @@ CHUNK = 64
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one tree gave; missed is called identifiable but is not, false the other way."""
+    """Counts of one tree; missed is called identifiable but is not, false the other way."""
 
     joints: int
     rank: int

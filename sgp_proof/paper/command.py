@@ -90,7 +90,7 @@ def run_reproduction(
 
 @dataclass(frozen=True, slots=True)
 class _Plan:
-    """What is run.
+    """Experiments and seeds to run.
 
     Attributes:
         chosen: experiments.

@@ -74,7 +74,7 @@ class FigureEight:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArmRun:
-    """What is true of a run at its n samples; each array is (n, 3).
+    """True motion and torque of a run at its n samples; each array is (n, 3).
 
     Attributes:
         position: [rad].

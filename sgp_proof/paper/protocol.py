@@ -61,7 +61,7 @@ class World:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """What one method did in one world.
+    """Result of one method in one world.
 
     Attributes:
         scores: region to channel to nmse, nmse_measured, nlpd, coverage95.

@@ -31,9 +31,9 @@ PAPER_INPUTS = (0, 1, 2, 3, 7)
 CANDIDATES = (*PAPER_INPUTS, 8, 9)
 """The same and both directions of motion."""
 CONCEALED = ('position_friction:joint=pole,amplitude=0.02,lo=2.7,hi=3.1,kind=coulomb',)
-"""What stands for the unknown physics of section IV.C: extra dry friction of the pole near the
-bottom of its swing, which is none of the ten coefficients. No recording of the paper's physical
-wheel is public, so this is a simulation and told as one."""
+"""Stand-in for the unknown physics of section IV.C: extra dry friction of the pole near the bottom
+of its swing, which none of the ten coefficients describes. No recording of the paper's physical
+wheel is public, so this is a simulation and reported as one."""
 ENCODER_SETTINGS = {'filter.window': 0.1, 'filter.hop': 0.05, 'reorder_window': 0.0}
 
 

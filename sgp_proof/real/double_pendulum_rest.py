@@ -1,4 +1,4 @@
-"""What bodies, rotors, dry and viscous friction leave of the double pendulums' efforts.
+"""Rest of the double pendulums' efforts after bodies, rotors, dry and viscous friction.
 
     python -m sgp_proof.real.double_pendulum_rest
 

@@ -1,4 +1,4 @@
-"""What an expert expects of a diagnosis, and how far a diagnosis meets it.
+"""Diagnoses that an expert expects, and how far a diagnosis meets them.
 
 `expected.yaml` beside this module says for each recording which verdicts are right, which effects
 must be found with numbers between which limits, what else may be named, and what a fit by hand

@@ -252,7 +252,7 @@ def _recording(run, runs):
 
 
 def _weight(model):
-    """What J and G say of a point mass at a length, in units of the measured torque."""
+    """Length and mass of the point mass that J and G describe, in units of the measured torque."""
     J, G = (model['parameters'][c]['value'] for c in ('J', 'G'))
     return {'length_m': GRAVITY * J / G, 'mass_kg': (G / GRAVITY) ** 2 / J, 'G_N_m': G}
 

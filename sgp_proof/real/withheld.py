@@ -44,12 +44,12 @@ def main():
     known = {}
     if TARGET.exists():
         known = json.loads(TARGET.read_text(encoding='utf-8'))['machines']
-    known[arguments.name] = told(found, withheld)
+    known[arguments.name] = summary(found, withheld)
     write_result(TARGET, {'machines': known})
     print(json.dumps(known[arguments.name], indent=1))
 
 
-def told(found, withheld):
+def summary(found, withheld):
     """Return what a diagnosis says, as far as the page needs it."""
     return {
         'withheld': list(withheld),

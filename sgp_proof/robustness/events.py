@@ -40,7 +40,7 @@ MOST_HELD = 60_000
 
 
 class Faults(Counter[str]):
-    """What must not happen, by what it was, with the first seed of each."""
+    """Counts of events that must not happen, by kind, with the first seed of each."""
 
     def note(self, what: str, seed: int) -> None:
         """Count one."""

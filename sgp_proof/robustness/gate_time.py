@@ -1,4 +1,4 @@
-"""What the gates add to the time of a step.
+"""Time that the gates add to a step.
 
     python -m sgp_proof.robustness.gate_time
 
@@ -49,7 +49,7 @@ NOTHING = {
         (Journal, 'note', lambda *_: None),
     ),
 }
-"""What is measured, and what takes its place: functions that do nothing."""
+"""Functions that are measured, and their replacements, which do nothing."""
 
 
 @contextlib.contextmanager

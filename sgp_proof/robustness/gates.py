@@ -1,4 +1,4 @@
-"""What the gates refuse of clean streams, and what garbage leaves behind, by seed.
+"""Refusals of the gates on clean streams, and traces left by garbage, by seed.
 
     python -m sgp_proof.robustness.gates [clean|garbage ...] [--seeds 0:60]
 

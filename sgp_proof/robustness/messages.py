@@ -69,13 +69,13 @@ class Fuzzed:
             Parameter(name, value=to_ros(value)) for name, value in settings.items()
         ])  # fmt: skip
         self._kind = kind
-        self.told: Any = self._node._identification
+        self.identification: Any = self._node._identification
         self.given: Counter[str] = Counter()
 
     @property
     def engine(self) -> Any:
         """The engine behind the node."""
-        return self.told._session.engine
+        return self.identification._session.engine
 
     def close(self) -> None:
         """End the node."""
@@ -103,7 +103,7 @@ class Fuzzed:
 
     def _hear(self, kind: str, convert: Any, message: Any) -> None:
         self.given[kind] += 1
-        self.told._guarded(self.told._hear, convert, message)
+        self.identification._guarded(self.identification._hear, convert, message)
 
     def _state(self, sample: JointSample) -> JointState:
         names, velocity, effort = list(sample.names), sample.velocity, sample.effort
@@ -170,7 +170,7 @@ class Fuzzed:
 
     def _call(self) -> None:
         self.given['service'] += 1
-        services = self.told._services
+        services = self.identification._services
         name = str(self._rng.choice(['reset', 'learn', 'save', 'cancel', 'diagnose']))
         answer = getattr(services, f'_{name}')
         if name == 'learn':
@@ -181,13 +181,14 @@ class Fuzzed:
 
     def _tick(self) -> None:
         self.given['timer'] += 1
-        actions = (self.told._poll, self.told._session.flush_record, self.told._report,
-                   self.told._publish_parameters)  # fmt: skip
-        self.told._guarded(actions[int(self._rng.integers(len(actions)))])
+        node = self.identification
+        actions = (node._poll, node._session.flush_record, node._report,
+                   node._publish_parameters)  # fmt: skip
+        self.identification._guarded(actions[int(self._rng.integers(len(actions)))])
 
     def faults(self) -> list[str]:
         """Return what is wrong with the node now."""
-        session = self.told._session
+        session = self.identification._session
         found = [] if self._is_counted() else ['a message that is not counted']
         found += check(self.engine, NOTHING, None)
         if session.health.failures:
@@ -200,7 +201,7 @@ class Fuzzed:
 
     def _is_counted(self) -> bool:
         """Whether every message became a sample, or is counted where it did not."""
-        session = self.told._session
+        session = self.identification._session
         received = session.health._totals(self.engine.counts)
         return received['messages'] + received['commands_read'] + received['unreadable'] == (
             self.given['state'] + self.given['command']
@@ -215,13 +216,13 @@ def run(seed: int, messages: int, folder: Path, faults: Faults) -> Counter[str]:
         for i, kind in enumerate(fuzzed.steps(messages)):
             if time.process_time() - began > LONGEST_S:
                 faults.note(f'{kind}: longer than 10 s', seed)
-            if i % 50 == 0 or fuzzed.told._session.health.failures:
+            if i % 50 == 0 or fuzzed.identification._session.health.failures:
                 for fault in fuzzed.faults():
                     faults.note(fault, seed)
             began = time.process_time()
         for fault in fuzzed.faults():
             faults.note(fault, seed)
-        totals = fuzzed.told._session.health._totals(fuzzed.engine.counts)
+        totals = fuzzed.identification._session.health._totals(fuzzed.engine.counts)
         return fuzzed.given + Counter({k: v for k, v in totals.items() if v})
     finally:
         fuzzed.close()

@@ -91,10 +91,10 @@ class NodeKills:
         faults = []
         recording = open_recording(record)
         states = sum(isinstance(event, JointSample) for event in recording.events())
-        told = any(topic.name == _PREDICTION for topic in recording.topics)
+        has_predictions = any(topic.name == _PREDICTION for topic in recording.topics)
         stamps = {
             message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
-            for _, message in (recording.messages(_PREDICTION) if told else ())
+            for _, message in (recording.messages(_PREDICTION) if has_predictions else ())
         }
         newest = max(stamps, default=min(self._heard))  # none yet, where none was flushed
         missing = [stamp for stamp in self._heard if stamp not in stamps]

@@ -5,7 +5,7 @@
 Simulated reaction wheels with encoders, through the whole engine in the settings of `config/`. An
 undisturbed stretch counts false alarms, for several rates that are asked for; an alarm of any
 joint counts. Then the motor loses a third of its gain for two seconds, again and again: the engine
-is told more than the wheel gets.
+is given a larger command than the wheel gets.
 
 A rate of one an hour takes many hours to see. These are of linear axes whose motion and measured
 effort are written down, so that an hour takes a minute: with cogging that the model lacks and Z
@@ -56,9 +56,9 @@ class Run:
     def step(self, is_disturbed):
         """Take one sample; return its time [s]."""
         sample = self._simulation.step()
-        told = sample.command * (GAIN if is_disturbed else 1.0)
+        command = sample.command * (GAIN if is_disturbed else 1.0)
         events = (
-            CommandSample(sample.stamp_ns, told, ('wheel',)),
+            CommandSample(sample.stamp_ns, command, ('wheel',)),
             JointSample(sample.stamp_ns, self._simulation.joint_names, sample.position),
         )
         self.first_ns = sample.stamp_ns if self.first_ns is None else self.first_ns

@@ -75,7 +75,7 @@ class Machine:
 
 
 class Listener:
-    """What the node says, with the time of receipt."""
+    """Messages of the node, with the time of receipt."""
 
     def __init__(self, context, domain_id):
         rclpy.init(context=context, domain_id=domain_id)

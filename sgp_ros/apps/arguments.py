@@ -61,7 +61,7 @@ def _count(text: str) -> int:
 def _add_recording(
     parser: argparse.ArgumentParser, metavar: str = 'BAG', several: str | None = None
 ) -> None:
-    """Add what is read of a robot; `several` says what more than one recording means."""
+    """Add the inputs of a robot; `several` states the meaning of several recordings."""
     parser.add_argument('bag', metavar=metavar, nargs=None if several is None else '+',
                         help=f'.mcap file, rosbag2 directory or ROS 1 .bag{several or ""}'
                         )  # fmt: skip
@@ -296,4 +296,4 @@ COMMANDS = (
     _add_demo, _add_simulate, _add_replay, _add_identify, _add_diagnose, _add_effects,
     _add_without_arguments, _add_import, _add_export, _add_watch, _add_check, _add_campaign,
 )  # fmt: skip
-"""What adds each command of the package, in the order of its help."""
+"""Functions that add each command of the package, in the order of its help."""

@@ -16,7 +16,7 @@ from sgp_ros.apps.campaign_task import examine_recording
 from sgp_ros.apps.terminal import mark_folder, strong, warned
 from sgp_ros.campaign.changes import FALSE_ALARMS
 from sgp_ros.campaign.cluster import cluster, run_tasks
-from sgp_ros.campaign.recordings import Told, find_recordings, read_covariates
+from sgp_ros.campaign.recordings import TableRow, find_recordings, read_covariates
 from sgp_ros.campaign.table import (
     COLUMNS,
     RUN_COLUMNS,
@@ -42,7 +42,7 @@ _SCHEMA = 1
 
 @dataclass(frozen=True, slots=True)
 class CampaignOptions:
-    """What is made of each recording, and of all.
+    """Options of a campaign: the task for each recording, and the table of all.
 
     Attributes:
         task: of `TASKS`.
@@ -95,7 +95,7 @@ def run_campaign(
     chosen = CampaignOptions(**options)
     remarks: list[str] = []
     found = find_recordings(bag)
-    told = read_covariates(chosen.covariates, tuple(found), remarks)
+    table = read_covariates(chosen.covariates, tuple(found), remarks)
     jobs = _jobs(found, robot, chosen)
     (out / RESULTS).mkdir(parents=True, exist_ok=True)
     mark_folder(out, 'campaign')  # an interrupted run has left its sign
@@ -103,7 +103,7 @@ def run_campaign(
         open_jobs = [job for job in jobs if not _is_finished(out, job)]
         print(f'{len(jobs)} recordings, {len(jobs) - len(open_jobs)} of them finished before')
         broken = _compute(out, open_jobs, scheduler, workers, progress)
-        results = [_result(out, job, told[job['recording']], broken) for job in jobs]
+        results = [_result(out, job, table[job['recording']], broken) for job in jobs]
         content = write_campaign(out, results, remarks)
     _print_summary(content, out)
     progress(1.0)
@@ -175,21 +175,21 @@ def _is_finished(out: Path, job: Mapping[str, Any]) -> bool:
 
 
 def _result(
-    out: Path, job: Mapping[str, Any], told: Told, broken: Mapping[str, str]
+    out: Path, job: Mapping[str, Any], row: TableRow, broken: Mapping[str, str]
 ) -> dict[str, Any]:
-    """Return the result of one recording with what a table tells of it."""
+    """Return the result of one recording with its row of the table."""
     name = job['recording']
     if name in broken:
         kept = {'recording': name, 'robot': Path(job['robot']).stem, 'covariates': {},
                 'tasks': {t: {'failure': broken[name]} for t in job['arguments']}}  # fmt: skip
     else:
         kept = json.loads(_place(out, job).read_text(encoding='utf-8'))
-    if told.time_s is not None:
-        kept['start_ns'] = round(told.time_s * 1e9)
-    if told.robot:
-        kept['robot'] = told.robot
-    kept['session'] = told.session or None
-    kept['covariates'] = {**kept['covariates'], **told.covariates}
+    if row.time_s is not None:
+        kept['start_ns'] = round(row.time_s * 1e9)
+    if row.robot:
+        kept['robot'] = row.robot
+    kept['session'] = row.session or None
+    kept['covariates'] = {**kept['covariates'], **row.covariates}
     return kept
 
 

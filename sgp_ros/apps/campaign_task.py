@@ -1,4 +1,4 @@
-"""What a worker does with one recording of a campaign."""
+"""Task of a worker for one recording of a campaign."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _FIELDS = ('data', 'temperature', 'relative_humidity', 'fluid_pressure', 'voltag
 
 
 def examine_recording(job: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is kept of one recording: rows or a failure by task, and what they cost.
+    """Return the result of one recording: rows or a failure by task, and their cost.
 
-    It runs in a worker. What the recording can cause is a result too, in one line.
+    It runs in a worker. An error that the recording causes is a result too, in one line.
     """
     tasks: dict[str, Any] = {}
     result = {key: job[key] for key in ('recording', 'fingerprint')}

@@ -129,7 +129,7 @@ def _print_setup(connected: Connected) -> None:
     for f in connected.findings:
         print(f'  set-up    p {f.probability:.2f}  {f.joint}: {phrase(f)}')
     for e in connected.equivalents:
-        told = ' with '.join(f'{plain_name(effect)} of {joint}' for joint, effect in e.effects)
-        print(f'  alike     this motion cannot separate missing physics from {told}')
+        rival = ' with '.join(f'{plain_name(effect)} of {joint}' for joint, effect in e.effects)
+        print(f'  alike     this motion cannot separate missing physics from {rival}')
     for remark in connected.remarks:
         print(f'  remark    {remark}')

@@ -38,7 +38,7 @@ def run_commanded(
     robot: str, out: Path, progress: Callable[[float], None], *, commands: str,
     nominal: str | None = None, gains: str | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Replay recorded commands and write what the robot does, beside what was measured.
+    """Replay recorded commands and write the simulated motion beside the measured one.
 
     Writes `<robot>_replayed.mcap` (the motion of the longest stable replay), `replay.csv`,
     `overlay.json`, `overlay.npz` and a page.

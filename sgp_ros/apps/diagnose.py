@@ -51,7 +51,7 @@ _RIVALS = 3
 
 @dataclass(frozen=True, slots=True)
 class DiagnoseOptions:
-    """What is read.
+    """Inputs of a diagnosis.
 
     Attributes:
         sim: recording or model file of the simulation that the machine is compared with; None
@@ -142,7 +142,7 @@ def examine(
         options: fields of `DiagnoseOptions`.
 
     Raises:
-        ConfigError: a robot without nominal bodies or inertias, or a file that is none.
+        ConfigError: a robot without nominal bodies or inertias, or a file of another kind.
         RecordingError: nothing in the recording can be used, or nothing moves.
         NumericalError: the motion leaves the equations without a solution.
     """
@@ -171,7 +171,7 @@ def examine(
         has_overlays=True, progress=progress, config=EngineConfig(effort_source=source),
     )  # fmt: skip
     found = replace(found, remarks=(*found.remarks, *remarks))
-    # a node meets one recording of a motion, as it is; settled points are none
+    # a node meets one recording of a motion, as it is; settled points are not a motion
     is_met = gains is None and not chosen.static and not found.setup
     first = next(iter(events.values())) if is_met else []
     known, _, _ = on_one_clock(next(iter(events.values())), USUAL)

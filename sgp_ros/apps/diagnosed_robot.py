@@ -81,7 +81,7 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis, gains: Gains | No
 
 @dataclass(frozen=True, slots=True)
 class Online:
-    """What a node leaves of the efforts with a diagnosed robot that does not hold all findings.
+    """Effort error of a node with a diagnosed robot that does not hold all findings.
 
     Attributes:
         left_out: the findings that a node does not model.
@@ -126,7 +126,7 @@ def replayed(
     events: Sequence[Event],
     effort_source: str,
 ) -> Online | None:
-    """Return what a node would leave of what was diagnosed; None where nothing is left out.
+    """Return the residual of a node with the diagnosed robot; None where it models all findings.
 
     Args:
         robot: nominal robot from a URDF.
@@ -159,7 +159,7 @@ def _is_online(finding: Finding) -> bool:
 
 
 def stated_findings(findings: Iterable[Finding]) -> list[dict[str, Any]]:
-    """Return the findings as the `effects` of a robot YAML; what is unknown has no effect."""
+    """Return the findings as the `effects` of a robot YAML; unknown ones have no effect."""
     return [
         _stated_law(finding)
         if finding.effect == LAW

@@ -1,4 +1,4 @@
-"""`sgp export`: a robot as a file of another program, with a list of what it cannot say."""
+"""`sgp export`: a robot as a file of another program, with a list of what it cannot hold."""
 
 from __future__ import annotations
 

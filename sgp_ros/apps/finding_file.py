@@ -147,7 +147,7 @@ def colour_of(share: float) -> tuple[float, float, float]:
 
 
 def half_band(found: Diagnosis) -> np.ndarray:
-    """Return half the interval that holds 95 % of what the final model leaves, (k,)."""
+    """Return half the interval that holds 95 % of the final model's residual, (k,)."""
     return INTERVAL_95 * np.sqrt(np.nanmean(found.traces.after**2, axis=0))
 
 

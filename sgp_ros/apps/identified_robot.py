@@ -76,7 +76,7 @@ def robot_yaml(robot: Robot, values: np.ndarray, std: np.ndarray, urdf: str = ''
 def robot_urdf(robot: Robot, values: np.ndarray) -> str | None:
     """Return the robot's URDF with identified bodies, damping and dry friction.
 
-    None where the robot has no URDF, or none can hold the bodies. What no term models stays.
+    None where the robot has no URDF, or none can hold the bodies. Physics without a term stays.
     """
     if 'urdf' not in robot.source:
         return None

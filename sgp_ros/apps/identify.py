@@ -16,7 +16,7 @@ from sgp_ros.apps.recorded import checked, gains_of, read_events
 from sgp_ros.apps.terminal import strong, warned
 from sgp_ros.batch.identification import HELD_OUT, Identification, IdentificationOptions, identify
 from sgp_ros.batch.signals import Signals, collect_signals
-from sgp_ros.diagnosis.gathered import Knowledge, driven, suspected
+from sgp_ros.diagnosis.gathered import Knowledge, driven, setup_remarks
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.setting import EFFORT_SOURCES
 from sgp_ros.errors import ConfigError, RecordingError
@@ -68,7 +68,7 @@ class IdentifyOptions:
 
     @property
     def identification(self) -> IdentificationOptions:
-        """What is fitted and held out."""
+        """Options of the fit and of the held-out part."""
         return IdentificationOptions(
             residual_inputs=None if self.inputs is None else tuple(self.inputs),
             holdout=self.holdout,
@@ -80,7 +80,7 @@ class IdentifyOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IdentifiedRecording:
-    """A finished identification, and what is told of it.
+    """A finished identification, and its findings and remarks.
 
     Attributes:
         found: the identification.
@@ -226,7 +226,7 @@ def read_signals(
         checked({Path(bag).stem: events}, robot, gains, said)
         if nominal is not None:
             known = Knowledge(nominal.robot, nominal.stated, config, gains)
-            said += suspected(events, nominal.tree, known)
+            said += setup_remarks(events, nominal.tree, known)
             events = events if gains is None else driven(events, nominal.tree, known)
         signals = collect_signals(events, robot, config)
     except RecordingError as error:

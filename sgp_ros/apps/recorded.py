@@ -75,7 +75,7 @@ def checked(
     recordings: Mapping[str, Iterable[Event]], robot: Robot, gains: Gains | None,
     remarks: list[str], simulation: Iterable[Event] | None = None,
 ) -> dict[str, RecordingCheck]:  # fmt: skip
-    """Return what recordings hold, by stem; what should be looked at is appended to `remarks`.
+    """Return the contents of recordings, by stem; oddities are appended to `remarks`.
 
     Args:
         recordings: events by stem.
@@ -103,7 +103,7 @@ def gains_of(
 ) -> Gains | None:
     """Return the gains of drives that hold targets: given, recorded, or those of the robot's file.
 
-    The last count where the commands are targets: by the type of their messages, or, where that
+    The last apply where the commands are targets: by the type of their messages, or, where that
     says nothing, because positions follow them.
 
     Args:

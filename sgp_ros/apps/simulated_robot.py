@@ -22,7 +22,7 @@ from sgp_ros.strangers import read_text
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedRobot:
-    """What is simulated.
+    """Robot to simulate, with its stated effects.
 
     Attributes:
         simulator: of the robot without the effects.
@@ -116,7 +116,7 @@ def _part(nominal: Nominal, before: Iterable[EffectAt]) -> TreePart:
 def _chosen(stated: EffectAt, nominal: Nominal) -> EffectAt:
     """Return a stated effect in the words of the simulation.
 
-    A diagnosis may leave one level just below zero, where it is none.
+    A diagnosis may leave one level just below zero; it is then taken as zero.
     """
     quantities = stated.effect.stated_quantities(stated.kind)
     lowest = {q.name: min(0.0, q.low) for q in quantities}

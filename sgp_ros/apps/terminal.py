@@ -1,4 +1,4 @@
-"""What a terminal shows and a command may overwrite: colour where it is wanted, folders of ours.
+"""Terminal output and output folders: colour where it is wanted, overwriting only our own.
 
 It is loaded with every command, so it imports nothing that takes time.
 """

@@ -103,7 +103,7 @@ class Accepted:
         """Return the rows of stretches of one source each, without a pause or a jump of positions.
 
         Args:
-            max_gap: longest time between two states that is no pause [s].
+            max_gap: longest time between two states without a pause [s].
         """
         ends = np.diff(self.stamps_ns) > max_gap * 1e9
         ends |= np.diff(self.is_measured)

@@ -1,4 +1,4 @@
-"""What held commands are, as the motion shows: efforts, or targets of position."""
+"""Kind of held commands as the motion shows it: efforts, or targets of position."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ def unwrapped(stamps_ns: np.ndarray, position: np.ndarray) -> np.ndarray:
 
 
 def _jumps(stamps_ns: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """Return which steps (m - 1, k) of a motion are none, (m - 1,) of bool."""
+    """Return which steps (m - 1, k) are jumps, not motion, (m - 1,) of bool."""
     n = len(step)
     if n < _FEWEST:
         return np.zeros(n, dtype=bool)

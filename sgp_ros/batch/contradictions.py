@@ -1,4 +1,4 @@
-"""What a recording says that its robot, or its own numbers, contradict: units and targets.
+"""Contradictions of a recording with its robot or within its own numbers: units and targets.
 
 Only numbers that no robot can have are refused. What a diagnosis can name, such as a recording in
 degrees or a drive in saturation, is said and goes on.
@@ -161,7 +161,7 @@ def _slope_of_velocity(states: Sequence[JointSample], name: str) -> float:
 def target_contradictions(
     events: Sequence[Event], robot: Robot, gains: Gains | None
 ) -> tuple[list[str], list[str]]:
-    """Return what is odd about targets of position, and what no diagnosis could stand on.
+    """Return oddities of the position targets, and errors that rule out a diagnosis.
 
     Args:
         events: of a recording whose commands are targets of position.
@@ -280,7 +280,7 @@ def require_shared_motion(
         name for name in both
         if ours[name][1] < simulation[name][0] or simulation[name][1] < ours[name][0]
     ]  # fmt: skip
-    told = {
+    ranges = {
         name: f'{name} {ours[name][0]:.3g} to {ours[name][1]:.3g}, in the simulation '
         f'{simulation[name][0]:.3g} to {simulation[name][1]:.3g}'
         for name in apart
@@ -288,10 +288,10 @@ def require_shared_motion(
     if len(apart) == len(both):
         raise RecordingError(
             'no joint passes through the same positions on machine and in simulation: '
-            f'{", ".join(told.values())}', 'motions that overlap',
+            f'{", ".join(ranges.values())}', 'motions that overlap',
             'run the simulation with the commands of the machine',
         )  # fmt: skip
-    said = [f'Machine and simulation pass different positions: {x}.' for x in told.values()]
+    said = [f'Machine and simulation pass different positions: {x}.' for x in ranges.values()]
     alone = [n for n in (*ours, *simulation) if n not in both]
     if alone:
         said.append(f'Moving only on the machine or only in the simulation: {", ".join(alone)}.')

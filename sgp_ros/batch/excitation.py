@@ -1,4 +1,4 @@
-"""What a robot can show of its parameters, beside what a recording showed.
+"""Parameters that a robot can show, beside those that a recording showed.
 
 Some directions of the parameters never reach a torque: the rank over random motions tells. Others
 would, had this recording moved the right joint in the right pose: see `suggestions`.
@@ -27,7 +27,7 @@ is sampled often enough to be differentiated has nearly 1, white noise 0."""
 def require_motion(signals: Signals, robot: Robot) -> None:
     """Refuse a recording of a robot that stands still or has no effort. O(n k).
 
-    A joint that stands still beside others that move is no reason; an effort that is one number
+    A joint at rest beside others that move is not a reason; an effort that is one number
     throughout is, where it is what f(u) W predicts: its joint is not measured.
 
     Args:
@@ -68,7 +68,7 @@ IDENTIFIABLE, NOT_EXCITED, STRUCTURAL = 'identifiable', 'not_excited', 'structur
 
 @dataclass(frozen=True, slots=True)
 class JointRange:
-    """What a joint may do; metres in place of radians for a prismatic one.
+    """Limits of the motion of a joint; metres in place of radians for a prismatic one.
 
     Attributes:
         lower: least position [rad].

@@ -46,7 +46,7 @@ class OfflineOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedCoefficients:
-    """What was found out about W.
+    """Estimate of W.
 
     Attributes:
         names: of the p coefficients; none for GP.

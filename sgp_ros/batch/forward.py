@@ -102,7 +102,7 @@ class Dynamics:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DryFriction:
-    """What dry friction does until a joint stops or starts.
+    """State of dry friction until a joint stops or starts.
 
     Attributes:
         level: (m, k) [unit of the drive].

@@ -29,7 +29,7 @@ from sgp_ros.robots.robot import Robot
 
 METHODS = ('PR', 'GP', 'PRGP', 'SGP')
 OWN = CANDIDATES[-1]
-"""What GP and PRGP see, unless said otherwise: all candidates."""
+"""Inputs of GP and PRGP, unless said otherwise: all candidates."""
 HELD_OUT = 'held out'
 """Name of the held-out part of the recording itself."""
 
@@ -60,7 +60,7 @@ class IdentificationOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Identification:
-    """What was found in a recording.
+    """Result of an identification from a whole recording.
 
     Attributes:
         robot: that was identified.

@@ -26,7 +26,7 @@ CANDIDATES: tuple[tuple[str, ...], ...] = (
     ('own:position', 'own:direction'),
     ('own:position', 'own:velocity', 'own:direction'),
 )
-"""Sets of inputs of a joint that compete; the first one is no process."""
+"""Sets of inputs of a joint that compete; the first one means no process."""
 _FOLDS, _STRETCHES, _LEVEL = 4, 3, 0.05
 _LEAST_GAIN = 0.01  # of the squared error without a process
 _EQUAL = 1.02

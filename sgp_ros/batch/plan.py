@@ -163,7 +163,7 @@ def _regret(trials: list[_Trial], cutoff: float) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Trial:
-    """What one cut-off and source of velocity make of the recording.
+    """Recording under one cut-off and source of velocity.
 
     Attributes:
         plan: with the decimation found.

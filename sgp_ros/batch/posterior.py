@@ -39,7 +39,7 @@ _ROUNDING = 1e-10
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PivotedBasis:
-    """Basis functions of one kernel.
+    """Basis functions of one kernel; the pivots are its inducing points.
 
     Attributes:
         kernel: the kernel.
@@ -106,7 +106,7 @@ class _JointPart:
         weight: (n,) inverse variance of noise and remainder.
         factor: (r, r) upper, `factor^T factor = I + phi^T diag(weight) phi`.
         coupling: (r, p) and data: (r,), so that `factor v = data - coupling W`.
-        rows: (m, p) and target: (m,) what the joint tells of W.
+        rows: (m, p) and target: (m,) information of the joint on W.
     """
 
     basis: PivotedBasis | None
@@ -183,8 +183,8 @@ class BatchPosterior:
         ]
         rows = np.vstack([part.rows for part in self._parts])
         target = np.concatenate([part.target for part in self._parts])
-        told = Observations(np.zeros((len(rows), 1)), rows[:, None, :], target[:, None])
-        self._physics = Posterior(Model((None,), (1.0,)), told, prior)
+        whitened = Observations(np.zeros((len(rows), 1)), rows[:, None, :], target[:, None])
+        self._physics = Posterior(Model((None,), (1.0,)), whitened, prior)
         self._weights = [
             _back(part.factor, part.data - part.coupling @ self.coefficients)
             for part in self._parts

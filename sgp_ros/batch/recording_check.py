@@ -1,4 +1,4 @@
-"""What a recording holds before anything is made of it: clock, channels, commands, excitation.
+"""Check of a raw recording before any processing: clock, channels, commands, excitation.
 
 All numbers are of the raw samples in the order in which they come; nothing is refused or filtered
 here, so that a reader sees what the later stages will meet.
@@ -34,7 +34,7 @@ _COPY = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class JointCheck:
-    """What a recording shows of one joint.
+    """Check of one joint in a recording.
 
     Attributes:
         lower, upper: least and greatest position [rad or m].
@@ -68,7 +68,7 @@ class JointCheck:
 
 @dataclass(frozen=True, slots=True)
 class RecordingCheck:
-    """What a recording holds.
+    """Contents of a recording.
 
     Attributes:
         states, commands: numbers of them.
@@ -253,7 +253,7 @@ def _units(states: Sequence[JointSample], found: RecordingCheck, robot: Robot) -
 def _followed(
     events: Sequence[Event], robot: Robot, gains: Gains | None
 ) -> tuple[list[str], list[str]]:
-    """Return what is odd about targets of position, and what is refused."""
+    """Return oddities of the position targets, and errors that are refused."""
     if not has_targets(events, gains):
         return [], []
     try:

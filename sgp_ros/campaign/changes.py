@@ -26,7 +26,7 @@ EQUIVALENT_TESTS = 7_500.0
 white noise: `sgp_proof/results/campaign.json`, to which a test holds this number."""
 _MOST_STEPS, _ROUNDS = 5, 3
 LEAST_SIDE = 5
-"""Recordings on each side of a step; a single stray estimate then is none."""
+"""Recordings on each side of a step; a single stray estimate then is not a step."""
 _LIKELIHOOD_SET = -2.0 * math.log(1.0 - math.sqrt(0.95))
 """Twice the log likelihood that a place of a step may lose within its 95 % set (Yao 1987; Eo and
 Morley 2015): the quantile of the larger one of two exponential variables."""
@@ -143,7 +143,7 @@ class Estimates:
         return [column_of(step, self.time, self.robots) for step in found]
 
     def chance(self, fit: MixedFit) -> float:
-        """Return the chance that the last column of a fit is none."""
+        """Return the probability that the last column of a fit arises by chance."""
         return chance(float(fit.t[-1]), fit.dof, int(np.bincount(self.robots).max()), self.scans)
 
     def next_step(self, before: Sequence[Step]) -> tuple[Step, MixedFit] | None:
@@ -163,7 +163,7 @@ class Estimates:
         return None if step is None else (step, self.fit(self.steps([*before, step])))
 
     def when(self, days: np.ndarray) -> tuple[list[Step], bool, list[float]]:
-        """Return steps that are no chance, or whether a steady drift says it better.
+        """Return steps beyond chance, or whether a steady drift describes the data better.
 
         The two are compared by the criterion of Schwarz: a step has a size and a place, a drift a
         slope. The chances are those of the slope and of each step that was tried.

@@ -41,7 +41,7 @@ class Frame:
         age: (m,) middle of it after the beginning of its session [s].
         sessions, robots: (m,) numbers.
         robot_names: by number.
-        covariates: (m,) by name; NaN where nothing is told.
+        covariates: (m,) by name; NaN where none is given.
     """
 
     names: Sequence[str]
@@ -74,9 +74,9 @@ def frame_of(results: Sequence[Mapping[str, Any]]) -> Frame:
             if said == last and (said is not None or pause < PAUSE_S):
                 sessions[row] = sessions[before]
                 age[row] += start[row] - start[sessions[row]]
-    told = {c: None for r in results for c in r.get('covariates', {})}
+    columns = {c: None for r in results for c in r.get('covariates', {})}
     covariates = {
-        c: np.array([r.get('covariates', {}).get(c, math.nan) for r in results]) for c in told
+        c: np.array([r.get('covariates', {}).get(c, math.nan) for r in results]) for c in columns
     }
     return Frame(
         [r['recording'] for r in results], start, age, sessions, robots, names.tolist(), covariates

@@ -27,7 +27,7 @@ _BOUNDS = (-16.0, 3.0)
 _NEW = 1e-9
 """Share of a column that those before it must leave."""
 _LEAST = 1e-12
-"""Of the scale of the residuals, which copies of one recording leave none of."""
+"""Least relative scale of the residuals: copies of one recording leave no residual."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

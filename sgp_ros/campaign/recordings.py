@@ -23,8 +23,8 @@ _EXPECTED = f'a folder, a recording ({", ".join(_ENDINGS)}, rosbag2 directory) o
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
-    """What a table tells of one recording.
+class TableRow:
+    """Row of the table of covariates for one recording.
 
     Attributes:
         robot: which machine it is of; empty where the table does not say.
@@ -86,8 +86,10 @@ def _below(path: Path) -> Iterable[Path]:
                 yield from _below(entry)
 
 
-def read_covariates(path: str | None, names: Sequence[str], remarks: list[str]) -> dict[str, Told]:
-    """Return what a table tells of recordings, by their names.
+def read_covariates(
+    path: str | None, names: Sequence[str], remarks: list[str]
+) -> dict[str, TableRow]:
+    """Return the rows of a table of covariates, by the names of recordings.
 
     Args:
         path: of a CSV file, or another table that `sgp import` reads, with a column `recording`;
@@ -99,9 +101,9 @@ def read_covariates(path: str | None, names: Sequence[str], remarks: list[str]) 
         ConfigError: no column `recording`, or a recording twice.
         RecordingError: the file cannot be read.
     """
-    told = {name: Told() for name in names}
+    found = {name: TableRow() for name in names}
     if path is None:
-        return told
+        return found
     columns, _ = load_columns(Path(path), remarks)
     if RECORDING not in columns:
         raise ConfigError(f'{path} has the columns {sorted(columns)}', f'a column {RECORDING}')
@@ -123,13 +125,13 @@ def read_covariates(path: str | None, names: Sequence[str], remarks: list[str]) 
         remarks.append(f'{path}: nothing on {len(names) - len(rows)} of {len(names)} recordings')
     numbers = _numbers(columns, path, remarks)
     for name, row in rows.items():
-        told[name] = Told(
+        found[name] = TableRow(
             str(columns[ROBOT][row]) if ROBOT in columns else '',
             str(columns[SESSION][row]) if SESSION in columns else '',
             _seconds(str(columns[TIME][row]), path) if TIME in columns else None,
             {c: float(x[row]) for c, x in numbers.items() if math.isfinite(x[row])},
         )
-    return told
+    return found
 
 
 def _by_any_name(names: Sequence[str]) -> dict[str, str]:

@@ -69,7 +69,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trend:
-    """What was found of one quantity.
+    """Trend and changes of one quantity.
 
     Attributes:
         key: which one.
@@ -80,10 +80,10 @@ class Trend:
         terms: `level` first.
         tau_s: of the warm-up [s]; None without one.
         scatter: standard deviations beyond the intervals: of recordings, sessions, robots.
-        changes: steps that are no chance, in the order in which they were found.
-        is_drift: whether the level drifts with time, which a slope says better than steps.
+        changes: steps beyond chance, in the order in which they were found.
+        is_drift: whether the level drifts with time, which a slope describes better than steps.
         chance: bound on the probability that chance alone shows as much change of the level.
-        remarks: what could not be told.
+        remarks: what could not be determined.
     """
 
     key: Key
@@ -126,7 +126,7 @@ def find_trends(results: Sequence[Mapping[str, Any]]) -> list[Trend]:
 def _trend(key: Key, series: Series, frame: Frame, scans: int) -> Trend:
     """Return the trend of one quantity."""
     remarks: list[str] = []
-    pick, told = _usable(np.array(series.rows), frame, remarks)
+    pick, covariates = _usable(np.array(series.rows), frame, remarks)
     rows = np.array(series.rows)[pick]
     time, n = frame.time[rows], len(rows)
     has_time = bool(np.isfinite(time).all()) and len(np.unique(time)) >= _LEAST_SESSIONS
@@ -141,7 +141,7 @@ def _trend(key: Key, series: Series, frame: Frame, scans: int) -> Trend:
         np.array(series.value)[pick], np.array(series.std)[pick], time, robots,
         list(groups.values()), levels, {'level': np.ones(n)}, scans,
     )  # fmt: skip
-    for name, x in told.items():
+    for name, x in covariates.items():
         _add(problem.columns, name, x[rows] - x[rows].mean(), remarks)
     tau = _warm_up(problem, frame.age[rows]) if has_sessions else None
     names, is_drift, chances = [*problem.columns], False, [1.0]
@@ -175,16 +175,16 @@ def _usable(
     rows: np.ndarray, frame: Frame, remarks: list[str]
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return which of some recordings are used, and the covariates; what is missing is said."""
-    told = {c: x for c, x in frame.covariates.items() if np.isfinite(x[rows]).any()}
+    covariates = {c: x for c, x in frame.covariates.items() if np.isfinite(x[rows]).any()}
     has_all = np.isfinite(frame.time[rows])
-    for x in told.values():
+    for x in covariates.values():
         has_all &= np.isfinite(x[rows])
     if has_all.sum() < LEAST_RECORDINGS:
         remarks.append('time and covariates are known for too few recordings: neither is used')
         return np.ones(len(rows), bool), {}
     if not has_all.all():
         remarks.append(f'{(~has_all).sum()} recordings without time or covariates are left out')
-    return has_all, told
+    return has_all, covariates
 
 
 def _add(columns: dict[str, np.ndarray], name: str, x: np.ndarray, remarks: list[str]) -> bool:

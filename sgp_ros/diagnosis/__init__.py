@@ -1,1 +1,1 @@
-"""What a recording has that the nominal robot lacks: compare, locate, explain, decide, prove."""
+"""Physics that the nominal robot lacks: compare, locate, explain, decide, prove."""

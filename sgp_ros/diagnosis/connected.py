@@ -28,10 +28,10 @@ from sgp_ros.diagnosis.gathered import Recordings
 from sgp_ros.diagnosis.result import Equivalent, Finding
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.evidence import Probe
-from sgp_ros.diagnosis.setup.said import equal_errors, error_finding, price_of, suspicion
+from sgp_ros.diagnosis.setup.said import equal_errors, error_finding, price_of, setup_advice
 from sgp_ros.diagnosis.setup.search import Connection, search
 from sgp_ros.diagnosis.shown import LawSearch, Predictions
-from sgp_ros.diagnosis.unlisted.told import extended
+from sgp_ros.diagnosis.unlisted.statement import extended
 from sgp_ros.physics.catalogue import COMMAND_DELAY, TORQUE_GAIN
 from sgp_ros.rigid.tree import Tree
 
@@ -100,7 +100,7 @@ class Connected:
 
     @property
     def left(self) -> tuple[np.ndarray, np.ndarray]:
-        """What the nominal robot leaves beyond errors of signals, and how much less bodies do.
+        """Rest of the nominal robot beyond errors of signals, and how much less bodies leave.
 
         (k,) shares. The first is at least what bodies gain of the variance of the effort, for a
         weight that is held makes the mean square large and tells nothing of the motion.
@@ -161,7 +161,7 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
     bandwidth = choose_bandwidth(recordings.learned, tree)
     known = plain
     if recordings.learned.gains is not None:
-        # gains can be told from bodies that are known alone
+        # gains can be separated from bodies only where these are known
         by_gains = search(Probe(recordings.learned, tree, bandwidth, knows_bodies=True))
         known = _connected(plain, by_gains, tree, each)
         is_body = plain.several.decision.verdict == 'parameters_only'
@@ -215,7 +215,7 @@ def _connected(
     )
     if corrected.several.decision.verdict == 'unexplained':
         is_explained = plain.several.decision.verdict != 'unexplained'
-        said = () if is_explained else (suspicion(found),)
+        said = () if is_explained else (setup_advice(found),)
         return replace(plain, remarks=(*said, *plain.remarks))
     price, rare = price_of(found)
     gain = _gain(plain, corrected) - price
@@ -240,7 +240,7 @@ def _connected(
 
 
 def _stands_for_gains(plain: Connected, found: Connection) -> bool:
-    """Return whether the gain of a motor stands for the gains of its drive, which are both scaled.
+    """Return whether the gain of a motor imitates those of its drive, both scaled alike.
 
     Where commands are position targets, the motor that multiplies them is the drive.
     """
@@ -268,10 +268,10 @@ def _beside(
     common: frozenset[tuple[str, str]] = frozenset(),
 ) -> Connected:
     """Return the recording as it is, with errors of the connection that explain as much."""
-    told = tuple((e.hypothesis.joint, e.hypothesis.effect) for e in found.errors)
+    named = tuple((e.hypothesis.joint, e.hypothesis.effect) for e in found.errors)
     return replace(
-        plain, equivalents=(Equivalent(told, '', 1.0),),
-        rivals=tuple(joint for joint, _ in told),
+        plain, equivalents=(Equivalent(named, '', 1.0),),
+        rivals=tuple(joint for joint, _ in named),
         has_rival_gains=any(e.hypothesis.is_of_gains for e in found.errors),
         trust=1.0 / (1.0 + math.exp(TEMPER * gain)), common=common,
     )  # fmt: skip

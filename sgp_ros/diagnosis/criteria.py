@@ -52,9 +52,9 @@ SIGNIFICANT = 0.05
 REGION_ENERGY = 0.95
 """Share of the energy of a discrepancy that the region it is confined to holds [1]. Simulation."""
 REGION_ROWS = 0.5
-"""Greatest share of the rows that a region may hold; larger ones are none [1]. Simulation."""
+"""Greatest share of the rows of a region; larger ones are not reported [1]. Simulation."""
 REGION_LEAST_ROWS = 100
-"""Rows below which nothing is said of regions [rows]. Simulation."""
+"""Rows below which no regions are reported [rows]. Simulation."""
 REMAINDER_SHARE = 0.2
 """A joint has its own Z where it leaves this part of what the worst one leaves [1]. Convention."""
 
@@ -76,7 +76,7 @@ The shape of a column is only nearly right, and what is wrong with it repeats in
 SHAPE_ERROR = 0.001
 """Part of the discrepancy that the right column may leave for the same reason [1]. Nulls."""
 PER_EFFECT, PER_PARAMETER = 10.0, 3.0
-"""What an effect, and each number that the data determine, must be worth [nats]. Nulls."""
+"""Least worth of an effect, and of each number that the data determine [nats]. Nulls."""
 MOST_OPPOSED = 5.0
 """Greatest ratio of the effects' mean squares, added up, to that of their sum [1]. Nulls.
 
@@ -106,7 +106,7 @@ LEAST_ODDS = 0.01
 ALIKE = math.log(20.0) / TEMPER
 """Difference of the fits below which a recording prefers neither model [nats]. Convention."""
 PER_UNUSUAL = ALIKE
-"""What a law that few joints have must be worth beyond the price of an effect [nats]. Convention.
+"""Least worth of a law that few joints have, beyond the price of an effect [nats]. Convention.
 
 Odds of one to twenty against laws that nearly every joint with a motor has, or that add to them.
 """
@@ -122,10 +122,10 @@ MOST_CERTAIN = 0.99
 DOUBTED = 0.4
 """Greatest probability where the final model is worse than a constant [1]. Convention.
 
-So too of a finding whose size may be none.
+The same holds for a finding whose size may be zero.
 """
 CARRIED_REST = 0.1
-"""What a model may leave of the discrepancy where it was not fitted [1]. Convention.
+"""Largest rest of a model, as part of the discrepancy, where it was not fitted [1]. Convention.
 
 Friction that is a third larger or smaller than it was leaves that.
 """

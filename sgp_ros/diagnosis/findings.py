@@ -113,10 +113,10 @@ def differences(several: Several, names: Sequence[str]) -> tuple[Difference, ...
 
 
 def doubted_if_none(finding: Finding, effect: EffectAt) -> Finding:
-    """Return a finding that is doubted where it may be none, or is too small to count as physics.
+    """Return a finding, doubted if its size may be zero, or is too small to count as physics.
 
-    The 95 % interval of its size includes none at all; of several numbers that say how large it is
-    one is enough, of a form that data chose all of them, and none where a bound hides them all.
+    One 95 % interval of its sizes must exclude zero; in a form that the data chose, each must. A
+    finding with all sizes at bounds, which have no interval, is kept.
     """
     chance = min(finding.probability, DOUBTED)
     if finding.share <= COUNTED_SHARE:

@@ -34,7 +34,7 @@ from sgp_ros.robots.robot import Robot
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Knowledge:
-    """What is known of the machine beside its bodies.
+    """Prior knowledge of the machine beside its bodies.
 
     Attributes:
         robot: names, actuated joints and gains.
@@ -61,7 +61,7 @@ class Knowledge:
 
 @dataclass(frozen=True, eq=False)
 class Recordings:
-    """What is learned from, kept back and held out.
+    """Recordings to learn from, kept-back blocks and held-out recordings.
 
     Attributes:
         names: stems of what is learned from.
@@ -175,11 +175,11 @@ def driven(events: Iterable[Event], tree: Tree, known: Knowledge) -> list[Event]
     ]
 
 
-def suspected(events: Iterable[Event], tree: Tree, known: Knowledge) -> tuple[str, ...]:
+def setup_remarks(events: Iterable[Event], tree: Tree, known: Knowledge) -> tuple[str, ...]:
     """Return what to check of how a robot is connected before its bodies are estimated.
 
-    Looked for only where bodies and everyday friction leave what counts as physics. What cannot
-    be looked at is refused by those who need it.
+    Searched only where bodies and everyday friction leave a residual that counts as physics.
+    Recordings that cannot be used are refused by the later stages.
 
     Args:
         events: of a recording.

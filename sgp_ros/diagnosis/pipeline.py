@@ -194,7 +194,7 @@ _Proven = tuple[Several, Contrasts, Probabilities, FinalModel, tuple[Remainder, 
 
 
 def _proven(connected: Connected, parts: Mapping[str, RawTrajectory]) -> _Proven:
-    """Return what is asserted with its proofs; a law that fails on another recording is none."""
+    """Return what is asserted with its proofs; laws that fail on another recording are dropped."""
     several = connected.several
     while True:
         several, sides, chances = settled_of(several)
@@ -247,7 +247,7 @@ def _certainty(certainty: float, connected: Connected) -> float:
 
 
 def _predictions(final: FinalModel, connected: Connected, tree: Tree) -> dict[str, Predictions]:
-    """Return the accelerations of held-out recordings; settled points have none."""
+    """Return the accelerations of held-out recordings; settled points have no acceleration."""
     held = connected.recordings.held
     moved = {stem: part for stem, part in held.items() if part.approach is None}
     return {stem: connected.recorded(final.predict(part, tree)) for stem, part in moved.items()}

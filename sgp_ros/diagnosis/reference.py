@@ -1,4 +1,4 @@
-"""What a machine has that its simulation has not, and the other way round.
+"""Differences between a machine and its simulation, in both directions.
 
 Both recordings are explained by one structure: the effects named on the machine, those named on
 the simulation, or all of them, whichever is worth most on the two together. Each recording then

@@ -1,4 +1,4 @@
-"""What a diagnosis found, as data for files, reports and nodes."""
+"""Result of a diagnosis, as data for files, reports and nodes."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """What one of several recordings has beyond what is common to all.
+    """Effect in one of several recordings beyond the model common to all.
 
     Attributes:
         recording: its stem; joint, effect, probability and share in it as of a finding.

@@ -12,7 +12,7 @@ from sgp_ros.diagnosis.criteria import SIGNIFICANT
 
 @dataclass(frozen=True, slots=True)
 class Dependence:
-    """What the discrepancy of a joint depends on.
+    """Variables that the discrepancy of a joint depends on.
 
     Attributes:
         joint: name.
@@ -153,7 +153,7 @@ class TriedFormula:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LawSearch:
-    """What a search for a law that no list has found at a joint.
+    """Result of the search for an unlisted law at a joint.
 
     Attributes:
         joint: name.

@@ -2,7 +2,7 @@
 
 A stamp far from all others is either an error of one message or the first of a new time: a looped
 recording, a simulator that was reset, a computer whose clock was set. Only what follows can tell.
-So such an event waits as a suspect. The next state near the present refuses it; a second state
+So such an event stays pending. The next state near the present refuses it; a second state
 near it, nearer than to the present, makes it the beginning of a new segment. Commands never tell
 the time: their clock may be another computer's, and without states nothing is identified anyway.
 
@@ -23,14 +23,14 @@ END_NS = 2**31 * 10**9
 LEAST_JUMP_S = 1.0
 """Least difference of a stamp from the newest that is a jump. A wrong stamp below it is waited for
 as long: states in between are late."""
-MOST_SUSPECTS = 200
+MOST_PENDING = 200
 SHORTEST_ROUND = 16
 """Fewest states between two jumps of a clock on average; else messages only came late."""
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What becomes of an event and of those that waited for it.
+    """Decision on an event and on those that waited for it.
 
     Attributes:
         events: to be ordered now.
@@ -47,24 +47,24 @@ class StreamClock:
     """Decides of each event whether its stamp belongs to the time of the stream.
 
     Attributes:
-        suspects: events far from the present that wait for what follows, in order of arrival.
+        pending: events far from the present that wait for what follows, in order of arrival.
 
     Args:
         config: settings in force.
     """
 
     def __init__(self, config: EngineConfig) -> None:
-        self.suspects: list[Event] = []
+        self.pending: list[Event] = []
         self.configure(config)
 
     def configure(self, config: EngineConfig) -> None:
-        """Take new settings: a pause or a delay that they permit is no jump."""
+        """Take new settings: a pause or a delay that they permit is not a jump."""
         jump_s = max(LEAST_JUMP_S, 2.0 * config.max_gap) + config.reorder_window
         self._jump_ns = round(1e9 * jump_s)
 
     def agrees(self, stamp_ns: int, newest_ns: int | None) -> bool:
         """Whether a stamp is near the present and nothing waits for a decision, the usual case."""
-        if self.suspects:
+        if self.pending:
             return False
         return newest_ns is None or abs(stamp_ns - newest_ns) <= self._jump_ns
 
@@ -77,32 +77,32 @@ class StreamClock:
         """
         if newest_ns is None or abs(event.stamp_ns - newest_ns) <= self._jump_ns:
             refused: tuple[Event, ...] = ()
-            if self.suspects and isinstance(event, JointSample):
-                refused = tuple(self.suspects)
-                self.suspects = []
+            if self.pending and isinstance(event, JointSample):
+                refused = tuple(self.pending)
+                self.pending = []
             return Verdict((event,), refused)
-        self.suspects.append(event)
+        self.pending.append(event)
         if isinstance(event, JointSample) and self._is_confirmed(event, newest_ns):
-            near = [self._is_nearer(other, event, newest_ns) for other in self.suspects]
-            found = tuple(e for e, is_near in zip(self.suspects, near, strict=True) if is_near)
-            wrong = tuple(e for e, is_near in zip(self.suspects, near, strict=True) if not is_near)
-            self.suspects = []
+            near = [self._is_nearer(other, event, newest_ns) for other in self.pending]
+            found = tuple(e for e, is_near in zip(self.pending, near, strict=True) if is_near)
+            wrong = tuple(e for e, is_near in zip(self.pending, near, strict=True) if not is_near)
+            self.pending = []
             return Verdict(found, wrong, is_jump=True)
-        if len(self.suspects) > MOST_SUSPECTS:
-            return Verdict(refused=(self.suspects.pop(0),))
+        if len(self.pending) > MOST_PENDING:
+            return Verdict(refused=(self.pending.pop(0),))
         return Verdict()
 
     def finish(self, newest_ns: int | None) -> Verdict:
-        """Return what becomes of suspects at the end: those ahead had only a pause before them."""
-        ahead = tuple(e for e in self.suspects if newest_ns is None or e.stamp_ns > newest_ns)
-        behind = tuple(e for e in self.suspects if e not in ahead)
-        self.suspects = []
+        """Return the end of pending events: those ahead had only a pause before them."""
+        ahead = tuple(e for e in self.pending if newest_ns is None or e.stamp_ns > newest_ns)
+        behind = tuple(e for e in self.pending if e not in ahead)
+        self.pending = []
         return Verdict(ahead, behind)
 
     def _is_confirmed(self, event: JointSample, newest_ns: int) -> bool:
         return any(
             isinstance(other, JointSample) and self._is_nearer(other, event, newest_ns)
-            for other in self.suspects[:-1]
+            for other in self.pending[:-1]
         )
 
     @staticmethod

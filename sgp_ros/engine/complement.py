@@ -23,7 +23,7 @@ Expert = tuple[Regression, OnlinePrediction]
 
 
 class Complement:
-    """Complement signals of one robot: what they say of themselves, and what the target says.
+    """Complement signals of one robot: predicted from their own past, then from the target.
 
     Attributes:
         signals: prior of the next values of the signals that the robot has.

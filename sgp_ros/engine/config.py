@@ -141,12 +141,12 @@ class EngineConfig:
     )  # fmt: skip
     buffer_mode: str = _setting(
         'buffer.mode', 'str', 'exact',
-        'exact: Z predicts from the buffer; basis: from all samples, with basis functions.',
+        'exact: Z predicts from the buffer; basis: from all samples, with inducing points.',
         choices=('exact', 'basis'), read_only=True,
     )  # fmt: skip
     basis_features: int = _setting(
         'basis.features', 'int', 100,
-        'Largest number of basis functions per joint; in both modes W is estimated with them.',
+        'Largest number of inducing points per joint; in both modes W is estimated with them.',
         low=1, high=2000, read_only=True,
     )  # fmt: skip
     forgetting_samples: float = _setting(

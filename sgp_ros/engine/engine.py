@@ -95,7 +95,7 @@ class Engine(Fold):
         return SettingsChange(self._now_ns, {name: values[name] for name in settings})
 
     def reset(self) -> Reset:
-        """Forget everything that was learned and what waits for its order, keep the settings.
+        """Forget everything that was learned and all waiting events; keep the settings.
 
         Returns:
             The event to record.
@@ -194,7 +194,7 @@ class Engine(Fold):
     @property
     def waiting_events(self) -> tuple[int, int]:
         """How many states and commands are neither used nor refused yet."""
-        held = [*self.order.pending, *self.clock.suspects]
+        held = [*self.order.pending, *self.clock.pending]
         states = sum(isinstance(event, JointSample) for event in held)
         return states, sum(isinstance(event, CommandSample) for event in held)
 
@@ -231,7 +231,7 @@ class Engine(Fold):
         self.order.seal()
 
     def _reset(self, now_ns: int) -> int:
-        for event in (*self.order.pending, *self.clock.suspects):
+        for event in (*self.order.pending, *self.clock.pending):
             self.intake.refuse(event, 'reset')
         self.order, self.clock = ReorderBuffer(self.order.window_ns), StreamClock(self.config)
         self.began_ns = now_ns
@@ -252,7 +252,7 @@ class Engine(Fold):
         """Yield values that no step changes, so that a copy of the state can share them."""
         yield from (self.robot, self.config)
         yield from self.order.pending
-        yield from self.clock.suspects
+        yield from self.clock.pending
         yield from self.filter.windows.states
         yield from self.intake.commands.efforts
         if self.filter.trial is not None:

@@ -19,7 +19,7 @@ from sgp_ros.engine.prior_knowledge import (
     model_of_settings,
     prior_of_robot,
 )
-from sgp_ros.engine.rest import free_targets, is_enough, told, without_rest
+from sgp_ros.engine.rest import free_targets, is_enough, learnable, without_rest
 from sgp_ros.engine.results import Channel, Counts, Estimate
 from sgp_ros.engine.scoring import Scoring
 from sgp_ros.engine.windows import Equation
@@ -190,7 +190,7 @@ class Estimator:
     def _learn(
         self, regression: Regression, prediction: OnlinePrediction, y: np.ndarray, held: np.ndarray
     ) -> bool:
-        sample = told(regression, prediction, y, held)
+        sample = learnable(regression, prediction, y, held)
         if sample is None or not self._config.learning_enabled:
             return False
         try:
@@ -256,7 +256,7 @@ class Estimator:
         self, prediction: OnlinePrediction, y: np.ndarray, held: np.ndarray
     ) -> None:
         assert self.baseline is not None
-        sample = told(self.baseline, prediction, y, held)
+        sample = learnable(self.baseline, prediction, y, held)
         if sample is not None and self._config.learning_enabled:
             self.baseline.learn(*sample)
 

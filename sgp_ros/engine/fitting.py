@@ -1,12 +1,13 @@
 """Fits hyper-parameters to a snapshot of the buffer: a pure function, for any process.
 
 The evidence trusts the model. Samples that repeat each other, as those of a robot at rest, raise
-it without bound where the noise falls to nothing and Z to a length at which nothing is alike: such
-a model knows them by heart and nothing else. So a fit has to predict too, each stretch of the
-buffer from the others: fits that do it worse, or worse than a constant, and yet claim less noise
-are no choice for an output, which takes the next best one or keeps what it has. Where they claim
-more, the model before was too sure of itself. Stretches, for neighbours in time know each other:
-their windows overlap, and a robot that stands still repeats itself.
+it without bound as the noise falls to zero and Z to a length scale at which no two inputs are
+correlated: such a model memorises the samples and predicts nothing else. So a fit has to predict
+too, each stretch of the buffer from the others. If it predicts an output worse than before, or
+worse than a constant, and yet claims less noise, the output takes the next best fit or keeps its
+hyper-parameters. If it claims more noise, the earlier model was overconfident. Whole stretches are
+left out because neighbours in time are correlated: their windows overlap, and a robot at rest
+repeats itself.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ class FitRequest:
     Attributes:
         number: how many were asked for before.
         data: the buffer.
-        base_root, base_target: what prior and dropped samples tell of W, (p, p) and (p,).
+        base_root, base_target: information of prior and dropped samples on W, (p, p) and (p,).
         model: hyper-parameters in force, the warm start.
         restarts: starts beside it: the values from the data, then random ones.
         seed: of the random ones.
@@ -105,22 +106,22 @@ def _fit_in_turn(request: FitRequest) -> FitResult:
     """Fit some outputs one after the other: ascent of the same evidence by coordinates.
 
     `p(y) = p(y_others) p(y_j | y_others)`, and only the second factor depends on the
-    hyper-parameters of output j. In it the others enter by what they tell of the columns of W that
-    j has, of which a joint of a tree has those of the bodies that it carries.
+    hyper-parameters of output j. The others enter it by their information on the columns of W that
+    j has; a joint of a tree has those of the bodies that it carries.
     """
     data, model, p = request.data, request.model, request.data.F.shape[2]
     k = len(model.noise)
     some = min(k, max(1, ROWS // len(data.U)))
     turn = [(request.number * some + i) % k for i in range(some)]
-    told = [_told(model, data, j) for j in range(k)]
+    information = [_information(model, data, j) for j in range(k)]
     base = np.column_stack([request.base_root, request.base_target])
-    rest = np.vstack([base, *(told[j] for j in range(k) if j not in turn)])
+    rest = np.vstack([base, *(information[j] for j in range(k) if j not in turn)])
     rest = np.asarray(np.linalg.qr(rest, mode='r'))
     before = after = 0.0
     evaluations, refusals = 0, []
     for j in turn:
         columns = np.flatnonzero(np.any(data.F[:, j] != 0.0, axis=0))
-        others = np.vstack([rest, *(told[i] for i in turn if i != j)])
+        others = np.vstack([rest, *(information[i] for i in turn if i != j)])
         known = marginal_equations(others, [*columns, p])
         F, root = _determined(data.F[:, j, columns], known[:, :-1])
         found = _fit_together(replace(
@@ -134,14 +135,14 @@ def _fit_in_turn(request: FitRequest) -> FitResult:
         before, after = before + found.log_evidence_before, after + found.log_evidence
         assert found.model is not None
         model = model.with_output(j, found.model)
-        told[j] = _told(model, data, j)
+        information[j] = _information(model, data, j)
     return FitResult(request.number, model, after, before, evaluations, all(refusals))
 
 
 def _determined(F: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return regressor (n, r) and prior (m, r) of the combinations of W that they determine.
 
-    From regressor (n, p) and prior (m, p); nothing enters them of what is left out.
+    From regressor (n, p) and prior (m, p); directions that are left out do not enter.
     """
     rows = np.vstack([F, root])
     size = np.linalg.norm(rows, axis=0)
@@ -151,15 +152,15 @@ def _determined(F: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return combined[: len(F)], combined[len(F) :]
 
 
-def _told(model: Model, data: Observations, j: int) -> np.ndarray:
-    """Return equations of unit noise in which output j tells of W all it does, (r, p + 1)."""
+def _information(model: Model, data: Observations, j: int) -> np.ndarray:
+    """Return all that output j tells of W, as equations of unit noise, (r, p + 1)."""
     p = data.F.shape[2]
     columns = np.flatnonzero(np.any(data.F[:, j] != 0.0, axis=0))
     own = Observations(data.U, data.F[:, [j]][:, :, columns], data.y[:, [j]])
     block = build_blocks(model.output(j), own)[0]
-    told = np.asarray(np.linalg.qr(np.column_stack([block.A, block.b]), mode='r'))
-    rows = np.zeros((len(told), p + 1))
-    rows[:, [*columns, p]] = told
+    known = np.asarray(np.linalg.qr(np.column_stack([block.A, block.b]), mode='r'))
+    rows = np.zeros((len(known), p + 1))
+    rows[:, [*columns, p]] = known
     return rows
 
 
@@ -258,8 +259,8 @@ def left_out_errors(
             found = Posterior(model, others, prior).predict(data.U[part], data.F[part])
         except NumericalError:
             continue
-        is_told = np.isfinite(found.variance)
-        errors[part] = np.where(is_told, data.y[part] - found.mean, np.nan)
+        is_determined = np.isfinite(found.variance)
+        errors[part] = np.where(is_determined, data.y[part] - found.mean, np.nan)
     return errors
 
 

@@ -90,7 +90,7 @@ class Gate:
         Args:
             errors: of the joints.
             variance: that the model expects of them, (k,).
-            held: joints that the equation does not tell of, (k,).
+            held: joints on which the equation holds no information, (k,).
         """
         found: bool = is_beyond(errors, variance, held, self.mean_square, self.n, (LARGEST, FIRST))
         return found
@@ -131,7 +131,7 @@ class Gate:
 
 @dataclass(slots=True)
 class Before:
-    """What was learned before equations that persist were implausible to it.
+    """Copy of the model from before persistent equations were implausible to it.
 
     Attributes:
         regression, baseline: as `Estimator` has them.
@@ -167,7 +167,7 @@ class Before:
         Args:
             errors: of that model.
             equation: input (d,), regressor (k, p) and target (k,).
-            held: joints that the equation does not tell of, (k,).
+            held: joints on which the equation holds no information, (k,).
         """
         u, f, y = equation
         own = y - self.regression.predict(u, f).mean

@@ -1,6 +1,6 @@
 """Compiled loops of the gates: a few numbers a joint, where a call on an array costs too much.
 
-Nothing is allocated but where a window is as rough as to be compared with those before it.
+Memory is allocated only where a window is rough enough to be compared with earlier ones.
 """
 
 from __future__ import annotations

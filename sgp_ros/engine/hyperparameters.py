@@ -26,7 +26,7 @@ def prefix_of(joint: str) -> str:
 
 
 def kernel_named(name: object) -> type[Kernel]:
-    """Return the kernel of that name; the default one for what is no name of a kernel."""
+    """Return the kernel of that name; the default one for any other name."""
     return KERNELS.get(name, SquaredExponential) if isinstance(name, str) else SquaredExponential
 
 

@@ -1,7 +1,7 @@
 """The one intake of states and commands, which live, replay, identify and diagnose share.
 
-It decides of every event whether it is used, and for which reason it is not. What follows from the
-accepted states is not decided here: online they fill windows, offline whole stretches.
+It decides for every event whether it is used, and if not, for which reason. The use of accepted
+states is decided elsewhere: online they fill windows, offline whole stretches.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from sgp_ros.robots.gains import Gains, stated_gains
 from sgp_ros.robots.robot import Robot
 
 GREATEST = 1e30
-"""From here on a number is no measurement: products of what follows from it, such as accelerations
-over nanoseconds, would not be finite."""
+"""Numbers from here on are not measurements: products of quantities derived from them, such as
+accelerations over nanoseconds, would not be finite."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,7 +103,7 @@ class Intake:
         ) if order == ('',) else order  # fmt: skip
 
     def admit(self, event: Event) -> bool:
-        """Count an event that arrives; refuse what no order can mend.
+        """Count an event that arrives; refuse what sorting cannot repair.
 
         Returns:
             Whether joints, numbers and lengths are as they should be.
@@ -288,11 +288,11 @@ def _chosen(values: np.ndarray | None, order: np.ndarray | None) -> np.ndarray |
 def _are_numbers(values: np.ndarray) -> bool:
     """Return whether all numbers (m,) are smaller than `GREATEST`.
 
-    Their norm tells it of all at once, in the usual case.
+    In the usual case, their norm decides for all at once.
     """
     return math.hypot(*values.tolist()) < GREATEST or bool((np.abs(values) < GREATEST).all())
 
 
 def _may_count(values: np.ndarray) -> bool:
-    """Return whether all numbers are smaller than `GREATEST`, or NaN, which is none."""
+    """Return whether all numbers are smaller than `GREATEST`, or missing (NaN)."""
     return not (np.abs(values) >= GREATEST).any()

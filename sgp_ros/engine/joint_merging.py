@@ -40,7 +40,7 @@ Part = tuple[int, np.ndarray, np.ndarray, np.ndarray]
 
 
 class Source:
-    """What is remembered of the messages with the same joints.
+    """Memory of the messages with the same joints.
 
     Attributes:
         joints: indices of the robot's joints that it brings, increasing.

@@ -40,7 +40,7 @@ class Failure:
 
 
 class Journal:
-    """What was done to a state since its last copy.
+    """Log of the changes to a state since its last copy.
 
     Args:
         state: attributes of the object that is kept; changed in place when undone.

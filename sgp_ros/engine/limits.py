@@ -16,11 +16,12 @@ RARE = 10
 
 
 class Limits:
-    """What the joints of a robot cannot do: far more than its model file permits.
+    """Impossible motions of a robot's joints: far more than its model file permits.
 
     Limits of model files are those of controllers, and often conservative; so `LIMIT_MARGIN` times
-    them is impossible, and a position as far beyond its range as the range is long. Those of many
-    files stand for none: a motion passes them again and again, and then they hold no more.
+    them is impossible, and a position as far beyond its range as the range is long. Many files
+    state limits that are not real: once a motion has passed them again and again, they no longer
+    hold.
 
     Attributes:
         impossible: `RARE` for each state beyond the limits, less one for each within.
@@ -60,4 +61,4 @@ class Limits:
 
 
 def _margin(limit: float) -> float:
-    return LIMIT_MARGIN * limit if limit > 0.0 else np.inf  # 0 stands for none in many files
+    return LIMIT_MARGIN * limit if limit > 0.0 else np.inf  # 0 means no limit in many files

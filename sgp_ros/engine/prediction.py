@@ -139,9 +139,9 @@ def update_complement(
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Update a prior of the complement signals by the measured target.
 
-    A torque residual divided by a small inertia is no acceleration: where the target tells little
-    of a signal, the prior keeps it. With gain `K = P B^T (B P B^T + S)^-1` the mean is
-    `c_0 + K (target - m(c_0))`, the covariance `(I - K B) P (I - K B)^T + K S K^T`.
+    A torque residual divided by a small inertia is not an acceleration: where the target holds
+    little information on a signal, the prior keeps it. With gain `K = P B^T (B P B^T + S)^-1` the
+    mean is `c_0 + K (target - m(c_0))`, the covariance `(I - K B) P (I - K B)^T + K S K^T`.
 
     Args:
         prior: mean c_0 (c,) and covariance P (c, c).

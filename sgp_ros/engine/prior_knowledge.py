@@ -1,4 +1,4 @@
-"""What robot and settings say before any sample: prior of W, hyper-parameters, empty model."""
+"""Prior of robot and settings before any sample: of W, hyper-parameters, empty model."""
 
 from __future__ import annotations
 

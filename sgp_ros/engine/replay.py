@@ -1,9 +1,9 @@
 """A whole stream through an engine, with the hyper-parameter fits that are due put in force.
 
-All factors at once would be one callback as long as those of many samples. Outputs that share no
-factor are independent given W, so a model in which some have new hyper-parameters and others
-still the old ones is a model like any other; every step is a change of settings that a record
-holds and a replay repeats.
+To replace all factors at once would make one callback as long as those of many samples. Outputs
+that share no factor are independent given W, so a model in which some have new hyper-parameters
+and others still the old ones is valid; every step is a change of settings that a record holds and
+a replay repeats.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Rest of joints in a window, where dry friction takes up what is needed.
 
-While a joint rests, dry friction is anything between what it is in sliding one way and the other.
+While a joint rests, dry friction takes any value between those of sliding one way and the other.
 The equation of a window is then an inequality: it holds for some force within that band, and only
 what lies outside the band is an error.
 
@@ -149,13 +149,13 @@ def free_targets(y: np.ndarray, held: np.ndarray) -> np.ndarray:
     return targets
 
 
-def told(
+def learnable(
     regression: Regression, prediction: OnlinePrediction, y: np.ndarray, held: np.ndarray
 ) -> tuple[OnlinePrediction, np.ndarray] | None:
-    """Return the sample that an equation tells, in which rows of held joints are zero.
+    """Return the sample to learn from an equation, in which rows of held joints are zero.
 
-    Such a row tells W nothing where the joint has no Z. One that Z enters cannot be left out
-    alone: outputs share their samples.
+    Such a row holds no information on W where the joint has no Z. A row that Z enters cannot be
+    left out alone, because outputs share their samples.
 
     Args:
         regression: that made the prediction.

@@ -1,4 +1,4 @@
-"""What the engine gives back: values only, read by nodes, commands and reports."""
+"""Results of the engine: values only, read by nodes, commands and reports."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ CHANGE_REFUSALS = ('late', 'clock', 'invalid', 'no_factor', 'reset', 'error')
 """Reasons for which a change of settings or a reset in a stream is refused."""
 
 REFIT_REFUSALS = ('diverged', 'no_better', 'no_factor', 'outdated')
-"""Reasons for which a fit is refused: it found nothing that has an evidence; it found none higher
-than the one in force; the buffer of by then has no factor under what it found; what it was fitted
-to is forgotten."""
+"""Reasons for which a fit is refused: no hyper-parameters with a finite evidence were found; none
+with a higher evidence than those in force; the covariance of the present buffer has no factor
+under them; the samples that they were fitted to are forgotten."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -184,7 +184,7 @@ class Counts:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What one `push` set free.
+    """Result of one `push`.
 
     Attributes:
         released: events in the order in which they took effect; a record of these reproduces
@@ -205,7 +205,7 @@ class Step:
 
 
 NOTHING = Step()
-"""What an event sets free that waits, or is refused."""
+"""Result of an event that waits, or is refused."""
 
 
 def read_parameters(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 EFFORT, POSITION, VELOCITY = 'effort', 'position', 'velocity'
-"""What a command asks for."""
+"""Quantities that a command can ask for."""
 
 SettingValue = bool | int | float | str | tuple[float, ...] | tuple[str, ...]
 

@@ -1,4 +1,4 @@
-"""What the errors of one-step predictions tell: scores, drift, intervals, the weight of Z.
+"""Statistics of the errors of one-step predictions: scores, drift, intervals, the weight of Z.
 
 Everything here sees an error after the prediction it belongs to. Scores and drift are of one
 stream; the scales of the intervals and the weights of Z belong to the model and stay with it.
@@ -52,23 +52,25 @@ class Scoring:
 
         Args:
             channel: key of `CHANNELS`.
-            raw: variances of the model, (k,); what is no variance stays as it is.
+            raw: variances of the model, (k,); other numbers stay as they are.
         """
         return np.array([
             scale.variance(v) if 0.0 < v < math.inf else v
             for scale, v in zip(self.scales[channel], raw.tolist(), strict=True)
         ])  # fmt: skip
 
-    def take(self, channel: str, values: Channel, is_told: np.ndarray, *, adapts: bool) -> None:
+    def take(
+        self, channel: str, values: Channel, is_informed: np.ndarray, *, adapts: bool
+    ) -> None:
         """Score the joints whose variance is known; their scales follow if `adapts`.
 
         Args:
             channel: key of `CHANNELS`.
             values: measured and predicted.
-            is_told: whether the equation says something of each joint.
+            is_informed: whether the equation holds information on each joint.
             adapts: whether the intervals learn from these errors.
         """
-        for j in np.flatnonzero(is_told):
+        for j in np.flatnonzero(is_informed):
             y, mean, variance, raw = (
                 float(x[j])
                 for x in (values.measured, values.mean, values.variance, values.raw_variance)
@@ -79,26 +81,28 @@ class Scoring:
             if adapts:
                 self.scales[channel][j].add(y - mean, raw)
 
-    def take_target(self, values: Channel, is_told: np.ndarray) -> None:
+    def take_target(self, values: Channel, is_informed: np.ndarray) -> None:
         """Test the errors of the target for drift, beside what the model itself expects."""
         errors = (values.measured - values.mean) / np.sqrt(values.raw_variance)
-        for j in np.flatnonzero(is_told):
+        for j in np.flatnonzero(is_informed):
             self.drift[j].add(float(errors[j]))
 
     def take_baseline(
-        self, y: np.ndarray, mean: np.ndarray, variance: np.ndarray, is_told: np.ndarray
+        self, y: np.ndarray, mean: np.ndarray, variance: np.ndarray, is_informed: np.ndarray
     ) -> None:
         """Score the physics alone, (k,) each."""
-        for j in np.flatnonzero(is_told):
+        for j in np.flatnonzero(is_informed):
             self.baseline[j].add(*(float(x[j]) for x in (y, mean, variance, variance)))
 
     def weight(self, *, is_used: bool) -> np.ndarray:
         """Return the weight of Z for each joint, (k,); 1 where none is used."""
         return np.array([weight.value if is_used else 1.0 for weight in self.weights])
 
-    def take_experts(self, model: np.ndarray, physics: np.ndarray, is_told: np.ndarray) -> None:
+    def take_experts(
+        self, model: np.ndarray, physics: np.ndarray, is_informed: np.ndarray
+    ) -> None:
         """Weigh the errors (k,) with Z against those of the physics alone."""
-        for j in np.flatnonzero(is_told):
+        for j in np.flatnonzero(is_informed):
             self.weights[j].add(float(model[j]), float(physics[j]))
 
     def state(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What is known of one setting before it has a value: type, unit, range, default."""
+"""Declaration of one setting before it has a value: type, unit, range, default."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ EFFORT_SOURCES = {
     'auto': 'auto', 'measured': 'state', 'commanded': 'command', 'state': 'state',
     'command': 'command',
 }  # fmt: skip
-"""What `--effort` of the commands may be, to the value of the setting `effort.source`."""
+"""Choices of `--effort` of the commands, to the value of the setting `effort.source`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What is known of one setting before it has a value.
+    """Declaration of one setting before it has a value.
 
     Attributes:
         name: dotted name, such as `filter.window`.

@@ -61,7 +61,7 @@ def take_snapshot(engine: Engine) -> dict[str, np.ndarray]:
 
 
 def _plain(engine: Engine) -> dict[str, Any]:
-    """Return what is no array, as JSON holds it."""
+    """Return everything but arrays, as JSON holds it."""
     estimator, intake, order = engine.estimator, engine.intake, engine.order
     return {
         'version': VERSION,
@@ -78,7 +78,7 @@ def _plain(engine: Engine) -> dict[str, Any]:
         else [order.released_ns, order.released_rank],
         'newest_ns': order.newest_ns,
         'pending': [_encode(event) for event in order.pending],
-        'suspects': [_encode(event) for event in engine.clock.suspects],
+        'suspects': [_encode(event) for event in engine.clock.pending],
         'began_ns': engine.began_ns,
         'commands': _held(intake.commands),
         'targets': _held(intake.targets),
@@ -166,7 +166,7 @@ def _fill(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
         text['newest_ns'],
         [_decode(event) for event in text['pending']],
     )
-    engine.clock.suspects = [_decode(event) for event in text['suspects']]
+    engine.clock.pending = [_decode(event) for event in text['suspects']]
     engine.began_ns = text['began_ns']
     estimator = engine.estimator
     estimator.scoring.restore(text['scoring'])

@@ -1,7 +1,7 @@
 """Weights that filter an equation of motion over one window, for stamps of any spacing.
 
 A least-squares fit over a window gives weights `c_j` with `a = sum_j c_j q(t_j)`. The weights
-annihilate what a motion without acceleration does, so `a = integral kappa(s) q''(s) ds` holds
+annihilate any motion without acceleration, so `a = integral kappa(s) q''(s) ds` holds
 exactly, with the Peano kernel `kappa(s) = sum_j c_j max(t_j - s, 0)` (from positions) or
 `kappa(s) = sum_{t_j > s} c_j` (from velocities), which has unit area. Averaging every other term
 of the equation with the same kernel filters the equation instead of approximating it.
@@ -73,7 +73,7 @@ class WeakForm:
         return areas[index] + inside * (self.left[index] + 0.5 * slope * inside)
 
     def nodes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return three samples that stand for all in an average of what changes slowly.
+        """Return three samples that represent all in an average of slowly changing quantities.
 
         Returns:
             indices (3,) and shares (3,), which average a quadratic as the kernel does.

@@ -2,9 +2,9 @@
 
 One filter for both sides of the equation of motion, for stamps of any spacing.
 
-What a column holds of the acceleration is averaged with it: `integral kappa M(q) a ds` is the
-averaged M times the averaged a, and what both change together within the window, for which a
-comes from the polynomial that follows the motion.
+Coefficients of the acceleration are averaged together with it: `integral kappa M(q) a ds` is the
+averaged M times the averaged a plus their covariance within the window, for which a comes from
+the polynomial that follows the motion.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What signals say of their own next values.
+"""Prediction of signals from their own earlier values.
 
 A robot's acceleration has a prior: it is finite, and it follows from the one before. Each of k
 signals is an autoregression of second order with a constant, `x_t = c_1 x_(t-1) + c_2 x_(t-2) +

@@ -215,7 +215,7 @@ class FactoredBuffer:
     def explain(
         self, whitenings: tuple[Whitening, ...]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return what the samples tell at an input: of each regressor, of Z, and its variance.
+        """Return the prediction at an input: of each regressor, of Z, and its variance.
 
         Returns:
             Shapes (k, p), (k,) and (k,): Z is the second less the first times W.

@@ -1,6 +1,6 @@
 """Intervals that hold their rate in the long run, whatever the errors do.
 
-A model says how uncertain it is under its own assumptions: white noise of one variance, the right
+A model states its uncertainty under its own assumptions: white noise of one variance, the right
 equation. Errors of a real robot are coloured, their size changes with the motion, and some of them
 are physics that is missing. So the errors themselves set the variance, in three parts:
 
@@ -60,7 +60,7 @@ class IntervalScale:
     def add(self, error: float, raw: float) -> None:
         """Take one error [unit] after it was predicted with the variance `raw` > 0 [unit^2].
 
-        One error counts for no more than `_LARGEST_ERROR` of the deviations now expected: a
+        An error is limited to `_LARGEST_ERROR` of the deviations now expected: a
         single outlier must not leave the interval wide for long.
         """
         reference, variance = self._reference(raw), self.variance(raw)

@@ -81,7 +81,7 @@ def reduce_rows(
         row: (p,), for what is rotated.
 
     Returns:
-        Whether every element was clearly a pivot or clearly none.
+        Whether every element was clearly a pivot or clearly not one.
     """
     for i in range(len(z)):
         for j in range(i, len(z)):

@@ -205,7 +205,7 @@ def _take_sums(U: np.ndarray, r: int, first: int, n: int, start: int, x: np.ndar
 def substitute_back(U: np.ndarray, start: int, x: np.ndarray) -> None:
     """Replace x (n,) by L^-T x for the factor that begins at `start`. O(n^2 / 2).
 
-    Four sums at once, of which none waits for another.
+    Four independent sums at once.
     """
     n = len(x)
     rest = n % 4

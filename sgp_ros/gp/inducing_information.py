@@ -2,7 +2,7 @@
 
 Z is linear in the weights of features as physics is in W, so one least-squares problem in
 square-root form holds all that was ever learned: each sample is a row, rotated into the weights of
-its outputs first, then into W. None counts twice, however often the robot comes back to a place.
+its outputs first, then into W. No sample counts twice, however often the robot returns to a place.
 
 Other hyper-parameters take over that information without the stream. The weights of features are
 values of Z: `z(B) = L theta`. Equations of the data alone, in which the prior of the weights has
@@ -262,7 +262,7 @@ class GradualFill:
         self.count = 0
 
     def catch_up(self, samples: SampleBuffer, room: int) -> None:
-        """Absorb so many samples that at this pace none is left when `room` more have come.
+        """Absorb as many samples as are needed for none to be left after `room` more have come.
 
         With room for none, all of them.
         """

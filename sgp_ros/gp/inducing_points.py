@@ -123,7 +123,7 @@ class InducingPoints:
     def explain(
         self, features: Whitening, gain: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return what the data tell at an input: of each regressor, of Z, and its variance.
+        """Return the prediction at an input: of each regressor, of Z, and its variance.
 
         Args:
             features: of the input.

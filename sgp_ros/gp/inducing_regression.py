@@ -63,8 +63,8 @@ class InducingPointRegression(Regression):
     def unresolved(self) -> int:
         """Samples at which the features of a component had no room for what Z may do there.
 
-        Such samples tell W and Z little: what Z does there may be the same at each return, so
-        they count as if it were.
+        Such samples hold little information on W and Z: Z may take the same value there at each
+        return, so they count as if it did.
         """
         return self._basis.unresolved
 

@@ -208,12 +208,12 @@ class _Solved:
 
     @cached_property
     def echelon(self) -> Echelon:
-        """What tells determined rows apart where that is beyond doubt."""
+        """Echelon form, which separates determined rows where that is beyond doubt."""
         return Echelon(self._A, self._z, self.scale)
 
     @cached_property
     def decomposition(self) -> _Decomposition:
-        """What tells them apart in every case."""
+        """Pivoted decomposition, which separates them in every case."""
         return _Decomposition(self._A, self._z, self.scale)
 
 
@@ -244,7 +244,7 @@ class _Decomposition:
 
 
 def marginal_equations(rows: np.ndarray, kept: Sequence[int]) -> np.ndarray:
-    """Return what equations of unit noise tell of some unknowns, whatever the others, (r, c).
+    """Return the information of equations of unit noise on some unknowns, for any others, (r, c).
 
     What is orthogonal to all columns of the others is free of them, which a QR with pivoting finds
     also where they depend on each other (Golub and Van Loan, section 5.4.2). O(m p^2).

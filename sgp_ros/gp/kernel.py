@@ -1,4 +1,4 @@
-"""Kernel of the process Z: one class that says of itself all that the rest of the package asks.
+"""Kernel of the process Z: one class that declares all that the rest of the package needs.
 
 Its name chooses it (`model.kernel`), its hyper-parameters carry name, unit, range and bounds of
 the search, `scales` tells where the search starts, `values` and `of_values` save and restore it.
@@ -88,7 +88,7 @@ class Kernel(ABC):
     inputs: tuple[int, ...]
 
     def __post_init__(self) -> None:
-        """Refuse what is no kernel.
+        """Refuse anything but a kernel.
 
         Raises:
             ValueError: a number of hyper-parameters that is not that of the inputs, no input, or a

@@ -113,7 +113,7 @@ class AdditiveSquaredExponential(Kernel):
     """Sum of squared exponential kernels, one per input (Duvenaud, Nickisch, Rasmussen 2011).
 
     `kappa(u, u') = sum_i signal_variance_i exp(-(u_i - u'_i)^2 / (2 l_i^2))`: Z is a sum of
-    functions of one input each, which still says something where only one input leaves the data.
+    functions of one input each, which still predicts where only one input leaves the data.
 
     Attributes:
         signal_variances: one per input [unit of the component squared].

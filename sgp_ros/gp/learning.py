@@ -258,7 +258,7 @@ class _Search:
         return value, -posterior.evidence_gradient()
 
     def _wall(self, theta: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return what stands for the evidence where the covariance has no factor.
+        """Return the value taken as the evidence where the covariance has no factor.
 
         A bowl about the best point: a line search that came from there is led back by a usable
         step. From a huge constant it would step back to where it started, and end there.

@@ -50,7 +50,7 @@ def singular_values(A: np.ndarray) -> np.ndarray:
 
 
 def null_space(A: np.ndarray) -> np.ndarray:
-    """Return an orthonormal basis (m, m - r) of what A (n, m) of rank r maps to rounding.
+    """Return an orthonormal basis (m, m - r) of the null space of A (n, m) of rank r.
 
     Raises:
         NumericalError: as `svd`.

@@ -58,8 +58,8 @@ class OnlineRegression(Regression):
     def unresolved(self) -> int:
         """Samples at which the features had no room for what Z may do there.
 
-        Such samples tell W and Z little: what Z does there may be the same at each return, so
-        they count as if it were.
+        Such samples hold little information on W and Z: Z may take the same value there at each
+        return, so they count as if it did.
         """
         return 0 if self._basis is None else self._basis.unresolved
 

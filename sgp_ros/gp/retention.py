@@ -65,7 +65,7 @@ class Oldest:
 
 
 class LeastInformative:
-    """The sample goes whose observation tells least of Z beside the others.
+    """The sample is dropped whose observation holds the least information on Z beside the others.
 
     With `C = (K + noise I)^-1` the variance of an observation given all others is `1 / C_ii`
     (Sundararajan and Keerthi 2001), so it tells `-1/2 log(noise C_ii)` nat of Z; these add up over

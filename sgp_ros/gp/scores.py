@@ -1,4 +1,4 @@
-"""Scores of one-step predictions, and a test that tells from their errors when a robot changed.
+"""Scores of one-step predictions, and a test of their errors for a change of the robot.
 
 Whether a model fits is one question, whether its errors grow is another: a model that never fitted
 well does not drift. So each squared error is compared with the mean of those before it. Under an

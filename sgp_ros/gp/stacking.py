@@ -7,9 +7,10 @@ under the variance that suits each best are in the ratio (profile likelihood, n 
 
     (S_physics / S_model)^(n / 2),    S the mean of squared errors,
 
-which is free of scale and of what either says of itself. The weight of Z is its share of the two
-(Bayesian averaging, Hoeting et al. 1999; with fading memory Raftery et al. 2010, dynamic model
-averaging). The mean is then the weighted mean, and the covariance that of the mixture.
+which depends neither on scale nor on the variance that either claims. The weight of Z is its
+share of the two (Bayesian averaging, Hoeting et al. 1999; with fading memory Raftery et al. 2010,
+dynamic model averaging). The mean is then the weighted mean, and the covariance that of the
+mixture.
 """
 
 from __future__ import annotations

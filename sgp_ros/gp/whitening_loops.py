@@ -71,7 +71,7 @@ def solve_lower(U: np.ndarray, start: int, x: np.ndarray) -> None:
 def combine_rows(v: np.ndarray, rows: np.ndarray, total: np.ndarray) -> None:
     """Set `total (m,) = v (n,) @ rows (n, m)`. O(n m).
 
-    Rows are added in order, each element in the same way: the bits depend on no library.
+    Rows are added in order, each element in the same way: the bits do not depend on a library.
     """
     n = len(v)
     quads = n - n % 4
@@ -108,7 +108,7 @@ def fill_covariances(
 ) -> None:
     """Set v (n,) to the covariances of one scaled input s (d,) with n of S (N, d) from `start` on.
 
-    O(n d). Four squared distances at once, of which no sum waits for another.
+    O(n d). Four independent squared distances at once.
     """
     n = len(v)
     quads = n - n % 4
@@ -144,7 +144,7 @@ def whiten_vector(
         start: first live row of both.
         scales: (k,) of the outputs.
         v: covariances of an input with the samples.
-        explained: (k w,), becomes what the samples tell of the data there.
+        explained: (k w,), becomes the prediction of the data there by the samples.
     """
     n = len(v)
     solve_lower(U, start, v)
@@ -185,7 +185,7 @@ def whiten_input(
         scales: (k,) of the outputs.
         s: becomes the scaled input.
         v: (n,), becomes the whitened covariances.
-        explained: (k w,), becomes what the samples tell of the data there.
+        explained: (k w,), becomes the prediction of the data there by the samples.
     """
     for j in range(len(s)):
         s[j] = u[columns[j]] / lengths[j]
@@ -196,7 +196,7 @@ def whiten_input(
 def whitened_numpy(
     L: np.ndarray, covariances: np.ndarray, white: np.ndarray, scales: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return v, what the samples tell and the squared norm of `whiten_vector`, by the library.
+    """Return v, prediction and squared norm of `whiten_vector`, by the library.
 
     Args:
         L: (n, n) lower factor.

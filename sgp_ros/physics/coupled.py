@@ -1,4 +1,4 @@
-"""What one joint does to another: torque of its motor, a cable, a motor that turns with both."""
+"""Couplings between joints: torque of a motor, a cable, a motor that turns with both."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ class Body(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PilotRun:
-    """What a pilot run of the nominal robot showed: rms and extremes, (k,) each."""
+    """Statistics of a pilot run of the nominal robot: rms and extremes, (k,) each."""
 
     effort: np.ndarray
     velocity: np.ndarray
@@ -62,7 +62,7 @@ class Drawn:
         largest: greatest size.
         power: of the size, with which its share of the squared effort grows.
         index: joint it acts on, -1 for none; None for the one that was drawn.
-        place: word for a place that is no joint; empty for the joint itself.
+        place: word for a place other than a joint; empty for the joint itself.
         interval: of the position it is confined to.
     """
 

@@ -126,7 +126,7 @@ class Effect:
 
     @property
     def key(self) -> str:
-        """What tells it from all others."""
+        """Unique name."""
         return self.name
 
     @property
@@ -148,7 +148,7 @@ class Effect:
         return tuple(known[n] for n in self.linear if n in known) or (Quantity('scale', '1'),)
 
     def shape_names(self, kind: str = '') -> tuple[str, ...]:
-        """Return the stated numbers that are no coefficients."""
+        """Return the stated numbers that are not coefficients."""
         return tuple(q.name for q in self.stated_quantities(kind) if q.name not in self.linear)
 
     def model(self, numbers: Numbers, kind: str = '') -> tuple[np.ndarray, np.ndarray]:
@@ -199,7 +199,7 @@ class Effect:
         return all(bool(x > 0.0) for q, x in named if q.low >= 0.0)
 
     def is_inside(self, at: Placed, motion: SeenMotion) -> bool:
-        """Return whether a fit has not run into a bound where it is no such law; usually so."""
+        """Return whether a fit has stayed off bounds at which this law becomes another one."""
         return True
 
     def interval(self, at: Placed, motion: SeenMotion) -> tuple[str, list[list[float]]] | None:

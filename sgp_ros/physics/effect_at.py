@@ -49,7 +49,7 @@ class EffectAt:
 
         Args:
             effect: the law.
-            joint: name of a joint that moves on its own, or a word for a place that is no joint.
+            joint: name of a joint that moves on its own, or a word for another place.
             parameters: the stated numbers, and `kind`, `source_joint`, `side` where there are.
             tree: the robot.
             std: standard deviations of the numbers that have one.
@@ -115,7 +115,7 @@ class EffectAt:
         return self.effect.columns(motion, self.place, self.shape)
 
     def force(self, motion: SeenMotion) -> np.ndarray:
-        """Return what it exerts in a motion, (n, k) [N m or N]; zeros where it is no force."""
+        """Return what it exerts in a motion, (n, k) [N m or N]; zeros where it is not a force."""
         force = np.zeros(motion.position.shape)
         if not self.effect.is_force:
             return force
@@ -134,7 +134,7 @@ class EffectAt:
         return self.effect.is_possible(self, motion)
 
     def at_bounds(self, motion: SeenMotion) -> frozenset[str]:
-        """Return the reported numbers that a search left at a bound: they are no estimates."""
+        """Return the reported numbers that a search left at a bound: they are not estimates."""
         if not len(self.shape):
             return frozenset()
         scales = self.effect.scales(motion, self.place, self.shape)

@@ -3,7 +3,7 @@
 A formula is made of
 
 - `q[J]`, `dq[J]`, `ddq[J]`, `tau[J]`: position, velocity, acceleration and effort of joint J,
-  whose name stands in quotes where it is no plain word: `q["arm-1"]`;
+  whose name stands in quotes unless it is a plain word: `q["arm-1"]`;
 - numbers and named parameters;
 - `+ - * / **`, parentheses, and the functions of `FUNCTIONS`;
 - in a law of force also `t`, the time since the beginning of a recording, and functions that
@@ -38,7 +38,7 @@ from sgp_ros.physics.grammar import (
 from sgp_ros.physics.term import Motion
 
 Place = TypeVar('Place')
-"""What a formula is evaluated on, such as a motion or a mapping of values."""
+"""Point at which a formula is evaluated, such as a motion or a mapping of values."""
 T = TypeVar('T')
 Special = Callable[[str, frozenset[tuple[str, str]]], Callable[..., object] | None]
 """From a function and the signals in its arguments to what takes a place and these arguments."""
@@ -54,7 +54,7 @@ class Formula:
         signals: pairs such as `('dq', 'elbow')`; `('t', '')` for the time.
         functions: names of those in it.
         driven_degree: its degree as a polynomial in accelerations and efforts; 0 without them, 1
-            where it is affine, infinite where it is no polynomial.
+            where it is affine, infinite where it is not a polynomial.
 
     Examples:
         >>> friction = read_formula('level * sign(dq[elbow])')
@@ -141,7 +141,7 @@ def read_formula(text: object, *, is_law: bool = False) -> Formula:
         is_law: whether it is a law of force, which may see the time and remember.
 
     Raises:
-        ConfigError: neither of the two, or the text is no formula; it says which part of it.
+        ConfigError: neither of the two, or the text is not a formula; it says which part.
     """
     if isinstance(text, bool) or not isinstance(text, (str, int, float)):
         raise ConfigError(f'formula {text!r}', 'a text or a number')

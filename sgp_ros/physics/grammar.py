@@ -50,7 +50,7 @@ EXPECTED = (
 
 @dataclass(slots=True)
 class Contents:
-    """What a text is made of, noted while it is checked."""
+    """Contents of a text, noted while it is checked."""
 
     text: str
     is_law: bool

@@ -22,7 +22,7 @@ from sgp_ros.physics.waves import Wave, most_periods, peak_width, per_turn
 MECHANICS = 'Khalil and Dombre 2002, Modeling, Identification and Control of Robots, chapter 9'
 
 LEAST_PERIODS = 3.0
-"""Periods of cogging per revolution; fewer are no cogging. The schema."""
+"""Least periods per revolution for cogging. The schema."""
 
 
 def wave_coefficients(x: Numbers) -> tuple[float, float]:

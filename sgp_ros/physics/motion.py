@@ -82,7 +82,7 @@ class Structure(Protocol):
 
 
 class Commands(Protocol):
-    """What the drives receive."""
+    """Commands that the drives receive."""
 
     @property
     def values(self) -> np.ndarray:
@@ -153,7 +153,7 @@ class SeenMotion(Protocol):
 
     @property
     def drive(self) -> Commands | None:
-        """What the drives receive; None where only efforts were measured."""
+        """Commands that the drives receive; None where only efforts were measured."""
 
     @property
     def direction(self) -> np.ndarray:

@@ -22,7 +22,7 @@ from sgp_ros.physics.parts import BASE, Place, Placed, Quantity, Value, relative
 AXES = ('x', 'y', 'z')
 _SOFTEST_HZ = 0.3
 _PERIODS = 5.0
-"""Periods of the softest mount in the recording: fewer are no resonance."""
+"""Least periods of the softest mount in the recording for a resonance."""
 _STIFFEST = 3.0
 """Stiffest mount over the bandwidth."""
 _DAMPING, _USUAL_RATIO = (1e-3, 1.0), 0.1

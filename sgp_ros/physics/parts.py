@@ -15,14 +15,14 @@ from sgp_ros.physics.motion import SeenMotion, Structure
 Value = float | str
 
 PLACES = {'base': -1, 'tool': -2, 'all': -3}
-"""Words for places that are no joint."""
+"""Words for places other than joints."""
 NOWHERE = -4
 """Place of an effect whose robot is not known."""
 SIDES = {'lower': -1, 'upper': 1}
 
 
 class Site(Enum):
-    """What an effect may be put on."""
+    """Part of a robot that an effect may be put on."""
 
     JOINT = 'a joint'
     MOTOR = 'a motor'
@@ -121,7 +121,7 @@ class Quantity:
         is_scored: whether estimates are compared with the truth where worlds are drawn.
         kinds: the kind of the effect that it belongs to; empty for all.
         is_sought: whether a diagnosis states the least of it that the recording would show.
-        neutral: value with which the effect is none, where the number says how large it is.
+        neutral: value at which the effect vanishes, if the number states its size.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""What samples show of the ripple that held targets put on the motion between them.
+"""Ripple that held targets put on the motion between samples, as the samples show it.
 
 A target that is held for h and followed by a drive of the gains kp, kd is its mean, half a step
 late, and a sawtooth e of the slope -s, where s is the speed of the target. The loop answers it by

@@ -14,7 +14,7 @@ import numpy as np
 CHANNELS = ('position', 'velocity', 'acceleration', 'effort')
 """The four quantities of a joint."""
 INPUT_CHANNELS = (*CHANNELS, 'direction')
-"""What Z can see of a joint, in the order of `Robot.inputs`."""
+"""Inputs of Z at a joint, in the order of `Robot.inputs`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""Directories of rosbag2: their files, what metadata.yaml says of them, their compression."""
+"""Directories of rosbag2: their files, their metadata.yaml, their compression."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def read_directory(path: Path) -> tuple[Source, tuple[str, ...]]:
 
     Raises:
         RecordingError: no file of a recording in it, or a damaged one.
-        TooMuchError: a file that is none, or that unpacks to more than `RATIO`.
+        TooMuchError: not a regular file, or one that unpacks to more than `RATIO`.
     """
     metadata = _read_metadata(path)
     missing = [name for name in metadata.files if not (path / name).exists()]
@@ -105,7 +105,7 @@ def _size(files: Sequence[Path]) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _Metadata:
-    """What metadata.yaml says; a missing or broken one, as after a crash, says nothing.
+    """Contents of metadata.yaml; empty if it is missing or broken, as after a crash.
 
     Attributes:
         files: names of the files.

@@ -1,4 +1,4 @@
-"""What the name of a column says: a quantity, a joint, a unit, measured or asked for.
+"""Meaning of the name of a column: a quantity, a joint, a unit, measured or asked for.
 
 Names are cut into words at dots, slashes, underscores, brackets, changes of case and before
 digits. Words that name a quantity, a unit or a target are taken out; what is left names the joint.
@@ -51,7 +51,7 @@ _PAIRS = {('p', 'gain'): KP, ('d', 'gain'): KD, ('q', 'dot'): VELOCITY, ('theta'
 
 @dataclass(frozen=True, slots=True)
 class Meaning:
-    """What a name says.
+    """Meaning of a name.
 
     Attributes:
         role: the quantity; `command` where only that it is asked for; empty for nothing known.
@@ -67,7 +67,7 @@ class Meaning:
 
     @property
     def joint(self) -> str:
-        """What is left without words that mean nothing beside others."""
+        """Rest of the name, without words that mean nothing beside others."""
         return '_'.join(w for w in self.rest if w.lower() not in _FILLER)
 
 

@@ -28,7 +28,7 @@ _GAP = 5.0
 
 @dataclass(frozen=True, slots=True)
 class ImportSummary:
-    """What `import_table` wrote.
+    """Result of `import_table`.
 
     Attributes:
         path: of the recording.

@@ -27,7 +27,7 @@ DAMAGE = (
     McapError, struct.error, ValueError, RuntimeError, KeyError, TypeError, AttributeError,
     IndexError, OverflowError, MemoryError, EOFError, zstandard.ZstdError,
 )  # fmt: skip
-"""What reading damaged records raises."""
+"""Exceptions from reading damaged records."""
 
 _LOOSE_BYTES, _BLOCK_BYTES = 1 << 20, 1 << 16
 _LEAST_RUN, _MANY = 8, 4096
@@ -52,7 +52,7 @@ class Messages(NamedTuple):
 
 
 class Stamps(NamedTuple):
-    """What the heads of some messages say: channels and log times [ns], (n,)."""
+    """Heads of some messages: channels and log times [ns], (n,)."""
 
     channels: np.ndarray
     log_ns: np.ndarray
@@ -182,7 +182,7 @@ def read_records(data: bytes, unpacking: Unpacking) -> Iterator[Schema | Channel
 
     Raises:
         TooMuchError: beyond `CHUNK_MB`, `MESSAGES` or `RATIO`.
-        McapError: a wrong checksum, or what is no record; others of `DAMAGE`.
+        McapError: a wrong checksum, or bytes that are not a record; others of `DAMAGE`.
     """
     for found, begin, size, number in _runs(data, unpacking):
         if isinstance(found, bytes) and number == 1:

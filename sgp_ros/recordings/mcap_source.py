@@ -57,7 +57,7 @@ class McapSource:
         size: of the files that these were unpacked from [bytes]; None where they were not.
 
     Raises:
-        RecordingError: a file that is no MCAP file.
+        RecordingError: a file that is not an MCAP file.
         TooMuchError: more messages than `MESSAGES`.
     """
 
@@ -86,7 +86,7 @@ class McapSource:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What was wrong with the files, one sentence each."""
+        """Damage of the files, one sentence each."""
         damage = [*self._damage.values()]
         if len(damage) > _LISTED:
             damage[_LISTED:] = [f'{len(damage) - _LISTED} more places are damaged']
@@ -177,7 +177,7 @@ class _Segment(NamedTuple):
 
 @dataclass(slots=True)
 class _FileIndex:
-    """What is known of one file.
+    """Index of one file.
 
     Attributes:
         channels: channel number to (topic, type, encoding).
@@ -196,7 +196,7 @@ def _index_file(path: Path, number: int, unpacking: Unpacking) -> _FileIndex:
     """Return the index of the file at `path`, its segments marked with `number`.
 
     Raises:
-        RecordingError: it is no MCAP file.
+        RecordingError: it is not an MCAP file.
     """
     with path.open('rb') as stream:
         magic = stream.read(len(MAGIC))

@@ -93,7 +93,7 @@ def require_unpacked(path: Path) -> None:
 
     Raises:
         TooMuchError: it does.
-        zipfile.BadZipFile: it is no archive.
+        zipfile.BadZipFile: it is not an archive.
     """
     with zipfile.ZipFile(path) as archive:
         size = sum(entry.file_size for entry in archive.infolist())

@@ -1,4 +1,4 @@
-"""What is published and recorded of one estimate, before it is a message of any library.
+"""Published and recorded values of one estimate, before it is a message of any library.
 
 The same values go to the topics, into a record and into the result of a replay.
 """
@@ -21,7 +21,7 @@ INTERVAL_95 = 1.959963984540054
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outputs:
-    """What is published of one estimate.
+    """Published values of one estimate.
 
     Attributes:
         stamp_ns: of the sample predicted [ns].
@@ -70,7 +70,7 @@ def outputs(estimate: Estimate) -> Outputs | None:
 def _error(
     estimate: Estimate,
 ) -> tuple[JointSample | None, tuple[JointSample, JointSample] | None]:
-    """Return residual and band of the effort; NaN where there is none of a joint."""
+    """Return residual and band of the effort; NaN for joints without one."""
     effort = estimate.effort
     if np.all(np.isnan(effort.mean)):
         return None, None

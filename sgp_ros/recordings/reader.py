@@ -40,7 +40,7 @@ _WRONG = (
     TypeError,
     MemoryError,
 )
-"""What the decoding of a damaged message raises, beside `MessageError`."""
+"""Exceptions from decoding a damaged message, beside `MessageError`."""
 _HOPELESS, _MOST, _LONGEST = 20_000, 0.9, 200
 """Unreadable messages, and their share, beyond which no more are tried; length of a reason."""
 _KINDS = 'an .mcap file, a rosbag2 directory or a ROS 1 .bag'

@@ -31,7 +31,7 @@ _ROLES = {
 
 @dataclass(frozen=True, slots=True)
 class JointHint:
-    """What is known of a joint before the table is read.
+    """Prior knowledge of a joint before the table is read.
 
     Attributes:
         name: of the joint.

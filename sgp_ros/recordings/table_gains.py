@@ -78,7 +78,7 @@ def row_gains(
         rows: n.
 
     Raises:
-        ConfigError: no such columns, another length, or a gain that is no number of at least 0.
+        ConfigError: no such columns, another length, or a gain that is not a number of at least 0.
     """
     if not is_recorded(stated):
         return None

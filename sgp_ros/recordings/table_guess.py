@@ -61,7 +61,7 @@ def guess_map(
         rate_hz: where the table has no time; None for one that it states.
 
     Raises:
-        RecordingError: no time or no positions can be told.
+        RecordingError: no time or no positions can be recognised.
     """
     guess = Guess()
     rows = _rows(columns)

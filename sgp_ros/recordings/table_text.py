@@ -29,14 +29,14 @@ _COMMENTS = '#%'
 _COMMENTS_KEPT, _TITLES = 100, 20
 """Lines of comment that may hold the header, and lines without a number behind it."""
 _FEW = 0.1
-"""Share of the cells of a column up to which those that are no numbers are mistakes."""
+"""Share of the cells of a column up to which cells without a number are mistakes."""
 _IN_BRACKETS = re.compile(r'\[[^\[\]]*\]')
 _APART = re.compile(r'\[[^\[\]]*\]|\S+')
 _TIME = re.compile(r'\d{4}-\d\d-\d\d[T ]\d')
 _BLOCK = 1 << 22
 """Characters of a block: its rows times its longest line."""
 _DIGITS, _FINE = 15, 1e6
-"""What a float keeps: that many digits, or below that magnitude 1e-10 of a unit."""
+"""Precision of a float: that many digits, or below that magnitude 1e-10 of a unit."""
 _RAGGED = '[lists of different lengths]'
 
 
@@ -180,9 +180,9 @@ def _texts(numbers: np.ndarray) -> np.ndarray:
 def _require_numbers(
     path: Path, name: str, cells: np.ndarray, lines: Sequence[int], remarks: list[str]
 ) -> None:
-    """Refuse a column (n,) of numbers with a few cells that are none; say it where they are more.
+    """Refuse a column (n,) of numbers with a few other cells; remark on it where they are many.
 
-    Such a column would be left out as one of texts is, and nobody would know.
+    Such a column would be left out like a column of texts, without a notice.
     """
     if cells.ndim > 1 or as_numbers(cells) is not None:
         return
@@ -194,7 +194,7 @@ def _require_numbers(
         raise RecordingError(
             said, 'a number, or an empty cell for a missing one', 'correct it, or drop the column'
         )
-    remarks.append(f'{said} is no number; a column with {len(wrong)} such cells is not used')
+    remarks.append(f'{said} is not a number; a column with {len(wrong)} such cells is not used')
 
 
 def _header(path: Path, lines: Iterator[Numbered]) -> tuple[str, str, Iterator[Numbered]]:

@@ -105,7 +105,7 @@ def read_table(
 
     Raises:
         ConfigError: what is wrong with the map, all in one error.
-        RecordingError: the file cannot be read, or holds something that is no number or time.
+        RecordingError: the file cannot be read, or holds something other than numbers and times.
     """
     path = Path(path)
     remarks: list[str] = []
@@ -171,7 +171,7 @@ def _without_impossible(
 ) -> Table:
     """Return a table less the rows that no robot can have shown, which are counted.
 
-    A missing velocity, effort or command is none of them; a position must be there.
+    A row may lack velocity, effort or command, but not a position.
     """
     asked = (table.commands, table.command_rates)
     arrays = [x for x in (*table.channels.values(), *asked) if x is not None]

@@ -41,7 +41,7 @@ class Topic:
 
     @property
     def last_name(self) -> str:
-        """What follows the last slash."""
+        """Part of the name after the last slash."""
         return self.name.rsplit('/', 1)[-1]
 
 
@@ -68,7 +68,7 @@ class Source(Protocol):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What the user should know of its state."""
+        """Remarks for the user on its state."""
 
     def messages(self, topics: Collection[Topic]) -> Iterator[RawMessage]:
         """Yield the messages of `topics` by log time."""

@@ -39,7 +39,7 @@ def definition(kind: str) -> str:
 def decoder(kind: str, encoding: str) -> Callable[[bytes], Message]:
     """Return the function from bytes to a message of type `kind`.
 
-    It raises a `MessageError` for bytes that are no such message.
+    It raises a `MessageError` for bytes that are not such a message.
 
     Args:
         kind: short type name.

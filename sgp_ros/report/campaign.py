@@ -41,7 +41,7 @@ def render_campaign(
     names = [results[i]['recording'] for i in order]
     rank = np.argsort(order)
     charts = {' '.join(trend.key): trend_chart(trend, names, rank) for trend in shown}
-    told = trend_sentences(content['trends'])
+    sentences = trend_sentences(content['trends'])
     covariates = list(dict.fromkeys(
         term.name for trend in trends for term in trend.terms
         if term.name not in {'level', PER_DAY, WARM_UP}
@@ -51,8 +51,8 @@ def render_campaign(
         'campaign.html', charts, still,
         title=f'Campaign of {len(results)} recordings',
         verdict=campaign_sentence(content),
-        changes=told, remarks=content['remarks'],
-        cards=_cards(content, results, told),
+        changes=sentences, remarks=content['remarks'],
+        cards=_cards(content, results, sentences),
         bound=f'{100.0 * content["false_alarms"]:g} %',
         covariates=covariates,
         trends=[_trend_row(trend, covariates) for trend in trends],
@@ -154,7 +154,7 @@ def _share(number: Mapping[str, Any], key: str, level: float) -> str:
 
 
 def _cards(
-    content: Mapping[str, Any], results: Sequence[Mapping[str, Any]], told: Sequence[str]
+    content: Mapping[str, Any], results: Sequence[Mapping[str, Any]], changes: Sequence[str]
 ) -> list[tuple[str, str]]:
     hours = sum(result.get('duration_s') or 0.0 for result in results) / 3600.0
     robots = len({result['robot'] for result in results})
@@ -162,7 +162,7 @@ def _cards(
         (str(len(results)), f'recordings of {robots} {"robot" if robots == 1 else "robots"}'),
         (f'{hours:.3g} h', 'recorded'),
         (str(len({f['recording'] for f in content['failures']})), 'recordings failed'),
-        (str(len(told)), f'{"change" if len(told) == 1 else "changes"} beyond chance'),
+        (str(len(changes)), f'{"change" if len(changes) == 1 else "changes"} beyond chance'),
     ]
 
 

@@ -61,7 +61,7 @@ class Cells:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chart:
-    """What one chart shows.
+    """Contents of one chart.
 
     Attributes:
         title: above it.

@@ -94,11 +94,11 @@ def check_sentence(content: Mapping[str, Any], setup: Sequence[Finding]) -> str:
         text += f', but without {", ".join(still)}: there is no motion above the noise'
     if setup:
         text += f'. First correct the set-up: {place(setup[0])}, {phrase(setup[0])}'
-    told = [
+    rivals = [
         f'{plain_name(e)} of {j}' for pairs in content.get('equivalents', ()) for j, e in pairs
     ]
-    if told:
-        text += f'; this motion cannot separate missing physics from {" or ".join(told)}'
+    if rivals:
+        text += f'; this motion cannot separate missing physics from {" or ".join(rivals)}'
     return f'{text}.'
 
 

@@ -16,7 +16,7 @@ _SHORT = {'less than': '<', 'more than': '>'}
 
 
 def cards(found: Diagnosis) -> list[dict[str, str]]:
-    """Return certainty, what is explained, and errors on what was held out, before and after."""
+    """Return certainty, the explained share, and errors on held-out data, before and after."""
     shown = []
     if found.certainty is not None:
         label = 'probability that the verdict is right'

@@ -194,7 +194,7 @@ def _law(found: Diagnosis, i: int, finding: Finding, force: np.ndarray) -> Chart
 
 
 def _shape(found: Diagnosis, j: int) -> Chart:
-    """Return what has no name over what it depends on most, in both directions."""
+    """Return the unnamed force over its most important variable, in both directions."""
     name, unit = found.joints[j], found.units[j]
     depends = next(d for d in found.dependences if d.joint == name)
     unknown = next(f for f in found.findings if f.effect == UNKNOWN and f.joint == name)

@@ -37,7 +37,7 @@ class LawCurve:
 
 
 def law_curve(found: Diagnosis, finding: Finding, force: np.ndarray) -> LawCurve:
-    """Return the law of a finding with force (N, k), and what the data say of it."""
+    """Return the law of a finding with force (N, k), and the data beside it."""
     j = _strongest(found, finding, force)
     x, label = abscissa(found, finding, j)
     law, measured = force[:, j], found.traces.after[:, j] + force[:, j]

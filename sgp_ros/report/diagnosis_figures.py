@@ -1,4 +1,4 @@
-"""Figures of a diagnosis: when and after which law it acts, on what it depends, what is gained."""
+"""Figures of a diagnosis: times and law of each effect, its variables, the gain."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ def draw_time(found: Diagnosis) -> Figure:
 
 
 def draw_laws(found: Diagnosis) -> Figure:
-    """Draw the forces of the largest findings over what they depend on, beside the data."""
+    """Draw the forces of the largest findings over their variables, beside the data."""
     shown = sorted(forces_of(found), key=lambda pair: -pair[0].share)[:_LARGE]
     figure = Figure(figsize=(10 if len(shown) > 1 else 6.5, 3.6), layout='constrained')
     for i, (finding, force) in enumerate(shown):

@@ -99,7 +99,7 @@ def near_and_far(found: Diagnosis) -> str:
 
 
 def rollouts_sentences(found: Diagnosis) -> str:
-    """Say what roll-outs are, how they end far from what was learned, and how many were left out.
+    """Explain roll-outs, how they end far from the training data, and how many were left out.
 
     Empty where none were made.
     """

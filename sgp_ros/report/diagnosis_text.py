@@ -1,4 +1,4 @@
-"""What a diagnosis found, in plain sentences for the terminal and the top of the page."""
+"""Results of a diagnosis in plain sentences, for the terminal and the top of the page."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def is_calm(found: Diagnosis) -> bool:
 
 
 def scored_joints(proof: Proof) -> list[str]:
-    """Return the joints with a meaningful score: an effort that never changes gives none."""
+    """Return the joints with a meaningful score: an effort that never changes has no score."""
     return [
         name
         for name, before in proof.nmse_before.items()
@@ -51,7 +51,7 @@ def worst_joint(proof: Proof) -> str:
 
 
 def explained(found: Diagnosis) -> float:
-    """Return the share of what the nominal robot leaves that the final model takes away.
+    """Return the share of the nominal robot's residual that the final model explains.
 
     Mean squares of the training recording, relative to the effort of each joint, summed.
     """
@@ -62,7 +62,7 @@ def explained(found: Diagnosis) -> float:
 
 
 def gain_text(subject: str, found: Diagnosis) -> str:
-    """Say how much of what the nominal robot leaves is explained; or that it is none."""
+    """Say which share of the nominal robot's residual is explained, or that nothing is."""
     share = explained(found)
     if share <= 0.0:
         return 'the residual of the nominal robot does not become smaller by it'
@@ -148,7 +148,7 @@ def differences_text(found: Diagnosis) -> list[str]:
 
 
 def equivalence_sentence(found: Equivalent) -> str:
-    """Say what this motion cannot tell from the findings, and which motion would."""
+    """Say which effects this motion cannot separate from the findings, and which motion would."""
     parts = [
         f'{plain_name(effect)} {_PLACES.get(joint, f"on {joint}")}'
         for joint, effect in found.effects

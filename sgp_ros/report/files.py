@@ -153,7 +153,7 @@ def _is_plain(name: object) -> bool:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """Return what a note of ours holds; nothing where there is none."""
+    """Return the content of one of our notes; empty where there is none."""
     with contextlib.suppress(OSError, ValueError):
         content = json.loads(path.read_text(encoding='utf-8'))
         return content if isinstance(content, dict) else {}

@@ -1,4 +1,4 @@
-"""What was found in a whole recording, as data for JSON: `identification.json`."""
+"""Results of an identification, as data for JSON: `identification.json`."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def collect_findings(
 
 
 def _regions(found: Identification) -> dict[str, FilteredData]:
-    """Return what was learned from, what was held out, and its near and far halves."""
+    """Return training data, held-out data, and the near and far halves of these."""
     regions = {'train': found.train, **found.held}
     for name, data in found.held.items():
         is_far = far_half(found.train, data)

@@ -118,7 +118,7 @@ def render(
 
 
 def _picture(engine: Engine, history: History, metrics: Mapping[str, Any]) -> str:
-    """Return the robot in the middle of its motion, coloured by what the physics alone leaves."""
+    """Return the robot in the middle of its motion, coloured by the physics' residual."""
     robot = engine.robot
     left = {
         joint: scores[robot.target]['nmse']

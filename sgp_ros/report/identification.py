@@ -141,7 +141,7 @@ def draw_filter(plan: Mapping[str, Any]) -> Figure:
 
 
 def draw_prediction(found: Identification, name: str) -> Figure:
-    """Draw the target of every joint over the first seconds of what was held out."""
+    """Draw the target of every joint over the first seconds of the held-out data."""
     data = found.held[name]
     method = drawn(found.fits)
     mean, variance = found.fits[method].predict(data)
@@ -162,9 +162,9 @@ def draw_prediction(found: Identification, name: str) -> Figure:
 
 
 def picture_of(found: Identification, findings: Mapping[str, Any], tree: Tree) -> str:
-    """Return the robot in the middle of its motion, coloured by what the physics alone leaves.
+    """Return the robot in the middle of its motion, coloured by the physics' residual.
 
-    Of what was held out, each joint relative to the variance of its own target.
+    On held-out data, each joint relative to the variance of its own target.
     """
     left = dict.fromkeys(findings['joints'], 0.0)
     for name in findings['held_out']:

@@ -1,4 +1,4 @@
-"""What an identification found, in plain sentences for the terminal and its page."""
+"""Results of an identification in plain sentences, for the terminal and its page."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def cautions(findings: Mapping[str, Any]) -> list[str]:
 
 
 def _is_unreal(consistency: Mapping[str, Any] | None) -> bool:
-    """Return whether the fitted parameters are those of no bodies, beyond what counts."""
+    """Return whether no real bodies have the fitted parameters, by more than what counts."""
     if not consistency or consistency['was_consistent']:
         return False
     distance = consistency['distance']

@@ -1,4 +1,4 @@
-"""What a search for a law that no list has found: its shape beside the data, formulas, words."""
+"""Result of a search for an unlisted law: its shape beside the data, formulas, words."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _curve(search: LawSearch, tried: TriedFormula) -> np.ndarray:
 
 
 def beyond_sentence(search: LawSearch) -> str:
-    """Return what formulas say where nothing was seen that the recording hardly tells apart."""
+    """Return the predictions, beyond the data, of formulas that the recording hardly separates."""
     alike = [t.beyond for t in search.formulas if t.is_alike and np.isfinite(t.beyond).all()]
     if not alike:
         return ''
@@ -119,7 +119,7 @@ def draw_searches(searches: Sequence[LawSearch]) -> Figure:
 
 
 def search_rows(found: Diagnosis) -> list[dict[str, Any]]:
-    """Return what a page says of each search."""
+    """Return the content of a page for each search."""
     return [
         {
             'joint': s.joint,

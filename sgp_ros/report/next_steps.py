@@ -1,4 +1,4 @@
-"""What to do after a command: a sentence and the command to copy."""
+"""Next steps after a command: a sentence and the command to copy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _HANDED_BACK = {'.xml': 'mjcf', '.mjcf': 'mjcf', '.sdf': 'sdf'}
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """What a command was given.
+    """Inputs of a command.
 
     Attributes:
         bag: the recording.
@@ -143,7 +143,7 @@ def after_campaign(out: Path) -> Steps:
 
 
 def ending(out: Path, steps: Steps) -> str:
-    """Return the last lines of a command: what its signs mean, its page, what to do next."""
+    """Return the last lines of a command: legend, its page, the next steps."""
     return f'{PLUS_MINUS}\nreport: {out / "report.html"}\n{next_lines(steps)}'
 
 

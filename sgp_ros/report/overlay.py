@@ -86,7 +86,7 @@ def _series(found: Mapping[str, Overlay]) -> dict[str, np.ndarray]:
 
 
 def write_series(path: Path, joints: Sequence[str], found: Overlay) -> None:
-    """Write measured and replayed positions as a table, a row a time; nothing where none is."""
+    """Write measured and replayed positions as a table, a row a time; nothing without replays."""
     columns = {'t': found.time}
     for j, joint in enumerate(joints):
         columns[f'{joint}_measured'] = found.position[:, j]

@@ -33,7 +33,7 @@ _LINES = {'dashed': '--', 'line': '-'}
 
 
 def overlaid(found: Diagnosis) -> str:
-    """Return the recording whose motion is shown: the held-out one furthest from what was learned.
+    """Return the recording to show: the held-out one furthest from the training data.
 
     Empty where no recording was replayed.
     """
@@ -256,7 +256,7 @@ def _rms(x: np.ndarray) -> float:
 
 
 def motion_card(found: Diagnosis) -> dict[str, str]:
-    """Return how far the models are off in a replay, for the top of a page; empty for none."""
+    """Return the errors of the models in a replay, for the top of a page; empty without one."""
     stem = overlaid(found)
     if not stem:
         return {}

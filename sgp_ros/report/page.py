@@ -1,6 +1,6 @@
 """Pages in one file: text, styles, charts as data, and the script that draws them.
 
-A page opens from disk and asks nobody for anything. Without scripts, and on paper, the same
+A page opens from disk and makes no request. Without scripts, and on paper, the same
 figures stand there as pictures.
 """
 
@@ -68,7 +68,7 @@ def typeset(text: str) -> str:
 
 
 def robot_styles() -> str:
-    """Return the styles of a picture of a robot, for pages that are none of ours."""
+    """Return the styles of a picture of a robot, for pages of other programs."""
     return f'<style>{_asset("robot.css")}</style>'
 
 

@@ -166,7 +166,7 @@ def _view(azimuth: float) -> np.ndarray:
 
 
 def _heights(wanted: np.ndarray) -> np.ndarray:
-    """Return the heights of the labels: near those wanted (k,), none over another."""
+    """Return the heights of the labels: near those wanted (k,), without overlap."""
     order = np.argsort(wanted, kind='stable')
     heights = wanted[order].astype(float)
     for i in range(1, len(heights)):

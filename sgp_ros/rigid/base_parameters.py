@@ -92,7 +92,7 @@ class RegressorFactor:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BaseParameters:
-    """What a regressor of p columns and rank r tells of its parameters.
+    """Identifiability of the parameters from a regressor of p columns and rank r.
 
     Attributes:
         names: p names of the parameters.

@@ -93,7 +93,7 @@ def _check(place: str, what: str, names: list[str], free: list[str]) -> None:
     unknown = [name for name in names if name not in free]
     if unknown:
         raise ConfigError(
-            f'{place}: {what} {unknown} are no joints that move on their own', f'some of {free}'
+            f'{place}: {what} {unknown} are not joints that move on their own', f'some of {free}'
         )
     if len(set(names)) != len(names):
         raise ConfigError(f'{place}: {what} {names} repeats a name', 'different names')

@@ -1,4 +1,4 @@
-"""What the compiled loops over a kinematic tree read: its constants, and the motion of its joints.
+"""Inputs of the compiled loops over a kinematic tree: its constants, and its joints' motion.
 
 Each body is described in the frame of its joint.
 """
@@ -14,7 +14,7 @@ from sgp_ros.rigid.tree import Tree
 
 
 class Geometry(NamedTuple):
-    """What the loops read of a tree of b bodies; index b stands for the root.
+    """Constants of a tree of b bodies for the loops; index b stands for the root.
 
     Attributes:
         order: (b,) bodies from the root outwards.

@@ -110,7 +110,7 @@ class Tree:
     frames: tuple[Frame, ...] = ()
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only; refuse parents that are no tree.
+        """Make the arrays read-only; refuse parents that do not form a tree.
 
         Raises:
             ValueError: a joint that hangs on itself, directly or by others.
@@ -122,7 +122,7 @@ class Tree:
                 value.setflags(write=False)
                 object.__setattr__(self, field.name, value)
         if len(self.outward_order()) != len(self.parents):
-            raise ValueError(f'parents {self.parents.tolist()} are no tree')
+            raise ValueError(f'parents {self.parents.tolist()} do not form a tree')
 
     @property
     def size(self) -> int:
@@ -171,8 +171,8 @@ def read_urdf(
         payload: a known load, added to the nominal inertia of the body that carries its link.
 
     Raises:
-        ConfigError: the file is no tree of revolute, continuous, prismatic and fixed joints, or a
-            name is not in it.
+        ConfigError: the file is not a tree of revolute, continuous, prismatic and fixed joints, or
+            a name is not in it.
     """
     urdf = parse_urdf(path_or_text)
     plan = plan_joints(urdf, joints, locked or {}, passive)

@@ -52,7 +52,7 @@ class UrdfJoint:
 
 @dataclass(frozen=True, slots=True)
 class Urdf:
-    """What a URDF says of dynamics.
+    """Dynamics stated by a URDF.
 
     Attributes:
         name: of the robot.

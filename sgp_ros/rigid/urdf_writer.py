@@ -42,7 +42,7 @@ def write_urdf(
         dynamics: joint to viscous damping [N m s/rad or N s/m] and Coulomb friction [N m or N].
 
     Raises:
-        ConfigError: the text is no URDF, lacks a named link or joint, or a mass is not positive.
+        ConfigError: not a URDF, a named link or joint is missing, or a mass is not positive.
     """
     source = source_text.encode('utf-8')
     layout = _Layout.of(source)

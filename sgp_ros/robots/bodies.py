@@ -2,7 +2,7 @@
 
 The bodies are the simplest that have these coefficients: links with parallel axes, one behind the
 other, of which a robot YAML states each number as a formula. What the coefficients do not
-determine is chosen there, and changes no motion; mass and centre of a link are no measurement.
+determine is chosen there, and changes no motion; mass and centre of a link are not measurements.
 """
 
 from __future__ import annotations

@@ -125,7 +125,7 @@ def checked_gains(
         ConfigError: not one number of each kind for each drive.
     """
     if not isinstance(content, dict) or not set(content) <= set(_KEYS):
-        raise ConfigError(f'{place}: {_told(content)}', f'the keys {", ".join(_KEYS)}')
+        raise ConfigError(f'{place}: {_description(content)}', f'the keys {", ".join(_KEYS)}')
     feedforward = content.get('feedforward', 'none')
     if feedforward not in _FEEDFORWARD:
         raise ConfigError(f'{place}: feedforward {feedforward!r}', ' or '.join(_FEEDFORWARD))
@@ -137,8 +137,8 @@ def _column(
     place: str, found: Any, key: str, joints: Sequence[str], actuated: Sequence[str]
 ) -> np.ndarray:
     if found is not None and not isinstance(found, Mapping):
-        told = f'{len(found)} numbers' if isinstance(found, list) else repr(found)
-        raise ConfigError(f'{place}: {key} is {told} without names',
+        description = f'{len(found)} numbers' if isinstance(found, list) else repr(found)
+        raise ConfigError(f'{place}: {key} is {description} without names',
                           f'one number for each of {sorted(actuated)}, by name')  # fmt: skip
     table = found or {}
     if set(table) != set(actuated):
@@ -151,5 +151,5 @@ def _column(
     return np.array([float(table.get(joint, 0.0)) for joint in joints])
 
 
-def _told(content: Any) -> str:
+def _description(content: Any) -> str:
     return f'the keys {sorted(map(str, content))}' if isinstance(content, dict) else 'no mapping'

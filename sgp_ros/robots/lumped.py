@@ -162,7 +162,7 @@ def _term(name: str, entries: Entries, joints: Sequence[Joint], target: str, sou
 def _column(
     text: object, target: str, joints: Sequence[str], where: str, problems: list[str]
 ) -> Callable[[Motion], np.ndarray] | None:
-    """Return the column that a formula states; None where it is no column of a regressor."""
+    """Return the column that a formula states; None where it is not a column of a regressor."""
     try:
         formula = read_formula(text)
     except ConfigError as error:

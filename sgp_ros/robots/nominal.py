@@ -25,7 +25,7 @@ from sgp_ros.robots.urdf_robot import build_urdf_robot, nominal_tree, term_shape
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nominal:
-    """What is taken for known of a robot.
+    """Nominal robot: all that is taken as known of a robot.
 
     Attributes:
         robot: from a URDF.
@@ -56,7 +56,7 @@ class Nominal:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a user should know of it."""
+        """Remarks for the user."""
         lumped = (
             f'The bodies of {self.robot.name} are the simplest with its coefficients: '
             'mass and centre of mass of a link are not measured.'

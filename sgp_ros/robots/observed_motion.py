@@ -87,7 +87,7 @@ class ObservedMotion:
 
     @cached_property
     def moves(self) -> np.ndarray:
-        """Whether each joint moves at all, (k,); nothing can be said of one that does not."""
+        """Whether each joint moves at all, (k,); one that does not cannot be identified."""
         return np.asarray(np.ptp(self.position, axis=0) > STILL)
 
     @property
@@ -218,7 +218,7 @@ class ObservedMotion:
         pick = np.concatenate([np.arange(s.start, s.stop) for s in stretches])
         ends, drive = np.cumsum([s.stop - s.start for s in stretches]), self.drive
         if drive is not None:
-            assert isinstance(drive, RecordedCommands)  # of a node there are no stretches
+            assert isinstance(drive, RecordedCommands)  # a node has no stretches
             drive = drive.on(stretches)
         return replace(
             self, time=self.time[pick], position=self.position[pick],

@@ -1,4 +1,4 @@
-"""What a robot is to the estimator: joints, and physics that is linear in its coefficients.
+"""Robot as the estimator sees it: joints, and physics that is linear in its coefficients.
 
 `X(u) = f(u) W + Z(u)` (Wu and Movellan, equation 2). A `Term` contributes columns of `f`; a
 `Robot` is a tuple of terms. Its target says which side of the equation of motion is predicted:
@@ -36,7 +36,7 @@ class ActingEffort(Protocol):
 
 
 class RestForce(Protocol):
-    """What dry friction may do where joints rest."""
+    """Range of dry friction where joints rest."""
 
     @property
     def joints(self) -> frozenset[int]:
@@ -148,7 +148,7 @@ class Robot:
                 direction of the joint itself, `every:velocity` stands for those of all joints.
 
         Raises:
-            ConfigError: a name that is no input of this robot.
+            ConfigError: a name that is not an input of this robot.
         """
         if tuple(spec) == ('default',):
             named = self.residual_inputs
@@ -197,7 +197,7 @@ class Robot:
             spec: one name or a list of names, as `residual_columns` takes them.
 
         Raises:
-            ConfigError: not of this form, or a name that is no input of this robot.
+            ConfigError: not of this form, or a name that is not an input of this robot.
         """
         names = [spec] if isinstance(spec, str) else spec
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
@@ -213,7 +213,7 @@ class Robot:
             prior: coefficient name to (mean, std) in the coefficient's unit.
 
         Raises:
-            ConfigError: a name that is no coefficient of this robot.
+            ConfigError: a name that is not a coefficient of this robot.
         """
         known = [c.name for c in self.coefficients]
         unknown = sorted(set(prior) - set(known))

@@ -22,7 +22,7 @@ from sgp_ros.ros.verdict import OK, WARN
 
 _MEMORY = 100
 _ENOUGH = 5
-"""Parameters are told undetermined from this many times `learning.initial` samples on."""
+"""Parameters are reported as undetermined from this many times `learning.initial` samples on."""
 
 
 class FitHealth:
@@ -41,12 +41,12 @@ class FitHealth:
         self.monitors = [ExcursionMonitor(least_s, per_hour / joints) for _ in range(joints)]
         self._square = np.full(joints, np.nan)
         self._surprise = np.full(joints, np.nan)
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
 
     def take(self, estimates: Iterable[Estimate], robot: Robot) -> bool:
         """Take estimates; return whether an alarm began or ended.
 
-        What the model refuses as implausible counts here: a collision is.
+        Errors that the model refuses as implausible count here, because a collision is one.
         """
         has_changed = False
         for estimate in estimates:
@@ -142,9 +142,9 @@ class FitHealth:
         some = ', '.join(unknown[:8]) + (' ...' if len(unknown) > 8 else '')
         message = f'{len(unknown)} of {len(found)} parameters not determined so far: {some}'
         is_early = engine.counts.learned < _ENOUGH * engine.config.learning_initial
-        if is_early or set(unknown) <= self._told:
+        if is_early or set(unknown) <= self._reported:
             return OK, message, values
-        self._told |= set(unknown)
+        self._reported |= set(unknown)
         return WARN, f'{message}; move all joints, faster and farther', values
 
 

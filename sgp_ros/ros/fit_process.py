@@ -156,7 +156,7 @@ def _send(connection: Connection, request: FitRequest) -> None:
 
 
 def yield_to_others() -> None:
-    """Take a low weight, and never the place of one that runs.
+    """Take a low weight, and never preempt a running process.
 
     Not `SCHED_IDLE` (Linux): on a computer that is always busy, as that of a robot, no fit would
     ever come. A process of `SCHED_BATCH` gives way to one that wakes up, as the node does for a

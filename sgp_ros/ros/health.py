@@ -25,7 +25,7 @@ _LONGEST_DELAY_S = 60.0
 
 
 class Health:
-    """What happened since the node started, as far as the engine does not know it.
+    """Health of the node since its start, as far as the engine does not know it.
 
     Args:
         merger: of the joint states, which counts what came and what is missing.
@@ -103,7 +103,7 @@ class Health:
         self.note_failure(f'internal error in {place.strip("_")} ({text})')
 
     def note_unreadable(self, error: MessageError) -> None:
-        """Note a message that is no sample."""
+        """Note a message that is not a sample."""
         self._unreadable += 1
         self._unreadable_reason = str(error)[:_MOST_TEXT]
 
@@ -117,7 +117,7 @@ class Health:
         """Return the statuses since the last call.
 
         Args:
-            engine: whose counts and scores are told.
+            engine: whose counts and scores are reported.
             node: name of the node, the prefix of every status.
             elapsed_s: since the last call [s].
             sources: full topic name and names of the publishers of joint_states and command.

@@ -1,4 +1,4 @@
-"""What identifies a robot on a node: topics, services, timers and parameters around a session.
+"""Identification on a node: topics, services, timers and parameters around a session.
 
 A node has one `Identification` or none, so that a plain node and one with a lifecycle are the same
 beneath. Everything it makes on its node is gone after `close`.
@@ -63,7 +63,7 @@ class Identification:
         self._is_writing_back = False
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._reported = self._steady.now()
-        self._has_told_failure = False
+        self._has_reported_failure = False
         self._logged: dict[str, tuple[int, int]] = {}
         self._timers: list[Any] = []
         self._inputs: list[Any] = []
@@ -163,13 +163,13 @@ class Identification:
             self._timers.append(self._node.create_timer(save_s, save, clock=self._steady))
 
     def _guarded(self, action: Callable[..., None], *given: Any) -> None:
-        """Do what a message or a timer asks for; what only a bug can cause ends nothing."""
+        """Do what a message or a timer asks for; an error by a bug does not end the node."""
         try:
             action(*given)
         except Exception as error:  # noqa: BLE001 - the edge of the node: it must go on
             self._session.health.note_error(error, action.__name__)
-        if self._session.health.failures and not self._has_told_failure:
-            self._has_told_failure = True
+        if self._session.health.failures and not self._has_reported_failure:
+            self._has_reported_failure = True
             self._node.get_logger().error(self._session.health.first_failure)
 
     def _hear(self, convert: Callable[[Any, int], Event], message: Any) -> None:
@@ -240,10 +240,10 @@ class Identification:
         statuses += session.fit_health.statuses(session.engine, self._name)
         self._log(statuses)
         statuses += self._publish_monitor()
-        told = self._diagnosing.statuses(self._name)
-        if told:
-            self._out.diagnosis_status(self._now_ns, told)
-        statuses += told
+        diagnosis = self._diagnosing.statuses(self._name)
+        if diagnosis:
+            self._out.diagnosis_status(self._now_ns, diagnosis)
+        statuses += diagnosis
         self._out.diagnostics(self._now_ns, statuses)
 
     def _publisher_names(self, topic: str) -> tuple[str, ...]:
@@ -255,7 +255,7 @@ class Identification:
         logger, now_ns = self._node.get_logger(), self._steady.now().nanoseconds
         for status in statuses:
             if status.name.endswith(': errors'):
-                continue  # told once, with the event
+                continue  # reported once, with the event
             level, said_ns = self._logged.get(status.name, (OK, 0))
             if status.level == level and (level == OK or now_ns - said_ns < _QUIET_NS):
                 continue

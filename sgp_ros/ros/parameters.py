@@ -1,7 +1,7 @@
 """Settings as ROS parameters, with type, range, unit and description.
 
-A parameter never has an empty list as its value: ROS cannot tell what it is a list of. Empty is
-`['']` or `[0.0]`.
+A parameter never has an empty list as its value: ROS cannot infer the type of its elements. Empty
+is `['']` or `[0.0]`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a node remembers of a robot: plain tuples, and their way to another process.
+"""Memory of a robot's past in a node: plain tuples, and their way to another process.
 
 The garbage collector lets go of plain tuples of numbers and arrays; so many objects it would
 search for fifty milliseconds while messages wait. To another process they travel as one array a
@@ -20,7 +20,7 @@ Command = tuple[int, np.ndarray, Names | None, str, np.ndarray | None, int]
 """Fields of samples, then the time that had passed in the stream [ns]."""
 
 Layout = tuple[tuple[int, ...] | str | None, ...]
-"""What the samples of a group have alike, a field each: `_NUMBER`, `_ARRAY`, or the value."""
+"""Common layout of the samples of a group, a field each: `_NUMBER`, `_ARRAY`, or the value."""
 Packed = tuple[np.ndarray, list[tuple[Layout, list[np.ndarray]]]]
 """The group of each sample in the order in which they came, (n,), and the groups."""
 _NUMBER, _ARRAY = '<number>', '<array>'

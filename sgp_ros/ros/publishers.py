@@ -1,4 +1,4 @@
-"""What a node publishes of its estimates, where somebody listens."""
+"""Publishers of a node's estimates, where somebody listens."""
 
 from __future__ import annotations
 

@@ -132,7 +132,7 @@ class Record:
         self._begin()
 
     def write_event(self, event: Event, engine: Engine) -> None:
-        """Write an event that took effect; `engine` tells the settings in force.
+        """Write an event that took effect; `engine` has the settings in force.
 
         Changes before the first sample are part of the settings with which the record opens.
         """

@@ -1,4 +1,4 @@
-"""The settings of the node that are none of the engine. Nothing here needs ROS."""
+"""Settings of the node that the engine does not have. Nothing here needs ROS."""
 
 from __future__ import annotations
 

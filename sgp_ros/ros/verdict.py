@@ -1,4 +1,4 @@
-"""Says in one sentence whether what arrives can be used, and what to do when it cannot."""
+"""Verdict on the messages that arrive: whether they can be used, and what to do if not."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _LOST_SHARE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Arrivals:
-    """What came between two diagnostics, and from where.
+    """Messages received between two diagnostics, and their sources.
 
     Attributes:
         joint_states, command: full topic names.

@@ -1,4 +1,4 @@
-"""`sgp watch`: what a running node says of itself, as a table in the terminal."""
+"""`sgp watch`: the status of a running node, as a table in the terminal."""
 
 from __future__ import annotations
 

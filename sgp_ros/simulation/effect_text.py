@@ -69,7 +69,7 @@ def parse_physical(texts: Iterable[str]) -> dict[str, float]:
     """Read `NAME=value` texts; whether the names exist depends on the robot.
 
     Raises:
-        ConfigError: a text that is no name with a number.
+        ConfigError: a text that is not a name with a number.
     """
     values = {}
     for text in texts:

@@ -21,7 +21,7 @@ from sgp_ros.simulation.mechanism import Mechanism, SimulatedJoint
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moment:
-    """What an effect can see while the robot moves.
+    """State that an effect can see while the robot moves.
 
     Attributes:
         time_s: since the start of the simulation [s].
@@ -40,7 +40,7 @@ class Moment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Action:
-    """What an effect does at each place of the chain; None where it does nothing.
+    """Action of an effect at each place of the chain; None where it does nothing.
 
     Attributes:
         joint: index of the joint it acts on.
@@ -152,7 +152,7 @@ Build = Callable[[tuple['SimulatedJoint', ...], int, 'Mapping[str, Value]'], tup
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Law:
-    """What the simulation does for an effect of the catalogue.
+    """Law by which the simulation realises an effect of the catalogue.
 
     It either acts by what `build` returns or changes the mechanism.
 

@@ -1,4 +1,4 @@
-"""What the simulation asks of a robot: an equation of motion with physical parameters.
+"""Interface of a robot to the simulation: an equation of motion with physical parameters.
 
 `M(q) a = force(q, v) + drive(command, v) + effects`, where all but M and a are generalised forces
 on the joints. A mechanism is a frozen dataclass whose fields are its physical parameters, so that

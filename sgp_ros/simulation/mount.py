@@ -16,7 +16,7 @@ MOUNT = 'mount'
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """What the base stands on.
+    """Elastic mount of the base.
 
     Attributes:
         axis: of the root along which it gives way: 0, 1, 2.

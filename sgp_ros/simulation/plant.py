@@ -24,7 +24,7 @@ _AT_REST = 1e-12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inputs:
-    """What acts on a plant from outside.
+    """External inputs of a plant.
 
     Attributes:
         command: (m,) in force [unit of the command].
@@ -37,7 +37,7 @@ class Inputs:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shown:
-    """What the robot's sensors would show without noise, k joints.
+    """Ideal sensor values of the robot, without noise, k joints.
 
     Attributes:
         position: (k,) of the encoders [rad or m].

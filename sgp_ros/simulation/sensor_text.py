@@ -24,7 +24,7 @@ SENSOR_NAMES = (
     'bits', 'resolution', *_PER_JOINT, *_SENSOR_TIMES, *_SWITCHES, *_TRANSPORT,
     *_TRANSPORT_SWITCHES,
 )  # fmt: skip
-"""What can be set: `bits` of the encoders of revolute joints, `resolution` of those of prismatic
+"""Settable keys: `bits` of the encoders of revolute joints, `resolution` of those of prismatic
 ones [m], standard deviations, times [s], shares, and switches."""
 
 

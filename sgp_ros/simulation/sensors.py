@@ -1,4 +1,4 @@
-"""What the sensors make of the true state: noise, quantisation, uneven sampling."""
+"""Sensors of the true state: noise, quantisation, uneven sampling."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What happens to measurements and commands on their way into a recording.
+"""Transport of measurements and commands into a recording.
 
 Stamps have noise, logs are late, messages get lost, joints stand in another order. A message is
 dated by its stamp. A command without a header has no other time than that of its log, so that one
@@ -38,7 +38,7 @@ class Transport:
         """Return this transport if its numbers make sense.
 
         Raises:
-            ConfigError: negative or infinite times, a share that is none.
+            ConfigError: negative or infinite times, a share outside 0 to 1.
         """
         times = (self.stamp_noise_s, self.log_latency_s)
         if not all(0.0 <= x < math.inf for x in times) or not 0.0 <= self.drop < 1.0:

@@ -44,7 +44,7 @@ class Tree:
         payload_x: where it is in the frame of that link [m]; `payload_y`, `payload_z` likewise.
         tip_fx: force at the origin of the tool in the axes of the root [N]; `tip_fy`, `tip_fz`
             likewise.
-        text: what the URDF says of its joints.
+        text: joints of the URDF.
     """
 
     urdf: str
@@ -73,7 +73,7 @@ class Tree:
         """Compile the tree.
 
         Raises:
-            ConfigError: a URDF that is no tree of bodies with inertia, or MuJoCo is missing.
+            ConfigError: a URDF that is not a tree of bodies with inertia, or MuJoCo is missing.
         """
         library = _library()
         text = read_tree(self.urdf, self.part)

@@ -31,7 +31,7 @@ def tree_simulator(urdf: str, part: TreePart | None = None) -> Simulator:
             for all in N m or N.
 
     Raises:
-        ConfigError: a URDF that is no tree of bodies with inertia, or MuJoCo is missing.
+        ConfigError: a URDF that is not a tree of bodies with inertia, or MuJoCo is missing.
     """
     tree = Tree(urdf, part)
     joints, commanded = tree.text.joints, tree.text.command_joints

@@ -36,7 +36,7 @@ class Load:
 
 @dataclass(frozen=True, slots=True)
 class TreePart:
-    """What moves of a URDF, and how it is driven.
+    """Moving part of a URDF, and its drives.
 
     Attributes:
         joints: that move on their own, in this order; the link of the last one carries payloads.
@@ -77,7 +77,7 @@ class Follower:
 
 @dataclass(frozen=True, slots=True)
 class TreeText:
-    """What a simulation needs of a URDF.
+    """Parts of a URDF that a simulation needs.
 
     Attributes:
         urdf: the file.
@@ -127,7 +127,7 @@ def read_tree(text: str, part: TreePart | None = None) -> TreeText:
         part: says what of it is simulated; None leaves it to the file.
 
     Raises:
-        ConfigError: no URDF, or joints that are no single degree of freedom.
+        ConfigError: no URDF, or joints without exactly one degree of freedom.
     """
     urdf = parse_urdf(text)
     locked = {} if part is None else part.locked

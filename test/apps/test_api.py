@@ -22,7 +22,7 @@ def real(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def diagnosed(real):
-    """What it lacks."""
+    """Diagnosis of the real pendulum."""
     return sgp.diagnose(real, robot='simple_pendulum')
 
 

@@ -76,7 +76,7 @@ def test_the_friction_that_equation_28_leaves_out_is_found(tmp_path):
 
 
 def test_the_irregularity_of_the_toy_pendulum_is_found_without_a_motor(tmp_path):
-    """What is written moves as the truth and diagnoses the same recording without a finding."""
+    """The written robot moves as the truth and diagnoses the same recording without a finding."""
     found = _diagnosed(tmp_path, 'toy_pendulum', 'toy_pendulum')
     (finding,) = found['findings']
     assert (finding['effect'], finding['joint']) == ('position_friction', 'hinge')

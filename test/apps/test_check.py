@@ -64,7 +64,7 @@ def _commands(t, values, kind, names=('hinge',)):
 T = np.arange(1000) * 0.01
 
 
-def test_clock_motion_and_channels_are_told(tmp_path):
+def test_clock_motion_and_channels_are_reported(tmp_path):
     """Gaps, backward stamps and the share of the range, of samples as they came."""
     t = T + np.where(np.arange(1000) >= 500, 1.0, 0.0)
     t[700] = t[698]

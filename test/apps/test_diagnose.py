@@ -218,7 +218,7 @@ def test_bad_arguments_end_in_one_line(tmp_path, capsys, bag, robot, more, said)
     assert '\n' not in error
 
 
-def test_without_a_test_a_part_is_held_out_and_a_wrong_simulation_is_told(tmp_path, capsys):
+def test_without_a_test_a_part_is_held_out_and_a_wrong_simulation_is_reported(tmp_path, capsys):
     """An entry of its own in the file, intervals, roll-outs, and remarks with numbers."""
     case, out = _case('05'), tmp_path / 'out'
     sim = ('--sim', str(case / 'real_far.mcap'))

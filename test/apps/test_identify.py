@@ -256,7 +256,7 @@ def test_a_file_in_the_place_of_the_results_is_refused_before_anything_is_read(t
 
 @pytest.mark.parametrize('kind', ['gaps', 'no velocity', 'third NaN', 'extra joint'])
 def test_recordings_with_flaws_are_identified_all_the_same(kind, folder, tmp_path):
-    """What is missing is left out; what is there still finds the friction of the turning joint."""
+    """Flaws are left out; the rest still finds the friction of the turning joint."""
     robot, samples = folder / 'arm.yaml', SAMPLES
     if kind == 'gaps':
         samples = [s for i, s in enumerate(SAMPLES) if not 500 <= i < 600]

@@ -1,4 +1,4 @@
-"""What numbers of a recording contradict the robot or each other, in one line each."""
+"""Numbers of a recording that contradict the robot or each other, in one line each."""
 
 from __future__ import annotations
 

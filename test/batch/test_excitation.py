@@ -1,4 +1,4 @@
-"""What robots can show, and what motions showed."""
+"""Parameters that robots can show, and those that motions showed."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def test_an_effort_that_never_changes_is_refused_with_its_joint():
 
 
 def test_a_robot_without_any_effort_is_refused():
-    """Only ratios of its coefficients could be told."""
+    """Only ratios of its coefficients could be determined."""
     passive = replace(LINEAR_AXIS, joints=(Joint('axis', is_actuated=False),))
     with pytest.raises(RecordingError, match='is constant'):
         require_motion(SIGNALS, passive)

@@ -41,7 +41,7 @@ PRIORS = [
 @settings(max_examples=15)
 @given(seed=st.integers(0, 10_000))
 def test_all_rows_in_a_basis_equal_the_dense_posterior(prior, seed):
-    """What the basis leaves out is a thousandth of the noise: a tenth of a deviation at most."""
+    """The basis leaves out a thousandth of the noise: a tenth of a deviation at most."""
     dense, batch = _both(seed, prior)
     spread = np.sqrt(np.diag(dense.covariance))
     assert np.abs(batch.coefficients - dense.coefficients).max() < 0.02 * spread.max()

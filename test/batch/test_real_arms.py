@@ -1,4 +1,4 @@
-"""What real arms tell through the robot files that come with the package.
+"""Real arms, identified with the robot files that come with the package.
 
 Scores are mean squared errors over the variance of the target on rows that were not learned from,
 of torques under the same filter as the columns. The bounds are the acceptance limits of the two

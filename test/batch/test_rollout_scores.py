@@ -95,7 +95,7 @@ def test_a_robot_that_never_moves_scores_one():
 
 
 def test_a_wrong_model_scores_worse_the_longer_it_runs():
-    """What it gets wrong adds up, in units too."""
+    """Its errors add up, in units too."""
     time, q, v, level = _recording()
     effort = np.vstack([level, level[-1:]])
     wrong = W * [1.0, 1.3, 1.0, 1.0, 1.0]

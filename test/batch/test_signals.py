@@ -159,7 +159,7 @@ def test_a_gain_turns_recorded_efforts_into_those_of_the_physics(is_measured):
 
 
 def test_a_stale_command_pairs_with_no_state():
-    """What the drive did after the commands stopped is not known."""
+    """The drive's action after the commands stopped is not known."""
     events = cart_events(np.arange(300) * 0.01, [0.0, 0.5], [1.0, -1.0])
     signals = collect_signals(events, CART, EngineConfig(max_gap=0.1))
     assert signals.refused['unpaired'] == 149

@@ -108,7 +108,7 @@ def test_a_killed_campaign_goes_on_to_the_same_table(bags, client, finished, tmp
 
 
 def test_an_interrupted_campaign_goes_on_in_its_folder(bags, client, tmp_path, monkeypatch):
-    """What is finished there is no file of somebody else."""
+    """Finished results there are no files of somebody else."""
 
     def interrupt(*_):
         raise KeyboardInterrupt
@@ -124,7 +124,7 @@ def test_an_interrupted_campaign_goes_on_in_its_folder(bags, client, tmp_path, m
 
 
 def test_another_option_or_recording_is_computed(bags, finished):
-    """What is finished counts for the same file, robot, options and version only."""
+    """Finished results hold for the same file, robot, options and version only."""
     found = campaign.find_recordings([str(bags)])
     chosen = campaign.CampaignOptions(task='identify')
     jobs = campaign._jobs(found, 'linear_axis', chosen)

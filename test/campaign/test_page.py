@@ -1,4 +1,4 @@
-"""The page of a campaign says what changed, escapes what it is told, and sorts its tables."""
+"""The page of a campaign says what changed, escapes its input, and sorts its tables."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from sgp_ros.apps.campaign_task import mean_of_topic
-from sgp_ros.campaign.recordings import Told, find_recordings, read_covariates
+from sgp_ros.campaign.recordings import TableRow, find_recordings, read_covariates
 from sgp_ros.engine.samples import CommandSample, frozen_array
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.recordings.command_types import FLOAT64, FLOAT64_ARRAY
@@ -58,11 +58,11 @@ def test_a_table_tells_of_recordings_by_name_or_stem(tmp_path):
         'gone.mcap,left,5,1,Ann,1\n'
     )
     remarks: list[str] = []
-    told = read_covariates(str(table), ('a/1.mcap', 'b/1.mcap', 'b/2.mcap'), remarks)
+    rows = read_covariates(str(table), ('a/1.mcap', 'b/1.mcap', 'b/2.mcap'), remarks)
     noon = 1777896000.0
-    assert told['a/1.mcap'] == Told('left', '', noon, {'temperature': 31.5})
-    assert told['b/2.mcap'] == Told('right', '', noon, {'temperature': 20.0, 'payload': 1.5})
-    assert told['b/1.mcap'] == Told()
+    assert rows['a/1.mcap'] == TableRow('left', '', noon, {'temperature': 31.5})
+    assert rows['b/2.mcap'] == TableRow('right', '', noon, {'temperature': 20.0, 'payload': 1.5})
+    assert rows['b/1.mcap'] == TableRow()
     assert any('gone.mcap' in said for said in remarks)
     assert any('nothing on 1 of 3' in said for said in remarks)
     assert any('operator' in said for said in remarks)

@@ -1,4 +1,4 @@
-"""Wear is told from warm-up, a change from chance, and what cannot be told is said."""
+"""Wear is told from warm-up, a change from chance, and unknowns are reported."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_a_friction_that_grows_all_the_time_drifts():
     assert slope.low > 0.0
 
 
-def test_a_told_temperature_and_a_robot_take_their_share():
+def test_a_given_temperature_and_a_robot_take_their_share():
     """The covariate has its coefficient, and robots differ without being a change."""
     results = _only(draw_results(replace(SMALL, warm_up=0.0), 1))
     rng = np.random.default_rng(0)
@@ -126,8 +126,8 @@ def test_sessions_are_what_lies_between_pauses():
     frame = frame_of(results)
     assert frame.sessions.tolist() == [0, 0, 2, 2]
     assert frame.age.tolist() == [50.0, 1050.0, 50.0, 1050.0]
-    told = frame_of([result | {'session': 'one'} for result in results])
-    assert told.sessions.tolist() == [0, 0, 0, 0]
+    one = frame_of([result | {'session': 'one'} for result in results])
+    assert one.sessions.tolist() == [0, 0, 0, 0]
 
 
 def test_the_bound_on_false_alarms_is_the_measured_one():

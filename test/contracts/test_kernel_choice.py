@@ -146,5 +146,5 @@ def test_another_kernel_is_another_model():
 
 
 def test_the_example_of_a_kernel_runs():
-    """What the docstring shows to who writes one."""
+    """The example in the docstring, for those who write a kernel."""
     assert doctest.testmod(kernel_module).failed == 0

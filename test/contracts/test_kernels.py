@@ -1,4 +1,4 @@
-"""What every registered kernel promises."""
+"""Contract of every registered kernel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every robot promises, built in or from a URDF."""
+"""Contract of every robot, built in or from a URDF."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def test_names_are_unique_and_units_and_sources_given(name):
 @pytest.mark.parametrize('name', NAMES)
 @pytest.mark.parametrize('spec', [('default',), ('own',), ('all',)])
 def test_residual_inputs_resolve(name, spec):
-    """What Z sees are columns of the stacked motion, and names lead back to them."""
+    """The inputs of Z are columns of the stacked motion, and names lead back to them."""
     robot = ROBOTS[name]
     for columns in robot.residual_columns(spec):
         assert columns
@@ -162,7 +162,7 @@ def test_settings_of_every_robot_round_trip(name):
 
 @pytest.mark.parametrize('module', [robot_module, formula], ids=lambda module: module.__name__)
 def test_the_examples_in_docstrings_run(module):
-    """What people copy works."""
+    """Examples that people copy work."""
     found = doctest.testmod(module)
     assert found.attempted
     assert not found.failed

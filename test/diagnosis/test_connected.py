@@ -1,4 +1,4 @@
-"""What is compared before an error of the connection is asserted."""
+"""Comparisons before an error of the connection is asserted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a diagnosis costs, in work that no clock and no load of the machine can change."""
+"""Cost of a diagnosis, in work that no clock and no load of the machine can change."""
 
 from __future__ import annotations
 

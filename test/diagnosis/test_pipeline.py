@@ -111,7 +111,7 @@ def test_what_is_named_predicts_a_recording_that_was_held_out(robots, diagnosed,
 
 @pytest.mark.parametrize('seed', range(5))
 def test_a_perfect_model_yields_no_finding(robots, seed):
-    """Whatever the motion and, within reason, the noise of the encoder."""
+    """For any motion and, within reason, any noise of the encoder."""
     world = simulate(CHAINS[1], 20 + seed, 6.0)
     noise = np.random.default_rng(seed).normal(0.0, (0.0, 3e-5)[seed % 2], world.position.shape)
     found = diagnose(events_of(replace(world, position=world.position + noise)), *robots[1], {})

@@ -1,4 +1,4 @@
-"""What a diagnosis promises is what the online engine delivers with the diagnosed robot."""
+"""A diagnosis promises the error that the online engine delivers with the diagnosed robot."""
 
 from __future__ import annotations
 

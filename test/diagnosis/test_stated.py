@@ -1,4 +1,4 @@
-"""What the nominal robot states is no discrepancy, in a diagnosis from end to end."""
+"""Effects stated by the nominal robot are no discrepancy, in a diagnosis from end to end."""
 
 from __future__ import annotations
 
@@ -118,13 +118,13 @@ def test_roll_outs_of_the_nominal_robot_have_what_it_states(named, robots):
     """A robot whose truth is stated ends where it did; without, it does not."""
     name, events = named
     robot, tree = robots[1]
-    told, untold = (
+    known, unknown = (
         diagnose(events, robot, tree, {}, stated=stated)
         for stated in (_stated(name, tree), ())
     )  # fmt: skip
-    assert told.verdict == 'no_mismatch'
+    assert known.verdict == 'no_mismatch'
     after, before = (
-        found.proofs['train'].rollout_before[tree.joint_names[0]] for found in (told, untold)
+        found.proofs['train'].rollout_before[tree.joint_names[0]] for found in (known, unknown)
     )
     assert after < 0.05 * before
-    assert told.proofs['train'].failed == 0
+    assert known.proofs['train'].failed == 0

@@ -41,7 +41,7 @@ CHAINS = {
 
 @dataclass(frozen=True)
 class World:
-    """What happened, at the times of the states."""
+    """True history of a world, at the times of the states."""
 
     time: np.ndarray
     position: np.ndarray

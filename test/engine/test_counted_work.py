@@ -1,4 +1,4 @@
-"""What a push costs, in calls that no clock and no load of the machine can change."""
+"""Cost of a push, in calls that no clock and no load of the machine can change."""
 
 from __future__ import annotations
 

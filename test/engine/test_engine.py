@@ -98,7 +98,7 @@ def test_any_arrival_order_inside_the_window_gives_the_same_estimates(seed):
 
 
 def test_released_events_reproduce_the_run():
-    """What took effect, pushed again, gives the same estimates: this is what a record holds."""
+    """Events that took effect, pushed again, give the same estimates: a record holds these."""
     events = pendulum_events(300)
     events.insert(50, dataclasses.replace(events[10]))  # late
     events.insert(61, dataclasses.replace(events[60]))  # a repeated state or command

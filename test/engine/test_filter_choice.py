@@ -109,7 +109,7 @@ def test_an_engine_that_stopped_before_the_choice_makes_it_all_the_same(stop):
 
 
 def test_a_robot_at_rest_has_the_choice_wait_for_its_motion():
-    """What noise makes of a joint at rest says nothing of its acceleration."""
+    """Noise of a joint at rest tells nothing about its acceleration."""
     engine = Engine(PENDULUM, config(**AUTO))
     _, record = _run(engine, _events(1e-6, still_s=4.0))
     (change,) = [event for event in record if isinstance(event, SettingsChange)]

@@ -148,7 +148,7 @@ def _arm(k, n, rank_deficient):
 
 @pytest.mark.parametrize('rank_deficient', [False, True])
 def test_outputs_fitted_in_turn_raise_the_evidence_of_all(rank_deficient, monkeypatch):
-    """What the fit claims to gain is what the evidence of the whole gains, to rounding."""
+    """The gain that the fit claims is that of the evidence of the whole, to rounding."""
     request = _arm(4, 30, rank_deficient)
     monkeypatch.setattr(fitting, 'TOGETHER', 1)
     found = fit(request)

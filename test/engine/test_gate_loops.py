@@ -49,8 +49,8 @@ def test_errors_are_held_against_the_larger_deviation(rng):
         errors, n = 10.0 * rng.normal(size=K), rng.integers(0, 60, size=K)
         variance, square = rng.uniform(0.0, 2.0, size=(2, K)) ** 4
         held = rng.random(K) < 0.3
-        told = ~held & (n >= 30)
-        expected = np.abs(errors[told]) > 20.0 * np.sqrt(np.maximum(variance, square)[told])
+        known = ~held & (n >= 30)
+        expected = np.abs(errors[known]) > 20.0 * np.sqrt(np.maximum(variance, square)[known])
         found = gate_loops.is_beyond(errors, variance, held, square, n, (20.0, 30))
         assert found == expected.any()
 

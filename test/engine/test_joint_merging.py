@@ -22,7 +22,7 @@ def _merged(samples, joints=JOINTS):
 
 
 def test_a_whole_message_passes_as_it_is():
-    """Whatever the order of its joints, and with a joint more."""
+    """In any order of its joints, and with a joint more."""
     sent = [_sample(0, c=1, a=2, b=3), _sample(5, a=2, gripper=0, b=3, c=1)]
     _, states = _merged(sent)
     assert all(state is sample for state, sample in zip(states, sent, strict=True))

@@ -44,7 +44,7 @@ def test_a_monitor_does_not_get_used_to_collisions():
     assert 0.95 * len(starts) <= alarms <= len(starts) + 5
 
 
-def test_an_error_that_stays_alarms_and_its_end_is_told():
+def test_an_error_that_stays_alarms_and_its_end_is_reported():
     """Though the calibration would soon have widened the interval beyond it."""
     rng = np.random.default_rng(1)
     errors = rng.standard_normal(2000)

@@ -77,7 +77,7 @@ def test_a_step_that_fails_half_way_leaves_what_never_saw_it(monkeypatch):
 
 @pytest.mark.parametrize('length', [7, journal.COPY_EVENTS])
 def test_an_undone_step_folds_changes_and_fits_anew(monkeypatch, length):
-    """What was done since the copy, fits and changes included, is done again to the same bits."""
+    """Events since the copy, fits and changes included, are folded again to the same bits."""
     monkeypatch.setattr(journal, 'COPY_EVENTS', length)
     events = pendulum_events(400)
     whole, expected, _ = _run(events)

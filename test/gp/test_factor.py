@@ -119,7 +119,7 @@ def test_compiled_whitening_equals_the_library(seed, n, start):
 
 
 def test_a_kernel_of_ones_own_whitens_alike():
-    """What the loops do not know is evaluated by the kernel itself, to the same end."""
+    """A kernel that the loops do not know is evaluated by itself, to the same end."""
 
     class Own(SquaredExponential):
         __slots__ = ()
@@ -162,7 +162,7 @@ def test_absorbing_a_column_is_part_of_the_factor(seed, n):
 
 @given(SEEDS, st.integers(1, 10), st.data())
 def test_dropping_equals_refactorisation(seed, n, data):
-    """What stays is the factor of the others, and their data whitened by it."""
+    """The factor of the other samples stays, and their data whitened by it."""
     m = data.draw(st.integers(0, n - 1))
     factor, _, _ = _filled(np.random.default_rng(seed), n)
     L, white = dropped_sample_numpy(factor.lower.copy(), factor.white.reshape(n, -1).copy(), m)
@@ -220,7 +220,7 @@ def _machine_code(function, signature):
     ],
 )  # fmt: skip
 def test_compiled_loops_allocate_nothing(loop):
-    """What the compiler made of each loop calls no allocator."""
+    """The compiled code of each loop calls no allocator."""
     rng = np.random.default_rng(0)
     U, x = np.eye(12), np.zeros(9)
     solve_lower(U, 0, x)

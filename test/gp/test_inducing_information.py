@@ -224,7 +224,7 @@ def test_the_interpolation_error_is_the_variance_of_a_difference(length):
 
 
 def test_far_shorter_length_scales_learn_z_from_the_kept_samples():
-    """The old features say too little of such a Z; W keeps what it was told, none of it twice."""
+    """The old features say too little of such a Z; W keeps what it learned, none of it twice."""
     model, prior, _, data = returning(1)
     other = _model((1.0,), (0.1,), (0.1,))
     online = _learn(_basis(model, prior), data)

@@ -47,7 +47,7 @@ def test_equations_one_by_one_equal_one_factorisation(seed, m, count):
     """Rotations give the triangle of a single QR, and leave on W the same information."""
     rng = np.random.default_rng(seed)
     R, S = np.triu(rng.normal(size=(m, m))) + 3.0 * np.eye(m), rng.normal(size=(m, 3))
-    R[m // 2 :, m // 2 :], S[m // 2 :] = 0.0, 0.0  # nothing told yet of the later ones
+    R[m // 2 :, m // 2 :], S[m // 2 :] = 0.0, 0.0  # no data yet of the later ones
     phi, rest = rng.normal(size=(count, m)), rng.normal(size=(count, 3))
     expected_R, expected_S, expected_rest = absorbed_equations_numpy(R, S, phi, rest)
     for row, right in zip(phi.copy(), rest, strict=True):
@@ -191,7 +191,7 @@ def test_the_kept_samples_and_what_is_gone_add_up():
 
 
 def test_without_memory_only_the_kept_samples_count_under_new_hyperparameters():
-    """What is gone is then left to the past, and a fit begins from the prior."""
+    """Dropped samples are then left to the past, and a fit begins from the prior."""
     model, data = random_problem(11, n=60, k=1)
     other = model.with_log_parameters(model.log_parameters + 0.1)
     online = _learn(

@@ -119,7 +119,7 @@ def test_without_memory_only_the_buffer_counts_faded():
 
 @pytest.mark.parametrize('way', WAYS)
 def test_a_change_of_noise_keeps_the_weights(way):
-    """What is rebuilt under other hyper-parameters is as faded as it was."""
+    """Information rebuilt under other hyper-parameters is as faded as it was."""
     model, data = random_problem(6, n=40, noise_like='parametric')
     online = _learn(way(model, FLAT, forgetting=7.0), data)
     before = online.information
@@ -181,11 +181,11 @@ def test_stop_save_restore_continue_equals_never_stopped(way):
 
 @given(st.integers(0, 10_000), st.integers(3, 9), st.integers(1, 2))
 def test_echelon_form_tells_what_the_decomposition_does(seed, p, missing):
-    """Products with W and their covariance, in any units, where some of W is never told."""
+    """Products with W and their covariance, in any units, where some of W is never determined."""
     rng = np.random.default_rng(seed)
     span = rng.normal(size=(p - missing, p)) * 10.0 ** rng.uniform(-3.0, 3.0, size=p)
-    told = rng.normal(size=(3 * p, p - missing)) @ span
-    held = Information.nothing(p).with_rows(told, rng.normal(size=3 * p))
+    learned = rng.normal(size=(3 * p, p - missing)) @ span
+    held = Information.nothing(p).with_rows(learned, rng.normal(size=3 * p))
     rows = rng.normal(size=(2, p - missing)) @ span
     A, z = held.R / np.linalg.norm(held.R, axis=0), held.z
     echelon = Echelon(A, z, np.linalg.norm(held.R, axis=0))
@@ -207,8 +207,8 @@ def test_echelon_form_tells_what_the_decomposition_does(seed, p, missing):
 def test_what_is_not_determined_beyond_doubt_is_left_to_the_decomposition():
     """A row that leaves the span, and a direction between rounding and information."""
     rng = np.random.default_rng(0)
-    told = rng.normal(size=(9, 3)) @ rng.normal(size=(3, 5))
-    held = Information.nothing(5).with_rows(told, rng.normal(size=9))
+    learned = rng.normal(size=(9, 3)) @ rng.normal(size=(3, 5))
+    held = Information.nothing(5).with_rows(learned, rng.normal(size=9))
     outside = rng.normal(size=(2, 5))
     _, covariance = held.predict(outside, np.zeros(2), np.zeros(2))
     assert np.isinf(np.diag(covariance)).all()

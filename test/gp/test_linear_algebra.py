@@ -36,7 +36,7 @@ def test_exponents_are_those_of_numpy(shape):
 
 @pytest.mark.parametrize('n', [1, 31, 32, 33, 70])
 def test_a_symmetric_matrix_is_subtracted_on_both_sides(n):
-    """What lies below the diagonal of the second matrix is not read."""
+    """The part below the diagonal of the second matrix is not read."""
     H, upper = np.random.default_rng(n).normal(size=(2, n, n))
     expected = subtracted_numpy(H, upper)
     subtract_symmetric(H, upper)

@@ -238,7 +238,7 @@ def test_changed_hyperparameters_equal_a_fresh_start():
 @pytest.mark.parametrize('changed', [(0,), (1,), (0, 1)])
 def test_outputs_may_take_their_hyperparameters_one_after_the_other(changed):
     """Factors of the others are taken over; the end is that of one change, before and after the
-    buffer is full, and what a basis told is not counted anew."""
+    buffer is full, and what a basis learned is not counted anew."""
     model, data = random_problem(3, n=60, k=2, d=2)
     other = Model(
         tuple(replace(k, signal_variance=1.3 * k.variance) for k in model.kernels), (0.3, 0.2)

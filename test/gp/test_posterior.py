@@ -235,7 +235,7 @@ def test_priors_that_mean_nothing_are_refused():
 
 @pytest.mark.parametrize('kind', ['batch', 'information'])
 def test_a_column_of_rounding_errors_determines_nothing(kind):
-    """What cancels in exact arithmetic leaves 1e-16 of the other columns, not a coefficient."""
+    """Columns that cancel in exact arithmetic leave 1e-16 of the others, not a coefficient."""
     rng = np.random.default_rng(0)
     F = rng.normal(size=(50, 3))
     F[:, 1] = 1e-16 * rng.normal(size=50)

@@ -109,7 +109,7 @@ def test_coverage_parts_the_closest_pair(seed):
 
 @pytest.mark.parametrize('policy', RETENTIONS)
 def test_who_leaves_has_no_part_in_what_is_known_of_w(policy):
-    """W is told by the whole stream, to the bit the same whichever samples Z is conditioned on."""
+    """W is learned from the whole stream, the same to the bit for any samples that Z keeps."""
     model, data = random_problem(4, n=30)
     one, other = (OnlineRegression(model, FLAT, Memory(5, policy=x)) for x in (policy, 'oldest'))
     left = [_learn(online, data) for online in (one, other)]
@@ -135,7 +135,7 @@ def test_stop_save_restore_continue_equals_never_stopped(policy):
 
 @pytest.mark.parametrize('policy', RETENTIONS)
 def test_a_policy_taken_later_goes_on_from_the_buffer(policy):
-    """What a change rebuilds is what would have grown sample by sample."""
+    """A change rebuilds the state that would have grown sample by sample."""
     model, data = random_problem(9, n=40)
     changed = OnlineRegression(model, FLAT, Memory(8))
     for i in range(8):

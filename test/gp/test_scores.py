@@ -61,7 +61,7 @@ def test_normal_scores_are_standard_normal():
 
 
 @pytest.mark.parametrize(('growth', 'delay'), [(1.5, 300), (3.0, 40)])
-def test_errors_that_grow_are_told(growth, delay):
+def test_errors_that_grow_are_reported(growth, delay):
     """An alarm comes after the change and soon, the sooner the more they grow."""
     for seed in range(20):
         errors = np.random.default_rng(seed).standard_normal(4000)

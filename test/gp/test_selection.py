@@ -62,7 +62,7 @@ def test_complete_physics_needs_no_process():
 
 
 def test_choice_costs_little_evidence():
-    """What is dropped was worth less than the margin, input by input."""
+    """Each dropped input was worth less than the margin."""
     data = _data(1, lambda U: np.sin(2.0 * U[:, 1]))
     selection = select_inputs(data, CoefficientPrior.flat(1), 0, (0, 1, 2))
     assert selection.evidence > selection.evidence_of_all - 3.0 * len(selection.path)

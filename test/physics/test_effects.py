@@ -121,7 +121,7 @@ def test_columns_are_finite_and_have_the_shape_of_the_motion(effect, place):
 
 @pytest.mark.parametrize(('effect', 'place'), CONTRACT)
 def test_the_report_has_the_names_of_its_quantities_and_finite_numbers(effect, place):
-    """What is a word is a kind or a joint; what is a number has a unit."""
+    """A word is a kind or a joint; a number has a unit."""
     shape = _starts(effect, place)[0]
     m = effect.columns(MOTION, place, shape).shape[-1]
     values = EffectAt(effect, place, shape, np.linspace(0.5, 0.8, m)).report(MOTION)
@@ -151,7 +151,7 @@ def test_bounds_are_ordered_and_hold_every_start(effect, place):
 
 @pytest.mark.parametrize('effect', EFFECTS.values(), ids=lambda e: e.name)
 def test_no_place_on_a_joint_that_does_not_move(effect):
-    """What cannot be seen is not suspected; a load on the last link is one on all joints."""
+    """Invisible effects are no candidates; a load on the last link is one on all joints."""
     still = _motion(still=(0,))
     for place in effect.places(still):
         assert place.joint != 0
@@ -595,7 +595,7 @@ def test_what_a_drive_does_is_the_effort_it_gives_less_the_command(name, shape, 
 
 
 def test_a_motor_at_speed_loses_what_drives_above_its_line_alone():
-    """What brakes is limited as at rest; nothing drives beyond the speed without load."""
+    """Braking effort is limited as at rest; nothing drives beyond the speed without load."""
     u = np.array([1.0, 1.0, 1.0, -1.0, -1.0, 0.3, 1.0])
     v = np.array([0.0, 2.0, -2.0, 2.0, -2.0, 2.0, 5.0])
     n = len(u)
@@ -670,7 +670,7 @@ def _sine_cosine(size, phase=0.4):
 
 
 def test_an_eccentric_encoder_is_right_to_first_order_of_its_size():
-    """What the nominal robot takes for the shown motion less the true one, amplitude to zero."""
+    """Nominal effort of the shown motion less that of the true one, amplitude to zero."""
     small = EFFECTS['encoder_eccentricity'].small
     for j in range(4):
         left, linear = [], []

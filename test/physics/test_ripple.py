@@ -1,4 +1,4 @@
-"""What samples show of the ripple between them, against a loop that is solved exactly."""
+"""Ripple between samples, against a loop that is solved exactly."""
 
 import numpy as np
 import pytest

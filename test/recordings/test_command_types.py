@@ -78,7 +78,7 @@ def test_the_nodes_offer_and_understand_a_registered_type():
 
 @pytest.mark.parametrize('kind', COMMAND_TYPES)
 def test_every_type_is_the_same_for_rosbags_and_rclpy(kind):
-    """What the encoder makes for a node reads back as what it was made of."""
+    """A message of the encoder for a node reads back as the command that it was made of."""
     names = ('a',) if COMMAND_TYPES[kind].has_names else None
     command = CommandSample(7, np.array([0.25]), names)
     message = COMMAND_TYPES[kind].message(new_message, command)

@@ -275,7 +275,7 @@ def test_recorded_changes_can_be_left_out(tmp_path):
 
 
 def test_damaged_chunk_of_an_indexed_file_is_left_out_and_said(tmp_path):
-    """What is intact is used; how much of it there is, and where the damage is, is said."""
+    """Intact parts are used; how much of it there is, and where the damage is, is said."""
     events = worlds.swing(500)
     path = worlds.write_chunks(tmp_path / 'x.mcap', [events[:400], events[400:]])
     content = bytearray(path.read_bytes())

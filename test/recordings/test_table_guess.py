@@ -87,7 +87,7 @@ def test_a_log_of_position_control_is_read_with_its_gains(tmp_path):
 
 
 def test_columns_of_each_joint_are_gathered(tmp_path):
-    """In any order, with the joint before or behind; degrees are told by the ranges."""
+    """In any order, with the joint before or behind; degrees are recognised by the ranges."""
     degrees = np.degrees(Q)
     table = np.column_stack([1e3 * T, degrees[:, 1], degrees[:, 0], np.degrees(DQ[:, ::-1]), TAU])
     header = 'time,elbow_pos,shoulder_pos,elbow_vel,shoulder_vel,torque_shoulder,torque_elbow'
@@ -111,7 +111,7 @@ def test_columns_of_each_joint_are_gathered(tmp_path):
     ],
 )
 def test_the_torque_of_a_single_joint_is_its_own_whatever_it_is_called(tmp_path, header, said):
-    """As a user names the columns of one pendulum; a name of something else is told."""
+    """As a user names the columns of one pendulum; a name of something else is reported."""
     table = np.column_stack([1e3 * T, np.degrees(Q[:, 0]), TAU[:, 0]])
     np.savetxt(tmp_path / 'log.csv', table, delimiter=',', header=header, comments='')
     summary, _, commands = _read(tmp_path / 'log.csv', tmp_path, (JointHint('elbow'),))

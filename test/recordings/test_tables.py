@@ -1,4 +1,4 @@
-"""Tables become recordings in SI units, and a wrong map is told everything at once."""
+"""Tables become recordings in SI units, and all errors of a wrong map are reported at once."""
 
 from __future__ import annotations
 
@@ -235,7 +235,7 @@ def test_an_array_that_is_damaged_is_not_left_out(tmp_path):
 
 @pytest.mark.parametrize('wrong', ['12..5', '1_0', '0x10', '1d5', 'two'])
 def test_a_cell_that_is_no_number_does_not_cost_its_column_in_silence(wrong, tmp_path):
-    """A few are refused by line, more are told; a column of texts is nobody's loss."""
+    """A few are refused by line, more are reported; a column of texts is nobody's loss."""
     rows = [f'{i},{i},{wrong if i % 30 == 7 else i},label' for i in range(60)]
     path = _csv(tmp_path, '\n'.join(['t,q,tau,note', *rows]))
     with pytest.raises(RecordingError, match=rf"line 9, column tau: '{re.escape(wrong)}'"):
@@ -349,7 +349,7 @@ def test_rate_must_be_positive_and_alone(tmp_path):
     ],
     ids=['cut off', 'units', 'impossible', 'header as comment', 'comments', 'quotes'],
 )
-def test_what_can_be_read_of_a_table_is_used_and_the_rest_is_told(text, said, tmp_path):
+def test_what_can_be_read_of_a_table_is_used_and_the_rest_is_reported(text, said, tmp_path):
     """Two whole rows in each; what is left out has its line in a remark."""
     table = read_table(_csv(tmp_path, text), MAP)
     np.testing.assert_array_equal(table.channels['position'], [[0.0], [0.5]])
@@ -364,7 +364,7 @@ def test_a_table_without_header_says_so(tmp_path):
 
 
 def test_a_list_in_a_cell_is_a_row_of_a_matrix(tmp_path):
-    """Whatever separates the cells, in quotes or not."""
+    """For any separator of the cells, in quotes or not."""
     content = _map(index=1)
     for text in ('t,q\n1,"[0.1, 0.2]"\n2,"[0.3, 0.4]"\n', 't,q\n1,[0.1, 0.2]\n2,[0.3, 0.4]\n',
                  't q\n1 [0.1, 0.2]\n2 [0.3, 0.4]\n'):  # fmt: skip

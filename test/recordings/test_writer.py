@@ -1,4 +1,4 @@
-"""What is written reads back bit for bit, in any reader, also after a crash."""
+"""Written recordings read back bit for bit, in any reader, also after a crash."""
 
 from __future__ import annotations
 

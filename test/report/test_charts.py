@@ -1,4 +1,4 @@
-"""What a page draws from: thinned curves, maps, and a robot whose joints are where they are."""
+"""Data that a page draws: thinned curves, maps, and a robot whose joints are where they are."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ ARM = """
 @given(arrays.arrays(float, st.integers(2, 400), elements=st.floats(-1e3, 1e3)),
        st.integers(8, 50))  # fmt: skip
 def test_thinning_keeps_the_greatest_and_the_least_value(values, most):
-    """What stands out is not thinned away, and rows stay in order."""
+    """Peaks are not thinned away, and rows stay in order."""
     rows = kept([values], most)
     assert values[rows].max() == values.max()
     assert values[rows].min() == values.min()
@@ -56,7 +56,7 @@ def test_what_is_no_number_reaches_the_page_as_a_break():
 
 
 def test_the_page_of_a_diagnosis_draws_each_model_over_what_acted():
-    """What the nominal robot lacks is the difference of two curves that lie over each other."""
+    """The lack of the nominal robot is the difference of two curves that lie over each other."""
     found = replace(diagnosis('missing_physics', [COULOMB]), overlays={})
     charts = charts_of(render(found, {}))
     effort = {s['label']: np.array(s['y'], float) for s in charts['effort elbow']['series']}

@@ -155,22 +155,22 @@ def test_a_share_below_one_is_never_called_all(share):
     assert percent(share) != '100 %'
 
 
-def test_what_cannot_be_told_is_said_with_the_motion_that_would(tmp_path):
-    told = Equivalent((('elbow', 'spring'), ('base', 'gravity_tilt')), 'a motion twice as wide', 7)
-    sentence = equivalence_sentence(told)
+def test_what_cannot_be_separated_is_said_with_the_motion_that_would(tmp_path):
+    pair = Equivalent((('elbow', 'spring'), ('base', 'gravity_tilt')), 'a motion twice as wide', 7)
+    sentence = equivalence_sentence(pair)
     assert 'a spring on elbow and a base that is not level at the base together' in sentence
     assert 'would fit equally well' in sentence
     assert 'a motion twice as wide separates them' in sentence
     assert ' 7 times' in sentence
     never = equivalence_sentence(Equivalent((), '', 1.0))
     assert 'another set of bodies would fit equally well; no motion tried' in never
-    found = replace(diagnosis('parameters_only'), equivalents=(told,))
+    found = replace(diagnosis('parameters_only'), equivalents=(pair,))
     write_diagnosis(tmp_path, found)
     assert sentence in (tmp_path / 'report.html').read_text()
 
 
 def test_without_held_out_recordings_the_page_promises_nothing(tmp_path):
-    """What was learned from proves little."""
+    """Data that were learned from prove little."""
     found = diagnosis('missing_physics', [COULOMB], held=False)
     write_diagnosis(tmp_path, found)
     assert held_out_sentence(found) in (tmp_path / 'report.html').read_text()
@@ -322,7 +322,7 @@ def test_each_row_over_time_names_the_forces_it_shows():
 
 
 def test_no_line_joins_rows_with_a_pause_between_them():
-    """What was not recorded is not drawn."""
+    """Nothing is drawn where nothing was recorded."""
     found = diagnosis('missing_physics', [COULOMB])
     later = found.traces.time + 5.0 * (np.arange(N) >= N // 2)
     found = replace(found, traces=replace(found.traces, time=later))

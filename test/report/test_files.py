@@ -187,7 +187,7 @@ def test_an_interrupted_run_leaves_no_growing_file(tmp_path, monkeypatch, moment
 
 
 def test_an_interrupt_takes_nothing_that_has_a_name_to_come(tmp_path, monkeypatch):
-    """What is noted is completed by the next run."""
+    """Noted moves are completed by the next run."""
     make_moves, calls = files._make_moves, []
 
     def cut_off(out, command):

@@ -213,7 +213,7 @@ def test_a_table_is_copied_with_its_columns(opened):
 
 @once
 def test_paper_shows_pictures_instead_of_charts(opened):
-    """What a script draws is replaced by what is drawn already, and no control is printed."""
+    """Charts of a script are replaced by pictures drawn before, and no control is printed."""
     page, _ = opened
     shown = '() => [...document.querySelectorAll("img.still")].every(i => i.offsetHeight > 50)'
     assert not page.evaluate(shown)

@@ -83,7 +83,7 @@ def test_what_is_not_asserted_is_nowhere_called_the_finding(found):
 
 
 def test_a_finding_that_a_simulation_was_not_asked_for_has_no_empty_number():
-    """What is unknown there is called so."""
+    """A quantity that is unknown there is called so."""
     known = replace(COULOMB, in_simulation={'level': Parameter(0.1, 0.01, 'N m')})
     found = diagnosis('missing_physics', [known, UNKNOWN])
     text = verdict_sentence(found)

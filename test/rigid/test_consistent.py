@@ -38,7 +38,7 @@ def _is_real(w, blocks, friction):
 @given(SEEDS)
 @settings(max_examples=50)
 def test_the_result_is_always_a_real_body(seed):
-    """Whatever least squares gave."""
+    """For any result of least squares."""
     _, mean, R, blocks, friction = _problem(seed)
     found = project_information(mean, R, blocks, nonnegative=friction)
     assert _is_real(found.coefficients, blocks, friction)
@@ -96,7 +96,7 @@ def test_projection_is_the_optimum_of_a_brute_force_search(seed):
 
 
 def test_undetermined_directions_come_from_the_reference():
-    """What the data do not show is nominal; what they show stays, to the digit."""
+    """Directions that the data do not show are nominal; the others stay, to the digit."""
     truth, mean, R, blocks, friction = _problem(5, rank=7)
     found = project_information(mean, R, blocks, nonnegative=friction, reference=truth)
     assert np.allclose(R @ found.coefficients, R @ mean, atol=1e-6 * np.linalg.norm(R @ mean))

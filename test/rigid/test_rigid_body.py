@@ -118,7 +118,7 @@ def test_samples_do_not_see_one_another():
 
 
 def test_memory_that_was_used_before_gives_the_same():
-    """What stood in `out` does not matter; another shape is refused."""
+    """The earlier content of `out` does not matter; another shape is refused."""
     tree, _, q, v, a = _world(5, 6, 2)
     expected = torque_regressor(tree, q, v, a)
     out = np.full_like(expected, 7.0)

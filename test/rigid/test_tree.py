@@ -1,4 +1,4 @@
-"""What a URDF becomes: order, frames, locked and following joints, and what is refused."""
+"""Kinematic trees of URDFs: order, frames, locked and following joints, and refusals."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ def test_windows_line_ends_stay():
     ],
 )
 def test_bad_input_is_named_in_one_line(text, links, joints, found):
-    """What was found, and where."""
+    """The message says what was found, and where."""
     with pytest.raises(ConfigError, match=found) as caught:
         write_urdf(text, links, joints)
     assert '\n' not in str(caught.value)

@@ -98,7 +98,7 @@ def test_mjcf_states_its_physics(tmp_path):
 
 
 def test_mjcf_motors_have_lag_delay_rotor_and_limit(tmp_path):
-    """What belongs to an actuator counts at the joint: rotor and damping by the gear squared."""
+    """Numbers of an actuator count at the joint: rotor and damping by the gear squared."""
     motors = (
         '<general joint="j1" dyntype="filter" dynprm="0.02" gainprm="1" forcerange="-9 9"/>'
         '<motor joint="j2" gear="2" armature="0.1" damping="0.5"/>'

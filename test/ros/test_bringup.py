@@ -76,7 +76,7 @@ def test_the_robot_comes_from_the_latched_description(graph: Graph, *, is_first:
 
 
 @pytest.mark.ros
-def test_a_useless_description_is_told_and_a_better_one_taken(graph: Graph) -> None:
+def test_a_useless_description_is_reported_and_a_better_one_taken(graph: Graph) -> None:
     publisher = graph.client.create_publisher(String, 'robot_description', KEPT)
     publisher.publish(String(data='<mujoco/>'))
     node = graph.start('sgp_node', command__type='none', diagnostics__period=0.1)

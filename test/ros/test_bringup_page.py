@@ -1,4 +1,4 @@
-"""What docs/bringup.md says, beside stand-ins for the nodes of ros2_control.
+"""Statements of docs/bringup.md, beside stand-ins for the nodes of ros2_control.
 
 ros2_control is on no registry for pip. This client publishes what its nodes publish: the URDF on
 the latched topic robot_description, joint states of a joint_state_broadcaster, commands of a

@@ -1,4 +1,4 @@
-"""What the node keeps for a diagnosis, without a graph."""
+"""Recordings that the node keeps for a diagnosis, without a graph."""
 
 from __future__ import annotations
 

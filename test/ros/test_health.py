@@ -39,7 +39,7 @@ def test_a_robot_that_stays_the_same_is_fine():
     assert 0.0 <= float(status.values['drift']) < 1.0
 
 
-def test_a_robot_that_changed_is_told():
+def test_a_robot_that_changed_is_reported():
     """An actuator that loses a third of its gain is a warning in plain words."""
     events = pendulum_events(1500, noise=1e-4)
     weaker = [
@@ -55,7 +55,7 @@ def test_a_robot_that_changed_is_told():
 
 
 @pytest.mark.parametrize(('grown', 'level'), [(0.9, OK), (1.003, OK), (1.006, WARN)])
-def test_errors_that_drift_are_told_once_they_have_grown(monkeypatch, grown, level):
+def test_errors_that_drift_are_reported_once_they_have_grown(monkeypatch, grown, level):
     """By more than counts as physics: of a joint whose errors are all noise that is none."""
     engine = Engine(PENDULUM, config(buffer__budget=60))
     health = FitHealth(1, 0.3, 1.0)
@@ -83,7 +83,7 @@ def test_errors_that_drift_are_told_once_they_have_grown(monkeypatch, grown, lev
         ('found', 5.0, 'no_factor', 'singular'),
     ],
 )
-def test_the_reason_of_a_refused_fit_is_told(model, evidence, refusal, said):
+def test_the_reason_of_a_refused_fit_is_reported(model, evidence, refusal, said):
     """A fit that diverged asks for another look at the data; one that is no better does not."""
     engine = Engine(PENDULUM, config())
     for event in pendulum_events(100):
@@ -108,7 +108,7 @@ def test_refused_fits_are_counted_by_reason():
     assert values['refits_refused.no_better'] == values['refits_refused.no_factor'] == '0'
 
 
-def test_a_parameter_that_is_not_determined_is_told_once(monkeypatch):
+def test_a_parameter_that_is_not_determined_is_reported_once(monkeypatch):
     """A warning with its name, then information; one more that gets lost is a new warning."""
     engine = Engine(PENDULUM, config(buffer__budget=60))
     for event in pendulum_events(1200):
@@ -118,17 +118,17 @@ def test_a_parameter_that_is_not_determined_is_told_once(monkeypatch):
     monkeypatch.setattr(engine, 'parameters', lambda: shown)
     health = FitHealth(1, 0.3, 1.0)
 
-    def told():
+    def reported():
         status = health.statuses(engine, 'arm/node')[-1]
         assert status.name == 'arm/node: parameters'
         return status.level, status.message
 
-    level, message = told()
+    level, message = reported()
     assert level == WARN
     assert '1 of 2 parameters not determined so far: J; move' in message
-    assert told()[0] == OK
+    assert reported()[0] == OK
     shown[0] = SimpleNamespace(name='b', std=None)
-    assert told()[0] == WARN
+    assert reported()[0] == WARN
 
 
 @pytest.mark.parametrize(('window', 'wait'), [(0.1, 0.02), (0.2, 0.05)])

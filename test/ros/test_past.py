@@ -1,4 +1,4 @@
-"""What is remembered of a robot comes through to another process as it was, in few objects."""
+"""The past of a robot reaches another process as it was, in few objects."""
 
 from __future__ import annotations
 

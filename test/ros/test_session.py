@@ -107,7 +107,7 @@ def test_a_fit_in_a_process_equals_a_fit_in_place(fits: FitProcess) -> None:
     np.testing.assert_allclose(answer.log_evidence, expected.log_evidence, rtol=1e-6)
 
 
-def test_a_killed_worker_is_told_and_replaced(fits: FitProcess) -> None:
+def test_a_killed_worker_is_reported_and_replaced(fits: FitProcess) -> None:
     process = fits._process
     assert process is not None
     assert process.pid is not None
@@ -278,7 +278,7 @@ def test_the_record_opens_with_the_settings_in_force(session: Session, tmp_path:
     assert [dict(c.settings) for c in changes[1:]] == [{'buffer.budget': 25}]
 
 
-def test_a_fit_that_runs_is_told_until_it_ends(session: Session) -> None:
+def test_a_fit_that_runs_is_reported_until_it_ends(session: Session) -> None:
     for event in _events(60):
         session.take(event)
     assert session.refit()

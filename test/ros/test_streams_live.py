@@ -180,7 +180,7 @@ def _socket_limit() -> int:
 def test_every_message_of_a_burst_is_read_or_counted(
     graph: Graph, depth: int, count: int, step_ns: int, *, is_whole: bool
 ) -> None:
-    """What comes while the node stands still, and more than its queue holds or less."""
+    """Messages that come while the node stands still, more than its queue holds or fewer."""
     node = graph.start('sgp_node', **MEASURED, qos__depth=depth)
     states = graph.client.create_publisher(JointState, 'joint_states', 1000)
     told = graph.collect(DiagnosticArray, '/diagnostics')

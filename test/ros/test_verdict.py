@@ -1,4 +1,4 @@
-"""What the node says about what arrives."""
+"""Sentences of the node on the messages that arrive."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ LAWS = {
 
 
 def _at_speed(u, v):
-    """What drives is below the line, what brakes below the torque of the standing motor."""
+    """Driving effort is below the line, braking effort below the torque of the standing motor."""
     most = np.where(u * v < 0.0, 0.6, np.maximum(0.6 - 0.2 * np.abs(v), 0.0))
     return np.sign(u) * np.minimum(np.abs(u), most)
 

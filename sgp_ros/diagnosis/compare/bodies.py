@@ -1,4 +1,4 @@
-"""What wrong inertial parameters can do: their prior, and the columns of one joint that follow.
+"""Wrong inertial parameters: their prior, and the columns of one joint that follow.
 
 A body may have another mass, another centre, another inertia: ten changes of one standard
 deviation each. What they do to a joint is factored once, for every scale of its rows.

@@ -115,7 +115,7 @@ class Equations:
     def with_dry_friction(self, joints: frozenset[int]) -> Equations:
         """Return the equations under the hypothesis that dry friction may hold these joints.
 
-        While it does, it takes up whatever is needed: such rows ask nothing of anything else.
+        While it does, it takes up any force: such rows do not constrain anything else.
         """
         held = [j for j in sorted(joints) if self.moving[self.rests[:, j], j].any()]
         if not held:
@@ -161,8 +161,8 @@ class Equations:
         Their sum is the mean of log det(M / M nominal) for changed bodies and what is added to M;
         joints differ by the diagonal of M. What is measured is the motion: a model of other
         inertia must not gain from residuals in smaller units of effort. That holds as far as they
-        are no noise of measured efforts, which no inertia changes. Minus infinity where the mass
-        matrix is not positive, infinity where the nominal one has none.
+        are not noise of measured efforts, which no inertia changes. Minus infinity where the mass
+        matrix is not positive, infinity where the nominal robot has a joint without inertia.
 
         Args:
             w: (p,) change of the bodies.
@@ -219,7 +219,7 @@ def _smoothing_error(
 def make_equations(
     raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth, unstated: Collection[int] = ()
 ) -> Equations:
-    """Return the equations of a recording; a joint that does not move is asked nothing.
+    """Return the equations of a recording; a joint that does not move has rows of zeros.
 
     Args:
         raw: the recording.

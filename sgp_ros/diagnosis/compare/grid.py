@@ -78,9 +78,9 @@ def effort_noise(
 ) -> np.ndarray:
     """Return the mean square that noise of measured efforts may have below a cut-off, (k,).
 
-    It is taken for white, at the lowest level that the spectra have in a quarter of what lies
-    above: motion, ripple and what a current loop adds there are no noise of the measurement.
-    Two standard deviations of that, and of what so many rows have by chance, are added.
+    It is taken for white, at the lowest level that the spectra have in a quarter of the band
+    above: motion, ripple and the noise of a current loop there are not noise of the measurement.
+    Two standard deviations of that level, and of the chance of so many rows, are added.
 
     Args:
         effort: (n, k) [N m or N].
@@ -103,9 +103,9 @@ def part_of_noise(noise: np.ndarray, d: np.ndarray) -> np.ndarray:
 
 
 def noisy_volume(volume: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """Return logarithms of the units of residuals, (k,), of which a part is noise of efforts.
+    """Return logarithms of the units of residuals, (k,), part of which is noise of efforts.
 
-    Only what the motion shows is measured in units of motion.
+    Only the part that the motion shows is measured in units of motion.
     """
     return np.asarray(0.5 * np.log(part + (1.0 - part) * np.exp(2.0 * volume)))
 

@@ -38,7 +38,7 @@ _ROUNDS = 3
 
 
 def open_bodies(robot: str, tree: Tree) -> tuple[int, ...]:
-    """Return the bodies without usable inertia of a robot that cannot do without; mostly none.
+    """Return the bodies without usable inertia, where the robot needs one; mostly empty.
 
     A body without mass, or of mass in a point, is usable where the others resist acceleration.
 
@@ -103,7 +103,8 @@ def with_open_bodies(raw: RawTrajectory, tree: Tree, bodies: Sequence[int]) -> T
 def _solved(A: np.ndarray, y: np.ndarray, p: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the first p coefficients of A (N, k, m) on y (N, k), and their information R (p, p).
 
-    `R^T R` is what the others leave of the information: the last block of a QR with theirs first.
+    `R^T R` is their information once the other coefficients are eliminated: the last block of a QR
+    with the others first.
     """
     sigma = np.sqrt((y**2).mean(axis=0))
     for _ in range(_ROUNDS):
@@ -119,7 +120,7 @@ def _solved(A: np.ndarray, y: np.ndarray, p: int) -> tuple[np.ndarray, np.ndarra
 
 
 def open_remark(tree: Tree, bodies: Sequence[int]) -> tuple[str, ...]:
-    """Return what a user should know of bodies that the file left open; nothing without any."""
+    """Return remarks on bodies that the file left open; empty without any."""
     if not bodies:
         return ()
     links = ', '.join(tree.link_names[i] for i in bodies)

@@ -27,7 +27,7 @@ LEAD_S = 0.3
 def sampled(equations: Equations) -> Equations:
     """Return the equations of at most `SCREENED_ROWS` rows; all of a short recording.
 
-    Rows, columns and target are those of the whole; only what remembers begins anew in each block.
+    Rows, columns and target are those of the whole; only memories restart in each block.
     """
     motion, low = equations.motion, equations.filter
     if len(equations.d) <= SCREENED_ROWS or motion.is_static:
@@ -90,7 +90,7 @@ def _extreme(equations: Equations, starts: list[int]) -> Iterator[int]:
 
 
 def _joined(blocks: list[slice], low: ParallelFilter) -> list[slice]:
-    """Return blocks in which neighbours are one, unless a pause lies between them."""
+    """Return blocks with neighbours joined, unless a pause lies between them."""
     rows, found = low.rows, blocks[:1]
     for block in blocks[1:]:
         if block.start == found[-1].stop and rows[block.start] - rows[block.start - 1] == (

@@ -79,7 +79,7 @@ def collect_settled(
 def approaches(position: np.ndarray) -> np.ndarray:
     """Return the direction from which each position was approached, (n,) of -1 and 1.
 
-    A flicker of the encoder is no change of direction: the position must turn back by
+    A flicker of the encoder is not a change of direction: the position must turn back by
     `COUNTS_BACK` of its least steps.
 
     Args:
@@ -116,7 +116,7 @@ def _poses(raw: RawTrajectory, which: np.ndarray) -> RawTrajectory:
 
 
 def shows(effect: Effect, place: Place, motion: ObservedMotion) -> bool:
-    """Return whether a recording can show an effect: of settled points, what is at rest.
+    """Return whether a recording can show an effect; settled points show only static ones.
 
     Its force must neither vanish nor change when poses are approached faster and later.
     """

@@ -24,7 +24,7 @@ _NO_COMMANDS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeveralDrives:
-    """What the drives receive in recordings one after the other.
+    """Commands to the drives in recordings one after the other.
 
     Attributes:
         parts: of each recording.

@@ -32,7 +32,7 @@ from sgp_ros.errors import RecordingError
 _FEW = 16
 """Positions below which no spectrum is taken."""
 _ROUNDING = 1e-9
-"""Steps that are smaller, relative to the range, are no counts of an encoder."""
+"""Least step of an encoder's counts, relative to the range."""
 _LOWEST = 0.2
 """Part of what is near zero that a fold is in for at least half of this share of the time."""
 
@@ -103,7 +103,7 @@ def require_motion(events: Iterable[Event], robot: str, names: Sequence[str]) ->
 def at_rest(raw: RawTrajectory, is_still: np.ndarray) -> RawTrajectory:
     """Return a trajectory in which still joints (k,) of bool rest at the median position.
 
-    What their encoders show is noise, and nothing is to be explained by it.
+    What their encoders show is noise, and it explains nothing.
     """
     rest = np.median(raw.position, axis=0)
     return replace(raw, position=np.where(is_still, rest, raw.position))

@@ -1,10 +1,11 @@
 """Recordings at a high rate on the rows that their band needs.
 
 No equation is formed above `HIGHEST_CUTOFF_HZ`, and every column of force is computed on all rows
-before its filter: beyond some rows a period, more of them cost time and tell nothing. Positions,
-velocities and measured efforts pass one low-pass before rows are left out, so that noise between
-the two rates does not fold into the band, and the noise of the positions stays what it was there.
-Commands hold until the next one whatever the grid; their efforts are averaged over its steps.
+before its filter: beyond some rows a period, more of them cost time and add no information.
+Positions, velocities and measured efforts pass one low-pass before rows are left out, so that
+noise between the two rates does not fold into the band, and the noise of the positions in the band
+does not change. Commands hold until the next one on any grid; their efforts are averaged over its
+steps.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ its gain is 1 but for a millionth."""
 def every_row_needed(raw: RawTrajectory) -> int:
     """Return the distance of the rows that stay; 1 where all do.
 
-    All do of settled points, which are no motion, and of position targets: what a drive makes of
-    them depends on the rows between which it holds.
+    All do of settled points, which are not a motion, and of position targets: the effort that a
+    drive makes of them depends on the rows between which it holds.
     """
     if raw.approach is not None or raw.gains is not None:
         return 1
@@ -65,7 +66,7 @@ def thinned(raw: RawTrajectory) -> RawTrajectory:
 
 
 def _on_fewer(drive: RecordedCommands, every: int) -> RecordedCommands:
-    """Return commands whose efforts are wanted on every so many-th point of each grid."""
+    """Return commands whose efforts are wanted only on every n-th point of each grid."""
     if isinstance(drive, SeveralDrives):
         return SeveralDrives(tuple(_on_fewer(part, every) for part in drive.parts))
     assert isinstance(drive, Drive)

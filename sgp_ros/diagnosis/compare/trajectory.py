@@ -3,7 +3,7 @@
 Positions are joined by a cubic spline, commands are averaged as exactly as `Drive` does it.
 The bandwidth follows from the noise of the encoders: noise of density S in the position becomes a
 force of variance `M^2 (2 pi)^4 S f^5 / 5` below f. The cut-off is the frequency at which that
-reaches `NOISE_SHARE` of the commanded effort, or the highest that motion and rate give sense to.
+reaches `NOISE_SHARE` of the commanded effort, or the highest that motion and rate justify.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ NOISE_SHARE = 3e-6
 """Share of the mean square of the effort that noise may take below the cut-off."""
 _COMMON_SHARE = 0.5
 _NO_EFFORTS = (
-    'The commands are no efforts: the measured effort does not follow them. It is taken as the '
+    'The commands are not efforts: the measured effort does not follow them. It is taken as the '
     'effort that acts: nothing can be said of delay, dead zone, saturation and lag of the drive.'
 )
 VANISHING = 1e-9
@@ -96,8 +96,8 @@ def collect(
     """Bring a recording to its uniform grid.
 
     Where states carry a measured effort and there are commands too, the commands act if the
-    measured effort follows them: then the laws of the drive can be told from them. Commands of
-    another kind never take the place of measured efforts.
+    measured effort follows them: then the laws of the drive can be identified from them. Commands
+    of another kind never take the place of measured efforts.
 
     Args:
         events: of the recording.
@@ -188,9 +188,9 @@ class Bandwidth:
 
 
 def choose_bandwidth(raw: RawTrajectory, tree: Tree) -> Bandwidth:
-    """Return the filters that noise, rate and motion of a recording ask for.
+    """Return the filters that noise, rate and motion of a recording require.
 
-    Each row of settled points stands for itself: nothing is filtered.
+    Rows of settled points are independent: nothing is filtered.
     """
     rate = 1.0 / raw.step
     if raw.approach is not None:
@@ -216,7 +216,7 @@ def _driven(motion: ObservedMotion) -> np.ndarray:
 def observe(raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth) -> ObservedMotion:
     """Return the lightly smoothed motion of a trajectory; settled points as they are.
 
-    Those are approached at a speed at which only its direction counts.
+    Their speed of approach has a meaning only by its direction.
     """
     if raw.approach is not None:
         assert raw.effort is not None

@@ -1,4 +1,4 @@
-"""Whether the measured velocity lags behind the positions.
+"""Lag of the measured velocity behind the positions.
 
 The velocity field is compared with the derivative of the position, both through one filter. A
 first-order low-pass with time constant T shows `v_T`, `T dv_T/dt + v_T = v`; T follows by least

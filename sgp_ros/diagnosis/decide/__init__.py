@@ -1,1 +1,1 @@
-"""What the comparison lets us assert, with what certainty, and what it cannot tell apart."""
+"""Effects that can be asserted, with their certainty and equivalents."""

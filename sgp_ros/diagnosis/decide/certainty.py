@@ -57,14 +57,14 @@ class Probabilities:
 def settled(
     equations: Equations, comparison: Comparison, decision: Decision
 ) -> tuple[Decision, Contrasts, Probabilities]:
-    """Return the decision without findings that are improbable, with probabilities of the rest.
+    """Return the decision without improbable findings, with the probabilities of the others.
 
-    What is asserted beside others is at least `LEAST_ASSERTED` probable, and a law that few joints
-    have is worth `ALIKE` more than none, or than its plain one. What is not gives way to the plain
-    law that it adds to, of which others are rivals that add to it too, or is left out; unless a
-    model that was compared, of which all is probable, is worth more than what is left. The most
-    probable one stays: something is missing there, unless bodies alone leave less than counts as
-    physics.
+    Effects that are asserted beside others have a probability of at least `LEAST_ASSERTED`; a law
+    that few joints have is worth `ALIKE` more than no law, or than its plain law. Others are
+    replaced by the plain law that they add to, if their rivals add to it too, or are left out,
+    unless another compared model, with probable effects only, is worth more than the result. The
+    most probable effect stays, because something is missing there, unless bodies alone leave less
+    than counts as physics.
     """
     dropped: set[object] = set()
     while True:
@@ -103,7 +103,7 @@ def settled(
 
 
 def settled_of(several: Several) -> tuple[Several, Contrasts, Probabilities]:
-    """Return what is asserted, of one recording without what is improbable, and how certain."""
+    """Return what is asserted and how certain; of one recording without improbable findings."""
     equations, comparison, decision = several.equations, several.comparison, several.decision
     if several.chances:
         contrasts = Contrasts(equations, decision.model)
@@ -149,8 +149,8 @@ def probabilities(
 ) -> Probabilities:
     """Return the tempered probabilities of all effects.
 
-    A richer law whose numbers make it the asserted one is no rival to it. An effect is as certain
-    as its joint is described; one that acts on all joints, as the least that is.
+    A richer law whose numbers reduce it to the asserted one is not a rival. An effect is only as
+    certain as its joint is well described; one that acts on all joints, as the worst of them.
     """
     scale, asserted = Scale.of(equations, comparison), decision.model
     if any(s.effect.has_chosen_form for s in asserted.effects):
@@ -189,10 +189,10 @@ def probabilities(
 def certainty_of(
     findings: Sequence[Finding | Difference], comparison: Comparison, trust: float = 1.0
 ) -> float:
-    """Return the probability that the verdict is right: the least of what it rests on.
+    """Return the probability that the verdict is right: the least of those it rests on.
 
-    That is all findings that count as physics; of unknowns alone the most certain one; of none the
-    probability `trust` of bodies against errors of the connection.
+    It rests on all findings that count as physics; on the most certain one where all are unknown;
+    without findings, on the probability `trust` of bodies against errors of the connection.
     """
     named = [f.probability for f in findings if f.effect != UNKNOWN and f.share > COUNTED_SHARE]
     if named:
@@ -208,7 +208,8 @@ def rests_on(
 ) -> bool:
     """Return whether a verdict rests on joints that are doubted.
 
-    One that names physics rests on the joints of that alone, and on all for what acts on several.
+    A verdict that names physics rests on the joints of its effects, or on all joints where an
+    effect acts on several.
 
     Args:
         in_doubt: joints of which nothing is certain.
@@ -223,7 +224,7 @@ def rests_on(
 def doubted(
     findings: Iterable[Finding], in_doubt: Collection[str], joints: Collection[str]
 ) -> tuple[Finding, ...]:
-    """Return findings, those that rest on joints in doubt with no more than `DOUBTED`."""
+    """Return findings, with at most the probability `DOUBTED` if they rest on doubted joints."""
     return tuple(
         replace(f, probability=min(f.probability, DOUBTED))
         if f.joint in in_doubt or rests_on(in_doubt, (f,), joints) else f

@@ -39,7 +39,7 @@ from sgp_ros.gp.model import CoefficientPrior
 from sgp_ros.physics.effect_at import EffectAt
 
 LEAST_ROWS = 5 * PARTS
-"""Rows below which nothing can be said of structure."""
+"""Rows below which structure cannot be tested."""
 ORDER = 8
 """Rows before that may predict one."""
 LEARNED = 200
@@ -49,7 +49,8 @@ LEARNED = 200
 def structure(equations: Equations, residual: np.ndarray) -> np.ndarray:
     """Return the share of each joint's rest that is not noise, (k,), with its uncertainty.
 
-    The greater of what Z and what earlier rows explain, of joints that leave most; 1 of others.
+    The greater of the shares that Z and earlier rows explain, at joints with a large residual;
+    1 at others.
 
     Args:
         equations: of the recording.
@@ -61,10 +62,10 @@ def structure(equations: Equations, residual: np.ndarray) -> np.ndarray:
 
 
 def repeatable(equations: Equations, residual: np.ndarray, asked: np.ndarray) -> np.ndarray:
-    """Return what the motion, and what earlier rows, explain of each joint's rest, (2, k).
+    """Return the shares of each joint's rest that the motion and earlier rows explain, (2, k).
 
-    Shares on parts left out, plus `1/sqrt(N)` for N rows; 1 where no opinion was asked or can be
-    had. What only earlier rows explain is slow, and does not come back with the motion.
+    Shares on parts left out, plus `1/sqrt(N)` for N rows; 1 where none was asked for or can be
+    computed. A part that only earlier rows explain is slow and does not repeat with the motion.
 
     Args:
         equations: of the recording.
@@ -77,13 +78,13 @@ def repeatable(equations: Equations, residual: np.ndarray, asked: np.ndarray) ->
         return found
     for j in np.flatnonzero(asked):
         r = residual[:, j]
-        told = np.array([_by_motion(equations, r, int(j)), _by_past(equations, r)])
-        found[:, j] = np.minimum(1.0, np.maximum(told, 0.0) + 1.0 / np.sqrt(N))
+        explained = np.array([_by_motion(equations, r, int(j)), _by_past(equations, r)])
+        found[:, j] = np.minimum(1.0, np.maximum(explained, 0.0) + 1.0 / np.sqrt(N))
     return found
 
 
 def _by_past(equations: Equations, r: np.ndarray) -> float:
-    """Return the share of r (N,) that rows before explain, beyond what they do of white noise."""
+    """Return the share of r (N,) that earlier rows explain, beyond their share of white noise."""
     order = min(ORDER, len(r) // 10)
     rows = len(r) - order
     past = np.column_stack([r[order - i - 1 : order - i - 1 + rows] for i in range(order)])
@@ -157,7 +158,7 @@ def left_out(
 def support(columns: Columns, model: Model, floor: np.ndarray, rows: float) -> np.ndarray:
     """Return how much better parts left out are predicted with each effect than without it.
 
-    Bodies that could stand for an effect, as for the inertia of a rotor, predict as much: then it
+    Bodies that could imitate an effect, such as the inertia of a rotor, predict as much: then it
     counts how unlikely they are.
 
     Args:
@@ -195,7 +196,7 @@ def supported(
 ) -> Model | None:
     """Return the first model whose effects all predict parts of the recording left out.
 
-    Of more than two effects those that do not are taken out.
+    From models of more than two effects, those that do not are removed.
 
     Args:
         equations: of the recording.
@@ -207,11 +208,11 @@ def supported(
     for model in ranked:
         found = model
         while found.effects and is_credible(found):
-            told = support(columns, found, floor, rows)
-            if told.min() > EVIDENCE:
+            evidence = support(columns, found, floor, rows)
+            if evidence.min() > EVIDENCE:
                 return found
             if len(found.effects) <= 2:
                 break
-            weakest = found.effects[int(np.argmin(told))]
+            weakest = found.effects[int(np.argmin(evidence))]
             found = without(equations, found, lambda s, out=weakest: s is out)  # type: ignore[misc]
     return None

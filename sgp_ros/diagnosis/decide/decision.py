@@ -1,6 +1,6 @@
-"""What the comparison of models lets us assert.
+"""Model that the comparison of models allows to assert.
 
-Statistical significance is not enough: the schema calls physics what makes at least 0.4 % of the
+Statistical significance is not enough: the schema requires physics to make at least 0.4 % of the
 mean squared effort of some joint. Among models of nearly the same residual the one with the fewest
 parameters is asserted, if each of its effects predicts parts of the recording that were left out
 (`support`).
@@ -80,7 +80,7 @@ class Decision:
 
 @dataclass(frozen=True, eq=False)
 class Scale:
-    """What mean squares are measured against.
+    """Reference powers for mean squares.
 
     Attributes:
         power: (k,) mean squared efforts.
@@ -107,7 +107,7 @@ class Scale:
 
     @property
     def floor(self) -> np.ndarray:
-        """What the right model may leave, (k,) shares."""
+        """Largest rest that the right model may leave, (k,) shares."""
         return np.asarray(FLOOR_SHARE + self.shape_error * self.nominal + self.error / self.power)
 
     def of_forms(self) -> Scale:
@@ -115,7 +115,7 @@ class Scale:
         return replace(self, shape_error=0.0)
 
     def explained(self, model: Model) -> float:
-        """Return the size of what is to explain.
+        """Return the size of the force to explain.
 
         That is the rest of the parameters, or the effects where changed parameters could imitate
         them, but never more than the nominal robot leaves.
@@ -128,29 +128,29 @@ class Scale:
         return float((structured * model.left).sum()) / self.explained(model)
 
     def found(self, model: Model) -> np.ndarray:
-        """Return what there is to explain at each joint, (k,) shares, as in `explained`."""
+        """Return the force to explain at each joint, (k,) shares, as in `explained`."""
         net = sum(model.forces, np.zeros_like(model.residual))
         effects = np.minimum((net**2).mean(axis=0) / self.power, self.nominal)
         return np.asarray(np.maximum(self.base, effects))
 
-    def excess(self, model: Model, told: np.ndarray | None = None) -> np.ndarray:
+    def excess(self, model: Model, predictable: np.ndarray | None = None) -> np.ndarray:
         """Return what a model leaves at each joint, relative to what an adequate one may, (k,).
 
-        A joint that has effects of its own is measured by what is explained there; of others all
-        that is explained counts, and what is no physics.
+        A joint with effects of its own is measured relative to the force that they had to explain;
+        others relative to all that is explained there, or to the least share of physics if larger.
 
         Args:
             model: fitted.
-            told: (2, k) share of the rest that motion and earlier rows predict, see `repeatable`;
-                None for all of it.
+            predictable: (2, k) share of the rest that motion and earlier rows predict, see
+                `repeatable`; None for all of it.
         """
-        told = np.ones((2, len(self.power))) if told is None else told
+        predictable = np.ones((2, len(self.power))) if predictable is None else predictable
         owned = [s.place.joint for s in model.effects if s.effect.site in {JOINT, MOTOR}]
         is_own = np.isin(np.arange(len(self.power)), owned)
         explained = np.where(is_own, self.found(model), self.explained(model))
         slight = np.where(is_own, SLIGHT_REST, LEAST_SHARE)
         limits = np.maximum(np.multiply.outer([ADEQUATE_REST, COLOURED_REST], explained), slight)
-        return np.asarray((told * model.left / limits).max(axis=0))
+        return np.asarray((predictable * model.left / limits).max(axis=0))
 
     def counts(self, model: Model) -> bool:
         """Return whether effects are large enough, credible, and do not cancel each other."""
@@ -158,7 +158,7 @@ class Scale:
 
     @staticmethod
     def is_large(model: Model) -> bool:
-        """Return whether effects count and are seen, those few joints have each by itself."""
+        """Return whether effects are large enough and visible; each rare law by itself."""
         counted = zip(model.effects, model.shares, model.filtered_shares, strict=True)
         small = [s.effect for s, x, seen in counted if x <= COUNTED_SHARE or seen <= SLIGHT_REST]
         return len(small) < len(model.effects) and all(e.is_usual for e in small)
@@ -202,7 +202,7 @@ def _ranked(comparison: Comparison, scale: Scale) -> list[Model]:
 def decide(equations: Equations, comparison: Comparison) -> Decision:
     """Return the verdict on a recording.
 
-    Nothing is missing where likely bodies leave no more than is adequate in any case.
+    Nothing is missing where plausible bodies leave no more than any adequate model may.
     """
     scale, base = Scale.of(equations, comparison), comparison.base
     ranked = _ranked(comparison, scale)
@@ -225,7 +225,7 @@ def decide(equations: Equations, comparison: Comparison) -> Decision:
 
 
 def calm(base: Model, rivals: tuple[Model, ...], scale: Scale) -> Decision:
-    """Return the decision that no physics is missing."""
+    """Return the decision that no effect is missing."""
     verdict = 'parameters_only' if base.is_free else 'no_mismatch'
     excess = np.full(len(scale.base), NOTHING_EXPLAINED)
     return Decision(verdict, base, rivals, excess, int(np.argmax(scale.base)), against=base.score)
@@ -240,8 +240,8 @@ def _judged(
 ) -> Decision:
     """Return the verdict on the best model: which joints it describes, and whether most."""
     base = comparison.base
-    told = repeatable(equations, best.residual, scale.excess(best) >= 1.0)
-    excess = scale.excess(best, told)
+    predictable = repeatable(equations, best.residual, scale.excess(best) >= 1.0)
+    excess = scale.excess(best, predictable)
     if not (excess >= 1.0).any():
         worst = int(np.argmax(scale.base))
         return Decision('missing_physics', best, rivals, excess, worst, against=base.score)

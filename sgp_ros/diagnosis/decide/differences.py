@@ -1,12 +1,12 @@
-"""What differs between several recordings of one robot: a load taken up, friction, a mount.
+"""Differences between several recordings of one robot: a load taken up, friction, a mount.
 
 All recordings share one model. A difference is a law that acts in one recording alone, on top of
 what is common, fitted together with it. Laws that may differ are those without a shape to search,
 such as levels of friction and loads, and those that change gravity or bodies. One after the other
 is added while it is worth its price and predicts parts that were left out. A law of the common
 model that one recording alone needs is moved there; so of two recordings of which one carries a
-load, that one is named. Where either says the same, such as friction that is lower in the second
-or higher in the first, the first recording stands for what is common.
+load, that one is named. Where either is possible, such as friction that is lower in the second
+or higher in the first, the first recording is taken as the common one.
 
 What differs would hide what is common. So once differences are found, they are taken off, the
 common models are compared anew, and differences are looked for again beside the new one.
@@ -44,7 +44,7 @@ ALIKE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Several:
-    """What is common to several recordings, and what differs.
+    """Common model of several recordings, and their differences.
 
     Attributes:
         equations: with what differs taken off.
@@ -92,7 +92,7 @@ def decide_several(equations: Equations, count: int, progress: Callable[[float],
 
 
 def _start(comparison: Comparison, decision: Decision, scale: Scale) -> Model:
-    """Return the best common model, be it adequate or not: what differs may spoil it."""
+    """Return the best common model, adequate or not: differences may spoil it."""
     models = (comparison.base, *comparison.singles, *comparison.pairs, *comparison.more)
     return max((decision.model, *models), key=scale.worth)
 
@@ -120,9 +120,9 @@ def _force(model: Model, some: tuple[EffectAt, ...]) -> np.ndarray:
 
 
 def without_laws_of(several: Several, joints: Mapping[str, str]) -> Several:
-    """Return what is left where the laws of some joints are refused; the same where none is.
+    """Return the decision with the laws of some joints refused.
 
-    Of several recordings what differs stands with what is common, and nothing is refused.
+    With several recordings, differences depend on the common model, and nothing is refused.
 
     Args:
         several: decided.
@@ -145,7 +145,7 @@ def without_laws_of(several: Several, joints: Mapping[str, str]) -> Several:
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """Looks for what differs between so many recordings."""
+    """Search for differences between so many recordings."""
 
     columns: Columns
     scale: Scale
@@ -164,7 +164,7 @@ class _Search:
             model = best
 
     def _worth(self, model: Model) -> float:
-        """Return the worth of a model; of two that say the same, the one with more in common."""
+        """Return the worth of a model; between equal ones, more common laws win."""
         own = [s.effect.recording for s in model.effects if isinstance(s.effect, InRecording)]
         return self.scale.worth(model) - 4.0 * ALIKE * len(own) - 2.0 * ALIKE * own.count(0)
 
@@ -247,7 +247,7 @@ class _Search:
     def _holds(self, model: Model) -> bool:
         """Return whether the last effect counts as physics and predicts what was left out.
 
-        Anything is said of effects in one recording alone.
+        Only effects that act in one recording are tested.
         """
         equations, last = model.frame.equations, model.effects[-1]
         if not isinstance(last.effect, InRecording):
@@ -257,8 +257,10 @@ class _Search:
         there = recording[equations.filter.rows] == last.effect.recording
         share = (model.forces[-1][there] ** 2).mean(axis=0) / equations.power
         floor = self.scale.floor * self.scale.power
-        told = support(self.columns, model, floor, self.scale.rows)[-1]
-        return bool(share.max() > COUNTED_SHARE) and told > EVIDENCE and math.isfinite(told)
+        evidence = support(self.columns, model, floor, self.scale.rows)[-1]
+        return (
+            bool(share.max() > COUNTED_SHARE) and evidence > EVIDENCE and math.isfinite(evidence)
+        )
 
 
 def _same(law: Effect) -> Effect:

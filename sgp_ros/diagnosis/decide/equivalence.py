@@ -1,7 +1,7 @@
-"""Rivals that explain a recording as well as the asserted model, and a motion that would tell.
+"""Rivals that explain a recording as well as the asserted model, and a motion to separate them.
 
-Two models are told apart by what they leave. Where the likelihoods differ by less than the odds
-of one to twenty, the recording prefers none; only their size does. Such rivals are carried over
+Two models are told apart by their residuals. Where the likelihoods differ by less than the odds
+of one to twenty, the recording prefers neither; only their size does. Such rivals are carried over
 to other motions, and the one on which their efforts differ most is the excitation to ask for.
 """
 
@@ -43,7 +43,7 @@ A width without bound is what the limits of the joints allow, a turn where there
 class Contrasts:
     """How far rivals differ from the asserted model, on the recorded motion and on others.
 
-    What the asserted model takes for these motions is computed once.
+    The efforts of the asserted model for these motions are computed once.
 
     Args:
         equations: of the recording.
@@ -67,14 +67,14 @@ class Contrasts:
         return self._known[rival]
 
     def is_same_law(self, rival: Model) -> bool:
-        """Return whether a rival says the same on any motion, as far as physics counts.
+        """Return whether a rival gives the same efforts on any motion, but for less than physics.
 
         So does a law with one parameter more whose value makes it the simpler one.
         """
         return max(self.of(rival).values()) < LEAST_SHARE
 
     def stands_for(self, rival: Model, effect: EffectAt) -> bool:
-        """Return whether an effect of a rival is an asserted one by another name.
+        """Return whether an effect of a rival is an asserted one under another name.
 
         On any motion they differ by less than what an adequate model leaves of what it explains,
         as dry friction and a hysteresis whose presliding nobody can resolve; or it is a richer law
@@ -176,15 +176,15 @@ def equivalents(
         if is_other and scale.fit(rival) + prior > least:
             known.append(rival)
             if not contrasts.is_same_law(rival):
-                found.append(_told(equations, rival, contrasts.of(rival)))
+                found.append(_equivalent(equations, rival, contrasts.of(rival)))
     return tuple(found)
 
 
 def _without_prior(equations: Equations, parameters: Model) -> Model:
     """Return the model of the bodies alone that may differ by any amount.
 
-    What the prior thinks unlikely still explains the recording: a motor that delivers a third,
-    or bodies three times as heavy.
+    Bodies that are unlikely by the prior still explain the recording: a motor that delivers a
+    third, or bodies three times as heavy.
     """
     base = equations.base / parameters.sigma[:, None]
     N, k, p = base.shape
@@ -199,11 +199,11 @@ def _without_prior(equations: Equations, parameters: Model) -> Model:
 
 
 def _contains(rival: Model, model: Model) -> bool:
-    """Return whether a rival is a model with more freedom: it fits as well of necessity."""
+    """Return whether a rival is a model with more freedom, which necessarily fits as well."""
     return model.key <= rival.key and (rival.is_free or not model.is_free)
 
 
-def _told(equations: Equations, rival: Model, contrasts: Mapping[str, float]) -> Equivalent:
+def _equivalent(equations: Equations, rival: Model, contrasts: Mapping[str, float]) -> Equivalent:
     """Return a rival with the motion that would tell it from the asserted model."""
     name = max(MOTIONS, key=lambda n: contrasts[n])
     effects = tuple(

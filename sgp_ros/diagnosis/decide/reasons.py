@@ -1,4 +1,4 @@
-"""Why a model that was compared is not asserted, in words that its numbers bear out."""
+"""Reasons why a compared model is not asserted, in words that its numbers support."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ def apart(a: float, b: float, digits: int = 2) -> tuple[str, str]:
 
 
 def why_not(model: Model, decision: Decision, scale: Scale) -> str:
-    """Return why a model is not asserted: what it leaves, beside what it was compared with.
+    """Return why a model is not asserted: its residual beside that of its reference.
 
-    That is the asserted model; where nothing is asserted, the nearest one, and of the nearest one
-    itself the bodies alone.
+    The reference is the asserted model; where nothing is asserted, the nearest model, and for the
+    nearest model itself the bodies alone.
 
     Args:
         model: that was not asserted.
@@ -104,7 +104,7 @@ def _joint(
 def _unsupported(model: Model, scale: Scale) -> str:
     """Return what is wrong with a model that is worth no less than the asserted one."""
     columns = Columns(model.frame.equations)
-    told = support(columns, model, scale.floor * scale.power, scale.rows)
-    if told.min() > EVIDENCE:
+    evidence = support(columns, model, scale.floor * scale.power, scale.rows)
+    if evidence.min() > EVIDENCE:
         return 'this recording prefers neither of the two clearly'
     return 'it does not help to predict parts of the recording that were left out'

@@ -1,9 +1,9 @@
-"""What a recording could not have shown: the least size of effects that it would show.
+"""Visibility: the least size of an effect that a recording would have shown.
 
 An effect is found when the evidence for it pays for its freedom, and when it makes enough of the
-squared effort to count as physics. Both are asked of the force that it would exert in the motion
-that was recorded. Of this force bodies and the other effects of the final model take their part,
-with least squares; what is left stands beside what the final model leaves. The evidence is that of
+squared effort to count as physics. Both are computed from the force that it would exert in the
+recorded motion. Bodies and the other effects of the final model absorb a part of this force, by
+least squares; the rest is compared with the residual of the final model. The evidence is that of
 `Scale.fit`, so it counts as few rows as the decision does. The motion would have differed a little
 with the effect in it: the size holds to first order.
 """
@@ -83,7 +83,7 @@ class _Beside:
     model: Model
 
     def clearness(self, candidate: EffectAt) -> float:
-        """Return the lesser of evidence and share, each over what a finding needs of it."""
+        """Return the lesser of evidence and share, each relative to the one a finding needs."""
         model, scale = self.model, self.scale
         held = [s.effect.held_joints(s.place) for s in (*model.effects, candidate)]
         equations = self.columns.equations(frozenset().union(*held))
@@ -108,7 +108,7 @@ class _Beside:
         return min(float(nats) / (PER_EFFECT + PER_PARAMETER * size), share / COUNTED_SHARE)
 
     def _is(self, found: EffectAt, own: np.ndarray, equations: Equations) -> bool:
-        """Return whether an effect of the model gives a force (N, k, 1) too: it was shown then."""
+        """Return whether a model's effect gives this force (N, k, 1): it was then visible."""
         x = self.columns.of(found, equations, self.model.w).reshape(own.size, -1)
         y = own.ravel()
         left = y - x @ np.linalg.lstsq(x, y, rcond=1e-9)[0]
@@ -116,7 +116,7 @@ class _Beside:
 
 
 def _least(beside: _Beside, effect: Effect, quantity: Quantity, place: Place) -> float:
-    """Return the least size that shows; infinite where none does."""
+    """Return the least size that shows; infinite where no size does."""
     low, high = _range(beside, effect, quantity, place)
 
     def shows(size: float) -> bool:
@@ -133,7 +133,7 @@ def _least(beside: _Beside, effect: Effect, quantity: Quantity, place: Place) ->
 def _of_size(
     beside: _Beside, effect: Effect, quantity: Quantity, place: Place, size: float
 ) -> EffectAt:
-    """Return an effect of this size; of numbers that this does not say, the usual ones."""
+    """Return an effect of this size, with usual values of its other numbers."""
     shape, coefficients = effect.model({quantity.name: size}, place.kind)
     motion = beside.columns.equations(frozenset()).motion
     if len(shape):

@@ -61,7 +61,7 @@ def fit(
 
 
 class _Projected:
-    """Projected columns of candidates in one frame; of several shapes the others stay as they are.
+    """Projected columns of candidates in one frame, with all but one shape held.
 
     Args:
         frame: that projects.

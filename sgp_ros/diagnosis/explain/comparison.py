@@ -93,11 +93,11 @@ def _plain(columns: Columns, models: Iterable[Model]) -> Iterator[Model]:
 
 
 def _more(columns: Columns, found: Comparison) -> list[Model]:
-    """Return models of a search joint by joint, where the best credible model is not enough.
+    """Return models of a search joint by joint, where the best credible model does not suffice.
 
-    It leaves what counts as physics, or is not adequate, or has unlikely bodies that may stand for
-    what is missing. From that model, and from what nearly every joint has, with bodies that may
-    differ.
+    It does not if its residual counts as physics, if it is not adequate, or if its bodies are so
+    unlikely that they may imitate missing physics. The search starts from that model and from the
+    laws that nearly every joint has, with bodies that may differ.
     """
     by_score = _ranked([found.base, *found.singles, *found.pairs])
     best = next((m for m in by_score if not m.effects or is_credible(m)), found.base)
@@ -112,7 +112,7 @@ def _more(columns: Columns, found: Comparison) -> list[Model]:
 
 
 def _late(columns: Columns, sigma: np.ndarray) -> Iterator[Model]:
-    """Yield what nearly every joint has beside a delay of targets, of both variants.
+    """Yield the laws that nearly every joint has beside a delay of targets, in both variants.
 
     A target that is late by T acts at every joint much as viscous friction kp T and a rotor
     kd T - kp T^2/2; a search that has taken these would not come back to the delay.

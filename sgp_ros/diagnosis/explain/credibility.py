@@ -1,4 +1,4 @@
-"""Whether the laws of a fitted model are what their names say."""
+"""Credibility of a fitted model: whether its laws are those that their names state."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def is_sound(model: Model) -> bool:
 
 
 def _is_needed(s: EffectAt, equations: Equations) -> bool:
-    """Return whether plain laws would leave more of a law than is adequate in any case.
+    """Return whether plain laws would leave more of a law than any adequate model may.
 
-    Not so one whose shape is at its lower bound: there it is one of them.
+    A law with its shape at the lower bound is not needed: there it is a plain law.
     """
     if not s.effect.plain or s.place.source >= 0:
         return True

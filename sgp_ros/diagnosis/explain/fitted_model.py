@@ -81,10 +81,10 @@ class Model:
 
     @property
     def law_price(self) -> float:
-        """What laws must be worth, the more where few joints have them [nats].
+        """Price of the laws, higher where few joints have them [nats].
 
-        Those of which the prior says how unlikely their numbers are have paid by that, and further
-        waves of one law with the first.
+        Laws with a prior on their numbers have paid by that, and further waves of one law with the
+        first.
         """
         unusual = sum(
             type(e).surprise is Effect.surprise and not (e.is_open or adds_to_usual(e))
@@ -94,7 +94,7 @@ class Model:
 
     @property
     def cost(self) -> float:
-        """What the freedom of the model costs [nats]."""
+        """Price of the freedom of the model [nats]."""
         return price_of(self.frame, self.size)
 
     @property
@@ -156,9 +156,9 @@ def _extra_laws(s: EffectAt) -> int:
 
 
 def beyond_plain(s: EffectAt, force: np.ndarray, equations: Equations) -> np.ndarray:
-    """Return what plain laws of one joint do not say of a force, (n, k) or (n,) as given.
+    """Return the rest of a force that plain laws of one joint leave, (n, k) or (n,) as given.
 
-    Nothing is said of a joint while dry friction holds it: that takes up any force.
+    Rows in which dry friction holds the joint are left out: it takes up any force.
     """
     if not s.effect.plain:
         return force

@@ -69,7 +69,7 @@ class Frame:
 
     @cached_property
     def y(self) -> np.ndarray:
-        """What is left of the target, (N k + p,)."""
+        """Rest of the target, (N k + p,)."""
         if self.given is not None:
             return self.given
         return self.projected(self.equations.d[:, :, None])[:, 0]
@@ -122,12 +122,12 @@ class Frame:
 
     @property
     def occam(self) -> float:
-        """What free inertial parameters cost in evidence, `log det R / sqrt(weight)` [nats]."""
+        """Cost of free inertial parameters in evidence, `log det R / sqrt(weight)` [nats]."""
         return float(np.log(np.abs(np.diag(self.R)) / math.sqrt(self.weight)).sum())
 
     @property
     def determined(self) -> int:
-        """Number of combinations of inertial parameters that the data tell more of than the prior.
+        """Number of combinations of inertial parameters that data determine better than the prior.
 
         Their singular values of R are above `sqrt(2 weight)`.
         """
@@ -135,7 +135,7 @@ class Frame:
 
     @property
     def covariance(self) -> np.ndarray:
-        """Expected square errors of w, (p, p): of the rows, and of what the prior takes off.
+        """Expected square errors of w, (p, p): from the rows, and from the shrinkage by the prior.
 
         `A^-1 (D + weight^2 I) A^-1` with the information D of the rows and `A = D + weight I`.
         """

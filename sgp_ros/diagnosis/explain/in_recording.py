@@ -14,7 +14,7 @@ from sgp_ros.robots.observed_motion import ObservedMotion
 
 
 class InRecording(Effect):
-    """A law that acts in one recording alone; what it does not say itself, the law says.
+    """A law that acts in one recording alone; other attributes are those of the law.
 
     Args:
         law: the law.

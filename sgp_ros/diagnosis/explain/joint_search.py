@@ -44,8 +44,9 @@ def gain(trial: Model, model: Model, *, is_whole: bool = True) -> float:
     """Return what a trial is worth more than a model of the same recording [nats].
 
     The log likelihood, less the prices of effects and parameters. Rows that are correlated in
-    time count as fewer, joint by joint, and never as more than `INDEPENDENT_ROWS`. What is missing
-    is correlated too: only the model that leaves less tells how much, and only once all is there.
+    time count as fewer, joint by joint, and never as more than `INDEPENDENT_ROWS`. Missing physics
+    is correlated too; only the model with the smaller residual shows how much, and only once it is
+    complete.
 
     Args:
         trial: to compare.
@@ -63,7 +64,7 @@ def gain(trial: Model, model: Model, *, is_whole: bool = True) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """What is chosen together: the laws of one joint, or those of no joint.
+    """Laws that are chosen together: those of one joint, or those of no joint.
 
     Attributes:
         effects: laws.
@@ -111,7 +112,7 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
 def usual(columns: Columns, base: Model, first: tuple[EffectAt, ...] = ()) -> Model:
     """Return the model with the laws that nearly every joint has, where they can be seen.
 
-    A search that starts from nothing adds first what stands best for all of them together.
+    A search that starts from nothing would first add the law that best imitates all of them.
 
     Args:
         columns: of the recording.
@@ -172,8 +173,9 @@ def _best(model: Model, trials: Iterable[Model], *, is_whole: bool = True) -> Mo
 def _grown(columns: Columns, model: Model, block: _Block) -> Model:
     """Add the effects of a block that are worth their price, as long as something is left.
 
-    That is a residual, or bodies so unlikely that they may stand for what is missing. What nearly
-    every joint has, or adds to that, may be small, and is looked for in all that is not slight.
+    That is a residual, or bodies so unlikely that they may imitate the missing physics. Laws that
+    nearly every joint has, or that add to these, may be small and are sought in any residual that
+    is not slight.
     """
     while True:
         left, strain = block.left(model), 0.5 * float(model.w @ model.w)
@@ -196,7 +198,7 @@ def _grown(columns: Columns, model: Model, block: _Block) -> Model:
 
 
 def _shrunk(columns: Columns, model: Model, block: _Block) -> Model:
-    """Take out, or replace by a law of one number, what is not worth its price."""
+    """Remove laws that are not worth their price, or replace them by a law of one number."""
     while any(block.holds(s) for s in model.effects):
         better = _best(model, _changes(columns, model, block, is_simple=True))
         if better is None:
@@ -210,7 +212,7 @@ def _changes(
 ) -> Iterator[Model]:
     """Yield the model without each effect of a block, and with the best other law in its place.
 
-    Of simple ones, a law of one number stands for one of several.
+    Among simple laws, one with one number replaces one with several.
     """
     for s in model.effects:
         if not block.holds(s):
@@ -234,7 +236,8 @@ def _changes(
 def uncoupled(columns: Columns, without: Model, coupled: EffectAt) -> Iterator[Model]:
     """Yield models with the plain laws of each joint in place of one that couples or drifts.
 
-    Of two joints on one, on the other, on both; laws that drive, or are too small, are left out.
+    For a law of two joints: on one, on the other, on both. Laws that drive, or are too small, are
+    left out.
     """
     place = coupled.place
     both = (place.joint, place.source)
@@ -254,7 +257,7 @@ def uncoupled(columns: Columns, without: Model, coupled: EffectAt) -> Iterator[M
 
 
 def coupled(columns: Columns, model: Model) -> Iterator[Model]:
-    """Yield models with a law that couples two joints in place of what stands for it there.
+    """Yield models with a law that couples two joints in place of the laws that imitate it there.
 
     The inverse of `uncoupled`: several laws, none of which could go alone, make room for one.
     """
@@ -276,9 +279,10 @@ def coupled(columns: Columns, model: Model) -> Iterator[Model]:
 
 
 def _is_part(other: EffectAt, coupled: EffectAt, ends: set[int]) -> bool:
-    """Return whether a law could stand for a part of one that couples two joints.
+    """Return whether a law could imitate a part of one that couples two joints.
 
-    Couplings of the two, and what it says of its own joint; the source may have that beside it.
+    Such laws couple the same two joints, or are plain laws of its own joint; laws of the source
+    may stand beside it.
     """
     is_own = other.name in coupled.effect.plain and other.place.joint == coupled.place.joint
     return is_own or {other.place.joint, other.place.source} == ends

@@ -1,4 +1,4 @@
-"""Products that tell what a trial adds to a model, without a fit.
+"""Products that give the gain of a trial over a model, without a fit.
 
 With B an orthonormal basis of what bodies and effects explain, r what they leave, and x the
 columns of a trial, of which only the rows of one joint differ from zero,
@@ -26,7 +26,7 @@ _UNSEEN = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """What a model leaves, in one frame, with products of the basis B of what it explains.
+    """Residual of a model in one frame, with products of the basis B of the model's columns.
 
     B has the P columns `[Q, own]`, Q that of the bodies.
 

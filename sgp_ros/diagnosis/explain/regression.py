@@ -93,7 +93,7 @@ class Columns:
     def small(
         self, start: EffectAt, small: SmallEffect, equations: Equations, motion: ObservedMotion
     ) -> Seen:
-        """Return the filtered columns of an effect that is small, to first order in its size."""
+        """Return the filtered columns of a small effect, to first order in its size."""
         key = (*start.key, start.shape.tobytes(), motion, 'small')
         place, shape = start.place, start.shape
         return self._kept(key, equations, place.joint, lambda: small.columns(motion, place, shape))

@@ -1,4 +1,4 @@
-"""A quick look at every effect, place and shape, given the model so far; see `products`."""
+"""Screening of every effect, place and shape, given the model so far; see `products`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sgp_ros.robots.observed_motion import ObservedMotion
 TRIALS = 2
 """Shapes per effect and place that are worth a fit."""
 WIDEST = 0.75
-"""Widest interval of position, as a share of the range: wider ones are no region."""
+"""Widest interval of position, as a share of the range, that is a region."""
 
 Trial = tuple[float, EffectAt]
 
@@ -32,7 +32,7 @@ def screen(
 ) -> list[Trial]:
     """Return candidates with the gain in score they promise, best first.
 
-    Of a long recording a few rows are looked at, see `sampled`.
+    In a long recording only some rows are used, see `sampled`.
 
     Args:
         columns: of the recording.
@@ -65,7 +65,7 @@ def screen(
 
 
 def _free_places(effect: Effect, model: Model, motion: ObservedMotion) -> Iterator[Place]:
-    """Yield the places of a law that a model has not there yet; of a wave further ones too."""
+    """Yield the places of a law that the model does not have yet; further ones too for a wave."""
     for place in effect.places(motion):
         here = [s.place.number for s in model.effects if _is_like(s, effect, place)]
         if not here:
@@ -75,7 +75,7 @@ def _free_places(effect: Effect, model: Model, motion: ObservedMotion) -> Iterat
 
 
 def _is_like(s: EffectAt, effect: Effect, place: Place) -> bool:
-    """Return whether an effect is one of a law at a place, of which waves may have several."""
+    """Return whether an effect is of this law and place; waves may have several there."""
     return s.effect is effect and replace(s.place, number=0) == place
 
 

@@ -1,1 +1,1 @@
-"""Where a discrepancy is, what it depends on, and the process Z for what has no name."""
+"""Location of a discrepancy, the variables it depends on, and the process Z of unnamed forces."""

@@ -221,7 +221,7 @@ def bands(
             cells = cells_of(x, velocity[:, j] > 0.0)
             is_angle = variable == 'position' and bool(motion.is_continuous[j])
             field = learn_field(cells, r, noise_density(r), is_angle=is_angle)
-            if dependence.is_significant(variable):  # what this variable causes is no noise
+            if dependence.is_significant(variable):  # a significant variable does not cause noise
                 rest = r - field.mean[cells.of]
                 field = learn_field(cells, r, noise_density(rest), is_angle=is_angle)
             looks.append((dependence, variable))
@@ -258,7 +258,7 @@ def _band(dependence: Dependence, variable: str, field: Field, c: float) -> Band
 
 
 def merged(differs: np.ndarray) -> list[tuple[int, int]]:
-    """Return first and last cell of each run of (m,) of bool; a gap of one cell is none."""
+    """Return first and last cell of each run of (m,) of bool; a gap of one cell is bridged."""
     runs: list[tuple[int, int]] = []
     for i in np.flatnonzero(differs):
         if runs and i - runs[-1][1] <= 2:

@@ -81,7 +81,7 @@ class _Look:
     count: np.ndarray
 
     def score(self, r: np.ndarray) -> float:
-        """Return the share of r (N,) that is explained; negative where that is worse than none.
+        """Return the share of r (N,) that is explained; negative where the averages do harm.
 
         From the sums of each part and bin alone: O(N) with a small constant.
         """
@@ -149,7 +149,7 @@ def _looks(equations: Equations) -> list[_Look]:
 
 def _look(joint: int, variable: str, x: np.ndarray, forward: np.ndarray) -> _Look:
     edges = np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)[1:-1])
-    # neighbours in time are no test of time: leave out every other half bin
+    # neighbours in time do not test dependence on time: leave out every other half bin
     stretches = PARTS * BINS if variable == 'time' else STRETCHES
     part = (np.arange(len(x)) * stretches // len(x)) % PARTS
     cell = (part * BINS + np.searchsorted(edges, x)) * 2 + forward

@@ -58,7 +58,7 @@ def region(equations: Equations, r: np.ndarray, joint: int) -> Location:
 
 
 def confined(x: np.ndarray, r: np.ndarray) -> tuple[float, float, float]:
-    """Return the interval of x (N,) with the fewest rows that holds most of r (N,), and these.
+    """Return the interval of x (N,) with the fewest rows that holds most of r (N,).
 
     That is `REGION_ENERGY` of its energy.
 
@@ -148,8 +148,9 @@ def process_inputs(
 def learn_remainder(equations: Equations, residual: np.ndarray, joint: int) -> Remainder | None:
     """Return Z of a joint learned from a residual (N, k).
 
-    None where there is none, or where it predicts nothing of parts left out: what happens once,
-    such as a burst, is no function of the motion, and predictions elsewhere are better without.
+    None where there is none, or where it does not predict parts that were left out: an event that
+    happens once, such as a burst, is not a function of the motion, and predictions elsewhere are
+    better without it.
     """
     sees_effort = bool(equations.motion.is_commanded[joint])
     full, names = process_inputs(equations.motion, joint, sees_effort=sees_effort)

@@ -34,7 +34,7 @@ _SMALL = 1e-6
 class DiagnosedDynamics:
     """Equations of motion `M(q) a = drive` of k joints, see `batch.forward.ForcedMotion`.
 
-    What is called loads is, row by row, the commanded effort (k), the force of effects that
+    The loads are, row by row, the commanded effort (k), the force of effects that
     remember (k), the time since the first state (1), and the recording (1), see `ObservedMotion`.
 
     Attributes:

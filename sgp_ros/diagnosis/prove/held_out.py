@@ -1,4 +1,4 @@
-"""Blocks of time that nothing is fitted to, where no other recording proves a diagnosis.
+"""Held-out blocks of time, which prove a diagnosis where there is no other recording.
 
 The recording is cut into equal parts, and the last quarter of each is held out. So what is held
 out shows every phase of the recording, and its last block lies behind everything that was
@@ -34,7 +34,7 @@ LEAST_BLOCK_S = 2.4
 
 
 def block_count(raw: RawTrajectory) -> int:
-    """Return how many blocks are held out; none of a recording too short for one."""
+    """Return how many blocks are held out; 0 of a recording too short for one."""
     return min(MOST_BLOCKS, int(SHARE * len(raw.time) * raw.step / LEAST_BLOCK_S))
 
 
@@ -58,7 +58,7 @@ def split_sentence(raw: RawTrajectory) -> str:
 def keep_back(
     raw: RawTrajectory,
 ) -> tuple[RawTrajectory, dict[str, RawTrajectory], tuple[str, ...]]:
-    """Return what to learn from, the blocks to prove it on by name, and what is to be said."""
+    """Return the training data, the held-out blocks by name, and remarks."""
     if raw.approach is not None:
         learned, held = every_fourth(raw)
         return learned, {HELD_OUT: held}, (_POSES_SAID,)

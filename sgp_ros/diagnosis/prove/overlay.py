@@ -95,7 +95,7 @@ class _View:
 
     @property
     def modes(self) -> list[_Mode]:
-        """What is replayed of it."""
+        """Replays of the recording: windows and, in closed loop, gains."""
         trim = ZeroPhase(1.0 / self.raw.step, self.bandwidth.state_cutoff).trim
         gains = self.raw.gains
         known = None if gains is None or gains.is_recorded else gains

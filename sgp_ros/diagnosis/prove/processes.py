@@ -1,9 +1,9 @@
-"""Whether Z is worth having beside the physics: it stays only where predictions are no worse.
+"""Decision on Z beside the physics: it stays only where predictions are not worse.
 
 Z is learned from one-step errors, and a small error of a force that pushes the wrong way adds up
 along a motion. So each process is learned again without each part of the recording in turn, and
 rolled out over that part: if the positions are worse than by physics alone, its weight is zero.
-Recordings that are held out choose nothing; there only a remark says where Z does harm.
+Held-out recordings take no part in this choice; a remark says where Z does harm there.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from sgp_ros.diagnosis.result import Proof
 
 
 def learned_processes(equations: Equations, decision: Decision) -> tuple[Remainder, ...]:
-    """Return Z of the joints that no effect describes and that leave most, at most two."""
+    """Return Z of joints that no effect describes, at most the two with the largest residual."""
     left = (decision.model.mean_square / equations.power)[list(decision.unknown)]
     joints = [
         decision.unknown[i] for i in np.argsort(-left) if left[i] > REMAINDER_SHARE * left.max()
@@ -35,7 +35,7 @@ def learned_processes(equations: Equations, decision: Decision) -> tuple[Remaind
 
 
 def kept_processes(final: FinalModel) -> tuple[tuple[Remainder, ...], tuple[str, ...]]:
-    """Return the processes of a final model that do no harm to roll-outs, and what to remark.
+    """Return the processes of a final model that do no harm to roll-outs, and remarks.
 
     One after the other joins those that were kept. Cost: one roll-out of the recording each.
     """
@@ -106,7 +106,7 @@ def left_out_errors(
 def final_model(
     several: Several, equations: Equations
 ) -> tuple[FinalModel, tuple[Remainder, ...], tuple[str, ...]]:
-    """Return the final model, all processes that were learned, and what is to be said of them."""
+    """Return the final model, all processes that were learned, and remarks on them."""
     learned = learned_processes(several.equations, several.decision)
     final = FinalModel(several.model, several.comparison.nominal, equations, learned)
     kept, remarks = kept_processes(final)

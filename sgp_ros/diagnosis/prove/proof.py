@@ -62,7 +62,7 @@ def ratio_interval(x: np.ndarray, y: np.ndarray) -> Interval | None:
 
 
 def correlation_time(x: np.ndarray) -> float:
-    """Return how many neighbours of x (n,) tell as much as one independent value, at least 1."""
+    """Return how many neighbours of x (n,) are worth one independent value, at least 1."""
     n = len(x)
     deviation = x - x.mean()
     power = np.abs(np.fft.rfft(deviation, 2 * n)) ** 2
@@ -113,7 +113,7 @@ class _Scores:
 
 
 def _ratio(error: float, yardstick: float) -> float:
-    """Return the quotient of two mean squares; infinite for an error beside nothing."""
+    """Return the quotient of two mean squares; infinite if only the second is zero."""
     if yardstick > 0.0:
         return error / yardstick
     return math.inf if error > 0.0 else 0.0
@@ -122,7 +122,7 @@ def _ratio(error: float, yardstick: float) -> float:
 def reasons_to_doubt(
     proofs: Mapping[str, Proof], still: Collection[str]
 ) -> dict[str, tuple[str, ...]]:
-    """Return by joint why nothing is certain of it: a constant says no less than the model.
+    """Return by joint why it is doubted: a constant predicts no worse than the model.
 
     Args:
         proofs: by stem of the recording; `train` is what was learned from.
@@ -149,7 +149,7 @@ def reasons_to_doubt(
 
 
 def not_carried_over(proofs: Mapping[str, Proof], still: Collection[str]) -> dict[str, str]:
-    """Return the joints at which the final model fails on what was held out, and a sentence each.
+    """Return the joints at which the final model fails on held-out data, and a sentence each.
 
     It leaves more than `CARRIED_REST` of what the nominal robot does, more than counts as physics,
     and `CARRIED_ERROR` times what it leaves where it was fitted; by the lower end of the interval.

@@ -2,7 +2,7 @@
 
 A one-step error says little: the state hardly moves in a step. Windows of 0.3 s are simulated all
 at once from where they start, and compared with what was measured. The yardstick is the error of
-holding the position at the start of the window: 1 knows nothing of the robot.
+holding the position at the start of the window: 1 means no knowledge of the robot.
 
 The force of an effect that remembers depends on the motion before. It is taken along the motion
 that was rolled out last, and the windows are rolled out again until nothing changes: the causal
@@ -152,7 +152,7 @@ def roll_outs(
 
 
 class _Set:
-    """Windows of one recording, what acts in them, and how they were rolled out last.
+    """Windows of one recording, their loads, and their latest roll-out.
 
     Args:
         windows: of the recording.
@@ -188,7 +188,7 @@ class _Set:
 
     @property
     def loads(self) -> np.ndarray:
-        """What acts during each step, (m, n, 2 k + 2), see `DiagnosedDynamics`."""
+        """Loads during each step, (m, n, 2 k + 2), see `DiagnosedDynamics`."""
         motion = self.windows.motion
         recording = -np.ones(len(motion.time)) if motion.recording is None else motion.recording
         signals = self._effort, self._force, motion.time[:, None], recording[:, None]

@@ -1,4 +1,4 @@
-"""What undoes errors of how a robot was connected, as one affine map of a recording and its robot.
+"""Correction of connection errors, as one affine map of a recording and its robot.
 
 `q = (q_recorded[order] - offset) / scale`, `tau = tau_recorded[effort_order] / effort_scale`,
 commands and efforts taken `clock` later than they are stamped, gravity turned with the base, and
@@ -75,7 +75,7 @@ class Correction:
 
     @property
     def moves(self) -> tuple[object, ...]:
-        """What of it changes motion and robot; the rest changes efforts alone."""
+        """Part of it that changes motion and robot; the rest changes efforts alone."""
         origins = b'' if self.origins is None else self.origins.tobytes()
         columns = (self.order.tobytes(), self.offset.tobytes(), self.scale.tobytes())
         return *columns, self.roll, self.pitch, origins

@@ -1,4 +1,4 @@
-"""Errors of how a robot was connected: what each is called, and the correction that undoes it.
+"""Errors of how a robot was connected: the name of each, and the correction that undoes it.
 
 An entry proposes its hypotheses for a robot: numbers to start from, and how numbers become a
 correction on top of another. Names, parameters and signs are those of the schema.
@@ -57,10 +57,10 @@ class Hypothesis:
         starts: (s, m) numbers to start from; m = 0 where there is nothing to estimate.
         steps: (m,) first steps of a search [units]; of scales and delays relative to these.
         applied: returns a correction with the error of these numbers (m,) undone too.
-        words: parameters that are no numbers.
+        words: parameters that are words.
         is_possible: whether it can have these numbers (m,).
         canonical: returns the one of several equal sets of numbers (m,) that is reported.
-        is_physics: whether it is none, but hides errors of the connection as long as it is there.
+        is_physics: whether it is physics, which hides errors of the connection while present.
     """
 
     effect: str
@@ -95,7 +95,7 @@ class Hypothesis:
 
     @property
     def key(self) -> tuple[str, str, tuple[str, ...]]:
-        """What is asserted, without numbers."""
+        """Assertion without its numbers."""
         return self.effect, self.joint, tuple(self.words.values())
 
 
@@ -222,7 +222,7 @@ def _clock(*, has_commands: bool) -> Hypothesis:
 
 
 def _late_targets() -> Hypothesis:
-    """Return the delay of targets, beside which gains are another law than without."""
+    """Return the delay of targets, which changes the fitted gains."""
     return Hypothesis(
         COMMAND_DELAY.name, ALL, ('delay',), ('s',), _column(_DELAYS), np.array([0.05]),
         lambda c, x: replace(c, clock=c.clock - float(x[0])),

@@ -1,10 +1,10 @@
-"""How well a recording agrees with its robot once its connections are corrected.
+"""Agreement of a recording with its robot once its connections are corrected.
 
 `d = low(tau_nominal(q, v, a) - tau) = low(X) b + noise` with everyday unknowns b: inertial
 parameters and, per joint, viscous and dry friction and an offset, each with a wide normal prior.
 The evidence is that of the recorded motion and efforts, with b integrated out (Laplace), for the
 nominal robot alone, with bodies, and with friction too; the best of the three counts, so that an
-error of the connection must explain what none of them does.
+error of the connection must explain what all three leave.
 
 Beside open bodies the size of all efforts is open too, and so are the gains of drives, where no
 effort is measured: these are looked for with known bodies, beside rotors and dry friction in the
@@ -180,9 +180,9 @@ class Probe:
     def _delivered(self, motion: ObservedMotion, correction: Correction) -> np.ndarray:
         """Return the size of the efforts to which errors are relative, (k,) mean squares.
 
-        What gains make of errors of position and velocity cancels for the most part, and what is
-        wrong with them does not: neither a delay nor a filter makes less of it. With known bodies
-        the size of efforts is known too.
+        The efforts that gains make of errors of position and velocity largely cancel; errors of
+        these efforts do not, as neither a delay nor a filter reduces them. With known bodies the
+        size of efforts is known too.
         """
         if not isinstance(self.full.drive, Servo):
             power = (motion.effort**2).mean(axis=0)

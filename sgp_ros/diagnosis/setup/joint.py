@@ -51,7 +51,7 @@ class Together:
 
     @cached_property
     def correction(self) -> Correction:
-        """What undoes all of them."""
+        """Correction of all errors together."""
         correction = Correction.none(self.probe.motion.tree.size)
         for h, x in zip(self.hypotheses, self.numbers, strict=True):
             correction = h.applied(correction, x)

@@ -1,4 +1,4 @@
-"""What is said of errors of the connection: findings, what cannot be told apart, their price."""
+"""Statements on errors of the connection: findings, equivalents, price."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from sgp_ros.diagnosis.setup.search import Connection
 
 
 def price_of(found: Connection) -> tuple[float, float]:
-    """Return what errors must be worth, and the part of it for such as are rare [nats]."""
+    """Return the price of errors, and the part of it that is for rare ones [nats]."""
     numbers = sum(len(e.numbers) for e in found.errors)
     rare = PER_UNUSUAL * sum(not e.hypothesis.is_of_gains for e in found.errors)
     return PER_EFFECT * len(found.errors) + PER_PARAMETER * numbers + rare, rare
 
 
-def suspicion(found: Connection) -> str:
-    """Return what to check where errors are not asserted: with them too something is left."""
-    told = ', '.join(
+def setup_advice(found: Connection) -> str:
+    """Return what to check where errors are not asserted because too much is left with them."""
+    errors = ', '.join(
         f'{e.hypothesis.effect.replace("_", " ")} ({e.hypothesis.joint})' for e in found.errors
     )
-    return f'Check the set-up: {told} would reduce the residual, but not enough to be asserted.'
+    return f'Check the set-up: {errors} would reduce the residual, but not enough to be asserted.'
 
 
 def error_finding(found: Connection, number: int, gain: float) -> Finding:
-    """Return an error with its probability against its rivals and against none."""
+    """Return an error with its probability against its rivals and against no error."""
     e = found.errors[number]
     rivals = [r.worth - e.worth for r in found.rivals[number]]
     odds = math.exp(-TEMPER * gain) + math.exp(-TEMPER * e.needed)

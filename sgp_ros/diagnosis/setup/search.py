@@ -46,7 +46,7 @@ class Tried:
 
     @property
     def remedy(self) -> str:
-        """What to do about the error."""
+        """Remedy for the error."""
         values = dict(zip(self.hypothesis.names, map(float, self.numbers), strict=True))
         return self.hypothesis.remedy(values)
 
@@ -58,7 +58,7 @@ class Tried:
 
 @dataclass(frozen=True, eq=False)
 class Connection:
-    """What is wrong with the connection.
+    """Errors of the connection, with their rivals.
 
     Attributes:
         errors: in the order in which they were found.
@@ -76,16 +76,16 @@ class Connection:
 
     @property
     def is_enough(self) -> bool:
-        """Whether nothing is wrong, and what is left does not count as physics at any joint."""
+        """Whether no error was found, and no residual counts as physics at any joint."""
         return not self.errors and float(self.end.left.max()) <= COUNTED_SHARE
 
 
 def search(probe: Probe) -> Connection:
     """Return the errors that explain what bodies and everyday friction do not.
 
-    A delay of targets looks like other gains of every drive, so that a search one by one would
-    not come back to it: where it is worth its price, a search begins with it. Another one that
-    begins with nothing follows where that leaves what counts as physics.
+    A delay of targets looks like other gains of every drive, so a search that adds errors one by
+    one would not return to it: where a delay is worth its price, the search begins with it. If
+    the result leaves a residual that counts as physics, a second search begins without it.
     """
     none = Correction.none(probe.motion.tree.size)
     start = probe.agreement(none)
@@ -107,9 +107,9 @@ def search(probe: Probe) -> Connection:
 
 
 def _physics(probe: Probe, h: Hypothesis) -> Tried:
-    """Return physics of one number, searched from where it leaves least of each joint.
+    """Return an effect of one number, searched from the starts with the least rest at each joint.
 
-    With wrong gains at another joint the evidence of all has its best elsewhere.
+    With wrong gains at another joint, the evidence of all joints has its maximum elsewhere.
     """
     none = Correction.none(probe.motion.tree.size)
     left = np.array([probe.agreement(h.applied(none, x)).left for x in h.starts])  # (s, k)
@@ -162,7 +162,7 @@ def _beside(probe: Probe, errors: Sequence[Tried], ranked: Sequence[Tried]) -> l
 def _together(probe: Probe, errors: Sequence[Tried]) -> list[Tried]:
     """Return errors with all their numbers searched at once; the last one undoes all.
 
-    One that the others, with their numbers searched anew, make superfluous is left out.
+    An error is left out if the others, with their numbers searched anew, make it superfluous.
     """
     found = _joint(probe, errors).best()
     while True:
@@ -209,7 +209,7 @@ def _ranked(
 ) -> list[Tried]:  # fmt: skip
     """Return the hypotheses that are worth most on top of a correction, best first.
 
-    What makes less than counts as physics is none.
+    Those that change the residual by less than the share that counts as physics are left out.
     """
     known = [e.hypothesis.key for e in errors]
     screened = []
@@ -254,7 +254,7 @@ def _parabola(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> n
 
 
 def _refined(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> Tried:
-    """Return a hypothesis with the numbers that agree best; one that changes nothing is 0."""
+    """Return a hypothesis with its best numbers; 0 for numbers that change nothing."""
     m = len(x)
     std = np.zeros(m)
     if m:

@@ -1,1 +1,1 @@
-"""Laws that no list has: shapes without form first, then the shortest formula for one."""
+"""Unlisted laws: first a shape without a formula, then the shortest formula for it."""

@@ -1,9 +1,9 @@
-"""Whether a law that a search found is asserted, and what is said where it is not.
+"""Decision whether a law that was found is asserted, with the reason where it is not.
 
 A formula is asserted where it is worth more than every listed effect, every shorter formula and
 the smooth force without form, predicts parts left out, describes its joint as any law must, has
 all its numbers inside their ranges, is finite over the range of the joints, and holds most of the
-odds against all formulas that would say something else in other motions. Else the joint is
+odds against all formulas that would predict something else in other motions. Else the joint is
 unexplained, and listed effects that explain it less well than the smooth force are not asserted.
 """
 
@@ -35,7 +35,7 @@ _STEPS = 8
 
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """What is decided once laws were looked for.
+    """Decision after the search for unlisted laws.
 
     Attributes:
         comparison: with the models of formulas.
@@ -51,7 +51,7 @@ class Explained:
 
 
 def with_laws(equations: Equations, comparison: Comparison, decision: Decision) -> Explained:
-    """Return the decision with laws that no list has, where effects of the list say too little.
+    """Return the decision with unlisted laws, where listed effects explain too little.
 
     Args:
         equations: of one recording.
@@ -126,7 +126,7 @@ def _with_plain_laws(equations: Equations, searched: Searched) -> tuple[Model, .
 
 
 def _objection(equations: Equations, comparison: Comparison, searched: Searched) -> str:
-    """Return what is wrong with the best formula by itself; empty for nothing."""
+    """Return the objection to the best formula by itself; empty for none."""
     if not searched.laws:
         return 'every formula tried would need impossible parameters'
     best, scale = searched.laws[0], Scale.of(equations, comparison).of_forms()

@@ -1,4 +1,4 @@
-"""Laws of a joint beside its listed effects: which there are, and what either says."""
+"""Unlisted laws of a joint beside its listed effects: which there are, and what each explains."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from sgp_ros.physics.parts import JOINT, MOTOR
 
 PLAIN = (COULOMB_FRICTION, VISCOUS_FRICTION, CONSTANT_LOAD)
 _NONE = 2.0
-"""Standard deviations from zero below which a coefficient cannot be told from none."""
+"""Standard deviations below which a coefficient is not distinguished from zero."""
 
 
 def law_of(model: Model, joint: int) -> EffectAt | None:
@@ -42,7 +42,7 @@ def own_effects(model: Model, joint: int) -> tuple[EffectAt, ...]:
 def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
     """Return a model without the listed effects that are not worth their price beside its formula.
 
-    They were chosen before the formula was known, and may have stood for a part of it. One after
+    They were chosen before the formula was known, and may have imitated a part of it. One after
     the other goes, and the formula and all others are fitted again, as long as that is worth more.
 
     Args:
@@ -68,9 +68,9 @@ def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
 
 
 def says_less(equations: Equations, model: Model, joint: int) -> bool:
-    """Return whether a formula has a coefficient that cannot be told from none.
+    """Return whether a formula has a coefficient that is not distinguished from zero.
 
-    It then says what a shorter one says.
+    A shorter formula would then do.
     """
     law = law_of(model, joint)
     assert law is not None
@@ -89,7 +89,7 @@ def is_slight(listed: Model, smooth: Model, joint: int) -> bool:
     """Return whether a smooth force differs from plain laws by less than counts as physics.
 
     Friction that creeps a little near rest is friction, a spring that hardens a little a spring.
-    A law with a shape of its own could be bent to stand for another one, and so could several.
+    A law with a shape of its own could be distorted to imitate another one, and so could several.
     """
     own = own_effects(listed, joint)
     rare = [s for s in own if not (s.effect.is_usual or s.effect in PLAIN or _is_plain_sum(s))]
@@ -100,10 +100,10 @@ def is_slight(listed: Model, smooth: Model, joint: int) -> bool:
 
 
 def is_bent(listed: Model, smooth: Model, joint: int) -> bool:
-    """Return whether a listed law was bent to stand for a smooth force.
+    """Return whether a listed law was distorted to imitate a smooth force.
 
-    It has a shape of its own, and more than an adequate model may leave of what that law adds is
-    what a smooth force says and the law does not.
+    It has a shape of its own, and the smooth force explains more beyond the law than an adequate
+    model may leave of the part that this law adds.
     """
     apart = float(listed.mean_square[joint] - smooth.mean_square[joint])
     own, power = own_effects(listed, joint), listed.frame.equations.power[joint]
@@ -115,7 +115,7 @@ def is_bent(listed: Model, smooth: Model, joint: int) -> bool:
 
 
 def _is_plain_sum(s: EffectAt) -> bool:
-    """Return whether a law is plain ones added up: it adds to one, and has no shape to bend."""
+    """Return whether a law is a sum of plain ones: it adds to one, and has no shape."""
     return bool(s.effect.plain) and not len(s.shape)
 
 

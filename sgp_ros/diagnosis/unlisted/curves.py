@@ -27,10 +27,10 @@ Columns = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """What the data say of a force that is linear between nodes of its variable.
+    """Least-squares statistics of a force that is linear between nodes of its variable.
 
-    A force with values f at the nodes leaves `|y - R f|^2` of the rows, and what no force of this
-    variable explains.
+    A force with values f at the nodes leaves `|y - R f|^2` of the rows, plus `rest`, which no
+    force of this variable explains.
 
     Attributes:
         x: (p,) nodes.

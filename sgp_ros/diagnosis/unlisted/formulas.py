@@ -1,4 +1,4 @@
-"""Formulas that a smooth force may have, those that follow its data best.
+"""Formulas for a smooth force, those that fit its data best first.
 
 A formula is a text of `sentences` in the variable of the smooth force, times its factor:
 
@@ -42,7 +42,7 @@ from sgp_ros.physics.parts import LawParameter, Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 PER_PIECE = 0.5
-"""What each number, name and operation of a formula takes [nats]."""
+"""Price of each number, name and operation of a formula [nats]."""
 NAMELESS = 'a law found from the data'
 NEAREST = {
     'a*X/(1 + (X/v0)**2)': 'an eddy-current brake',
@@ -85,7 +85,7 @@ _PIECES = 100
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """What was seen of a variable."""
+    """Observed range of a variable."""
 
     low: float
     high: float
@@ -108,7 +108,7 @@ class Range:
         return max(abs(self.low), abs(self.high))
 
     def ends(self, name: str) -> tuple[float, float, str]:
-        """Return the ends of a parameter that is no coefficient, and its unit."""
+        """Return the ends of a parameter that is not a coefficient, and its unit."""
         span, turn = self.span, 2.0 * np.pi / self.span
         return {
             'x': (self.low - 0.25 * span, self.high + 0.25 * span, self.unit),
@@ -236,7 +236,7 @@ def _shape(
     name: str, smooth: SmoothForce, motion: ObservedMotion, seen: Range,
     numbers: Mapping[str, float],
 ) -> LawParameter:  # fmt: skip
-    """Return a parameter that is no coefficient, with unit, start and range."""
+    """Return a parameter that is not a coefficient, with unit, start and range."""
     if name == MEMORY:
         assert smooth.variable.memory is not None
         kind, start = smooth.variable.memory

@@ -55,7 +55,7 @@ EARNED = 3
 
 @dataclass(frozen=True, eq=False)
 class Searched:
-    """What a search at one joint ended with.
+    """Result of a search at one joint.
 
     Attributes:
         joint: index.
@@ -78,7 +78,7 @@ class Searched:
 
     @property
     def lack_of_fit(self) -> tuple[float, float]:
-        """Ratio of what the first formula leaves to what any form does, and its chance.
+        """Ratio of the residual of the first formula to that of any form, and its chance.
 
         The chance is that of the F test on as many rows as are independent (Fisher 1922).
         """
@@ -94,7 +94,7 @@ class Searched:
 def search(
     equations: Equations, scale: Scale, listed: Model, joint: int, *, is_open: bool = False
 ) -> Searched | None:
-    """Return what explains a joint better than listed effects, at its price; None for nothing.
+    """Return the laws that explain a joint better than listed effects, at their price, or None.
 
     Args:
         equations: of the recording.
@@ -147,7 +147,7 @@ class _Look:
     def ranked(self) -> list[Model]:
         """Return models with a smooth force, best first.
 
-        Of two joints together and of what was before only such as are worth more than any other.
+        Forces of two joints, or of the past, are kept only if worth more than any plain one.
         """
         motion = self.columns.equations(frozenset()).motion
         found = [m for m in self.smooth() if not smooth_at_bound(m, self.joint, motion)]
@@ -177,9 +177,9 @@ class _Look:
                 yield from self._fitted(base, alike, SMOOTH if is_plain else 1)
 
     def more(self, best: Model) -> Iterator[Model]:
-        """Yield models with smooth forces that are tried where the best of others leaves much.
+        """Yield models with smooth forces that are tried where the best other one leaves much.
 
-        And only where listed effects are beaten, or leave the joint unexplained.
+        They are tried only where listed effects are beaten, or leave the joint unexplained.
         """
         floor = float(self.scale.power[self.joint] * self.scale.floor[self.joint])
         is_beaten = self.scale.worth(best) > self.scale.worth(self.listed) + ALIKE
@@ -217,7 +217,7 @@ class _Look:
         return best
 
     def free(self, model: Model) -> tuple[np.ndarray, int]:
-        """Return what any form leaves in the place of a formula (N,), and the numbers it takes.
+        """Return the residual of any form in place of a formula (N,), and its count of numbers.
 
         A fine spline, fitted with all else, or then a force that is linear between many nodes.
         """

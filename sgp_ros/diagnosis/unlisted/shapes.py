@@ -2,9 +2,9 @@
 
     tau_x = f(x) g,   f a cubic spline,   g of 1, sign(v), v, |v| v, motor torque
 
-What depends on what is seen here before any formula is tried. A named law that leaves more than
-such a force, at its price, is not the law; and a formula is looked for only among those of the
-variable and the factor that explain most.
+The variables of a force are found here before any formula is tried. A named law that leaves more
+than such a force, at its price, is not the law; and a formula is looked for only among those of
+the variable and the factor that explain most.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ UNITS = {'': '1', 'sign': '1', 'soft': '1', 'speed': '{l}/s', 'square': '{l}2/s2
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """What a force may be a function of: `q` or `dq` of a joint, or of two, or what it was.
+    """Variable of a force: `q` or `dq` of a joint, of two joints, or an earlier value of it.
 
     Attributes:
         kind: `q` or `dq`.
@@ -105,8 +105,8 @@ class Variable:
     def knots(self, motion: SeenMotion, pieces: int) -> np.ndarray:
         """Return the knots of a spline over it, (pieces + 7,).
 
-        Half way from even ones to quantiles: the ends of a range are seldom seen, and tell most.
-        Of velocities, denser towards rest, where friction changes.
+        Half way from even ones to quantiles: the ends of a range are seldom visited, and hold most
+        information. Knots of velocities are denser towards rest, where friction changes.
         """
         x = self.values(motion)
         inner = np.quantile(x, np.linspace(0.0, 1.0, pieces + 1))
@@ -266,7 +266,7 @@ def smooth_of(model: Model, joint: int) -> tuple[EffectAt, SmoothForce]:
 
 
 def smooth_at_bound(model: Model, joint: int, motion: ObservedMotion) -> bool:
-    """Return whether what remembers does so as little, or as much, as is looked for."""
+    """Return whether a memory is at either bound of its search."""
     placed, _ = smooth_of(model, joint)
     low, high = placed.effect.bounds(motion, placed.place)
     has_memory = placed.effect.shape_names() == (MEMORY,)

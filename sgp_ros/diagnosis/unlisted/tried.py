@@ -1,4 +1,4 @@
-"""The smooth forces that are tried at a joint, and those that are tried where they leave much."""
+"""Smooth forces that are tried at a joint, and those that are tried where these leave much."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a robot has, sorted by what other programs have a place for.
+"""Physics of a robot, sorted by the places that other programs have for it.
 
 Bodies, damping and dry friction of joints, rotor inertia, springs, delay, lag, gains and limits
 are numbers of joints that most formats know. Every other effect is named where a format is
@@ -93,7 +93,7 @@ class Handover:
         nominal: the robot.
         urdf: with its bodies, damping and dry friction.
         joints: numbers by name of the joint.
-        others: effects that are no numbers of a joint, in words.
+        others: effects that are not numbers of a joint, in words.
         holds_gravity: whether drives of positions hold gravity.
     """
 

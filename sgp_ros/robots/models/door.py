@@ -28,7 +28,7 @@ READ = (
     ('mimic; mimic of ros2_control', 'joint that follows another'),
     ('ros2_control command_interface', 'which joints are driven'),
 )
-"""What is read of a URDF, and what it becomes."""
+"""Elements of a URDF that are read, and their meaning here."""
 LEFT = {
     'reduction': 'Reductions of <transmission> are ignored: efforts and positions are those at '
     'the joint.',
@@ -180,7 +180,7 @@ def write_compiled(path: Path, stream: BinaryIO) -> None:
 
 
 def _remarks(text: str) -> Mapping[str, list[str]]:
-    """Say what a URDF says of dynamics that has no place here."""
+    """Report dynamics of a URDF that have no place here."""
     try:
         root = parse_xml(text)
     except ET.ParseError:

@@ -40,7 +40,7 @@ READ = (
     ('fixed tendon under an actuator, on one joint and its followers', 'its transmission'),
     ('option gravity', 'how the base stands'),
 )
-"""What is read, and what it becomes."""
+"""Elements that are read, and their meaning here."""
 LEFT = {
     'contact': 'Contacts are not modelled; none acts where the robot starts; solid bodies',
     'off': 'Constraints that are not active in the file, ignored',
@@ -64,7 +64,7 @@ REFUSED = (
 )
 _KINDS = {'mjJNT_HINGE': 'revolute', 'mjJNT_SLIDE': 'prismatic'}
 _NEAR = 1e-3
-"""Relative difference of two gravities, and depth of a contact [m], that count as none."""
+"""Relative difference of two gravities, and depth of a contact [m], that are taken as zero."""
 
 
 def read_mjcf(path: Path) -> Model:
@@ -192,7 +192,7 @@ class _Reading:
                 )  # fmt: skip
 
     def _mimics(self) -> dict[int, tuple[str, float, float]]:
-        """Return by joint what linear equations between two positions say of it."""
+        """Return the linear equations between two positions, by joint."""
         m, kinds, found = self.model, self.library.mjtEq, {}
         for e in range(m.neq):
             kind = kinds(int(m.eq_type[e])).name

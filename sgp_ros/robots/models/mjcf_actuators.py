@@ -34,7 +34,7 @@ Dropped = dict[str, list[str]]
 
 @dataclass(slots=True)
 class Drives:
-    """What the actuators of a model do, by joint.
+    """Drives that the actuators of a model make, by joint.
 
     Attributes:
         mimics: joint to the one that it follows, the multiplier and the offset.

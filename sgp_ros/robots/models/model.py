@@ -1,4 +1,4 @@
-"""What a model file of another program says, as the content of a robot YAML.
+"""Model files of other programs, as the content of a robot YAML.
 
 Every format comes down to a tree of links and joints, the physics stated of them, the gains of
 drives, and remarks on all that has no place here. The tree is written as a URDF, so that what

@@ -33,7 +33,7 @@ READ = (
     ('axis mimic', 'joint that follows another'),
     ('plugin joint-position-controller; p_gain, d_gain', 'gains of drives that hold targets'),
 )
-"""What is read, and what it becomes."""
+"""Elements that are read, and their meaning here."""
 LEFT = {
     'root': 'The root is assumed to be fixed to the ground',
     'mass': 'Links without <inertial>, 1 kg by default in SDF, are assumed to have no mass',
@@ -53,7 +53,7 @@ REFUSED = (
 _KINDS = ('revolute', 'continuous', 'prismatic', 'fixed')
 _WORLD, _MODEL = 'world', '__model__'
 _ENDLESS = 1e15
-"""A limit from here on is none: the format writes 1e16 for no limit."""
+"""Limits from here on mean no limit: the format writes 1e16 for it."""
 _ENTRIES = (('ixx', 'ixy', 'ixz'), ('ixy', 'iyy', 'iyz'), ('ixz', 'iyz', 'izz'))
 _SERVO = 'joint-position-controller'
 """Part of the file name of the plugin that drives a joint to a position."""

@@ -116,7 +116,7 @@ def _beside_a_still_joint(world):
 
 
 def test_a_joint_that_does_not_move_is_asked_nothing(robots, viscous):
-    """Whatever holds it; no candidate has a place there."""
+    """No matter what holds it, no candidate has a place there."""
     robot, tree = robots[2]
     world = _beside_a_still_joint(viscous)
     raw = collect(events_of(world), robot)

@@ -44,7 +44,7 @@ def test_a_singular_robot_of_whole_bodies_is_refused(robots):
 
 
 def test_open_bodies_are_found_beside_friction(robots):
-    """What gravity and acceleration show of the last link: first moment and inertia."""
+    """Gravity and acceleration show first moment and inertia of the last link."""
     robot, tree = robots[2]
     world = simulate(CHAINS[2], 5, 8.0, force=lambda t, q, v: (-0.2 * v[0], -0.1 * v[1]))
     raw = collect(events_of(world), robot)

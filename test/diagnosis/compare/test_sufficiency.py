@@ -44,7 +44,7 @@ ENCODERS = {
 @pytest.mark.parametrize('effort', [0.0, 0.5])
 @pytest.mark.parametrize('kind', ENCODERS)
 def test_nothing_is_said_of_a_robot_that_never_moved(robots, kind, effort):
-    """Whatever its encoders show, and whether or not it is pushed against a stop."""
+    """No matter what its encoders show, and whether or not it is pushed against a stop."""
     world = _at_rest(1, ENCODERS[kind](np.random.default_rng(0)), effort)
     with pytest.raises(RecordingError, match='no joint of chain moves'):
         diagnose(events_of(world, quantum=0), *robots[1], {})
@@ -66,7 +66,7 @@ def test_a_held_out_recording_of_no_rows_is_refused_by_its_name(robots, perfect)
 
 
 def test_the_noise_of_a_still_joint_explains_nothing(robots):
-    """Beside one that moves it is told, and no effect, body or doubt is found at it."""
+    """Beside one that moves it is reported, and no effect, body or doubt is found at it."""
     world = simulate(CHAINS[2], 11, 6.0, held=(1,))
     noise = np.random.default_rng(0).normal(0.0, 1e-4, len(world.time))
     shown = np.column_stack([world.position[:, 0], noise])

@@ -91,7 +91,7 @@ def test_the_motion_is_that_of_the_full_rate(robots):
 
 
 def test_commands_keep_their_times():
-    """What they give on fewer rows is what they gave there, delayed or not."""
+    """On fewer rows they give the same efforts as before, delayed or not."""
     raw = _raw(drive=_drive())
     few = thinned(raw)
     rows = np.searchsorted(raw.time, few.time - 1e-9)

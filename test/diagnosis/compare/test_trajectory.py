@@ -91,7 +91,7 @@ def test_velocity_and_effort_are_kept_where_they_were_measured(robots, perfect):
 
 
 def test_a_passive_joint_has_no_effort(tmp_path, perfect):
-    """Whatever was commanded to it."""
+    """No matter what was commanded to it."""
     robot, tree = robot_of(tmp_path, CHAINS[2], passive=(1,))
     world = replace(perfect[2], command=perfect[2].command[:, :1])
     raw = collect(events_of(world), robot)
@@ -174,14 +174,14 @@ def test_commands_of_another_kind_never_replace_a_measured_effort(robots, perfec
     events = events_of(replace(world, command=given), effort=world.command)
     raw = collect(events, robots[1][0])
     assert raw.drive is None
-    assert 'no efforts' in raw.remarks[0]
+    assert 'are not efforts' in raw.remarks[0]
     motion = observe(raw, robots[1][1], choose_bandwidth(raw, robots[1][1]))
     np.testing.assert_array_equal(motion.effort, raw.effort)
 
 
 @pytest.mark.parametrize('source', ['state', 'command'])
 def test_the_source_of_efforts_can_be_stated(robots, perfect, source):
-    """Whatever the efforts look like."""
+    """No matter what the efforts look like."""
     events = events_of(perfect[1], effort=perfect[1].command)
     raw = collect(events, robots[1][0], config=EngineConfig(effort_source=source))
     assert (raw.drive is None) == (source == 'state')

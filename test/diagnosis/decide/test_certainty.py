@@ -1,4 +1,4 @@
-"""What is said of models that were not asserted, and how certain the rest is."""
+"""Statements on models that were not asserted, and the certainty of the rest."""
 
 from __future__ import annotations
 
@@ -115,11 +115,11 @@ def test_a_finding_too_small_to_count_is_doubted(equations_for, viscous):
         'joint0', 'armature', {'inertia': Parameter(0.1, 0.001, 'kg m2')}, Location(), 1.0, 0.99,
         0.5 * COUNTED_SHARE,
     )  # fmt: skip
-    told = doubted_if_none(finding, EffectAt(EFFECTS['armature'], Place(0)))
-    assert told.probability <= DOUBTED
-    assert 'too small' in told.why
+    doubted = doubted_if_none(finding, EffectAt(EFFECTS['armature'], Place(0)))
+    assert doubted.probability <= DOUBTED
+    assert 'too small' in doubted.why
     sure = replace(finding, effect='spring', share=0.1, probability=0.97)
-    assert certainty_of([told, sure], _comparison(equations)) == 0.97
+    assert certainty_of([doubted, sure], _comparison(equations)) == 0.97
 
 
 @pytest.mark.parametrize(
@@ -148,8 +148,10 @@ def test_an_encoder_that_may_be_centred_is_doubted(std, is_doubted):
         name: Parameter(x, std if name == 'amplitude' else 0.1) for name, x in numbers.items()
     }
     finding = Finding('elbow', law.name, found, Location(), 30.0, 0.9, 0.1, law.formula)
-    told = doubted_if_none(finding, EffectAt(law, Place(0)))
-    assert (told.probability, bool(told.why)) == ((0.4, True) if is_doubted else (0.9, False))
+    doubted = doubted_if_none(finding, EffectAt(law, Place(0)))
+    assert (doubted.probability, bool(doubted.why)) == (
+        (0.4, True) if is_doubted else (0.9, False)
+    )
 
 
 @pytest.mark.parametrize(('is_chosen', 'std', 'expected'), [

@@ -1,4 +1,4 @@
-"""What is asserted, and what is not although it fits."""
+"""Models that are asserted, and models that are not although they fit."""
 
 from __future__ import annotations
 
@@ -213,7 +213,7 @@ def test_a_weak_motor_and_heavy_bodies_fit_alike(tmp_path):
 
 
 def test_a_load_and_a_heavier_body_have_the_same_inertia(equations_for):
-    """What a point mass adds to the mass matrix is what its body parameters add."""
+    """A point mass adds to the mass matrix as its body parameters do."""
     _, equations = equations_for(simulate(CHAINS[2], 2, 6.0))
     load = EffectAt(EFFECTS['payload'], Place(1), np.array([0.4, 0.0, 0.0, -0.2]), np.ones(1))
     rotor = EffectAt(EFFECTS['armature'], Place(0), coefficients=np.array([0.03]))

@@ -1,4 +1,4 @@
-"""What a motion cannot tell apart is said, with the motion that would."""
+"""Effects that a motion cannot tell apart are named, with the motion that would."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from test.diagnosis.fitted_models import fitted, with_coefficients
 from test.diagnosis.worlds import CHAINS, events_of, robot_of, simulate
 
 
-def _told(equations, best, rivals):
+def _equivalents(equations, best, rivals):
     bases = fitted(equations), fitted(equations, is_free=True)
     comparison = Comparison(*bases, (best, *rivals), ())
     decision = Decision('missing_physics', best, tuple(rivals), 0.0, 0)
@@ -37,7 +37,7 @@ def narrow(equations_for):
 
 def test_a_spring_seen_at_small_angles_may_be_a_wrong_body(narrow):
     """The wider motion separates them, for the weight follows the sine."""
-    found = _told(narrow, fitted(narrow, 'spring'), [])
+    found = _equivalents(narrow, fitted(narrow, 'spring'), [])
     assert [e.effects for e in found] == [()]
     assert found[0].motion == 'a motion over the whole range of the joints'
     assert found[0].contrast > CLEARER
@@ -47,17 +47,17 @@ def test_a_spring_seen_at_large_angles_has_no_equivalent(equations_for):
     world = simulate(CHAINS[1], 5, 10.0, force=lambda t, q, v: (-0.6 * q[0],), reach=3.0)
     equations = equations_for(world)[1]
     rivals = [fitted(equations, name) for name in ('viscous_friction', 'armature')]
-    assert _told(equations, fitted(equations, 'spring'), rivals) == ()
+    assert _equivalents(equations, fitted(equations, 'spring'), rivals) == ()
 
 
 def test_what_contains_the_finding_is_no_other_explanation(narrow):
     spring, more = fitted(narrow, 'spring'), fitted(narrow, 'spring', 'viscous_friction')
-    found = _told(narrow, spring, [more, fitted(narrow, 'spring', is_free=True)])
+    found = _equivalents(narrow, spring, [more, fitted(narrow, 'spring', is_free=True)])
     assert all(('joint0', 'spring') not in e.effects for e in found)
 
 
 def test_the_diagnosis_says_what_it_cannot_tell(robots):
-    """Whatever it asserts of a spring at small angles, the other explanation is named."""
+    """Beside the asserted explanation of a spring at small angles, the other one is named."""
     world = simulate(CHAINS[1], 5, 10.0, force=lambda t, q, v: (-0.6 * q[0],), reach=0.2)
     robot, tree = robots[1]
     found = diagnose(events_of(world), robot, tree, {})
@@ -105,7 +105,7 @@ def test_a_richer_name_of_the_same_law_is_no_other_explanation(equations_for):
     contrasts = Contrasts(equations, best)
     assert contrasts.is_same_law(richer)
     assert not contrasts.is_same_law(fitted(equations, 'viscous_friction'))
-    assert _told(equations, best, [richer]) == ()
+    assert _equivalents(equations, best, [richer]) == ()
 
 
 def test_one_law_of_two_names_is_one(narrow):

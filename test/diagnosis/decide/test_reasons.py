@@ -51,7 +51,7 @@ def test_a_rival_beside_what_is_asserted_is_told_from_one_in_its_place(damped, m
     assert ';' not in said  # the two numbers say it
 
 
-def test_a_rival_that_leaves_less_is_told_what_is_wrong_with_it(damped, models):
+def test_a_rival_that_leaves_less_gets_its_reason(damped, models):
     """Its price, the size of its effects, or bodies that are not likely."""
     right, more, _, _ = models
     more = replace(more, residual=0.9 * right.residual, forces=2 * right.forces)
@@ -106,7 +106,7 @@ def test_what_bodies_explain_much_worse_is_not_explained_by_them(
     assert is_calm or after.verdict == 'unexplained'
 
 
-def test_what_leaves_more_than_noise_is_told_by_how_much(damped, models):
+def test_what_leaves_more_than_noise_is_reported_with_its_size(damped, models):
     """A spring where friction is missing."""
     spring = models[2]
     comparison = _comparison(damped, spring)

@@ -13,7 +13,7 @@ from sgp_ros.diagnosis.criteria import ADEQUATE_REST, PER_EFFECT, PER_PARAMETER,
 
 RESULTS = Path(__file__).parents[3] / 'sgp_proof' / 'results'
 FALSE_ALARMS, UNKNOWN_CALLED = 0.05, 0.7
-"""What is promised: at most so many, at least so many."""
+"""Promised rates: at most so many, at least so many."""
 
 
 @pytest.fixture(scope='module')

@@ -1,4 +1,4 @@
-"""What a recording says that it would show is found at twice the size, and not at half."""
+"""Effects are found at twice the size that a recording says it would show, and not at half."""
 
 from __future__ import annotations
 

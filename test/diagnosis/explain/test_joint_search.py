@@ -57,7 +57,7 @@ def _pair(equations):
 
 
 def test_every_joint_gets_the_laws_that_it_lacks(equations):
-    """What the best pair lacks is added at its joint, and nothing beside it."""
+    """Laws that the best pair lacks are added at their joint, and nothing beside them."""
     columns, pair = _pair(equations)
     found, *rivals = by_joint(columns, pair)
     assert _keys(found) == TRUTH
@@ -114,7 +114,7 @@ def test_a_joint_is_screened_alone(equations):
 
 
 def test_friction_that_couples_nothing_is_that_of_each_joint(equations):
-    """What two joints have alone is no coupling, and their own laws are its rival."""
+    """Friction of two joints alone is no coupling, and their own laws are its rival."""
     columns, base = _start(equations)
     coupled, place = EFFECTS['coupled_friction'], Place(1, source=0)
     alone, both = (
@@ -269,7 +269,7 @@ def test_laws_that_few_joints_have_cost_more_once(equations):
 
 
 def test_joints_that_move_in_turn_show_no_motor_that_turns_with_both(equations):
-    """What plain friction does not say of the other joint is said while that one rests."""
+    """Plain friction of each joint explains the force wherever the other one rests."""
     moving = np.ones(equations.motion.position.shape)
     moving[: len(moving) // 2, 0] = moving[len(moving) // 2 :, 1] = 0.0
     motion = replace(equations.motion, velocity=moving * equations.motion.velocity)

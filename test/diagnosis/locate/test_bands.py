@@ -74,7 +74,7 @@ def test_the_slopes_of_the_evidence_are_its_differences(motion):
 
 
 def test_friction_is_odd_and_a_spring_is_not(motion):
-    """What is learned is the function, in each direction."""
+    """The learned object is the function, in each direction."""
     x, forward = motion
     noise = 0.1 * np.random.default_rng(1).normal(size=len(x))
     for law in (np.where(forward, -1.0, 1.0) * np.cos(2.0 * x), np.sin(2.0 * x)):
@@ -97,7 +97,7 @@ def test_noise_alone_is_worth_no_process(motion):
 
 
 def test_both_ends_of_a_turn_are_one_place():
-    """What was seen just before the angle wraps tells of just after."""
+    """Data from just before the angle wraps inform the estimate just after."""
     angle = np.linspace(-np.pi, np.pi, 400, endpoint=False)
     cells = cells_of(angle, np.arange(400) % 2 == 0)
     turning = _geometry(cells.centre, is_angle=True)[0]

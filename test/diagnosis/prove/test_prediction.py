@@ -1,4 +1,4 @@
-"""What the final model predicts, and its bodies."""
+"""Predictions of the final model, and its bodies."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def test_both_models_are_judged_on_the_roll_outs_that_both_finish(robots, equati
 
 
 def test_states_beyond_those_learned_from_are_far(robots, equations_for, perfect):
-    """What was learned from is no distance away."""
+    """States learned from have no distance."""
     raw, equations = equations_for(perfect[1])
     model = _fitted(equations)
     final = FinalModel(model, model, equations, ())

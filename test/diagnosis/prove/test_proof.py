@@ -102,7 +102,7 @@ def _proof(before, after, interval):
 
 
 @pytest.mark.parametrize(
-    ('before', 'after', 'interval', 'still', 'is_told'),
+    ('before', 'after', 'interval', 'still', 'is_reported'),
     [
         (0.4, 0.15, (0.08, 0.3), (), True),  # a fifth and more is left where it was 1 %
         (0.4, 0.03, (0.02, 0.05), (), False),  # friction that is a sixth larger
@@ -111,26 +111,26 @@ def _proof(before, after, interval):
         (0.003, 0.003, (0.002, 0.004), (), False),  # nothing there counts as physics
     ],
 )
-def test_what_does_not_carry_over_is_told(before, after, interval, still, is_told):
+def test_what_does_not_carry_over_is_reported(before, after, interval, still, is_reported):
     proofs = {'train': _proof(0.4, 0.004, (0.003, 0.005)), 'test': _proof(before, after, interval)}
     found = not_carried_over(proofs, still)
-    assert set(found) == ({'elbow'} if is_told else set())
+    assert set(found) == ({'elbow'} if is_reported else set())
     assert reasons_to_doubt(proofs, still) == {joint: (why,) for joint, why in found.items()}
 
 
 @pytest.mark.parametrize(
-    ('after', 'low', 'is_told'),
+    ('after', 'low', 'is_reported'),
     [(0.012, 8e-4, True), (0.003, 8e-4, False), (0.012, 2e-5, False)],
 )
-def test_what_does_harm_elsewhere_does_not_carry_over(after, low, is_told):
+def test_what_does_harm_elsewhere_does_not_carry_over(after, low, is_reported):
     """A force that has gone there, though its few places leave a wide interval."""
     far = _proof(1e-5, after, (low, 0.2))
     far.intervals['nmse_before'] = {'elbow': (3e-6, 3e-5)}
     found = not_carried_over({'train': _proof(0.13, 8e-6, (7e-6, 9e-6)), 'far': far}, ())
-    assert bool(found) is is_told
+    assert bool(found) is is_reported
 
 
 def test_noise_that_was_there_before_is_no_failure():
-    """What is left is as large where the model was fitted."""
+    """The rest is as large where the model was fitted."""
     noisy = _proof(0.4, 0.1, (0.08, 0.12))
     assert not not_carried_over({'train': noisy, 'test': noisy}, ())

@@ -11,7 +11,7 @@ from sgp_ros.diagnosis.connected import Connected, with_laws
 
 
 class _Worth(Connected):
-    """What was compared, with a worth that is given."""
+    """Comparison with a given worth."""
 
     def worth(self, nominal, recorded):
         return float(self.remarks[0])

@@ -67,7 +67,7 @@ def test_a_law_is_found_with_its_numbers(braked):
     assert braked.proofs['held_out'].nmse_after['joint0'] < 1e-3
 
 
-def test_the_shape_is_told_in_words_and_numbers(braked):
+def test_the_shape_is_described_in_words_and_numbers(braked):
     """With a band, in the file too."""
     (search,) = braked.law_searches
     assert search.why_not == ''
@@ -204,7 +204,7 @@ def test_a_formula_is_held_against_any_form(equations_for):
 
 
 def test_a_finer_spline_has_columns_of_its_own(equations_for):
-    """What is known of a spline is not what one with other pieces has."""
+    """Columns known for a spline are not those of one with other pieces."""
     _, equations = equations_for(simulate(CHAINS[1], 11, 10.0, force=_brake))
     columns, motion = Columns(equations), equations.motion
     for pieces in (PIECES, FINE):

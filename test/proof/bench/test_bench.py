@@ -53,7 +53,7 @@ def test_the_command_writes_what_it_prints(tmp_path, capsys):
 
 
 def test_unknown_benchmarks_are_refused(tmp_path):
-    """The names that exist are told."""
+    """The message lists the names that exist."""
     with pytest.raises(ConfigError, match=', '.join(BENCHES)):
         run_bench(['stepp'], tmp_path, lambda share: None)
 

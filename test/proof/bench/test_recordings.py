@@ -34,7 +34,7 @@ def test_a_command_is_measured_in_a_process_of_its_own():
         measured(['no_such_command'])
 
 
-def test_what_was_named_is_told_with_its_error(tmp_path):
+def test_what_was_named_is_reported_with_its_error(tmp_path):
     """Without a finding nothing is; a level is compared with that of the drawn friction."""
     file = tmp_path / 'diagnosis.json'
     file.write_text('{"findings": []}', encoding='utf-8')
@@ -55,7 +55,7 @@ def test_the_rival_that_knows_the_effect_finds_its_size(tmp_path):
     assert row['sysid_one_off_percent'] < 20.0
 
 
-def test_growth_is_told_between_rows_that_differ_in_one_size(monkeypatch):
+def test_growth_is_measured_between_rows_that_differ_in_one_size(monkeypatch):
     """Costs as the square of the joints and linear in the length."""
 
     def cost(words):
@@ -67,8 +67,8 @@ def test_growth_is_told_between_rows_that_differ_in_one_size(monkeypatch):
     monkeypatch.setattr(recordings, 'sysid_row', lambda *_: dict.fromkeys(SYSID_KEYS, 1.0))
     monkeypatch.setattr(recordings, 'draw_recording', lambda _, k, s: ('arm', f'arm_{k}_{s:g}'))
     rows = recordings.bench_diagnose({}, lambda share: None, is_quick=False)
-    told = {'seconds': 1.0, 'joints': 2.0}
-    for name, wanted in told.items():
+    sizes = {'seconds': 1.0, 'joints': 2.0}
+    for name, wanted in sizes.items():
         found = [row[f'exponent_{name}'] for row in rows if row[f'exponent_{name}'] != '']
         assert found
         assert all(math.isclose(x, wanted) for x in found)

@@ -187,12 +187,12 @@ def test_the_true_structure_finds_the_true_numbers_and_predicts_what_was_held_ou
 
 
 def test_where_the_fit_of_the_true_structure_starts_does_not_show(drawn):
-    """It is a fit: told half the true way before a bristle slides, it finds the same."""
+    """It is a fit: started from half the true way before a bristle slides, it finds the same."""
     folder = drawn('hysteresis')
     answer, case = _answer(folder), folder / 'cases' / 'case_000'
-    told = _answer(folder)
-    told['effects'][0]['parameters']['presliding'] *= 0.5
-    (one,), (other,) = (Oracle.fitted(case, a).findings() for a in (answer, told))
+    other_start = _answer(folder)
+    other_start['effects'][0]['parameters']['presliding'] *= 0.5
+    (one,), (other,) = (Oracle.fitted(case, a).findings() for a in (answer, other_start))
     for name, entry in one['parameters'].items():
         assert other['parameters'][name]['value'] == pytest.approx(entry['value'], rel=1e-3)
 

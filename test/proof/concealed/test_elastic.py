@@ -1,4 +1,4 @@
-"""What is said of elastic joints, and of worlds without any law, is counted rightly."""
+"""Statements on elastic joints, and on worlds without any law, are counted rightly."""
 
 from __future__ import annotations
 

@@ -145,7 +145,7 @@ def test_a_law_of_a_later_set_is_finite(kind):
         return
     source = p['source']
     (action,) = unlisted.BUILDERS[kind](0, p, ())
-    for k, told in enumerate(force):
+    for k, expected in enumerate(force):
         q, v = ({0: x[0, k], source: x[1, k]} for x in states)
         moment = SimpleNamespace(position=q, velocity=v)
         exerted = action.force(moment) if action.force else 0.0
@@ -153,7 +153,7 @@ def test_a_law_of_a_later_set_is_finite(kind):
             direction = int(np.sign(v[0]))
             assert action.dry_level(moment, direction) >= 0.0
             exerted -= direction * action.dry_level(moment, direction)
-        assert exerted == pytest.approx(told)
+        assert exerted == pytest.approx(expected)
 
 
 @pytest.mark.parametrize('kind', REMEMBER)
@@ -163,9 +163,9 @@ def test_a_law_that_remembers_is_simulated_as_it_is_scored(kind):
     (action,) = unlisted.BUILDERS[kind](0, p, ())
     t = unlisted.STEP_S * np.arange(400)
     q, v = 0.9 * np.sin(2.0 * t), 1.8 * np.cos(2.0 * t)
-    told = true_force(p, np.array([q, q]), np.array([v, v]))
+    expected = true_force(p, np.array([q, q]), np.array([v, v]))
     state = action.start(q[0], v[0])
-    for at in zip(q, v, told, strict=True):
+    for at in zip(q, v, expected, strict=True):
         moment = SimpleNamespace(position={0: at[0]}, velocity={0: at[1]}, state=state)
         assert action.force(moment) == pytest.approx(at[2])
         state = tuple(
@@ -175,7 +175,7 @@ def test_a_law_that_remembers_is_simulated_as_it_is_scored(kind):
 
 
 @pytest.mark.parametrize('is_apart', [True, False])
-def test_listed_friction_in_a_law_may_be_told_beside_the_rest(is_apart):
+def test_listed_friction_in_a_law_may_be_named_beside_the_rest(is_apart):
     """Or within the formula; elsewhere it is a wrong name."""
     (kind,) = third.LISTED_PARTS
     p = {name: float(x) if name != 'kind' else x for name, x in _drawn(kind).items()}
@@ -192,7 +192,7 @@ def test_listed_friction_in_a_law_may_be_told_beside_the_rest(is_apart):
 
 
 @pytest.mark.parametrize(
-    ('kind', 'rest', 'told'),
+    ('kind', 'rest', 'parameters'),
     [
         (
             'flow_valve', '-0.5*(1 - back)*min(dq[elbow]/1.5, 0)**2',
@@ -217,12 +217,12 @@ def test_listed_friction_in_a_law_may_be_told_beside_the_rest(is_apart):
         ),
     ],
 )  # fmt: skip
-def test_a_listed_part_may_be_told_beside_the_rest(kind, rest, told):
+def test_a_listed_part_may_be_named_beside_the_rest(kind, rest, parameters):
     """As that effect with its numbers; without it the rest is a wrong law."""
     p = {**_drawn(kind), 'source': 'wrist'}
     numbers = {name: {'value': p[name]} for name in fourth.SET.ranges[kind]}
     law = {**RIGHT, 'formula': f'tau_x[elbow] = {rest}', 'parameters': numbers}
-    values = {name: {'value': x} for name, x in told(p).items()}
+    values = {name: {'value': x} for name, x in parameters(p).items()}
     part = {**LISTED, 'effect': fourth.LISTED_PARTS[kind], 'parameters': values}
     answer = {'case': 'case_1', 'effects': [{**EFFECT, 'parameters': p}]}
     for findings, right in (([law, part], True), ([law], False)):

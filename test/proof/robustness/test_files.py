@@ -135,8 +135,8 @@ def test_files_made_to_harm_are_refused(tmp_path, monkeypatch, name, make, read,
 
 def test_every_bound_is_documented_with_its_default():
     page = (Path(__file__).parents[3] / 'docs' / 'security.md').read_text(encoding='utf-8')
-    told = re.findall(r'`SGP_MOST_(\w+)` \| (\d+) \|', page)
-    assert {name: int(default) for name, default in told} == strangers.DEFAULTS
+    named = re.findall(r'`SGP_MOST_(\w+)` \| (\d+) \|', page)
+    assert {name: int(default) for name, default in named} == strangers.DEFAULTS
 
 
 def _of_depth(path):

@@ -1,4 +1,4 @@
-"""What a search for a law says: the shape with its band, the formulas, one sentence in words."""
+"""Statement of an unlisted law: its shape with a band, formulas, one sentence in words."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _FORMULAS = 3
 _MOST_SEEN, _WEAK = 600, 0.2
 """Rows of the recording beside a shape; the least factor of them, relative to the greatest."""
 _BEYOND = 0.5
-"""Range in which formulas are told, beyond what was seen, in parts of that."""
+"""Range in which formulas are reported, beyond what was seen, in parts of that."""
 _CLEAR = 0.85
 """A curve rises or falls where it leaves this part of its greatest value."""
 
@@ -46,18 +46,18 @@ class Shape:
 
 
 def extended(several: Several) -> tuple[Several, tuple[LawSearch, ...]]:
-    """Return what is decided where laws that no list has are looked for, in one recording."""
+    """Return the decision with a search for unlisted laws, in one recording."""
     if several.chances or several.equations.motion.is_static:
         return several, ()
     found = with_laws(several.equations, several.comparison, several.decision)
     several = replace(
         several, comparison=found.comparison, decision=found.decision, model=found.decision.model
     )
-    return several, told(found)
+    return several, law_searches(found)
 
 
-def told(found: Explained) -> tuple[LawSearch, ...]:
-    """Return what is said of each joint at which a law was looked for."""
+def law_searches(found: Explained) -> tuple[LawSearch, ...]:
+    """Return the result at each joint where a law was looked for."""
     return tuple(_search(found, s) for s in found.searched)
 
 
@@ -127,8 +127,8 @@ def _curve(law: EffectAt, searched: Searched, seen: Seen) -> np.ndarray:
 def _beyond(law: EffectAt, searched: Searched, x: np.ndarray) -> np.ndarray:
     """Return a formula over its factor at places of its variable (b,); NaN if of other kind.
 
-    A sign is that of a fast motion ahead, a factor that is a speed or an effort is one; what
-    remembers has come to rest.
+    A sign is that of a fast motion ahead, a factor that is a speed or an effort is one; signals
+    with memory have settled.
     """
     _, smooth = smooth_of(searched.smooth, searched.joint)
     assert isinstance(law.effect, FoundLaw)
