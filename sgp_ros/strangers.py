@@ -36,6 +36,7 @@ _MEGABYTE = 1 << 20
 _GROWING = '.sgp_growing_'
 YAMLError = yaml.YAMLError
 _LOADER: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+_LIBYAML_DEPTH = 1000
 """The one in C is ten times as fast."""
 Waiting = dict[Path, Path]
 """Name in the end to the name of the complete file that waits for it."""
@@ -220,7 +221,12 @@ def load_yaml(text: str) -> Any:
         TooMuchError: more nesting, entries or aliases than a settings file has.
         yaml.YAMLError: no YAML.
     """
-    _require_bounded(text)
+    try:
+        _require_bounded(text)
+    except YAMLError as error:
+        if 'nesting depth' in str(error):  # libyaml has a limit of its own, and looks ahead
+            require_within(_LIBYAML_DEPTH, 'DEPTH', 'nesting depth of the YAML')
+        raise
     try:
         return yaml.load(text, Loader=_LOADER)  # noqa: S506  # a safe one
     except (ValueError, TypeError, OverflowError) as error:  # such as a date of month 13
