@@ -49,7 +49,7 @@ class ViscousFriction(Effect):
     formula = 'tau_x = -b v'
     source = _ARMSTRONG
     appearance = 'the residual effort is proportional to the velocity'
-    quantities = (Quantity('b', 'N m s/rad', low=0.0, is_sought=True),)
+    quantities = (Quantity('b', 'N m s/rad', low=0.0, is_sought=True, joint_number='damping'),)
     linear = ('b',)
     term = TermForm('viscous', ('viscous',), dynamics='damping', is_dissipative=True)
     drawn_over = 'velocity'
@@ -70,7 +70,7 @@ class CoulombFriction(Effect):
     formula = 'tau_x = -level sign(v)'
     source = _ARMSTRONG
     appearance = 'a step of the effort at each reversal; the joint sticks at rest'
-    quantities = (Quantity('level', 'N m', low=0.0, is_sought=True),)
+    quantities = (Quantity('level', 'N m', low=0.0, is_sought=True, joint_number='friction'),)
     linear = ('level',)
     term = TermForm('coulomb', ('coulomb',), dynamics='friction', is_dissipative=True)
     drawn_over = 'velocity'
@@ -96,7 +96,7 @@ class StribeckFriction(Effect):
     source = _ARMSTRONG
     appearance = 'a step at each reversal, largest at low speed; stick-slip'
     quantities = (
-        Quantity('coulomb', 'N m', low=0.0),
+        Quantity('coulomb', 'N m', low=0.0, joint_number='friction'),
         Quantity('static', 'N m', low=0.0),
         Quantity('stribeck_velocity', 'rad/s', low=1e-9, is_positive=True, is_scored=False),
     )
@@ -187,7 +187,10 @@ class AsymmetricCoulomb(Effect):
     formula = 'tau_x = -level_pos for v > 0, +level_neg for v < 0'
     source = _ARMSTRONG
     appearance = 'a step at each reversal that is not centred on zero'
-    quantities = (Quantity('level_pos', 'N m', low=0.0), Quantity('level_neg', 'N m', low=0.0))
+    quantities = tuple(
+        Quantity(name, 'N m', low=0.0, joint_number='friction')
+        for name in ('level_pos', 'level_neg')
+    )
     linear = ('level_pos', 'level_neg')
     plain = ('coulomb_friction',)
     term = TermForm(

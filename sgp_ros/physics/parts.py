@@ -122,6 +122,8 @@ class Quantity:
         kinds: the kind of the effect that it belongs to; empty for all.
         is_sought: whether a diagnosis states the least of it that the recording would show.
         neutral: value with which the effect is none, where the number says how large it is.
+        joint_number: number of a joint that it is in other programs, of a law with further ones
+            the nearest; empty for none.
     """
 
     name: str
@@ -133,6 +135,7 @@ class Quantity:
     kinds: tuple[str, ...] = ()
     is_sought: bool = False
     neutral: float = 0.0
+    joint_number: str = ''
 
     def of_kind(self, kind: str) -> Quantity:
         """Return the quantity of a kind of the effect: viscous levels are per velocity."""
