@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ast
+import re
 import sys
 from pathlib import Path
 
 import pytest
 
 from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.joint_terms import term_laws
 
 PACKAGE = Path(__file__).parents[1] / 'sgp_ros'
 MODULES = sorted(PACKAGE.rglob('*.py'))
@@ -33,8 +35,8 @@ LAYERS = {
     },
     'robots': {'numpy', 'yaml', 'physics', 'rigid', 'optional', 'apart', 'strangers', 'errors'},
     'simulation': NUMERIC | {
-        'mujoco', 'physics.catalogue', 'physics.effect', 'physics.effect_at', 'physics.parts',
-        'physics.law', 'physics.grammar', 'rigid', 'optional', 'errors',
+        'mujoco', 'physics.catalogue', 'physics.effect', 'physics.effect_at', 'physics.example',
+        'physics.parts', 'physics.law', 'physics.grammar', 'rigid', 'optional', 'errors',
     },
     'engine': {'numpy', 'numba', 'gp', 'physics', 'rigid', 'robots', 'errors'},
     'batch': NUMERIC | {
@@ -282,23 +284,42 @@ def test_every_module_says_what_it_is_for(path):
     assert docstring.split('\n\n')[0].rstrip().endswith(('.', '?')), docstring
 
 
+def _named(path):
+    """Return names in strings: one that stands alone or before a colon, or has several words."""
+    tree = _tree(path)
+    docstrings = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    texts = {
+        node.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        and id(node) not in docstrings
+    }  # fmt: skip
+    words = {word for text in texts for word in re.findall(r'\w+:?', text)}
+    return texts | {word.rstrip(':') for word in words if word[-1] == ':' or '_' in word}
+
+
 def test_no_effect_is_named_outside_physics_and_simulation():
     """What follows from a law follows from its value, so that a new one is one value.
 
-    `payload` is also a key of a robot YAML.
+    `payload` is also a key of a robot YAML, `viscous_friction` one of Isaac Lab.
     """
     scanned = [p for p in MODULES if _layer(p) not in {'physics', 'simulation'}]
-    scanned += [
-        *(PACKAGE.parent / 'sgp_proof').rglob('*.py'),
-        *(PACKAGE.parent / 'docs').glob('*.py'),
-    ]
-    keys = {'payload'}
-    found = {
-        (path.name, node.value)
-        for path in scanned
-        for node in ast.walk(_tree(path))
-        if isinstance(node, ast.Constant) and isinstance(node.value, str)
-        and node.value in EFFECTS
-        and not (node.value in keys and path.parent.name == 'robots')
-    }  # fmt: skip
-    assert not found
+    scanned += [*PROOF_MODULES, *(PACKAGE.parent / 'docs').glob('*.py')]
+    keys = {('robots', 'payload'), ('exports', 'viscous_friction')}
+    found = {(path, name) for path in scanned for name in _named(path) & set(EFFECTS)}
+    assert not {(path, name) for path, name in found if (path.parent.name, name) not in keys}
+
+
+def test_no_term_is_named_outside_physics():
+    """The terms of a robot YAML are laws too; an `offset` others have as well."""
+    terms = set(term_laws()) - {'offset', *EFFECTS}
+    scanned = [p for p in MODULES if _layer(p) not in {'physics', 'simulation'}]
+    assert not {(path, name) for path in scanned for name in _named(path) & terms}
+
+
+def test_names_are_found_within_texts(tmp_path):
+    """As on a command line; plain words such as a spring are none."""
+    path = tmp_path / 'some.py'
+    text = """'Of coulomb_friction.'\nx = 'a spring', f'--effect end_stop:joint={1}'\n"""
+    path.write_text(text, encoding='utf-8')
+    assert _named(path) & set(EFFECTS) == {'end_stop'}

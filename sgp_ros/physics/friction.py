@@ -10,7 +10,9 @@ from sgp_ros.physics.drawing import Drawn, JointScene
 from sgp_ros.physics.effect import Effect, Numbers
 from sgp_ros.physics.motion import SeenMotion
 from sgp_ros.physics.parts import (
+    COULOMB,
     MOTOR,
+    VISCOUS,
     OwnMotion,
     Place,
     Placed,
@@ -20,7 +22,7 @@ from sgp_ros.physics.parts import (
     relative_scales,
 )
 
-KINDS = ('coulomb', 'viscous')
+KINDS = (COULOMB, VISCOUS)
 SELF_LOCKING = 0.5
 """A drive that loses more than half of its torque to friction cannot be driven back."""
 RATIO_SPREAD = 0.5
@@ -37,7 +39,7 @@ def _ratio(large: float, small: float) -> float:
 
 def rubbing(motion: SeenMotion, place: Place) -> np.ndarray:
     """Return `sign(v)` for dry friction, v for viscous friction, (n,)."""
-    source = motion.velocity if place.kind == 'viscous' else motion.direction
+    source = motion.velocity if place.kind == VISCOUS else motion.direction
     return source[:, place.joint]
 
 
@@ -51,7 +53,9 @@ class ViscousFriction(Effect):
     appearance = 'the residual effort is proportional to the velocity'
     quantities = (Quantity('b', 'N m s/rad', low=0.0, is_sought=True, joint_number='damping'),)
     linear = ('b',)
-    term = TermForm('viscous', ('viscous',), dynamics='damping', is_dissipative=True)
+    term = TermForm(
+        'viscous', ('viscous',), dynamics='damping', is_dissipative=True, is_assumed=True
+    )
     drawn_over = 'velocity'
     is_usual = True
 
@@ -72,7 +76,9 @@ class CoulombFriction(Effect):
     appearance = 'a step of the effort at each reversal; the joint sticks at rest'
     quantities = (Quantity('level', 'N m', low=0.0, is_sought=True, joint_number='friction'),)
     linear = ('level',)
-    term = TermForm('coulomb', ('coulomb',), dynamics='friction', is_dissipative=True)
+    term = TermForm(
+        'coulomb', ('coulomb',), dynamics='friction', is_dissipative=True, is_assumed=True
+    )
     drawn_over = 'velocity'
     is_dry = True
     is_usual = True

@@ -78,7 +78,7 @@ class ConstantLoad(Effect):
     appearance = 'the residual effort is the same everywhere'
     quantities = (Quantity('force', 'N m'),)
     linear = ('force',)
-    term = TermForm('offset', ('offset',), sign=-1.0)
+    term = TermForm('offset', ('offset',), sign=-1.0, is_assumed=True)
 
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (np.ones_like(x.q),)
