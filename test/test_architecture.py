@@ -90,6 +90,11 @@ SUB_ROOMS = {
         'unlisted', 'findings', 'prove', 'mapping', 'gathered', 'connected', 'reference',
         'pipeline',
     ),
+    'robots': (
+        'entries', 'shipped', 'listing', 'gains', 'models', 'observed_motion', 'nominal_prior',
+        'stated_laws', 'stated_effects', 'effect_terms', 'bodies', 'robot', 'lumped',
+        'urdf_robot', 'registry', 'given_bodies', 'stated_values', 'nominal', 'bare', 'exports',
+    ),
 }  # fmt: skip
 """Layer to its sub-rooms in their order: each imports itself and those that stand before it."""
 
@@ -168,7 +173,7 @@ def test_rooms_of_the_proof_follow_their_table(path):
 
 @pytest.mark.parametrize('path', MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
 def test_sub_rooms_look_back_only(path):
-    """The stages of a diagnosis follow each other; none needs what comes after it."""
+    """As the stages of a diagnosis, none of which needs what comes after it."""
     layer, *within = path.relative_to(PACKAGE).with_suffix('').parts
     order = SUB_ROOMS.get(layer, ())
     if not order or within == ['__init__']:
@@ -178,6 +183,13 @@ def test_sub_rooms_look_back_only(path):
         parts = name.split('.')
         if parts[:2] == ['sgp_ros', layer]:
             assert parts[2] in before, f'{within[0]} imports {name} in line {node.lineno}'
+
+
+def test_every_layer_with_folders_has_an_order():
+    """A folder within a layer could hide a circle; rooms of the proof have none."""
+    inner = [p.relative_to(PACKAGE).parts for p in MODULES]
+    assert {parts[0] for parts in inner if len(parts) > 2} == set(SUB_ROOMS)
+    assert all(len(p.relative_to(PROOF).parts) <= 2 for p in PROOF_MODULES)
 
 
 @pytest.mark.parametrize(
@@ -268,7 +280,9 @@ def test_a_short_module_serves_more_than_one_other():
     assert not lonely
 
 
-@pytest.mark.parametrize('path', MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
+@pytest.mark.parametrize(
+    'path', [*MODULES, *PROOF_MODULES], ids=lambda p: str(p.relative_to(PACKAGE.parent))
+)
 def test_imports_are_plain(path):
     """No block for type checkers alone, in which circles hide."""
     assert 'TYPE_CHECKING' not in path.read_text(encoding='utf-8')
