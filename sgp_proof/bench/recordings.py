@@ -25,6 +25,7 @@ from sgp_proof.bench.sysid import SYSID_KEYS, sysid_row
 from sgp_proof.concealed.machines import draw_machine
 from sgp_proof.concealed.robots import urdf
 from sgp_ros.apps.simulation import write_simulated
+from sgp_ros.physics.example import example_effect
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.recording import simulate
 from sgp_ros.simulation.tree_simulator import tree_simulator
@@ -39,7 +40,7 @@ SIZES = {
 """Joints and seconds, by command."""
 _SEED = 36
 _JOINT, _LEVEL = 'joint_2', 3.0
-_FRICTION = (f'coulomb_friction:joint={_JOINT},level={_LEVEL:g}',)
+_FRICTION = (example_effect(_JOINT, _LEVEL),)
 _RIVALLED = ('diagnose', 3, 60.0)
 """Command, joints and seconds at which `mujoco.sysid` is asked too."""
 

@@ -9,7 +9,6 @@ from sgp_ros.physics.catalogue import (
     COMMAND_DELAY,
     CONSTANT_LOAD,
     COULOMB_FRICTION,
-    EFFECTS,
     GRAVITY_TILT,
     JOINT_COUPLING,
     LIMIT_FRICTION,
@@ -22,30 +21,28 @@ from sgp_ros.physics.law import NAME as LAW
 
 def effects_entry(concealed, bodies):
     """Return the entry of `effects` for one effect."""
+    at = concealed.at
     parameters = {
         name: value if isinstance(value, str) else float(value)
-        for name, value in concealed.parameters.items()
+        for name, value in at.parameters.items()
     }
-    scored = []
-    if concealed.name in EFFECTS:
-        known = EFFECTS[concealed.name].stated_quantities(parameters.get('kind', ''))
-        scored = [q.name for q in known if q.is_scored]
-    if concealed.name == NAME and parameters['source'] >= 0:
+    known = at.effect.stated_quantities(parameters.get('kind', ''))
+    if at.name == NAME and parameters['source'] >= 0:
         parameters['source'] = bodies[int(parameters['source'])].joint
     return {
-        'effect': concealed.name, 'joint': concealed.joint, 'parameters': parameters,
-        'scored': scored,
+        'effect': at.name, 'joint': at.joint, 'parameters': parameters,
+        'scored': [q.name for q in known if q.is_scored],
     }  # fmt: skip
 
 
 def accepted(concealed, bodies, motion):
     """Return the answers that are right for one effect."""
-    name, joint = concealed.name, concealed.joint
+    name, joint = concealed.at.name, concealed.at.joint
     body = bodies[concealed.index]
     is_fixed_axis = body.parent < 0 and joint == body.joint
     verdict = 'unexplained' if name == NAME else 'missing_physics'
     answers = [_answer(verdict, name, joint, 'true')]
-    if name == NAME and concealed.parameters['kind'] not in OF_TIME:
+    if name == NAME and concealed.at.parameters['kind'] not in OF_TIME:
         answers.append(_answer('missing_physics', LAW, joint, 'its law'))
     same = 'same motion'
     if name == ASYMMETRIC_COULOMB.name:
@@ -63,7 +60,7 @@ def accepted(concealed, bodies, motion):
     if name == LIMIT_FRICTION.name:
         answers.append(_answer(verdict, POSITION_FRICTION.name, joint, same))
     if name == POSITION_FRICTION.name and body.kind != 'continuous':
-        lo, hi = concealed.parameters['lo'], concealed.parameters['hi']
+        lo, hi = (concealed.at.parameters[end] for end in ('lo', 'hi'))
         low, high = motion.low[concealed.index], motion.high[concealed.index]
         if lo < low + 0.05 * (high - low) or hi > high - 0.05 * (high - low):
             answers.append(_answer(verdict, LIMIT_FRICTION.name, joint, same))
@@ -73,13 +70,13 @@ def accepted(concealed, bodies, motion):
 
 def _other_joints(concealed, bodies):
     """Return the joints at which the same effect would give the same motion."""
-    name, joint = concealed.name, concealed.joint
+    at, joint = concealed.at, concealed.at.joint
     driven = [b.joint for b in bodies if b.is_driven]
-    if name == JOINT_COUPLING.name and 'stiffness' in concealed.parameters:
-        return [concealed.parameters['source_joint']]
+    if at.name == JOINT_COUPLING.name and 'stiffness' in at.parameters:
+        return [at.parameters['source_joint']]
     if joint == 'all':
         return driven
-    return ['all'] if name == COMMAND_DELAY.name and len(driven) == 1 else []
+    return ['all'] if at.name == COMMAND_DELAY.name and len(driven) == 1 else []
 
 
 def without_effect(errors, bodies):

@@ -3,23 +3,32 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from sgp_proof.concealed.unknown import NAME, UNKNOWN
 from sgp_proof.concealed.unlisted import BUILDERS
-from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
+
+
+class Outside(Effect):
+    """Physics outside the catalogue: only the simulation knows its force."""
+
+    name = NAME
+
+
+OUTSIDE = Outside()
 
 
 @dataclass
 class Concealed:
     """An effect whose size is still open: `values(size)` are its parameters.
 
-    `power` says how its share of the squared effort grows with the size.
+    `index` is that of the joint at which it is measured; `power` says how its share of the squared
+    effort grows with the size.
     """
 
-    name: str
-    joint: str
+    unsized: EffectAt
     index: int
     values: object
     size: float
@@ -27,17 +36,22 @@ class Concealed:
     largest: float = math.inf
     location: dict = field(default_factory=dict)
 
+    @classmethod
+    def of(cls, law, joint, *sized, **more):
+        """Return a law at a joint, with what else there is to know."""
+        return cls(EffectAt.wanted(law, joint, {}), *sized, **more)
+
     @property
-    def parameters(self):
-        return self.values(self.size)
+    def at(self):
+        """The effect with the parameters of its size."""
+        return replace(self.unsized, parameters=self.values(self.size))
 
     def chosen(self):
         """Return the effect for the simulation; None where it has no name."""
-        if self.name == NAME:
-            return None
-        return EffectAt.wanted(EFFECTS[self.name], self.joint, self.parameters)
+        return None if self.unsized.effect is OUTSIDE else self.at
 
     def unlisted(self, joints):
-        if self.name != NAME:
+        if self.unsized.effect is not OUTSIDE:
             return ()
-        return (UNKNOWN | BUILDERS)[self.parameters['kind']](self.index, self.parameters, joints)
+        parameters = self.at.parameters
+        return (UNKNOWN | BUILDERS)[parameters['kind']](self.index, parameters, joints)

@@ -157,7 +157,7 @@ def _check(real, world, concealed):
     """Refuse a world in which a concealed effect is smaller than what counts as physics."""
     for effect, share in zip(concealed, own_shares(real, world, concealed), strict=True):
         if share < sizes.SMALLEST_SHARE:
-            raise UnsuitableError(f'{effect.name} makes {share:.2e}')
+            raise UnsuitableError(f'{effect.at.name} makes {share:.2e}')
     if not concealed and world.errors:
         error = max(x['nominal'] for x in balance.nominal_share(real, world).values())
         if error < sizes.SMALLEST_SHARE:
@@ -188,7 +188,9 @@ def write_case(seed, tier, wanted, out, rng, world, concealed, recordings, motio
         )  # fmt: skip
     real, held_out = recordings['real'], {n: recordings[n] for n in ('real_test', 'real_far')}
     if concealed:
-        verdict = 'unexplained' if any(e.name == UNKNOWN for e in concealed) else 'missing_physics'
+        verdict = (
+            'unexplained' if any(e.at.name == UNKNOWN for e in concealed) else 'missing_physics'
+        )
         right = [a for e in concealed for a in answers.accepted(e, world.bodies, motion)]
     else:
         verdict, right = answers.without_effect(world.errors, world.bodies)
@@ -226,7 +228,7 @@ def write_case(seed, tier, wanted, out, rng, world, concealed, recordings, motio
         signals[f'{name}_t'] = 1e-9 * (recording.stamps_ns - recording.stamps_ns[0])
         signals[f'{name}_a'] = recording.true_acceleration.astype(np.float32)
     np.savez(out / 'answers' / f'{case}_truth.npz', **signals)
-    what = ', '.join(f'{e.name}@{e.joint}' for e in concealed) or wanted
+    what = ', '.join(f'{e.at.name}@{e.at.joint}' for e in concealed) or wanted
     return f'{case} {tier} {world.family:9s} {what} {" ".join(f"{x:.4f}" for x in share)}'
 
 

@@ -123,4 +123,4 @@ def _unlisted(rng, bodies, loads, motion):
 def _fixed(effect, joint, j, **numbers):
     """Return a concealed effect of given size."""
     values = {name: float(value) for name, value in numbers.items()}
-    return Concealed(effect.name, joint, j, lambda _: values, 1.0)
+    return Concealed.of(effect, joint, j, lambda _: values, 1.0)

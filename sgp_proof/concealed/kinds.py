@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sgp_proof.concealed.concealed_effect import Concealed
+from sgp_proof.concealed.concealed_effect import OUTSIDE, Concealed
 from sgp_proof.concealed.unknown import NAME, UNKNOWN
 from sgp_proof.concealed.unlisted import constants, family_of
 from sgp_ros.physics.catalogue import EFFECTS
@@ -27,7 +27,9 @@ def draw_effect(rng, name, bodies, motion, is_hard):
             'joint': place, 'variables': ['position'],
             'intervals': {'position': [list(drawn.interval)]},
         }  # fmt: skip
-    return Concealed(name, place, j, drawn.values, drawn.size, drawn.power, drawn.largest, where)
+    return Concealed.of(
+        EFFECTS[name], place, j, drawn.values, drawn.size, drawn.power, drawn.largest, where
+    )
 
 
 def draw_unlisted(rng, seed, bodies, motion):
@@ -63,4 +65,6 @@ def _unknown(scene, family=''):
             'time': [[fixed['start'], fixed['end']]],
         }  # fmt: skip
     size = 0.3 if kind == 'position_gain' else 0.4 * force
-    return Concealed(NAME, bodies[j].joint, j, lambda s: {**fixed, 'a': s}, size, location=place)
+    return Concealed.of(
+        OUTSIDE, bodies[j].joint, j, lambda s: {**fixed, 'a': s}, size, location=place
+    )

@@ -94,14 +94,14 @@ def _attempt(seed, rng, tier, kind):
     recording = world.run('near', 33.0, 1, concealed)
     share = max(sizes.own_share(recording, world, e) for e in concealed) if concealed else 0.0
     if concealed and (share < sizes.SMALLEST_SHARE) != (kind == SLIGHT):
-        raise UnsuitableError(f'{concealed[0].name} makes {share:.2e}')
+        raise UnsuitableError(f'{concealed[0].at.name} makes {share:.2e}')
     error = max(x['nominal'] for x in balance.nominal_share(recording, world).values())
     if kind == PARAMETERS and error < sizes.SMALLEST_SHARE:
         raise UnsuitableError(f'wrong parameters make {error:.2e}')
-    what = concealed[0].name if concealed else ''
-    joint = concealed[0].joint if concealed else ''
+    what = concealed[0].at.name if concealed else ''
+    joint = concealed[0].at.joint if concealed else ''
     if what == OUTSIDE:
-        what = concealed[0].parameters['kind']
+        what = concealed[0].at.parameters['kind']
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder)
         (path / 'robot.urdf').write_text(urdf(world.family, world.bodies), encoding='utf-8')

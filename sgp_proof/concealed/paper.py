@@ -131,7 +131,7 @@ def pendulum(scale):
 
     size = scale * truth.friction_amplitude
     return 'pendulum', [body], [
-        Concealed(POSITION_FRICTION.name, 'hinge', 0, values, size, location=place)
+        Concealed.of(POSITION_FRICTION, 'hinge', 0, values, size, location=place)
     ]  # fmt: skip
 
 
@@ -150,8 +150,8 @@ def wheel(scale):
     motor = truth.torque_constant * truth.back_emf_constant / truth.resistance
     levels = (truth.pole_viscosity, truth.wheel_viscosity + motor)
     return 'rwp', [pole, rotor], [
-        Concealed(
-            VISCOUS_FRICTION.name, body.joint, i, lambda size: {'b': size}, scale * levels[i]
+        Concealed.of(
+            VISCOUS_FRICTION, body.joint, i, lambda size: {'b': size}, scale * levels[i]
         )
         for i, body in enumerate((pole, rotor))
     ]  # fmt: skip
@@ -173,9 +173,9 @@ def arm(scale):
         ))  # fmt: skip
     onset = limit - friction.onset
     return 'arm3', bodies, [
-        Concealed(
-            LIMIT_FRICTION.name, 'joint3', 2, lambda size, x=side * onset: {'amplitude': size,
-                                                                        'onset': x},
+        Concealed.of(
+            LIMIT_FRICTION, 'joint3', 2, lambda size, x=side * onset: {'amplitude': size,
+                                                                       'onset': x},
             scale * friction.growth,
         )
         for side in (1.0, -1.0)

@@ -87,7 +87,7 @@ def names_of(effect, force, others):
         force: (n, k) that it exerts.
         others: what bodies and all other effects explain.
     """
-    name, joint = effect.name, effect.index
+    name, joint = effect.at.name, effect.index
     found = [[name]]
     if name == ASYMMETRIC_COULOMB.name:
         found.append([COULOMB_FRICTION.name, CONSTANT_LOAD.name])

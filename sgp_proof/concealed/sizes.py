@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from sgp_proof.concealed.balance import Balance
-from sgp_ros.physics.catalogue import EFFECTS, VELOCITY_FILTER_LAG
+from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
 from sgp_ros.physics.drawing import UnsuitableError
 from sgp_ros.physics.parts import PLACES
 
@@ -32,13 +32,13 @@ def shares(recording, world):
 
 def own_share(recording, world, effect):
     """Return the share by which the size of an effect is measured."""
-    if effect.name == VELOCITY_FILTER_LAG.name:
+    at = effect.at
+    if at.name == VELOCITY_FILTER_LAG.name:
         clean = recording.shown_velocity[:, effect.index]
-        late = _late(recording, clean, effect.parameters['time_constant'])
+        late = _late(recording, clean, at.parameters['time_constant'])
         return float(np.mean((late - clean) ** 2) / np.var(clean))
     found = shares(recording, world)
-    law = EFFECTS.get(effect.name)
-    several = effect.joint in PLACES or (law is not None and (law.is_body or law.has_source))
+    several = at.joint in PLACES or at.effect.is_body or at.effect.has_source
     return float(found.max() if several else found[effect.index])
 
 

@@ -91,8 +91,8 @@ def drawn(seed, tier):
             effect = draw_effect(rng, name, world.bodies, motion, tier == 'B')
         except UnsuitableError:
             continue
-        value = least.get((name, effect.joint), math.inf)
-        if effect.joint in PLACES or not math.isfinite(value):
+        value = least.get((name, effect.at.joint), math.inf)
+        if effect.at.joint in PLACES or not math.isfinite(value):
             continue
         for factor in FACTORS:
             effect.size = factor * value
@@ -106,9 +106,9 @@ def drawn(seed, tier):
                 for s in decision.model.effects
             ]
             yield {
-                'seed': seed, 'robot': world.family, 'effect': name, 'joint': effect.joint,
+                'seed': seed, 'robot': world.family, 'effect': name, 'joint': effect.at.joint,
                 'stated': value, 'factor': factor, 'verdict': decision.verdict, 'said': said,
-                'is_named': [name, effect.joint] in said,
+                'is_named': [name, effect.at.joint] in said,
             }  # fmt: skip
 
 

@@ -66,7 +66,7 @@ def _attempt(seed, rng, sealed, answer_file):
                     command_topic=TOPIC)  # fmt: skip
     answer = {
         'robot': world.family, 'joints': [b.joint for b in world.bodies], 'setup': errors,
-        'bodies': world.errors, 'physics': [[e.name, e.joint] for e in effects],
+        'bodies': world.errors, 'physics': [[e.at.name, e.at.joint] for e in effects],
     }  # fmt: skip
     answer_file.write_text(json.dumps(answer, indent=1) + '\n', encoding='utf-8')
 

@@ -27,6 +27,7 @@ from sgp_ros.physics.catalogue import (
     COMMAND_DELAY,
     CONSTANT_LOAD,
     COULOMB_FRICTION,
+    EFFECTS,
     SPRING,
     VISCOUS_FRICTION,
 )
@@ -36,10 +37,7 @@ SIZE, MACHINE, SIMULATION, NOTHING = 'size', 'machine', 'simulation', 'nothing'
 PLAN = (SIZE, MACHINE, SIMULATION, NOTHING, SIZE)
 _FRICTION = (COULOMB_FRICTION.name, VISCOUS_FRICTION.name)
 _OTHER = (*_FRICTION, ARMATURE.name, SPRING.name, COMMAND_DELAY.name, CONSTANT_LOAD.name)
-_SIZES = {
-    COULOMB_FRICTION.name: 'level', VISCOUS_FRICTION.name: 'b', ARMATURE.name: 'inertia',
-    SPRING.name: 'stiffness', COMMAND_DELAY.name: 'delay', CONSTANT_LOAD.name: 'force',
-}  # fmt: skip
+_SIZES = {name: EFFECTS[name].quantities[0].name for name in _OTHER}
 _SECONDS = 25.0
 _CLOSE, _STD = 0.1, 3.0
 
@@ -70,7 +68,7 @@ def _attempt(seed, rng, sealed, answer_file):
         own = _sized(rng, world, motion, _OTHER)
         (ours if kind == MACHINE else theirs).append(own)
         differs = [(own, None) if kind == MACHINE else (None, own)]
-    if any(len({(e.name, e.joint) for e in side}) < len(side) for side in (ours, theirs)):
+    if any(len({(e.at.name, e.at.joint) for e in side}) < len(side) for side in (ours, theirs)):
         raise UnsuitableError('one effect twice')
     real, sim = world.run('near', _SECONDS, 1, ours), world.run('near', _SECONDS, 4, theirs)
     sealed.mkdir(parents=True, exist_ok=True)
@@ -81,7 +79,7 @@ def _attempt(seed, rng, sealed, answer_file):
         write_simulated(shown, sealed / f'{name}.mcap', transport, seed=seed, command_topic=TOPIC)
     answer = {
         'robot': world.family, 'kind': kind, 'differs': [_difference(*d) for d in differs],
-        'shared': [[e.name, e.joint] for e in both[len(differs) if kind == SIZE else 0 :]],
+        'shared': [[e.at.name, e.at.joint] for e in both[len(differs) if kind == SIZE else 0 :]],
     }  # fmt: skip
     answer_file.write_text(json.dumps(answer, indent=1) + '\n', encoding='utf-8')
 
@@ -94,10 +92,10 @@ def _sized(rng, world, motion, names):
 
 def _difference(machine, simulation):
     """Return effect, joint, and by how much its size is greater on the machine."""
-    effect = machine or simulation
-    name = _SIZES[effect.name]
-    size = sum(sign * e.parameters[name] for e, sign in ((machine, 1.0), (simulation, -1.0)) if e)
-    return {'effect': effect.name, 'joint': effect.joint, name: size}
+    at = (machine or simulation).at
+    name, sides = _SIZES[at.name], ((machine, 1.0), (simulation, -1.0))
+    size = sum(sign * e.at.parameters[name] for e, sign in sides if e)
+    return {'effect': at.name, 'joint': at.joint, name: size}
 
 
 def scored(row, diagnosis):

@@ -14,6 +14,7 @@ from sgp_ros.engine.results import Counts
 from sgp_ros.engine.samples import CommandSample, JointSample
 from sgp_ros.engine.windows import Equation, WindowFilter
 from sgp_ros.gp.model import Observations
+from sgp_ros.physics.catalogue import POSITION_FRICTION
 from sgp_ros.physics.term import Motion
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
@@ -30,7 +31,7 @@ PAPER_INPUTS = (0, 1, 2, 3, 7)
 """Both angles, both velocities, the voltage."""
 CANDIDATES = (*PAPER_INPUTS, 8, 9)
 """The same and both directions of motion."""
-CONCEALED = ('position_friction:joint=pole,amplitude=0.02,lo=2.7,hi=3.1,kind=coulomb',)
+CONCEALED = (f'{POSITION_FRICTION.name}:joint=pole,amplitude=0.02,lo=2.7,hi=3.1,kind=coulomb',)
 """Stand-in for the unknown physics of section IV.C: extra dry friction of the pole near the bottom
 of its swing, which none of the ten coefficients describes. No recording of the paper's physical
 wheel is public, so this is a simulation and reported as one."""

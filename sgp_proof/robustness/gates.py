@@ -22,6 +22,7 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
+from sgp_ros.physics import catalogue as laws
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.recording import simulate
@@ -33,11 +34,13 @@ ROBOTS = {
 }
 """Robot to the joint whose garbage is tried, and its joints."""
 EFFECTS = (
-    'coulomb_friction:level=0.02', 'viscous_friction:b=0.01', 'quadratic_drag:c=0.01',
-    'stribeck_friction:coulomb=0.02,static=0.03,stribeck_velocity=0.1',
-    'end_stop:position=0.5,stiffness=200,damping=1',
-    'hysteresis:level=0.02,presliding=0.01', 'cogging:amplitude=0.02,periods=6,phase=0',
-    'spring:stiffness=0.1,rest=0', 'constant_load:force=0.05',
+    f'{laws.COULOMB_FRICTION.name}:level=0.02', f'{laws.VISCOUS_FRICTION.name}:b=0.01',
+    f'{laws.QUADRATIC_DRAG.name}:c=0.01',
+    f'{laws.STRIBECK_FRICTION.name}:coulomb=0.02,static=0.03,stribeck_velocity=0.1',
+    f'{laws.END_STOP.name}:position=0.5,stiffness=200,damping=1',
+    f'{laws.HYSTERESIS.name}:level=0.02,presliding=0.01',
+    f'{laws.COGGING.name}:amplitude=0.02,periods=6,phase=0',
+    f'{laws.SPRING.name}:stiffness=0.1,rest=0', f'{laws.CONSTANT_LOAD.name}:force=0.05',
 )  # fmt: skip
 CLEAN_S, GARBAGE_S, RATE_HZ = 60.0, 60.0, 100.0
 BUDGET = 300

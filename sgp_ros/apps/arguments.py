@@ -6,6 +6,8 @@ import argparse
 from collections.abc import Callable
 from typing import Protocol
 
+from sgp_ros.physics.example import example_effect
+
 
 class AddCommand(Protocol):
     """Adds one command and returns its parser, to which its arguments are added.
@@ -100,7 +102,7 @@ def _add_simulate(add: AddCommand) -> None:
     parser = add(
         'simulate', 'sgp_ros.apps.simulation:run_simulation',
         'Simulate a robot, with effects to choose; write the recording and the true parameters.',
-        'sgp simulate arm.urdf --effect coulomb_friction:joint=elbow,level=0.3 --sensor bits=14',
+        f'sgp simulate arm.urdf --effect {example_effect("elbow", 0.3)} --sensor bits=14',
     )  # fmt: skip
     parser.add_argument('robot', metavar='ROBOT', help='built-in robot, robot YAML or model file')
     parser.add_argument('--duration', type=_above(0.0), default=20.0, metavar='S',
@@ -136,9 +138,8 @@ def _add_replay(add: AddCommand) -> None:
     parser.add_argument('--model', metavar='NPZ', help='continue from a saved model')
     parser.add_argument('--frozen', dest='is_learning', action='store_false',
                         help='predict and score without learning')  # fmt: skip
-    parser.add_argument(
-        '--truth', metavar='JSON', help='truth.json of a simulation, to compare parameters with'
-    )
+    parser.add_argument('--truth', metavar='JSON',
+                        help='truth.json of a simulation, to compare parameters with')  # fmt: skip
 
 
 def _add_identify(add: AddCommand) -> None:
@@ -258,7 +259,7 @@ def _add_export(add: AddCommand) -> None:
 
 
 def _add_without_arguments(add: AddCommand) -> None:
-    add('robots', 'sgp_ros.apps.robots:run_robots', 'List the built-in robots and their joints.',
+    add('robots', 'sgp_ros.apps.terminal:run_robots', 'List the built-in robots and their joints.',
         'sgp robots')  # fmt: skip
     add('compile', 'sgp_ros.apps.compiling:run_compile',
         'Compile the numerical code now instead of in the first commands.', 'sgp compile'
@@ -288,8 +289,8 @@ GROUPS = (
     ('Watch a running robot', ('watch',)),
 )
 """Titles and commands of the help; others come after them."""
-EXAMPLE = """example without data of your own:
-  sgp simulate double_pendulum --effect coulomb_friction:joint=elbow,level=0.05 --out out/real
+EXAMPLE = f"""example without data of your own:
+  sgp simulate double_pendulum --effect {example_effect('elbow', 0.05)} --out out/real
   sgp diagnose out/real/double_pendulum.mcap --robot double_pendulum"""
 
 COMMANDS = (

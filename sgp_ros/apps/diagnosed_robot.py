@@ -23,6 +23,7 @@ from sgp_ros.engine.replay import replay
 from sgp_ros.engine.samples import Event
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.formula import read_formula
+from sgp_ros.physics.joint_terms import term_laws
 from sgp_ros.physics.law import NAME as LAW
 from sgp_ros.physics.law import is_online
 from sgp_ros.report.files import write_text
@@ -225,13 +226,14 @@ def _physics(robot: Robot) -> dict[str, Any]:
     """Return what a diagnosis takes for known: bodies, damping and friction of the URDF."""
     if 'terms' in robot.source:
         return {}
-    terms: dict[str, object] = dict.fromkeys(('inertial', 'viscous'), 'all')
+    of = {form.dynamics: name for name, (_, form) in term_laws().items() if form.is_assumed}
+    terms: dict[str, object] = dict.fromkeys(('inertial', of['damping']), 'all')
     prior = {'prior': {name: {'spread': SPREAD} for name in terms}}
     tree = nominal_tree(robot)
     rubbing = [e.joint for e in dry_friction(tree)]
     if 'parameters' in robot.source:
         return {'terms': dict(DEFAULT_TERMS), **prior}
     if rubbing:
-        terms['coulomb'] = rubbing
-        prior['prior']['coulomb'] = {'spread': SPREAD}
+        terms[of['friction']] = rubbing
+        prior['prior'][of['friction']] = {'spread': SPREAD}
     return {'terms': terms, **prior}

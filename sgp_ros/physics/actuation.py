@@ -58,7 +58,7 @@ class TorqueGain(Effect):
     formula = 'motor torque = gain x command'
     source = _MECHATRONICS
     appearance = 'the residual effort is proportional to the effort'
-    quantities = (Quantity('gain', '1', is_positive=True, neutral=1.0),)
+    quantities = (Quantity('gain', '1', is_positive=True, neutral=1.0, joint_number='gain'),)
     linear = ('gain',)
     site = MOTOR
     drawn_over = 'effort'
@@ -246,7 +246,7 @@ class ActuatorLag(_Late):
     words = 'a lag of the drive'
     formula = 'time_constant d tau/dt + tau = command'
     appearance = 'the torque follows fast commands late and smoothed'
-    quantities = (Quantity('time_constant', 's', low=1e-4, is_positive=True),)
+    quantities = (Quantity('time_constant', 's', low=1e-4, is_positive=True, joint_number='lag'),)
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         given = _commands(motion).effort(place.joint, time_constant=max(shape[0], 0.0))
@@ -263,7 +263,9 @@ class CommandDelay(_Late):
     words = 'a delay of the command'
     formula = 'motor torque(t) = command(t - delay)'
     appearance = 'the motion responds to commands late, otherwise unchanged'
-    quantities = (Quantity('delay', 's', low=0.0, is_positive=True, is_sought=True),)
+    quantities = (
+        Quantity('delay', 's', low=0.0, is_positive=True, is_sought=True, joint_number='delay'),
+    )
     takes_all = True
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:

@@ -32,8 +32,10 @@ QUADRATIC_DRAG = friction.QuadraticDrag()
 ASYMMETRIC_COULOMB = friction.AsymmetricCoulomb()
 POSITION_FRICTION = confined.PositionFriction()
 LIMIT_FRICTION = confined.LimitFriction()
+END_STOP = confined.EndStop()
 SPRING = loads.Spring()
 CONSTANT_LOAD = loads.ConstantLoad()
+COGGING = loads.Cogging()
 ARMATURE = loads.Armature()
 GRAVITY_TILT = carried.GravityTilt()
 PAYLOAD = carried.Payload()
@@ -59,13 +61,13 @@ EFFECTS: dict[str, Effect] = {
         friction_drift.FrictionDrift(),
         SPRING,
         GRAVITY_TILT,
-        loads.Cogging(),
+        COGGING,
         ARMATURE,
         JOINT_COUPLING,
         CONSTANT_LOAD,
         carried.TipForce(),
         PAYLOAD,
-        confined.EndStop(),
+        END_STOP,
         TORQUE_GAIN,
         actuation.DeadZone(),
         actuation.Saturation(),

@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from sgp_ros.physics.parts import Value
+from sgp_ros.physics.parts import COULOMB, VISCOUS, Value
 
 Values = Callable[[float], Mapping[str, Value]]
 
@@ -150,7 +150,7 @@ class JointScene:
         self.is_prismatic = self.scene.bodies[j].is_prismatic
         self.ratio, self.sign = rng.uniform(0.2, 0.6), rng.choice([-1.0, 1.0])
         self.phase = rng.uniform(-3.0, 3.0)
-        self.kind = str(rng.choice(['coulomb', 'viscous']))
+        self.kind = str(rng.choice([COULOMB, VISCOUS]))
         linear = self.is_prismatic
         self.periods = float(rng.integers(8, 40) if linear else rng.integers(3, 16))
         self.turns = float(rng.integers(2, 8) if linear else rng.integers(1, 4))
@@ -163,7 +163,7 @@ class JointScene:
     @property
     def unit(self) -> float:
         """Speed that a level of this kind of friction is per, 1 for dry friction."""
-        return 1.0 if self.kind == 'coulomb' else self.velocity
+        return 1.0 if self.kind == COULOMB else self.velocity
 
     def levels(self, size: float) -> tuple[float, float]:
         """Return two levels, one of them smaller."""

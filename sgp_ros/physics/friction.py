@@ -10,7 +10,9 @@ from sgp_ros.physics.drawing import Drawn, JointScene
 from sgp_ros.physics.effect import Effect, Numbers
 from sgp_ros.physics.motion import SeenMotion
 from sgp_ros.physics.parts import (
+    COULOMB,
     MOTOR,
+    VISCOUS,
     OwnMotion,
     Place,
     Placed,
@@ -20,7 +22,7 @@ from sgp_ros.physics.parts import (
     relative_scales,
 )
 
-KINDS = ('coulomb', 'viscous')
+KINDS = (COULOMB, VISCOUS)
 SELF_LOCKING = 0.5
 """A drive that loses more than half of its torque to friction cannot be driven back."""
 RATIO_SPREAD = 0.5
@@ -37,7 +39,7 @@ def _ratio(large: float, small: float) -> float:
 
 def rubbing(motion: SeenMotion, place: Place) -> np.ndarray:
     """Return `sign(v)` for dry friction, v for viscous friction, (n,)."""
-    source = motion.velocity if place.kind == 'viscous' else motion.direction
+    source = motion.velocity if place.kind == VISCOUS else motion.direction
     return source[:, place.joint]
 
 
@@ -49,9 +51,11 @@ class ViscousFriction(Effect):
     formula = 'tau_x = -b v'
     source = _ARMSTRONG
     appearance = 'the residual effort is proportional to the velocity'
-    quantities = (Quantity('b', 'N m s/rad', low=0.0, is_sought=True),)
+    quantities = (Quantity('b', 'N m s/rad', low=0.0, is_sought=True, joint_number='damping'),)
     linear = ('b',)
-    term = TermForm('viscous', ('viscous',), dynamics='damping', is_dissipative=True)
+    term = TermForm(
+        'viscous', ('viscous',), dynamics='damping', is_dissipative=True, is_assumed=True
+    )
     drawn_over = 'velocity'
     is_usual = True
 
@@ -70,9 +74,11 @@ class CoulombFriction(Effect):
     formula = 'tau_x = -level sign(v)'
     source = _ARMSTRONG
     appearance = 'a step of the effort at each reversal; the joint sticks at rest'
-    quantities = (Quantity('level', 'N m', low=0.0, is_sought=True),)
+    quantities = (Quantity('level', 'N m', low=0.0, is_sought=True, joint_number='friction'),)
     linear = ('level',)
-    term = TermForm('coulomb', ('coulomb',), dynamics='friction', is_dissipative=True)
+    term = TermForm(
+        'coulomb', ('coulomb',), dynamics='friction', is_dissipative=True, is_assumed=True
+    )
     drawn_over = 'velocity'
     is_dry = True
     is_usual = True
@@ -96,7 +102,7 @@ class StribeckFriction(Effect):
     source = _ARMSTRONG
     appearance = 'a step at each reversal, largest at low speed; stick-slip'
     quantities = (
-        Quantity('coulomb', 'N m', low=0.0),
+        Quantity('coulomb', 'N m', low=0.0, joint_number='friction'),
         Quantity('static', 'N m', low=0.0),
         Quantity('stribeck_velocity', 'rad/s', low=1e-9, is_positive=True, is_scored=False),
     )
@@ -187,7 +193,10 @@ class AsymmetricCoulomb(Effect):
     formula = 'tau_x = -level_pos for v > 0, +level_neg for v < 0'
     source = _ARMSTRONG
     appearance = 'a step at each reversal that is not centred on zero'
-    quantities = (Quantity('level_pos', 'N m', low=0.0), Quantity('level_neg', 'N m', low=0.0))
+    quantities = tuple(
+        Quantity(name, 'N m', low=0.0, joint_number='friction')
+        for name in ('level_pos', 'level_neg')
+    )
     linear = ('level_pos', 'level_neg')
     plain = ('coulomb_friction',)
     term = TermForm(

@@ -39,7 +39,10 @@ class Spring(Effect):
     formula = 'tau_x = -stiffness (q - rest)'
     source = MECHANICS
     appearance = 'the residual effort is a straight line over the position'
-    quantities = (Quantity('stiffness', 'N m/rad', low=0.0), Quantity('rest', 'rad'))
+    quantities = (
+        Quantity('stiffness', 'N m/rad', low=0.0, joint_number='stiffness'),
+        Quantity('rest', 'rad', joint_number='rest'),
+    )
     linear = ('stiffness', 'rest')
     plain = ('constant_load',)
     term = TermForm('spring', ('stiffness',))
@@ -75,7 +78,7 @@ class ConstantLoad(Effect):
     appearance = 'the residual effort is the same everywhere'
     quantities = (Quantity('force', 'N m'),)
     linear = ('force',)
-    term = TermForm('offset', ('offset',), sign=-1.0)
+    term = TermForm('offset', ('offset',), sign=-1.0, is_assumed=True)
 
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (np.ones_like(x.q),)
@@ -92,7 +95,7 @@ class Armature(Effect):
     formula = 'tau_x = -inertia a'
     source = MECHANICS
     appearance = 'the residual effort is proportional to the acceleration'
-    quantities = (Quantity('inertia', 'kg m2', low=0.0),)
+    quantities = (Quantity('inertia', 'kg m2', low=0.0, joint_number='armature'),)
     linear = ('inertia',)
     term = TermForm('armature', ('armature',), is_dissipative=True)
     drawn_over = 'acceleration'

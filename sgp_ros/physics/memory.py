@@ -36,8 +36,9 @@ class Hysteresis(Effect):
     source = 'Dahl 1968'
     appearance = 'steps at reversals that build up over a short distance; loops over the position'
     quantities = (
-        Quantity('level', 'N m', low=0.0), Quantity('presliding', 'rad', 1e-9, is_positive=True),
-    )  # fmt: skip
+        Quantity('level', 'N m', low=0.0, joint_number='friction'),
+        Quantity('presliding', 'rad', 1e-9, is_positive=True),
+    )
     linear = ('level',)
     plain = ('coulomb_friction',)
     drawn_over = 'velocity'

@@ -19,6 +19,8 @@ PLACES = {'base': -1, 'tool': -2, 'all': -3}
 NOWHERE = -4
 """Place of an effect whose robot is not known."""
 SIDES = {'lower': -1, 'upper': 1}
+COULOMB, VISCOUS = 'coulomb', 'viscous'
+"""Kinds of friction: over the direction of the motion, and over its velocity."""
 
 
 class Site(Enum):
@@ -122,6 +124,8 @@ class Quantity:
         kinds: the kind of the effect that it belongs to; empty for all.
         is_sought: whether a diagnosis states the least of it that the recording would show.
         neutral: value at which the effect vanishes, if the number states its size.
+        joint_number: number of a joint that it is in other programs, of a law with further ones
+            the nearest; empty for none.
     """
 
     name: str
@@ -133,10 +137,11 @@ class Quantity:
     kinds: tuple[str, ...] = ()
     is_sought: bool = False
     neutral: float = 0.0
+    joint_number: str = ''
 
     def of_kind(self, kind: str) -> Quantity:
         """Return the quantity of a kind of the effect: viscous levels are per velocity."""
-        is_level = kind == 'viscous' and self.unit == 'N m'
+        is_level = kind == VISCOUS and self.unit == 'N m'
         return replace(self, unit='N m s/rad') if is_level else self
 
     def on(self, *, is_prismatic: bool) -> Quantity:
@@ -235,6 +240,7 @@ class TermForm:
         sign: of the term's coefficients over the law's: 1 for what takes effort from the motor.
         is_dissipative: no coefficient of it is negative in a real machine.
         dynamics: attribute of `<dynamics>` in a URDF that states it; empty for none.
+        is_assumed: every joint of a robot from a URDF has it, unless its YAML states `terms`.
     """
 
     name: str
@@ -243,6 +249,7 @@ class TermForm:
     sign: float = 1.0
     dynamics: str = ''
     is_dissipative: bool = False
+    is_assumed: bool = False
 
 
 def propagated(

@@ -19,6 +19,7 @@ from sgp_ros.diagnosis.result import (
 )
 from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.physics.catalogue import words_of
+from sgp_ros.physics.parts import COULOMB
 
 UNKNOWN = 'unknown'
 """Name of what no effect of the catalogue describes."""
@@ -88,7 +89,7 @@ def effect_name(finding: Finding | Difference) -> str:
         return f'{name} ({f"{kind} from" if kind else "with"} {words["source_joint"]})'
     if 'encoder' in words:
         return f'{name} (encoder on the {words["encoder"]})'
-    return f'{"Coulomb" if kind == "coulomb" else kind} {name}'.strip()
+    return f'{"Coulomb" if kind == COULOMB else kind} {name}'.strip()
 
 
 def place(finding: Finding | Difference) -> str:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
 
+from sgp_ros.physics.example import example_effect
+
 Steps = Sequence[tuple[str, str]]
 PLUS_MINUS = '+- is half the width of a 95 % interval'
 _OTHER = 'OTHER.mcap'
@@ -123,7 +125,7 @@ def after_robots(name: str) -> Steps:
 
 def after_effects(robot: str | None) -> Steps:
     """Return what to do with a list of effects."""
-    place = 'double_pendulum --effect coulomb_friction:joint=elbow,level=0.05'
+    place = f'double_pendulum --effect {example_effect("elbow", 0.05)}'
     return [
         ('Simulate a robot with an effect:', f'sgp simulate {quote(robot) if robot else place}')
     ]

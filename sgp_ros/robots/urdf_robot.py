@@ -57,7 +57,7 @@ from sgp_ros.robots.stated_effects import read_effects
 from sgp_ros.strangers import read_text
 
 DEFAULT_TERMS: Mapping[str, str] = dict.fromkeys(
-    ('inertial', 'viscous', 'coulomb', 'offset'), 'all'
+    ('inertial', *(name for name, (_, form) in term_laws().items() if form.is_assumed)), 'all'
 )
 
 

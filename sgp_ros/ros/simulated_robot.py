@@ -20,6 +20,7 @@ from sensor_msgs.msg import JointState
 from sgp_ros.engine.samples import CommandSample, JointSample, SettingValue
 from sgp_ros.engine.setting import Setting
 from sgp_ros.errors import MessageError
+from sgp_ros.physics.example import example_effect
 from sgp_ros.recordings.command_types import COMMAND_TYPES, FLOAT64_ARRAY
 from sgp_ros.recordings.messages import joint_state_message
 from sgp_ros.ros.messages import message_class, new_message
@@ -56,8 +57,8 @@ def simulator_settings() -> tuple[Setting, ...]:
         ),
         Setting(
             'effects', 'str_array', ('',),
-            "Effects added to the simulated robot, such as "
-            "'coulomb_friction:joint=pole,level=0.01'.",
+            'Effects added to the simulated robot, such as '
+            f"'{example_effect('pole', 0.01)}'.",
             read_only=True,
         ),
         Setting(

@@ -12,13 +12,14 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.example import example_effect
 from sgp_ros.physics.law import FormulaLaw
 from sgp_ros.physics.parts import BASE, TOOL, Value
 from sgp_ros.simulation.effects import EffectParameter, Law
 from sgp_ros.simulation.formula_law import formula_law
 from sgp_ros.simulation.registry import LAWS
 
-_EXAMPLE = 'write for example coulomb_friction:joint=pole,level=0.01'
+_EXAMPLE = f'write for example {example_effect("pole", 0.01)}'
 
 
 def parse_effect(text: str) -> EffectAt:

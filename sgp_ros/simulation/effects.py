@@ -85,34 +85,19 @@ EVERY_MOTOR = 'all'
 
 
 @dataclass(frozen=True, slots=True)
-class EffectParameter:
+class EffectParameter(Quantity):
     """A parameter of an effect, as the text `NAME:joint=J,name=value` states it.
 
     Attributes:
-        name: as in the text.
-        unit: on a revolute joint.
-        low: smallest value.
         choices: the only values of a parameter that is a word; empty for a number.
         default: value where none is given; None where one must be.
-        kinds: the kinds of the effect that have it; empty for all.
         is_joint: whether the value is the name of another joint.
     """
 
-    name: str
     unit: str = ''
-    low: float = -math.inf
     choices: tuple[str, ...] = ()
     default: Value | None = None
-    kinds: tuple[str, ...] = ()
     is_joint: bool = False
-
-    def unit_on(self, joint: SimulatedJoint, kind: Value) -> str:
-        """Return the unit on this joint for this kind of the effect."""
-        return (
-            Quantity(self.name, self.unit)
-            .of_kind(str(kind))
-            .unit_on(is_prismatic=joint.is_prismatic)
-        )
 
 
 def side_of(joint: SimulatedJoint, edge: float, side: Value) -> int:

@@ -184,7 +184,8 @@ def _described(simulator: Simulator, effects: Iterable[EffectAt]) -> list[dict[s
                 continue
             entry: dict[str, object] = {'value': effect.parameters[parameter.name]}
             if not parameter.choices and not parameter.is_joint:
-                entry['unit'] = parameter.unit_on(joint, effect.parameters.get('kind', ''))
+                shown = parameter.of_kind(str(effect.parameters.get('kind', '')))
+                entry['unit'] = shown.unit_on(is_prismatic=joint.is_prismatic)
             parameters[parameter.name] = entry
         entry_of: dict[str, object] = {
             'effect': effect.name,

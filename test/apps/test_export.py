@@ -182,6 +182,23 @@ def test_what_a_format_cannot_hold_is_listed(tmp_path, capsys):
     assert ranges == {'shoulder': {'friction': [pytest.approx(0.7), pytest.approx(0.9)]}}
 
 
+@pytest.mark.parametrize(
+    ('name', 'numbers', 'level'),
+    [
+        ('stribeck_friction', {'coulomb': 0.5, 'static': 0.9, 'stribeck_velocity': 0.1}, 0.5),
+        ('asymmetric_coulomb', {'level_pos': 0.4, 'level_neg': 0.8}, 0.6),
+        ('hysteresis', {'level': 0.7, 'presliding': 0.01}, 0.7),
+    ],
+)
+def test_other_dry_friction_is_written_as_the_nearest_level(tmp_path, name, numbers, level):
+    """It counts as friction of the joint, and is told with all its numbers."""
+    stated = {key: {'value': x} for key, x in numbers.items()}
+    robot = _robot(tmp_path, [{'effect': name, 'joint': 'elbow', 'parameters': stated}])
+    found = json.loads(_exported(robot, tmp_path, 'json').read_text())
+    assert found['joints']['elbow']['friction'] == pytest.approx(level)
+    assert f'(written as dry friction of {level:g})' in str(found)
+
+
 def test_settings_of_isaac_lab_and_ros2_control(tmp_path):
     """A Python module that names the joints, and parameters of a PID controller."""
     robot = _robot(tmp_path, gains=GAINS)

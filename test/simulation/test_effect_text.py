@@ -5,10 +5,12 @@ from __future__ import annotations
 import pytest
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.physics.catalogue import COULOMB_FRICTION
+from sgp_ros.physics.catalogue import COULOMB_FRICTION, EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Quantity
 from sgp_ros.simulation.assembly import make_simulation
 from sgp_ros.simulation.effect_text import parse_effect, parse_physical
+from sgp_ros.simulation.registry import LAWS
 
 
 def test_text_is_read_as_written():
@@ -18,6 +20,16 @@ def test_text_is_read_as_written():
     )
     assert (effect.name, effect.joint) == ('position_friction', 'pole')
     assert effect.parameters == {'hi': 2.5, 'kind': 'viscous', 'lo': 2.0, 'amplitude': 0.01}
+
+
+def test_parameters_are_the_quantities_of_the_catalogue():
+    """Names, units, limits and kinds stand there once; the simulation adds words and defaults."""
+    for name, law in LAWS.items():
+        known = {p.name: p for p in law.parameters(EFFECTS[name])}
+        assert all(isinstance(p, Quantity) for p in known.values())
+        for q in EFFECTS[name].quantities:
+            same = known[q.name]
+            assert (same.unit, same.low, same.kinds) == (q.unit, q.low, q.kinds), name
 
 
 @pytest.mark.parametrize(

@@ -13,45 +13,19 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+import numpy as np
+
 from sgp_ros.errors import ConfigError
-from sgp_ros.physics.catalogue import (
-    ACTUATOR_LAG,
-    ARMATURE,
-    ASYMMETRIC_COULOMB,
-    COMMAND_DELAY,
-    COULOMB_FRICTION,
-    HYSTERESIS,
-    SPRING,
-    STRIBECK_FRICTION,
-    TORQUE_GAIN,
-    VISCOUS_FRICTION,
-)
+from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.robots.nominal import Nominal
 from sgp_ros.robots.stated_values import stated_urdf
 
 _STD = 2.0
 """Standard deviations to either side of a range."""
-_KNOWN: Mapping[str, Mapping[str, str]] = {
-    VISCOUS_FRICTION.name: {'b': 'damping'},
-    COULOMB_FRICTION.name: {'level': 'friction'},
-    ARMATURE.name: {'inertia': ARMATURE.name},
-    SPRING.name: {'stiffness': 'stiffness', 'rest': 'rest'},
-    COMMAND_DELAY.name: {'delay': 'delay'},
-    ACTUATOR_LAG.name: {'time_constant': 'lag'},
-    TORQUE_GAIN.name: {'gain': 'gain'},
-}
-"""Law to its parameters and the numbers of a joint that they are."""
-_NEAREST = {
-    STRIBECK_FRICTION.name: lambda x: x['coulomb'],
-    ASYMMETRIC_COULOMB.name: lambda x: 0.5 * (x['level_pos'] + x['level_neg']),
-    HYSTERESIS.name: lambda x: x['level'],
-}
-"""Law to the level of plain dry friction that is nearest to it."""
 UNITS = {
-    'damping': 'N m s/rad', 'friction': 'N m', ARMATURE.name: 'kg m2', 'stiffness': 'N m/rad',
-    'rest': 'rad', 'delay': 's', 'lag': 's', 'gain': '1', 'kp': 'N m/rad', 'kd': 'N m s/rad',
-}  # fmt: skip
+    q.joint_number: q.unit for law in EFFECTS.values() for q in law.quantities if q.joint_number
+} | {'kp': 'N m/rad', 'kd': 'N m s/rad'}
 """Of the numbers of a joint; on one that slides read N and m."""
 
 
@@ -178,17 +152,19 @@ def _spreads(nominal: Nominal) -> list[dict[str, float]]:
 
 def _enter(effect: EffectAt, std: Mapping[str, float], found: Handover) -> None:
     """Enter an effect as numbers of its joints, or in words."""
-    places = _KNOWN.get(effect.name)
+    known = effect.effect.stated_quantities(effect.kind)
+    places = {q.name: q.joint_number for q in known if q.joint_number}
+    is_whole = bool(known) and len(set(places.values())) == len(known)
     words = f'{effect.joint}: {effect.effect.words}, ' + ', '.join(
         f'{name} {x:.4g}' if isinstance(x, float) else f'{name} {x}'
         for name, x in effect.parameters.items()
     )
-    if effect.name in _NEAREST and effect.joint in found.joints:
-        level = float(_NEAREST[effect.name](effect.numbers))
+    if places and not is_whole and effect.joint in found.joints:  # dry friction of some form
+        level = float(np.mean([effect.numbers[name] for name in places]))
         found.joints[effect.joint].friction += level
         found.others.append(f'{words} (written as dry friction of {level:.4g})')
         return
-    if places is None or effect.kind:
+    if not is_whole or effect.kind:
         if effect.effect.is_body:  # a load is part of the bodies, which no URDF splits again
             words += ' (add it to the last link)'
         found.others.append(words)

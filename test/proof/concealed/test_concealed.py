@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from sgp_proof.concealed import draw, paper, robots, run, scoring, sizes
+from sgp_proof.concealed.concealed_effect import OUTSIDE, Concealed
 from sgp_proof.concealed.oracle import Oracle, Unlisted, candidates, error, nominal_error, share
 from sgp_proof.concealed.unknown import UNKNOWN
 from sgp_proof.paper.figure_eight import ARM
 from sgp_proof.result_files import RESULTS
-from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.catalogue import EFFECTS, VISCOUS_FRICTION
 from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -32,6 +33,16 @@ def test_plan_has_every_effect():
     """Those of the catalogue, in turn."""
     assert set(LAWS) <= set(draw.PLAN)
     assert set(EFFECTS) == set(LAWS)
+
+
+def test_a_concealed_effect_has_the_parameters_of_its_size():
+    """It is an effect as any other at each size; what no list has stays outside the simulation."""
+    concealed = Concealed.of(VISCOUS_FRICTION, 'elbow', 1, lambda size: {'b': size}, 0.5)
+    concealed.size *= 4.0
+    found = concealed.chosen()
+    assert (found.effect, found.joint, found.parameters) == (VISCOUS_FRICTION, 'elbow', {'b': 2.0})
+    assert concealed.unlisted(()) == ()
+    assert Concealed.of(OUTSIDE, 'elbow', 1, dict, 1.0).chosen() is None
 
 
 @pytest.mark.parametrize('tier', ['a', 'b'])
@@ -114,8 +125,8 @@ def test_the_papers_arm_has_its_friction_towards_both_limits():
     middle = 0.5 * (friction.lower + friction.upper)
     for q in np.linspace(-body.limit, body.limit, 9):
         added = sum(
-            e.parameters['amplitude']
-            * max(0.0, (q - (x := e.parameters['onset'])) / (np.sign(x) * body.limit - x))
+            e.at.parameters['amplitude']
+            * max(0.0, (q - (x := e.at.parameters['onset'])) / (np.sign(x) * body.limit - x))
             for e in effects
         )
         assert added == pytest.approx(float(friction.near_limits(np.array(middle + q))))
