@@ -10,6 +10,7 @@ motion, see `smooth`. Source: Spong 1987.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numba import njit
@@ -46,9 +47,10 @@ _FIRST = np.array([1.0, -9.0, 45.0, 0.0, -45.0, 9.0, -1.0]) / 60.0
 
 def _convolved(x: np.ndarray, weights: np.ndarray, starts: tuple[int, ...]) -> np.ndarray:
     """Return x (n,) under symmetric or odd weights, the ends repeated, stretch by stretch."""
-    half = len(weights) // 2
-    parts = [np.convolve(np.pad(part, half, mode='edge'), weights, mode='valid')
-             for part in np.split(x, starts[1:])]  # fmt: skip
+    ends, parts = np.ones(len(weights) // 2), []
+    for part in np.split(x, starts[1:]):
+        padded = np.concatenate([part[0] * ends, part, part[-1] * ends])
+        parts.append(np.convolve(padded, weights, mode='valid'))
     return np.concatenate(parts)
 
 
@@ -57,10 +59,16 @@ def smooth(motion: SeenMotion, x: np.ndarray) -> np.ndarray:
     wide = _WIDER * motion.bandwidth * motion.step
     if not wide < 0.4:
         return x
+    return _convolved(x, _low_pass(wide), motion.starts)
+
+
+@lru_cache(maxsize=16)
+def _low_pass(wide: float) -> np.ndarray:
+    """Return weights of a low-pass filter of unit gain, for a frequency per row."""
     half = max(2, round(1.6 / wide))
     t = np.arange(-half, half + 1)
     weights = np.sinc(2.0 * wide * t) * np.kaiser(len(t), _SHARP)
-    return _convolved(x, weights / weights.sum(), motion.starts)
+    return np.asarray(weights / weights.sum())
 
 
 def derivatives(motion: SeenMotion, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

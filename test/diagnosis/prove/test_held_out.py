@@ -29,6 +29,12 @@ def world():
     return simulate(CHAINS[1], 17, 20.0, force=lambda t, q, v: (-2.0 * (q[0] - 0.3),))
 
 
+@pytest.fixture(scope='module')
+def kept(robots, world):
+    """A diagnosis that holds blocks out."""
+    return diagnose(events_of(world), *robots[1], {}, holds_out=True)
+
+
 def _with_pause(world, at):
     """Return the world with a second in which nothing was recorded."""
     late = np.where(np.arange(len(world.time)) >= at, PAUSE_S, 0.0)
@@ -90,14 +96,14 @@ def test_blocks_are_never_too_short_for_roll_outs(robots, world, seconds):
             split(longer)
 
 
-def test_nothing_is_learned_from_what_is_held_out(robots, world):
+def test_nothing_is_learned_from_what_is_held_out(robots, world, kept):
     """Another motion there changes the proof, and no parameter, evidence or probability."""
     at = (world.time % 10.0 >= 7.5) & (world.time % 10.0 < 10.0 - 0.5 * PERIOD)
     noise = np.random.default_rng(8).normal(0.0, 0.01, (at.sum(), 1))
     other = World(world.time, world.position.copy(), world.velocity, world.acceleration,
                   world.command)  # fmt: skip
     other.position[at] += noise
-    one, two = (diagnose(events_of(w), *robots[1], {}, holds_out=True) for w in (world, other))
+    one, two = kept, diagnose(events_of(other), *robots[1], {}, holds_out=True)
     (spring,) = one.findings
     assert (spring.effect, spring.joint) == ('spring', 'joint0')
     for f, g in zip(one.findings, two.findings, strict=True):
@@ -112,16 +118,14 @@ def test_nothing_is_learned_from_what_is_held_out(robots, world):
     )
 
 
-def test_the_proof_shows_blocks_only_where_nothing_else_was_given(robots, world):
+def test_the_proof_shows_blocks_only_where_nothing_else_was_given(robots, world, kept):
     """And says so; the node asks for none."""
-    events = events_of(world)
-    kept = diagnose(events, *robots[1], {}, holds_out=True)
     assert list(kept.proofs) == ['train', HELD_OUT]
     assert 'held out (5 of 20 s)' in kept.remarks[0]
     assert kept.predictions == {}
     proof = kept.proofs[HELD_OUT]
     assert proof.nmse_after['joint0'] < 1e-3 * proof.nmse_before['joint0']
     assert proof.rollouts > 8
-    plain = diagnose(events, *robots[1], {})
+    plain = diagnose(events_of(world), *robots[1], {})
     assert list(plain.proofs) == ['train']
     assert plain.remarks == ()
