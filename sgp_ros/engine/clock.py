@@ -5,6 +5,7 @@ recording, a simulator that was reset, a computer whose clock was set. Only what
 So such an event stays pending. The next state near the present refuses it; a second state
 near it, nearer than to the present, makes it the beginning of a new segment. Commands never tell
 the time: their clock may be another computer's, and without states nothing is identified anyway.
+A clock that is set back by less is only recognised by states that stay late, one after the other.
 
 A whole recording has no present: its events are sorted, and only a clock that was set back splits
 it, see `on_one_clock`.
@@ -25,7 +26,8 @@ LEAST_JUMP_S = 1.0
 as long: states in between are late."""
 MOST_PENDING = 200
 SHORTEST_ROUND = 16
-"""Fewest states between two jumps of a clock on average; else messages only came late."""
+"""Fewest states between two jumps of a clock on average; else messages only came late. So many late
+ones in a row, in the order of their stamps, are of a clock that was set back."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +50,7 @@ class StreamClock:
 
     Attributes:
         pending: events far from the present that wait for what follows, in order of arrival.
+        behind: how many late states came in a row, and the stamp of the last [ns].
 
     Args:
         config: settings in force.
@@ -55,18 +58,19 @@ class StreamClock:
 
     def __init__(self, config: EngineConfig) -> None:
         self.pending: list[Event] = []
+        self.behind = (0, 0)
         self.configure(config)
 
     def configure(self, config: EngineConfig) -> None:
         """Take new settings: a pause or a delay that they permit is not a jump."""
         jump_s = max(LEAST_JUMP_S, 2.0 * config.max_gap) + config.reorder_window
-        self._jump_ns = round(1e9 * jump_s)
+        self._jump_ns, self._late_ns = round(1e9 * jump_s), round(1e9 * config.reorder_window)
 
     def agrees(self, stamp_ns: int, newest_ns: int | None) -> bool:
         """Whether a stamp is near the present and nothing waits for a decision, the usual case."""
-        if self.pending:
+        if self.pending or self.behind[0]:
             return False
-        return newest_ns is None or abs(stamp_ns - newest_ns) <= self._jump_ns
+        return newest_ns is None or -self._late_ns <= stamp_ns - newest_ns <= self._jump_ns
 
     def judge(self, event: Event, newest_ns: int | None) -> Verdict:
         """Return what to do with an event.
@@ -77,10 +81,11 @@ class StreamClock:
         """
         if newest_ns is None or abs(event.stamp_ns - newest_ns) <= self._jump_ns:
             refused: tuple[Event, ...] = ()
-            if self.pending and isinstance(event, JointSample):
-                refused = tuple(self.pending)
-                self.pending = []
-            return Verdict((event,), refused)
+            is_jump = False
+            if isinstance(event, JointSample):
+                refused, self.pending = tuple(self.pending), []
+                is_jump = self._stays_behind(event.stamp_ns, newest_ns)
+            return Verdict((event,), refused, is_jump)
         self.pending.append(event)
         if isinstance(event, JointSample) and self._is_confirmed(event, newest_ns):
             near = [self._is_nearer(other, event, newest_ns) for other in self.pending]
@@ -91,6 +96,18 @@ class StreamClock:
         if len(self.pending) > MOST_PENDING:
             return Verdict(refused=(self.pending.pop(0),))
         return Verdict()
+
+    def _stays_behind(self, stamp_ns: int, newest_ns: int | None) -> bool:
+        """Count late states, and return whether enough of them follow each other."""
+        if newest_ns is None or stamp_ns >= newest_ns - self._late_ns:
+            self.behind = (0, 0)
+            return False
+        count, last_ns = self.behind
+        self.behind = (count + 1 if stamp_ns > last_ns else 1), stamp_ns
+        if self.behind[0] < SHORTEST_ROUND:
+            return False
+        self.behind = (0, 0)
+        return True
 
     def finish(self, newest_ns: int | None) -> Verdict:
         """Return the end of pending events: those ahead had only a pause before them."""
@@ -150,15 +167,21 @@ def _rounds(
     newest_ns: int | None = None
     rounds: list[list[Event]] = [[]]
     wrong: list[Event] = []
+    on_time = 0  # events of the round that came before those that stay behind
     for event in (*events, None):
         verdict = clock.finish(newest_ns) if event is None else clock.judge(event, newest_ns)
         wrong += verdict.refused
         if not verdict.events:
             continue
         if verdict.is_jump and newest_ns is not None and verdict.events[0].stamp_ns < newest_ns:
-            rounds.append([])
+            rounds.append(rounds[-1][on_time:])
+            del rounds[-2][on_time:]
             newest_ns = None
         rounds[-1] += verdict.events
-        stamps = [e.stamp_ns for e in verdict.events]
+        stamps = [e.stamp_ns for e in (rounds[-1] if newest_ns is None else verdict.events)]
         newest_ns = max(stamps if newest_ns is None else [newest_ns, *stamps])
+        if clock.behind[0] == 0:
+            on_time = len(rounds[-1])
+        elif clock.behind[0] == 1 and isinstance(event, JointSample):
+            on_time = len(rounds[-1]) - 1
     return rounds, wrong

@@ -36,7 +36,7 @@ from sgp_ros.gp.model import Model
 from sgp_ros.gp.regression import Regression
 from sgp_ros.robots.robot import Robot
 
-VERSION = 10
+VERSION = 11
 _WAITING = ('U', 'F', 'y', 'held')
 
 
@@ -79,6 +79,7 @@ def _plain(engine: Engine) -> dict[str, Any]:
         'newest_ns': order.newest_ns,
         'pending': [_encode(event) for event in order.pending],
         'suspects': [_encode(event) for event in engine.clock.pending],
+        'behind': list(engine.clock.behind),
         'began_ns': engine.began_ns,
         'commands': _held(intake.commands),
         'targets': _held(intake.targets),
@@ -167,6 +168,8 @@ def _fill(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
         [_decode(event) for event in text['pending']],
     )
     engine.clock.pending = [_decode(event) for event in text['suspects']]
+    count, last_ns = text['behind']
+    engine.clock.behind = int(count), int(last_ns)
     engine.began_ns = text['began_ns']
     estimator = engine.estimator
     estimator.scoring.restore(text['scoring'])

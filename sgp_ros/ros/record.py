@@ -14,6 +14,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from sgp_ros.engine.clock import LEAST_JUMP_S
 from sgp_ros.engine.config import describe_settings
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.samples import Event, Reset, SettingsChange, SettingValue
@@ -23,6 +24,7 @@ from sgp_ros.recordings.predictions import Outputs, PredictionTopics, write_outp
 from sgp_ros.recordings.writer import RecordingWriter
 
 _MOST_NUMBERS = 100_000
+_JUMP_NS = round(1e9 * LEAST_JUMP_S)
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,11 +187,13 @@ class Record:
     def _log_ns(self, stamp_ns: int) -> int:
         """Return the log time of an event: its stamp, or later where a clock was set back.
 
-        A reader goes by log time, so that it must not go back.
+        A reader goes by log time, so that it must not go back. A clock that comes and goes, as
+        between the times of a simulation and of the wall, is moved by no more than that takes.
         """
-        if self._newest_ns is not None and stamp_ns + self._shift_ns < self._newest_ns:
-            self._shift_ns = self._newest_ns - stamp_ns
-        self._newest_ns = stamp_ns + self._shift_ns
+        newest_ns = stamp_ns if self._newest_ns is None else self._newest_ns
+        if abs(stamp_ns + self._shift_ns - newest_ns) > _JUMP_NS:
+            self._shift_ns = max(newest_ns - stamp_ns, 0)
+        self._newest_ns = max(newest_ns, stamp_ns + self._shift_ns)
         return self._newest_ns
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sgp_ros.engine.clock import on_one_clock
+from sgp_ros.engine.clock import SHORTEST_ROUND, on_one_clock
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.samples import CommandSample, JointSample
 from test.engine.worlds import PENDULUM, START_NS, config, pendulum_events
@@ -117,3 +117,22 @@ def test_rounds_of_a_looped_recording_follow_each_other(by_ns):
     steps = {e.stamp_ns - m.stamp_ns for e, m in zip(later, moved, strict=True)}
     assert len(steps) == 1
     assert later[0].stamp_ns - events[-1].stamp_ns > 10**9 * config().command_timeout
+
+
+@pytest.mark.parametrize('by_ns', [400_000_000, 800_000_000])
+def test_a_clock_that_is_set_back_by_little_costs_some_states_and_not_the_stream(by_ns):
+    """A short loop would be late for ever; in a whole recording each of its rounds is kept."""
+    events = pendulum_events(80)
+    loop = [e for e in events if e.stamp_ns <= events[0].stamp_ns + by_ns]
+    looped = [e for _ in range(5) for e in loop]
+    states = sum(isinstance(e, JointSample) for e in loop)
+    engine, _ = _fed(looped)
+    lost = 4 * (SHORTEST_ROUND - 1)
+    assert engine.counts.clock_jumps == 4
+    assert engine.counts.refused['late'] <= lost
+    assert engine.counts.used >= 5 * states - lost - 5
+    found, wrong, jumps = on_one_clock(looped, engine.config)
+    assert (jumps, wrong) == (4, [])
+    stamps = [e.stamp_ns for e in found if isinstance(e, JointSample)]
+    assert len(stamps) == 5 * states
+    assert stamps == sorted(stamps)

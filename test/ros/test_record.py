@@ -93,3 +93,17 @@ def test_names_are_taken_by_creating_them(tmp_path: Path) -> None:
     assert free_name(tmp_path / 'a' / 'x.npz').is_file()
     assert free_name(tmp_path / 'a' / 'x.npz').name == 'x_2.npz'
     assert free_name(tmp_path / 'a' / 'y', is_folder=True).is_dir()
+
+
+def test_a_clock_that_comes_and_goes_keeps_log_times_near_the_latest_stamp(tmp_path: Path) -> None:
+    """As between the times of a simulation and of the wall; else they grow beyond any number."""
+    near, events = _events(20), []
+    far = [dataclasses.replace(event, stamp_ns=event.stamp_ns + 10**17) for event in near]
+    for _ in range(12):
+        events += [*near, *far]
+    record = Record(tmp_path / 'run.mcap', TOPICS, COMMAND)
+    _write(record, _engine(), events)
+    record.close()
+    times = [log_ns for log_ns, _ in open_recording(record.path).messages(TOPICS.joint_states)]
+    assert len(times) == sum(isinstance(e, JointSample) for e in events)
+    assert max(times) < max(e.stamp_ns for e in events) + 10**12
