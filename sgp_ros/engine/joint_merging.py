@@ -15,13 +15,12 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Iterable
-from statistics import median
 
 import numpy as np
 
+from sgp_ros.engine.missing_messages import MissingMessages
 from sgp_ros.engine.samples import JointSample
 
-_PERIODS = 31
 PAUSE_NS = 1_000_000_000
 """A source that is silent for longer, by the stamps of the others, is waited for no more."""
 _LONGEST_STEP_NS = PAUSE_NS // 4
@@ -46,11 +45,12 @@ class Source:
         joints: indices of the robot's joints that it brings, increasing.
         owned: those of them that are taken from it, the others come from another source.
         parts: its messages that are still needed, in order of stamps.
-        received, lost: messages that came, and those missing by its period.
+        received: messages that came.
+        missing: those that did not, by its period.
         pauses: gaps too long for a loss.
         returns: messages after which the joints were nearer to where they were two messages ago
             than to the last: two publishers that say different things of them look like this.
-        last_ns, period_ns: newest stamp and median distance of stamps [ns]; None and 0 before any.
+        last_ns: newest stamp [ns]; None before any.
         passed_ns: time that passed by its stamps, jumps of the clock left out [ns].
 
     Args:
@@ -61,13 +61,12 @@ class Source:
         self.joints = sorted(joints)
         self.owned: list[int] = []
         self.parts: list[Part] = []
-        self.received = self.lost = self.pauses = self.returns = 0
+        self.received = self.pauses = self.returns = 0
+        self.missing = MissingMessages()
         self.last_ns: int | None = None
-        self.period_ns = 0.0
         self.passed_ns = 0
         self._is_steady = False
         self._heard: dict[Source, tuple[int, int]] = {}
-        self._spacings: list[int] = []
         self._before: tuple[np.ndarray, ...] = ()
 
     def note(self, stamp_ns: int) -> None:
@@ -79,15 +78,11 @@ class Source:
         self._is_steady = 0 < spacing <= PAUSE_NS
         self.passed_ns += min(max(spacing, 0), _LONGEST_STEP_NS)
         self.pauses += spacing > _LONGEST_GAP_NS
-        if not 0 < spacing <= _LONGEST_GAP_NS:
-            return
-        if self.period_ns and spacing > 1.5 * self.period_ns:
-            self.lost += round(spacing / self.period_ns) - 1
-        self._spacings.append(spacing)
-        if len(self._spacings) == _PERIODS or not self.period_ns:
-            self.period_ns = float(median(self._spacings))
-        if len(self._spacings) == _PERIODS:
-            self._spacings = []
+        if -PAUSE_NS <= spacing <= _LONGEST_GAP_NS:
+            if spacing:
+                self.missing.add(max(spacing, 0))
+        else:
+            self.missing.forget_schedule()
 
     def misses(self, other: Source) -> bool:
         """Whether another source has been silent, by its last stamp or without asking for that.
@@ -191,7 +186,7 @@ class JointMerger:
     @property
     def lost(self) -> int:
         """Messages missing by the periods of their sources."""
-        return sum(source.lost for source in self.sources.values())
+        return sum(source.missing.count for source in self.sources.values())
 
     def take(self, sample: JointSample) -> list[JointSample]:
         """Take a message and return the whole states that it completes, in order of stamps."""
@@ -256,8 +251,8 @@ class JointMerger:
 
     def _complete(self, source: Source, newest_ns: int) -> list[JointSample]:
         slowest = self._slowest
-        if slowest is None or source.period_ns > _SLOWER * slowest.period_ns:
-            slowest = self._slowest = max(self._owners(), key=lambda part: part.period_ns)
+        if slowest is None or source.missing.period_ns > _SLOWER * slowest.missing.period_ns:
+            slowest = self._slowest = max(self._owners(), key=lambda part: part.missing.period_ns)
             done = self._done_ns
             self._waiting = [p[0] for p in slowest.parts if done is None or p[0] > done]
         elif source is slowest:
