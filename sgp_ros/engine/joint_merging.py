@@ -151,6 +151,7 @@ class JointMerger:
         joints: of the robot, in its order.
 
     Attributes:
+        joints: of the robot.
         sources: by the indices of the joints in their messages.
         foreign: messages without a joint of the robot.
         unmatched: states left out because another source paused.
@@ -158,7 +159,7 @@ class JointMerger:
     """
 
     def __init__(self, joints: Iterable[str]) -> None:
-        self._joints = tuple(joints)
+        self.joints = tuple(joints)
         self._places: dict[tuple[str, ...], tuple[Source, list[int]]] = {}
         self.sources: dict[frozenset[int], Source] = {}
         self.foreign = 0
@@ -172,7 +173,7 @@ class JointMerger:
     def missing(self) -> tuple[str, ...]:
         """Joints of the robot that no message has named so far."""
         owned = {joint for source in self.sources.values() for joint in source.owned}
-        return tuple(name for j, name in enumerate(self._joints) if j not in owned)
+        return tuple(name for j, name in enumerate(self.joints) if j not in owned)
 
     @property
     def shared(self) -> tuple[str, ...]:
@@ -181,7 +182,7 @@ class JointMerger:
         found |= {
             j for s in self.sources.values() for j in s.owned if 2 * s.returns > s.received > 1
         }
-        return tuple(self._joints[j] for j in sorted(found))
+        return tuple(self.joints[j] for j in sorted(found))
 
     @property
     def lost(self) -> int:
@@ -200,7 +201,7 @@ class JointMerger:
             source.note_return(sample.position[places])
         if len(source.owned) < len(source.joints):
             self._inherit(source)
-        if len(source.owned) == len(self._joints):
+        if len(source.owned) == len(self.joints):
             return [sample]
         if not source.owned:
             return []
@@ -215,7 +216,7 @@ class JointMerger:
 
     def _find(self, names: tuple[str, ...]) -> tuple[Source, list[int]]:
         """Return the source of messages with these names, and the places of its joints there."""
-        joints = frozenset(j for j, name in enumerate(self._joints) if name in names)
+        joints = frozenset(j for j, name in enumerate(self.joints) if name in names)
         source = self.sources.get(joints)
         if source is None:
             taken = {joint for other in self.sources.values() for joint in other.owned}
@@ -223,7 +224,7 @@ class JointMerger:
             source.owned = [joint for joint in source.joints if joint not in taken]
         if len(self._places) >= _MOST_ORDERS:
             self._places = {}
-        places = [names.index(self._joints[joint]) for joint in source.joints]
+        places = [names.index(self.joints[joint]) for joint in source.joints]
         self._places[names] = source, places
         return source, places
 
@@ -275,7 +276,7 @@ class JointMerger:
         return all(owner.parts and owner.parts[-1][0] >= stamp_ns for owner in self._owners())
 
     def _state(self, stamp_ns: int) -> JointSample | None:
-        state = np.full((3, len(self._joints)), math.nan)
+        state = np.full((3, len(self.joints)), math.nan)
         for owner in self._owners():
             found = owner.at(stamp_ns)
             if found is None:
@@ -285,7 +286,7 @@ class JointMerger:
         state.setflags(write=False)
         position, *others = state
         rates = (None if np.isnan(values).all() else values for values in others)
-        return JointSample(stamp_ns, self._joints, position, *rates)
+        return JointSample(stamp_ns, self.joints, position, *rates)
 
 
 def _part(sample: JointSample, places: list[int]) -> Part:

@@ -33,7 +33,8 @@ class Health:
 
     Attributes:
         seen_joints: names in the last joint states.
-        without_effort: joints of the robot without a finite effort in the last state.
+        without_effort: joints of the robot without a finite effort in the last message that named
+            them.
         last_fit: one sentence on the last fit of hyper-parameters.
         fit_since_s: when the fit that runs was handed out, on a steady clock [s]; None without.
         record_problem, unrecorded: why the record stopped, empty while all is well, and how many
@@ -59,15 +60,15 @@ class Health:
         self._before: dict[str, int] = {}
 
     def note_joints(self, sample: JointSample) -> None:
-        """Note what a message named, and which of its joints had no effort."""
+        """Note what a message named, and which of the robot's joints in it had no effort."""
         self.seen_joints = sample.names[:_MOST_NAMES]
-        if sample.effort is None:
-            self.without_effort = self.seen_joints
-        elif np.isnan(sample.effort).any():
-            is_unknown = np.isnan(sample.effort)
-            self.without_effort = tuple(np.array(sample.names)[is_unknown][:_MOST_NAMES].tolist())
-        else:
-            self.without_effort = ()
+        unknown = set(sample.names)
+        if sample.effort is not None:
+            pairs = zip(sample.names, np.isnan(sample.effort).tolist(), strict=True)
+            unknown = {name for name, is_unknown in pairs if is_unknown}
+        if unknown or self.without_effort:
+            kept = set(self.without_effort).difference(sample.names) | unknown
+            self.without_effort = tuple(n for n in self._merger.joints if n in kept)
 
     def note_push(self, duration_s: float, processor_s: float) -> None:
         """Note how long the engine took for one event [s], and its processor time of that [s]."""
