@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitResult
-from sgp_ros.engine.joint_merging import JointMerger
+from sgp_ros.engine.joint_merging import JointMerger, Source
 from sgp_ros.engine.results import Counts
 from sgp_ros.engine.samples import JointSample
 from sgp_ros.errors import MessageError
@@ -58,6 +58,7 @@ class Health:
         self._unreadable = 0
         self._unreadable_reason = ''
         self._before: dict[str, int] = {}
+        self._sources_before: dict[frozenset[int], tuple[int, int]] = {}
 
     def note_joints(self, sample: JointSample) -> None:
         """Note what a message named, and which of the robot's joints in it had no effort."""
@@ -129,11 +130,18 @@ class Health:
         parts.append(('timing', OK, *self._timing(engine)))
         parts.append(self._model(engine))
         if self.failures:
-            text = f'{self.failures} internal errors, the first: {self.first_failure}'
+            text = (
+                f'{self.failures} internal errors, the first: {self.first_failure}; please report '
+                'it, with the record'
+            )
             parts.append(('errors', ERROR, text, {'count': str(self.failures)}))
         if self.record_problem:
             values = {'unrecorded': str(self.unrecorded)}
-            parts.append(('record', ERROR, self.record_problem, values))
+            text = (
+                f'{self.record_problem}, {self.unrecorded} events are missing; free the disk, and '
+                'start the node again'
+            )
+            parts.append(('record', ERROR, text, values))
         return [
             Status(f'{node}: {name}', level, message, engine.robot.name, values)
             for name, level, message, values in parts
@@ -147,7 +155,7 @@ class Health:
         self._merger.looks_for_returns = len(publishers) > 1
         new = {name: max(n - self._before.get(name, 0), 0) for name, n in now.items()}
         self._before = now
-        return Arrivals(
+        found = Arrivals(
             joint_states=sources['joint_states'][0],
             command=sources['command'][0],
             robot_joints=engine.robot.joint_names,
@@ -158,6 +166,8 @@ class Health:
             without_effort=self.without_effort,
             missing_joints=self._merger.missing,
             shared_joints=self._merger.shared if len(publishers) > 1 else (),
+            silent_joints=self._joints_of(lambda source, received, _: source.received == received),
+            losing_joints=self._joints_of(lambda source, _, lost: source.missing.count > lost),
             received=new['messages'],
             lost=new['lost'],
             read=new['read'],
@@ -168,6 +178,20 @@ class Health:
             unreadable=new['unreadable'],
             unreadable_reason=self._unreadable_reason,
         )
+        sources_now = self._merger.sources.items()
+        self._sources_before = {k: (s.received, s.missing.count) for k, s in sources_now}
+        return found
+
+    def _joints_of(self, is_meant: Callable[[Source, int, int], bool]) -> tuple[str, ...]:
+        """Return the joints of sources, judged by what they had received and lost before."""
+        merger, before = self._merger, self._sources_before
+        joints = {
+            joint
+            for key, source in merger.sources.items()
+            if is_meant(source, *before.get(key, (0, 0)))
+            for joint in source.owned
+        }
+        return tuple(merger.joints[joint] for joint in sorted(joints))
 
     def _samples(self, counts: Counts, arrivals: Arrivals, elapsed_s: float) -> dict[str, str]:
         rate = arrivals.read / elapsed_s if elapsed_s > 0.0 else 0.0

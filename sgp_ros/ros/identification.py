@@ -29,7 +29,8 @@ from sgp_ros.engine.samples import Event
 from sgp_ros.errors import ConfigError, MessageError, NumericalError
 from sgp_ros.recordings.command_types import COMMAND_TYPES, NO_COMMAND
 from sgp_ros.recordings.messages import Status, joint_sample
-from sgp_ros.ros.diagnosing import Diagnosing, DiagnosisFailed
+from sgp_ros.ros.diagnosing import Diagnosing
+from sgp_ros.ros.diagnosis_outcome import DiagnosisFailed
 from sgp_ros.ros.messages import message_class
 from sgp_ros.ros.parameters import from_ros, to_ros
 from sgp_ros.ros.publishers import Publishers
@@ -212,7 +213,7 @@ class Identification:
             self._node.get_logger().error(f'no diagnosis: {outcome.reason}')
         elif outcome is not None:
             self._out.diagnosis(json.dumps(outcome.content, allow_nan=False))
-            self._node.get_logger().info(f'diagnosis: {outcome.content["verdict"]}')
+            self._node.get_logger().info(f'diagnosis: {outcome.sentence}')
 
     def _publish_parameters(self) -> None:
         engine = self._session.engine
@@ -260,8 +261,8 @@ class Identification:
             if status.level == level and (level == OK or now_ns - said_ns < _QUIET_NS):
                 continue
             if status.level == OK:  # rclpy wants a line of its own for each severity
-                over = f'over: {status.message}'
-                logger.info(over)
+                calm = f'no warning any more: {status.name}: {status.message}'
+                logger.info(calm)
             elif status.level == WARN:
                 logger.warning(status.message)
             else:

@@ -41,6 +41,8 @@ class Picture:
 
     def hear(self, message: Any) -> None:
         """Take a message of /diagnostics."""
+        if any(entry.name == f'{self._prefix}samples' for entry in message.status):
+            self.statuses = {}  # this is all that holds now
         for entry in message.status:
             status = _status(entry)
             if status.name.startswith(self._prefix):

@@ -114,17 +114,25 @@ def test_a_bag_that_is_played_in_a_loop_costs_nothing_that_was_learned(graph: Gr
 
 
 def test_lost_messages_are_counted(graph: Graph) -> None:
-    graph.start('sgp_node', **MEASURED)
+    """With the joints and the number, and the log says when the warning is over."""
+    node = graph.start('sgp_node', **MEASURED)
     states = graph.client.create_publisher(JointState, 'joint_states', 100)
 
     def send(i: int) -> None:
         if i < 100 or i % 4:
             states.publish(_state(i * STEP_NS))
 
-    _publish_until(
+    sent = _publish_until(
         graph, send, lambda: 'missing, judging by their period' in graph.message('samples')
     )
     assert graph.count('lost') > 0
+    assert "of joints ['pole', 'wheel']" in graph.message('samples')
+    sent *= STEP_NS
+    _publish_until(
+        graph,
+        lambda i: states.publish(_state(sent + i * STEP_NS)),
+        lambda: 'no warning any more: sgp_node: samples: all joint states' in node.stderr,
+    )
 
 
 @pytest.mark.parametrize('reliability', ['BEST_EFFORT', 'RELIABLE'])
