@@ -102,9 +102,10 @@ def run_watch(
                     f'{others}; check ROS_DOMAIN_ID and --node NAME',
                 )  # fmt: skip
         if layouts is not None:
+            _settle(picture, turn)
             joints = [n.removeprefix('fit ') for n in picture.statuses if n.startswith('fit ')]
             Path(layouts).mkdir(parents=True, exist_ok=True)
-            write_live_layouts(Path(layouts), node, joints)
+            write_live_layouts(Path(layouts), node, joints, list(picture.parameters))
         if once:
             _settle(picture, turn)
             console.print(dashboard(picture))
