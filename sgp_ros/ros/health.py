@@ -54,6 +54,8 @@ class Health:
         self.failures, self.first_failure = 0, ''
         self._durations_s: deque[float] = deque(maxlen=_DURATIONS)
         self._processor_s: deque[float] = deque(maxlen=_DURATIONS)
+        self._callbacks_s: deque[float] = deque(maxlen=_DURATIONS)
+        self._callbacks_cpu_s: deque[float] = deque(maxlen=_DURATIONS)
         self._delays_s: deque[float] = deque(maxlen=_DURATIONS)
         self._unreadable = 0
         self._unreadable_reason = ''
@@ -75,6 +77,11 @@ class Health:
         """Note how long the engine took for one event [s], and its processor time of that [s]."""
         self._durations_s.append(duration_s)
         self._processor_s.append(processor_s)
+
+    def note_callback(self, duration_s: float, processor_s: float) -> None:
+        """Note the time of a whole message, from its receipt to the last topic; as `note_push`."""
+        self._callbacks_s.append(duration_s)
+        self._callbacks_cpu_s.append(processor_s)
 
     def note_delay(self, delay_s: float) -> None:
         """Note the time from the stamp of a state to the publication of its prediction [s]."""
@@ -215,6 +222,8 @@ class Health:
         chosen_s = engine.config.reorder_window + engine.delay_s
         values = {'delay_s_chosen': f'{chosen_s:.4f}'}
         for name, times_s, unit in (
+            ('callback_ms', self._callbacks_s, 1e3),
+            ('callback_cpu_ms', self._callbacks_cpu_s, 1e3),
             ('push_ms', self._durations_s, 1e3), ('push_cpu_ms', self._processor_s, 1e3),
             ('delay_s', self._delays_s, 1.0),
         ):  # fmt: skip

@@ -7,6 +7,7 @@ beneath. Everything it makes on its node is gone after `close`.
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
@@ -16,12 +17,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import (
-    DurabilityPolicy,
-    HistoryPolicy,
-    QoSProfile,
-    ReliabilityPolicy,
-)
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
 
@@ -134,7 +130,7 @@ class Identification:
                 self._node.create_subscription(
                     kind,
                     topic,
-                    lambda message: self._guarded(self._hear, convert, message),
+                    lambda message: self._serve(convert, message),
                     quality,
                     qos_overriding_options=overrides,
                 )
@@ -172,6 +168,13 @@ class Identification:
         if self._session.health.failures and not self._has_reported_failure:
             self._has_reported_failure = True
             self._node.get_logger().error(self._session.health.first_failure)
+
+    def _serve(self, convert: Callable[[Any, int], Event], message: Any) -> None:
+        """Take a message, and note how long all of that took."""
+        started, used = time.perf_counter(), time.thread_time()
+        self._guarded(self._hear, convert, message)
+        times_s = time.perf_counter() - started, time.thread_time() - used
+        self._session.health.note_callback(*times_s)
 
     def _hear(self, convert: Callable[[Any, int], Event], message: Any) -> None:
         # The middleware's own time of receipt is out of reach: the wheels' EventsExecutor fails

@@ -178,7 +178,7 @@ def _head(picture: Picture) -> Any:
         f'{samples.get("rate_hz", "?")} Hz',
         f'{samples.get("used", "?")} states used, {samples.get("lost", "?")} lost',
         f'delay {timing.get("delay_s_p50", timing.get("delay_s_chosen", "?"))} s',
-        f'{timing.get("push_ms_p99", "?")} ms p99 a message',
+        f'{timing.get("callback_ms_p99", "?")} ms p99 a message',
     ]
     return _text(f'{", ".join(words)}\n{", ".join(numbers)}', 'bold')
 
