@@ -25,6 +25,7 @@ TOPICS = {
     '~/prediction_raw_variance': 'its variance before calibration',
     '~/predicted_joint_states': 'predicted effort by joint name, to plot over the measured one',
     '~/residual': 'measured minus predicted effort',
+    '~/measured_effort': 'effort as predicted: commanded or measured, filtered, in the order of the robot',
     '~/band/lower': 'lower end of the 95 % interval of the effort',
     '~/band/upper': 'upper end of it',
     '~/parameters': 'value, standard deviation and unit of every parameter',

@@ -137,6 +137,13 @@ def _live(result):
     return _table(titles, rows)
 
 
+def _timed(result):
+    """Say what the times of a result are of; the first results timed the engine alone."""
+    if result.get('timed') == 'callback':
+        return 'The callback is the whole of a message: decoding, merging, the engine, record and topics.'
+    return 'What is called callback here is the part of the engine alone, `push_ms` on `/diagnostics`.'
+
+
 def _live_text(result):
     plain, fitted = (
         [run['callback_ms']['p99'] for run in result['runs'][name]]
@@ -148,7 +155,7 @@ def _live_text(result):
         f'{statistics.median(fitted):.2f} ms with them; runs of one kind differ by up to {spread:.2f} ms. '
         f'Void, because this computer kept the publisher itself from sending for more than '
         f'{result["pause_s"]:g} s, and repeated: {len(result["void"])} of '
-        f'{len(result["void"]) + sum(map(len, result["runs"].values()))} runs.'
+        f'{len(result["void"]) + sum(map(len, result["runs"].values()))} runs. {_timed(result)}'
     )
 
 
@@ -167,8 +174,11 @@ def _soak_text(result):
     minutes = [block['callback_ms_p99'] for block in result['blocks']]
     below = sum(p99 < SOAK_P99_MS for p99 in minutes)
     memory = [block['resident_mb'] for block in result['blocks']]
+    shipped = result.get('settings')
     return (
-        f"{result['joints']} joints at {result['rate_hz']:g} Hz, Panda's model, a buffer of "
+        f"{result['joints']} joints at {result['rate_hz']:g} Hz, Panda's model, "
+        + (f'the settings of `{shipped}` with record and autosave, ' if shipped else '')
+        + f'a buffer of '
         f'{result["budget"]}, refits, `qos.depth` {result["qos_depth"]}, {result["executor"]}; '
         f'{result["minutes"]:.0f} minutes. Of {result["published"]} '
         f'messages {result["lost"]} did not arrive, and the node counted {result["counted_lost"]} '
@@ -177,7 +187,7 @@ def _soak_text(result):
         f'{memory[0]:.0f} to {memory[-1]:.0f} MB, between {min(memory):.0f} and {max(memory):.0f}. '
         f'The p99 of the callback was {statistics.median(minutes):.2f} ms in the median minute, '
         f'{max(minutes):.1f} ms in the worst; it was below the {SOAK_P99_MS:g} ms of the target in '
-        f'{below} of {len(minutes)} minutes.'
+        f'{below} of {len(minutes)} minutes. {_timed(result)}'
     )
 
 
@@ -197,7 +207,7 @@ def _priority(result):
 def _priority_text(result):
     return (
         f'Of {result["published"]} messages {result["lost"]} did not arrive, and the node counted '
-        f'{result["counted_lost"]} as missing.'
+        f'{result["counted_lost"]} as missing. {_timed(result)}'
     )
 
 
@@ -223,7 +233,7 @@ def _diagnosis_text(result):
         f'that its robot file lacks: `~/diagnose` on the last {result["window_s"]:g} s {came}; the '
         f'target is {2.0 * result["window_s"]:g} s. Of {result["sent"]} messages '
         f'{result["lost"]} did not arrive, and the node counted {result["counted_lost"]} as '
-        f'missing. The load of the computer was {result["load"]:.1f}.'
+        f'missing. The load of the computer was {result["load"]:.1f}. {_timed(result)}'
     )
 
 

@@ -56,21 +56,21 @@ def _node(context: object) -> list[Node]:
         if given[name]
     }
     if given['use_sim_time']:
-        own['use_sim_time'] = _is_true(given['use_sim_time'])
+        own['use_sim_time'] = _is_true('use_sim_time', given)
     if own:
         parameters.append(own)
     level = given['log_level']
     return [
         Node(
             package='sgp_ros',
-            executable='sgp_lifecycle_node' if _is_true(given['managed']) else 'sgp_node',
+            executable='sgp_lifecycle_node' if _is_true('managed', given) else 'sgp_node',
             namespace=given['namespace'] or None,
             output='screen',
             parameters=parameters,
             remappings=[(n, given[n]) for n in ('joint_states', 'command') if given[n]],
             arguments=['--ros-args', '--log-level', level] if level else [],
             prefix=given['prefix'] or None,
-            respawn=_is_true(given['respawn']),
+            respawn=_is_true('respawn', given),
             respawn_delay=1.0,
         )
     ]
@@ -81,5 +81,11 @@ def _shipped(robot: str) -> str:
     return str(path) if robot and path.is_file() else ''
 
 
-def _is_true(text: str) -> bool:
-    return text.lower() in ('true', '1', 'yes', 'on')
+def _is_true(name: str, given: dict[str, str]) -> bool:
+    """Return a switch; what is neither true nor false is refused, because it was misspelt."""
+    text = given[name].lower()
+    if text in ('true', '1', 'yes', 'on'):
+        return True
+    if text in ('', 'false', '0', 'no', 'off'):
+        return False
+    raise RuntimeError(f'launch argument {name}:={given[name]} is neither true nor false')

@@ -54,7 +54,8 @@ LAYERS = {
         'numpy', 'matplotlib', 'jinja2', 'markupsafe', 'gp', 'physics', 'rigid', 'robots',
         'engine', 'batch', 'diagnosis', 'campaign', 'strangers', 'errors',
     },
-    'ros': MESSAGES | {'optional', 'report.layouts'} | {
+    'ros': MESSAGES | {
+        'optional', 'report.layouts', 'report.verdict', 'report.diagnosis_text',
         'numpy', 'yaml', 'engine', 'physics', 'robots', 'simulation', 'diagnosis', 'recordings',
         'strangers', 'errors',
     },

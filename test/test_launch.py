@@ -107,6 +107,16 @@ def test_every_argument_reaches_the_node(launch):
     assert node.executable == 'sgp_lifecycle_node'
 
 
+@pytest.mark.parametrize('name', ['respawn', 'managed', 'use_sim_time'])
+def test_a_misspelt_switch_is_refused_in_one_line(launch, name):
+    """It would be false in silence; launch prints the exception."""
+    with pytest.raises(RuntimeError, match=f'{name}:=ture is neither true nor false'):
+        launch(NODE, **{name: 'ture'})
+    _, (node,) = launch(NODE, **{name: 'False'})
+    assert not node.respawn
+    assert node.executable == 'sgp_node'
+
+
 def test_a_robot_without_a_shipped_file_needs_none(launch):
     _, (node,) = launch(NODE, robot='/my/arm.urdf')
     assert node.parameters == [{'robot': '/my/arm.urdf'}]

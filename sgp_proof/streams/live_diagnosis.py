@@ -24,7 +24,7 @@ from std_srvs.srv import Trigger
 from sgp_proof.concealed.machines import draw_machine
 from sgp_proof.concealed.robots import urdf
 from sgp_proof.result_files import ROOT, make_parser, write_result
-from sgp_proof.streams.live_rate import BUDGET, Listener, Machine
+from sgp_proof.streams.live_rate import BUDGET, TIMED, Listener, Machine
 from sgp_proof.streams.soak import PAUSE_S, _counts, _publish, _quiet, _samples
 from sgp_ros.apps.live_processes import LiveProcesses, graph_environment
 from sgp_ros.recordings.model_files import load_parameters
@@ -152,7 +152,7 @@ def main():
         os.environ.update(graph)
         run = _run(arguments.window, arguments.limit, graph, Path(logs))
     print(json.dumps(run))
-    write_result(arguments.out, {'rate_hz': RATE_HZ, 'joints': JOINTS, **run})
+    write_result(arguments.out, {'timed': TIMED, 'rate_hz': RATE_HZ, 'joints': JOINTS, **run})
 
 
 if __name__ == '__main__':

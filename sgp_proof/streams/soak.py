@@ -2,11 +2,12 @@
 
     python -m sgp_proof.streams.soak --minutes 30
 
-Seven joints with Panda's model and refits, as in `live_rate`, and a process that computes without
-a pause. A message is lost that was published and not read; the node counts what it misses by the
-period of the stamps, which are those at which messages were due. Both are differences over the
-run, which begins after a warm-up and a pause long enough to be none of a loss. Memory is the
-resident set of the node's process, once a minute.
+Seven joints of Panda's URDF with the parameter file that is shipped for ros2_control, record and
+autosave included, and a process that computes without a pause. A message is lost that was
+published and not read; the node counts what it misses by the period of the stamps, which are those
+at which messages were due. Both are differences over the run, which begins after a warm-up and a
+pause long enough to be none of a loss. Memory is the resident set of the node's process, once a
+minute.
 
 With `--niceness -5` the node has a higher priority than the others in every second minute:
 
@@ -27,13 +28,15 @@ from pathlib import Path
 
 import numpy as np
 import rclpy
+import yaml
 
 from sgp_proof.result_files import ROOT, make_parser, write_result
-from sgp_proof.streams.live_rate import Listener, Machine, node_pid, processor_s
+from sgp_proof.streams.live_rate import TIMED, Listener, Machine, node_pid, processor_s
 from sgp_ros.apps.live_processes import LiveProcesses, graph_environment
-from sgp_ros.recordings.model_files import load_parameters
 
-RATE_HZ, WARM_UP_S, PAUSE_S, BUDGET, DEPTH = 500.0, 40.0, 12.0, 300, 1000
+RATE_HZ, WARM_UP_S, PAUSE_S = 500.0, 40.0, 12.0
+SETTINGS = ROOT / 'config' / 'bringup' / 'ros2_control.yaml'
+ROBOT = ROOT / 'config' / 'robots' / 'panda.urdf'
 BLOCK_S = 60.0
 _START_LIMIT_S = 60.0
 _BUSY = 'while True: pass'
@@ -87,17 +90,27 @@ def _renice(pid, niceness):
         os.setpriority(os.PRIO_PROCESS, int(thread.name), niceness)
 
 
-def _run(minutes, niceness, graph):
+def _shipped_settings():
+    """Return all settings of the shipped file by dotted name, those of the node alone too."""
+
+    def flat(prefix, entries):
+        for key, value in entries.items():
+            if isinstance(value, dict):
+                yield from flat(f'{prefix}{key}.', value)
+            else:
+                yield f'{prefix}{key}', value
+
+    document = yaml.safe_load(SETTINGS.read_text(encoding='utf-8'))
+    return dict(flat('', document['/**']['ros__parameters']))
+
+
+def _run(minutes, niceness, settings, graph):
     processes = LiveProcesses(graph)
     listener, machine = Listener(rclpy.Context(), int(graph['ROS_DOMAIN_ID'])), Machine()
     busy = None
     blocks, published, elapsed_s, t0 = [], 0, 0.0, 0.0
     try:
-        node = processes.start('sgp_ros.ros.sgp_node', {
-            **load_parameters(ROOT / 'config' / 'panda.yaml'),
-            'robot': 'panda', 'command.type': 'none', 'buffer.budget': BUDGET,
-            'filter.window': 0.1, 'qos.depth': DEPTH, 'refit.period': 200,
-        })  # fmt: skip
+        node = processes.start('sgp_ros.ros.sgp_node', settings)
         processes.wait_for(
             node, listener.publisher.get_subscription_count, _START_LIMIT_S, 'to listen'
         )
@@ -150,6 +163,7 @@ def _block(listener, pid, published, pause_s):
         'callback_ms_p99': float(np.median(callbacks[:, 1])),
         'callback_ms_max': float(callbacks[:, 2].max()),
         'callback_cpu_ms_p99': float(np.median(callbacks[:, 3])),
+        'push_ms_p99': float(np.median(callbacks[:, 4])),
         'counted_lost': int(listener.last['samples']['lost']),
         'load': os.getloadavg()[0],
     }  # fmt: skip
@@ -164,9 +178,16 @@ def main():
     with tempfile.TemporaryDirectory() as logs, graph_environment(Path(logs)) as graph:
         graph['PYTHONPATH'] = str(ROOT)
         os.environ.update(graph)
-        run = _run(arguments.minutes, arguments.niceness, graph)
+        settings = {**_shipped_settings(), 'robot': str(ROBOT)}
+        for name in ('record.path', 'save.path'):
+            settings[name] = str(Path(logs) / str(settings[name]))
+        run = _run(arguments.minutes, arguments.niceness, settings, graph)
+        recorded = sum(p.stat().st_size for p in Path(logs).rglob('*.mcap'))
+        saved = [path.name for path in Path(logs).glob('*.npz')]
     result = {
-        'rate_hz': RATE_HZ, 'joints': 7, 'budget': BUDGET, 'qos_depth': DEPTH,
+        'timed': TIMED, 'settings': SETTINGS.name, 'recorded_mb': recorded / 1e6, 'saved': saved,
+        'rate_hz': RATE_HZ, 'joints': 7, 'budget': settings['buffer.budget'],
+        'qos_depth': settings['qos.depth'],
         'executor': 'EventsExecutor', 'warm_up_s': WARM_UP_S, **run,
     }  # fmt: skip
     write_result(arguments.out, result, schema=1)

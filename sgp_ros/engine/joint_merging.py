@@ -15,13 +15,12 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Iterable
-from statistics import median
 
 import numpy as np
 
+from sgp_ros.engine.missing_messages import MissingMessages
 from sgp_ros.engine.samples import JointSample
 
-_PERIODS = 31
 PAUSE_NS = 1_000_000_000
 """A source that is silent for longer, by the stamps of the others, is waited for no more."""
 _LONGEST_STEP_NS = PAUSE_NS // 4
@@ -46,11 +45,12 @@ class Source:
         joints: indices of the robot's joints that it brings, increasing.
         owned: those of them that are taken from it, the others come from another source.
         parts: its messages that are still needed, in order of stamps.
-        received, lost: messages that came, and those missing by its period.
+        received: messages that came.
+        missing: those that did not, by its period.
         pauses: gaps too long for a loss.
         returns: messages after which the joints were nearer to where they were two messages ago
             than to the last: two publishers that say different things of them look like this.
-        last_ns, period_ns: newest stamp and median distance of stamps [ns]; None and 0 before any.
+        last_ns: newest stamp [ns]; None before any.
         passed_ns: time that passed by its stamps, jumps of the clock left out [ns].
 
     Args:
@@ -61,13 +61,12 @@ class Source:
         self.joints = sorted(joints)
         self.owned: list[int] = []
         self.parts: list[Part] = []
-        self.received = self.lost = self.pauses = self.returns = 0
+        self.received = self.pauses = self.returns = 0
+        self.missing = MissingMessages()
         self.last_ns: int | None = None
-        self.period_ns = 0.0
         self.passed_ns = 0
         self._is_steady = False
         self._heard: dict[Source, tuple[int, int]] = {}
-        self._spacings: list[int] = []
         self._before: tuple[np.ndarray, ...] = ()
 
     def note(self, stamp_ns: int) -> None:
@@ -79,15 +78,11 @@ class Source:
         self._is_steady = 0 < spacing <= PAUSE_NS
         self.passed_ns += min(max(spacing, 0), _LONGEST_STEP_NS)
         self.pauses += spacing > _LONGEST_GAP_NS
-        if not 0 < spacing <= _LONGEST_GAP_NS:
-            return
-        if self.period_ns and spacing > 1.5 * self.period_ns:
-            self.lost += round(spacing / self.period_ns) - 1
-        self._spacings.append(spacing)
-        if len(self._spacings) == _PERIODS or not self.period_ns:
-            self.period_ns = float(median(self._spacings))
-        if len(self._spacings) == _PERIODS:
-            self._spacings = []
+        if -PAUSE_NS <= spacing <= _LONGEST_GAP_NS:
+            if spacing:
+                self.missing.add(max(spacing, 0))
+        else:
+            self.missing.forget_schedule()
 
     def misses(self, other: Source) -> bool:
         """Whether another source has been silent, by its last stamp or without asking for that.
@@ -156,6 +151,7 @@ class JointMerger:
         joints: of the robot, in its order.
 
     Attributes:
+        joints: of the robot.
         sources: by the indices of the joints in their messages.
         foreign: messages without a joint of the robot.
         unmatched: states left out because another source paused.
@@ -163,7 +159,7 @@ class JointMerger:
     """
 
     def __init__(self, joints: Iterable[str]) -> None:
-        self._joints = tuple(joints)
+        self.joints = tuple(joints)
         self._places: dict[tuple[str, ...], tuple[Source, list[int]]] = {}
         self.sources: dict[frozenset[int], Source] = {}
         self.foreign = 0
@@ -177,7 +173,7 @@ class JointMerger:
     def missing(self) -> tuple[str, ...]:
         """Joints of the robot that no message has named so far."""
         owned = {joint for source in self.sources.values() for joint in source.owned}
-        return tuple(name for j, name in enumerate(self._joints) if j not in owned)
+        return tuple(name for j, name in enumerate(self.joints) if j not in owned)
 
     @property
     def shared(self) -> tuple[str, ...]:
@@ -186,12 +182,12 @@ class JointMerger:
         found |= {
             j for s in self.sources.values() for j in s.owned if 2 * s.returns > s.received > 1
         }
-        return tuple(self._joints[j] for j in sorted(found))
+        return tuple(self.joints[j] for j in sorted(found))
 
     @property
     def lost(self) -> int:
         """Messages missing by the periods of their sources."""
-        return sum(source.lost for source in self.sources.values())
+        return sum(source.missing.count for source in self.sources.values())
 
     def take(self, sample: JointSample) -> list[JointSample]:
         """Take a message and return the whole states that it completes, in order of stamps."""
@@ -205,7 +201,7 @@ class JointMerger:
             source.note_return(sample.position[places])
         if len(source.owned) < len(source.joints):
             self._inherit(source)
-        if len(source.owned) == len(self._joints):
+        if len(source.owned) == len(self.joints):
             return [sample]
         if not source.owned:
             return []
@@ -220,7 +216,7 @@ class JointMerger:
 
     def _find(self, names: tuple[str, ...]) -> tuple[Source, list[int]]:
         """Return the source of messages with these names, and the places of its joints there."""
-        joints = frozenset(j for j, name in enumerate(self._joints) if name in names)
+        joints = frozenset(j for j, name in enumerate(self.joints) if name in names)
         source = self.sources.get(joints)
         if source is None:
             taken = {joint for other in self.sources.values() for joint in other.owned}
@@ -228,7 +224,7 @@ class JointMerger:
             source.owned = [joint for joint in source.joints if joint not in taken]
         if len(self._places) >= _MOST_ORDERS:
             self._places = {}
-        places = [names.index(self._joints[joint]) for joint in source.joints]
+        places = [names.index(self.joints[joint]) for joint in source.joints]
         self._places[names] = source, places
         return source, places
 
@@ -256,8 +252,8 @@ class JointMerger:
 
     def _complete(self, source: Source, newest_ns: int) -> list[JointSample]:
         slowest = self._slowest
-        if slowest is None or source.period_ns > _SLOWER * slowest.period_ns:
-            slowest = self._slowest = max(self._owners(), key=lambda part: part.period_ns)
+        if slowest is None or source.missing.period_ns > _SLOWER * slowest.missing.period_ns:
+            slowest = self._slowest = max(self._owners(), key=lambda part: part.missing.period_ns)
             done = self._done_ns
             self._waiting = [p[0] for p in slowest.parts if done is None or p[0] > done]
         elif source is slowest:
@@ -280,7 +276,7 @@ class JointMerger:
         return all(owner.parts and owner.parts[-1][0] >= stamp_ns for owner in self._owners())
 
     def _state(self, stamp_ns: int) -> JointSample | None:
-        state = np.full((3, len(self._joints)), math.nan)
+        state = np.full((3, len(self.joints)), math.nan)
         for owner in self._owners():
             found = owner.at(stamp_ns)
             if found is None:
@@ -290,7 +286,7 @@ class JointMerger:
         state.setflags(write=False)
         position, *others = state
         rates = (None if np.isnan(values).all() else values for values in others)
-        return JointSample(stamp_ns, self._joints, position, *rates)
+        return JointSample(stamp_ns, self.joints, position, *rates)
 
 
 def _part(sample: JointSample, places: list[int]) -> Part:

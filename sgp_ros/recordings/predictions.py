@@ -33,6 +33,7 @@ class Outputs:
         joint_state: measured state with the predicted effort.
         residual: measured less predicted effort; None where no effort is predicted.
         band: lower and upper ends of the calibrated 95 % interval of the effort; None likewise.
+        measured: effort that was predicted, filtered as the equation is; None likewise.
     """
 
     stamp_ns: int
@@ -43,6 +44,7 @@ class Outputs:
     joint_state: JointSample
     residual: JointSample | None = None
     band: tuple[JointSample, JointSample] | None = None
+    measured: JointSample | None = None
 
 
 def outputs(estimate: Estimate) -> Outputs | None:
@@ -69,17 +71,19 @@ def outputs(estimate: Estimate) -> Outputs | None:
 
 def _error(
     estimate: Estimate,
-) -> tuple[JointSample | None, tuple[JointSample, JointSample] | None]:
-    """Return residual and band of the effort; NaN for joints without one."""
+) -> tuple[JointSample | None, tuple[JointSample, JointSample] | None, JointSample | None]:
+    """Return residual, band and measured effort; NaN for joints without one."""
     effort = estimate.effort
     if np.all(np.isnan(effort.mean)):
-        return None, None
+        return None, None, None
     half = INTERVAL_95 * np.sqrt(effort.variance)
-    residual, low, high = (
+    residual, low, high, measured = (
         JointSample(estimate.stamp_ns, estimate.names, _NONE, effort=values)
-        for values in (effort.measured - effort.mean, effort.mean - half, effort.mean + half)
-    )
-    return residual, (low, high)
+        for values in (
+            effort.measured - effort.mean, effort.mean - half, effort.mean + half, effort.measured,
+        )
+    )  # fmt: skip
+    return residual, (low, high), measured
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,12 +9,10 @@ import signal
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
-from typing import Any
 
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies
 from sgp_ros.diagnosis.compare.sufficiency import require_motion
@@ -25,40 +23,24 @@ from sgp_ros.errors import SgpError
 from sgp_ros.recordings.messages import Status
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.robot import Robot
+from sgp_ros.ros.diagnosis_outcome import (
+    CANCELLED,
+    DiagnosisDone,
+    DiagnosisFailed,
+    outcome_statuses,
+    told,
+)
 from sgp_ros.ros.fit_process import yield_to_others
 from sgp_ros.ros.past import Command, State, is_state, packed, samples, unpacked
-from sgp_ros.ros.verdict import ERROR, OK, WARN
+from sgp_ros.ros.verdict import OK
 
 _PART = 250
-_CANCELLED = 'cancelled'
 _REST_S = 0.001
 _CHECKED_AT_ONCE = 2000
 """Up to so many states, the service itself looks whether the robot moved; else the process."""
 MOST_EVENTS = 200_000
 """Remembered at most, whatever the window: a minute of states and commands at 1.6 kHz each."""
 _LONGEST_NS = 10 * 10**9  # beyond there is a pause, or a stamp is wrong
-
-
-@dataclass(frozen=True, slots=True)
-class DiagnosisDone:
-    """A finished diagnosis.
-
-    Attributes:
-        content: of diagnosis.json.
-    """
-
-    content: Mapping[str, Any]
-
-
-@dataclass(frozen=True, slots=True)
-class DiagnosisFailed:
-    """A diagnosis without a result.
-
-    Attributes:
-        reason: one sentence.
-    """
-
-    reason: str
 
 
 class DiagnosisProcess:
@@ -140,7 +122,6 @@ def _diagnose(connection: Connection) -> None:
 def _outcome(
     robot: str, config: EngineConfig, events: Sequence[Event], connection: Connection
 ) -> DiagnosisDone | DiagnosisFailed:
-    from sgp_ros.diagnosis.mapping import diagnosis_mapping
     from sgp_ros.diagnosis.pipeline import diagnose
     from sgp_ros.robots.registry import load_robot
 
@@ -151,7 +132,7 @@ def _outcome(
             events, nominal.robot, nominal.tree, {}, stated=nominal.stated, config=config,
             is_thinned=True, progress=lambda share: connection.send(float(share)),
         )  # fmt: skip
-        return DiagnosisDone(diagnosis_mapping(found))
+        return told(found)
     except SgpError as error:
         return DiagnosisFailed(' '.join(str(error).split()))
 
@@ -172,6 +153,7 @@ class Diagnosing:
         self._past: deque[State | Command] = deque(maxlen=MOST_EVENTS)
         self._process: DiagnosisProcess | None = None
         self._outcome: DiagnosisDone | DiagnosisFailed | None = None
+        self._ended_s = 0.0
 
     def take(self, event: Event) -> None:
         """Remember a state or command, forget what is older than the window."""
@@ -222,7 +204,7 @@ class Diagnosing:
         if self._process is None:
             return False, 'no diagnosis is running'
         self.close()
-        self._outcome = DiagnosisFailed(_CANCELLED)
+        self._outcome = DiagnosisFailed(CANCELLED)
         return True, 'the diagnosis is cancelled'
 
     def poll(self) -> DiagnosisDone | DiagnosisFailed | None:
@@ -230,7 +212,7 @@ class Diagnosing:
         outcome = None if self._process is None else self._process.poll()
         if outcome is not None:
             self.close()
-            self._outcome = outcome
+            self._outcome, self._ended_s = outcome, time.monotonic()
         return outcome
 
     def statuses(self, node: str) -> list[Status]:
@@ -245,35 +227,13 @@ class Diagnosing:
                 'left_s': f'{left_s:.1f}',
             }  # fmt: skip
             return [Status(name, OK, f'{100 * share:.0f} % diagnosed{left}', robot, values)]
-        if isinstance(self._outcome, DiagnosisFailed):
-            reason = self._outcome.reason
-            if reason == _CANCELLED:
-                return [Status(name, OK, reason, robot, {'state': reason})]
-            return [Status(name, ERROR, reason, robot, {'state': 'failed'})]
         if self._outcome is None:
             return []
-        content = self._outcome.content
-        verdict, findings = str(content['verdict']), content['findings']
-        values = {
-            'state': 'done', 'verdict': verdict, 'certainty': str(content['certainty']),
-            'findings': str(len(findings)),
-        }  # fmt: skip
-        level = WARN if findings else OK
-        return [
-            Status(name, level, verdict, robot, values),
-            *(_status(f'{name} {i + 1}', robot, finding) for i, finding in enumerate(findings)),
-        ]
+        is_fresh = 1e9 * (time.monotonic() - self._ended_s) <= self._window_ns
+        return outcome_statuses(self._outcome, name, robot, is_fresh=is_fresh)
 
     def close(self) -> None:
         """Kill a diagnosis that runs."""
         if self._process is not None:
             self._process.close()
         self._process = None
-
-
-def _status(name: str, robot: str, finding: Mapping[str, Any]) -> Status:
-    values = {key: str(finding[key]) for key in ('joint', 'effect', 'probability')}
-    for parameter, entry in finding['parameters'].items():
-        values[parameter] = str(entry['value'])
-        values |= {f'{parameter}.{k}': str(entry[k]) for k in ('std', 'unit') if k in entry}
-    return Status(name, WARN, f'{finding["effect"]} of {finding["joint"]}', robot, values)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitResult
-from sgp_ros.engine.joint_merging import JointMerger
+from sgp_ros.engine.joint_merging import JointMerger, Source
 from sgp_ros.engine.results import Counts
 from sgp_ros.engine.samples import JointSample
 from sgp_ros.errors import MessageError
@@ -33,7 +33,8 @@ class Health:
 
     Attributes:
         seen_joints: names in the last joint states.
-        without_effort: joints of the robot without a finite effort in the last state.
+        without_effort: joints of the robot without a finite effort in the last message that named
+            them.
         last_fit: one sentence on the last fit of hyper-parameters.
         fit_since_s: when the fit that runs was handed out, on a steady clock [s]; None without.
         record_problem, unrecorded: why the record stopped, empty while all is well, and how many
@@ -53,26 +54,34 @@ class Health:
         self.failures, self.first_failure = 0, ''
         self._durations_s: deque[float] = deque(maxlen=_DURATIONS)
         self._processor_s: deque[float] = deque(maxlen=_DURATIONS)
+        self._callbacks_s: deque[float] = deque(maxlen=_DURATIONS)
+        self._callbacks_cpu_s: deque[float] = deque(maxlen=_DURATIONS)
         self._delays_s: deque[float] = deque(maxlen=_DURATIONS)
         self._unreadable = 0
         self._unreadable_reason = ''
         self._before: dict[str, int] = {}
+        self._sources_before: dict[frozenset[int], tuple[int, int]] = {}
 
     def note_joints(self, sample: JointSample) -> None:
-        """Note what a message named, and which of its joints had no effort."""
+        """Note what a message named, and which of the robot's joints in it had no effort."""
         self.seen_joints = sample.names[:_MOST_NAMES]
-        if sample.effort is None:
-            self.without_effort = self.seen_joints
-        elif np.isnan(sample.effort).any():
-            is_unknown = np.isnan(sample.effort)
-            self.without_effort = tuple(np.array(sample.names)[is_unknown][:_MOST_NAMES].tolist())
-        else:
-            self.without_effort = ()
+        unknown = set(sample.names)
+        if sample.effort is not None:
+            pairs = zip(sample.names, np.isnan(sample.effort).tolist(), strict=True)
+            unknown = {name for name, is_unknown in pairs if is_unknown}
+        if unknown or self.without_effort:
+            kept = set(self.without_effort).difference(sample.names) | unknown
+            self.without_effort = tuple(n for n in self._merger.joints if n in kept)
 
     def note_push(self, duration_s: float, processor_s: float) -> None:
         """Note how long the engine took for one event [s], and its processor time of that [s]."""
         self._durations_s.append(duration_s)
         self._processor_s.append(processor_s)
+
+    def note_callback(self, duration_s: float, processor_s: float) -> None:
+        """Note the time of a whole message, from its receipt to the last topic; as `note_push`."""
+        self._callbacks_s.append(duration_s)
+        self._callbacks_cpu_s.append(processor_s)
 
     def note_delay(self, delay_s: float) -> None:
         """Note the time from the stamp of a state to the publication of its prediction [s]."""
@@ -128,11 +137,18 @@ class Health:
         parts.append(('timing', OK, *self._timing(engine)))
         parts.append(self._model(engine))
         if self.failures:
-            text = f'{self.failures} internal errors, the first: {self.first_failure}'
+            text = (
+                f'{self.failures} internal errors, the first: {self.first_failure}; please report '
+                'it, with the record'
+            )
             parts.append(('errors', ERROR, text, {'count': str(self.failures)}))
         if self.record_problem:
             values = {'unrecorded': str(self.unrecorded)}
-            parts.append(('record', ERROR, self.record_problem, values))
+            text = (
+                f'{self.record_problem}, {self.unrecorded} events are missing; free the disk, and '
+                'start the node again'
+            )
+            parts.append(('record', ERROR, text, values))
         return [
             Status(f'{node}: {name}', level, message, engine.robot.name, values)
             for name, level, message, values in parts
@@ -146,7 +162,7 @@ class Health:
         self._merger.looks_for_returns = len(publishers) > 1
         new = {name: max(n - self._before.get(name, 0), 0) for name, n in now.items()}
         self._before = now
-        return Arrivals(
+        found = Arrivals(
             joint_states=sources['joint_states'][0],
             command=sources['command'][0],
             robot_joints=engine.robot.joint_names,
@@ -157,6 +173,8 @@ class Health:
             without_effort=self.without_effort,
             missing_joints=self._merger.missing,
             shared_joints=self._merger.shared if len(publishers) > 1 else (),
+            silent_joints=self._joints_of(lambda source, received, _: source.received == received),
+            losing_joints=self._joints_of(lambda source, _, lost: source.missing.count > lost),
             received=new['messages'],
             lost=new['lost'],
             read=new['read'],
@@ -167,6 +185,20 @@ class Health:
             unreadable=new['unreadable'],
             unreadable_reason=self._unreadable_reason,
         )
+        sources_now = self._merger.sources.items()
+        self._sources_before = {k: (s.received, s.missing.count) for k, s in sources_now}
+        return found
+
+    def _joints_of(self, is_meant: Callable[[Source, int, int], bool]) -> tuple[str, ...]:
+        """Return the joints of sources, judged by what they had received and lost before."""
+        merger, before = self._merger, self._sources_before
+        joints = {
+            joint
+            for key, source in merger.sources.items()
+            if is_meant(source, *before.get(key, (0, 0)))
+            for joint in source.owned
+        }
+        return tuple(merger.joints[joint] for joint in sorted(joints))
 
     def _samples(self, counts: Counts, arrivals: Arrivals, elapsed_s: float) -> dict[str, str]:
         rate = arrivals.read / elapsed_s if elapsed_s > 0.0 else 0.0
@@ -190,6 +222,8 @@ class Health:
         chosen_s = engine.config.reorder_window + engine.delay_s
         values = {'delay_s_chosen': f'{chosen_s:.4f}'}
         for name, times_s, unit in (
+            ('callback_ms', self._callbacks_s, 1e3),
+            ('callback_cpu_ms', self._callbacks_cpu_s, 1e3),
             ('push_ms', self._durations_s, 1e3), ('push_cpu_ms', self._processor_s, 1e3),
             ('delay_s', self._delays_s, 1.0),
         ):  # fmt: skip

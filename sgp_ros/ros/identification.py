@@ -7,6 +7,7 @@ beneath. Everything it makes on its node is gone after `close`.
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
@@ -16,12 +17,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import (
-    DurabilityPolicy,
-    HistoryPolicy,
-    QoSProfile,
-    ReliabilityPolicy,
-)
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
 
@@ -29,7 +25,8 @@ from sgp_ros.engine.samples import Event
 from sgp_ros.errors import ConfigError, MessageError, NumericalError
 from sgp_ros.recordings.command_types import COMMAND_TYPES, NO_COMMAND
 from sgp_ros.recordings.messages import Status, joint_sample
-from sgp_ros.ros.diagnosing import Diagnosing, DiagnosisFailed
+from sgp_ros.ros.diagnosing import Diagnosing
+from sgp_ros.ros.diagnosis_outcome import DiagnosisFailed
 from sgp_ros.ros.messages import message_class
 from sgp_ros.ros.parameters import from_ros, to_ros
 from sgp_ros.ros.publishers import Publishers
@@ -133,7 +130,7 @@ class Identification:
                 self._node.create_subscription(
                     kind,
                     topic,
-                    lambda message: self._guarded(self._hear, convert, message),
+                    lambda message: self._serve(convert, message),
                     quality,
                     qos_overriding_options=overrides,
                 )
@@ -171,6 +168,13 @@ class Identification:
         if self._session.health.failures and not self._has_reported_failure:
             self._has_reported_failure = True
             self._node.get_logger().error(self._session.health.first_failure)
+
+    def _serve(self, convert: Callable[[Any, int], Event], message: Any) -> None:
+        """Take a message, and note how long all of that took."""
+        started, used = time.perf_counter(), time.thread_time()
+        self._guarded(self._hear, convert, message)
+        times_s = time.perf_counter() - started, time.thread_time() - used
+        self._session.health.note_callback(*times_s)
 
     def _hear(self, convert: Callable[[Any, int], Event], message: Any) -> None:
         # The middleware's own time of receipt is out of reach: the wheels' EventsExecutor fails
@@ -212,7 +216,7 @@ class Identification:
             self._node.get_logger().error(f'no diagnosis: {outcome.reason}')
         elif outcome is not None:
             self._out.diagnosis(json.dumps(outcome.content, allow_nan=False))
-            self._node.get_logger().info(f'diagnosis: {outcome.content["verdict"]}')
+            self._node.get_logger().info(f'diagnosis: {outcome.sentence}')
 
     def _publish_parameters(self) -> None:
         engine = self._session.engine
@@ -260,8 +264,8 @@ class Identification:
             if status.level == level and (level == OK or now_ns - said_ns < _QUIET_NS):
                 continue
             if status.level == OK:  # rclpy wants a line of its own for each severity
-                over = f'over: {status.message}'
-                logger.info(over)
+                calm = f'no warning any more: {status.name}: {status.message}'
+                logger.info(calm)
             elif status.level == WARN:
                 logger.warning(status.message)
             else:

@@ -18,7 +18,10 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 
 from sgp_ros.errors import SgpError
+from sgp_ros.robots.shipped import shipped_folder
+from sgp_ros.strangers import read_text
 
+BRINGUP = 'bringup/ros2_control.yaml'
 THREAD_LIMITS = ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS')
 """Environment variables that hold the number of threads of a linear algebra library."""
 
@@ -34,7 +37,7 @@ def run(name: str, summary: str, load: Callable[[], Callable[[], Node]]) -> int:
         summary: one sentence, for `--help`.
         load: imports what makes the node and returns it; called once the threads are limited.
     """
-    _answer_help(name, summary)
+    _answer(name, summary)
     os.environ.update(dict.fromkeys(THREAD_LIMITS, '1'))
     try:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -57,18 +60,26 @@ def settle_memory() -> None:
     gc.freeze()
 
 
-def _answer_help(name: str, summary: str) -> None:
-    """End with the help where it is asked for; what follows --ros-args is for ROS."""
+def _answer(name: str, summary: str) -> None:
+    """End with what is asked for without a node; what follows --ros-args is for ROS."""
     own = sys.argv[1:]
     if '--ros-args' in own:
         own = own[: own.index('--ros-args')]
-    argparse.ArgumentParser(
+    parser = argparse.ArgumentParser(
         prog=name,
         usage='%(prog)s [-h] [--ros-args [-p NAME:=VALUE] [--params-file YAML] [-r FROM:=TO] ...]',
         description=summary,
         epilog=f'`ros2 param describe` explains the parameters of a running {name}.',
         allow_abbrev=False,
-    ).parse_known_args(own)
+    )
+    if name.startswith('sgp_'):
+        parser.usage = str(parser.usage).replace('[-h]', '[-h] [--parameters]')
+        parser.add_argument('--parameters', action='store_true',
+                            help='print the parameter file for a robot of ros2_control, and exit'
+                            )  # fmt: skip
+    if getattr(parser.parse_known_args(own)[0], 'parameters', False):
+        sys.stdout.write(read_text(shipped_folder() / BRINGUP))
+        sys.exit(0)
 
 
 def _start(load: Callable[[], Callable[[], Node]]) -> int:

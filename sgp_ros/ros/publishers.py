@@ -45,6 +45,7 @@ class Publishers:
         self._raw_variance = publisher(JointTrajectory, '~/prediction_raw_variance')
         self._overlay = publisher(JointState, '~/predicted_joint_states')
         self._residual = publisher(JointState, '~/residual')
+        self._measured = publisher(JointState, '~/measured_effort')
         self._band = [publisher(JointState, f'~/band/{end}') for end in ('lower', 'upper')]
         self._parameters = publisher(DiagnosticArray, '~/parameters', _LATCHED)
         self._values = publisher(JointState, '~/parameter_values', _LATCHED)
@@ -55,8 +56,8 @@ class Publishers:
         self._diagnostics = publisher(DiagnosticArray, '/diagnostics')
         self._all = [
             self._prediction, self._variance, self._raw_variance, self._overlay, self._residual,
-            *self._band, self._parameters, self._values, self._monitor, self._alarm,
-            self._diagnosis, self._progress, self._diagnostics,
+            self._measured, *self._band, self._parameters, self._values, self._monitor,
+            self._alarm, self._diagnosis, self._progress, self._diagnostics,
         ]  # fmt: skip
 
     @property
@@ -80,10 +81,9 @@ class Publishers:
             if publisher.get_subscription_count():
                 publisher.publish(trajectory_message(new_message, stamp_ns, names, point))
         states: list[tuple[Any, JointSample]] = [(self._overlay, found.joint_state)]
-        if found.residual is not None and found.band is not None:
-            states += zip(
-                (self._residual, *self._band), (found.residual, *found.band), strict=True
-            )
+        errors = (found.residual, found.measured, *(found.band or ()))
+        publishers = (self._residual, self._measured, *self._band)
+        states += [(p, e) for p, e in zip(publishers, errors, strict=False) if e is not None]
         for publisher, state in states:
             if publisher.get_subscription_count():
                 publisher.publish(joint_state_message(new_message, state))

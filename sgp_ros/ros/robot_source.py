@@ -24,6 +24,7 @@ from std_msgs.msg import String
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.errors import ConfigError, SgpError
 from sgp_ros.recordings.messages import Status, diagnostics_message
+from sgp_ros.robots.models.door import MODEL_ENDINGS, find_file, read_model
 from sgp_ros.ros.messages import new_message
 from sgp_ros.ros.parameters import declare
 from sgp_ros.ros.settings import FIRST, node_settings
@@ -60,7 +61,8 @@ class RobotSource:
         assert isinstance(joints, tuple)
         self._joints = [str(joint) for joint in joints if joint]
         text = str(given['robot_description'])
-        self.robot = str(given['robot']) or (self._described(text) if text else '')
+        name = str(given['robot'])
+        self.robot = self._restricted(name) if name else self._described(text) if text else ''
         self.problem = ''
         self._entities: list[Any] = []
 
@@ -117,6 +119,18 @@ class RobotSource:
         status = Status(f'{name}: robot', level, message, '', {})
         now_ns = self._node.get_clock().now().nanoseconds
         self._diagnostics.publish(diagnostics_message(new_message, now_ns, [status]))
+
+    def _restricted(self, name: str) -> str:
+        """Return a robot of which only the joints in parameter `joints` move."""
+        if not self._joints:
+            return name
+        if Path(name).suffix.lower() not in MODEL_ENDINGS:
+            raise ConfigError(
+                f'parameter joints beside robot {name!r}', 'a model file such as a URDF',
+                'a robot YAML states its joints itself, under the key joints',
+            )  # fmt: skip
+        document = read_model(find_file(name, Path.cwd()))
+        return yaml.safe_dump({'schema': 1, **document, 'joints': self._joints})
 
     def _described(self, text: str) -> str:
         if not text.strip():

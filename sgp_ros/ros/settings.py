@@ -17,7 +17,8 @@ DESCRIPTION = Setting(
 )  # fmt: skip
 JOINTS = Setting(
     'joints', 'str_array', ('',),
-    "Joints of robot_description that move; all others are locked. ['']: all joints move.",
+    "Joints of robot_description, or of a URDF named by robot, that move; all others are locked. "
+    "['']: all joints move.",
     read_only=True,
 )  # fmt: skip
 MODEL_PATH = Setting(

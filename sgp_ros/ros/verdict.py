@@ -28,6 +28,7 @@ class Arrivals:
         without_effort: joints without a finite effort in the last state.
         missing_joints: joints that no message names.
         shared_joints: joints of which several publishers tell.
+        silent_joints, losing_joints: joints of which no message came, and some were lost.
         received, lost: messages that came, and those missing by the period of their source.
         read, estimated: states that came, and equations they gave.
         refused: states refused, by reason.
@@ -46,6 +47,8 @@ class Arrivals:
     without_effort: tuple[str, ...] = ()
     missing_joints: tuple[str, ...] = ()
     shared_joints: tuple[str, ...] = ()
+    silent_joints: tuple[str, ...] = ()
+    losing_joints: tuple[str, ...] = ()
     received: int = 0
     lost: int = 0
     read: int = 0
@@ -73,12 +76,18 @@ def _most_refused(arrivals: Arrivals) -> tuple[int, str] | None:
     reason, count = _most(arrivals.refused)
     if 2 * count > arrivals.read:
         remedy = _state_remedy(reason, arrivals)
-        return ERROR, f'{count} of {arrivals.read} joint states refused, {reason}: {remedy}'
+        return ERROR, (
+            f'{count} of {arrivals.read} joint states of joints {list(arrivals.robot_joints)} '
+            f'refused, {reason}: {remedy}'
+        )
     reason, commands = _most(arrivals.commands_refused)
     if 2 * commands > arrivals.commands_read:
         remedy = _command_remedy(reason, arrivals)
         read = arrivals.commands_read
-        return ERROR, f'{commands} of {read} commands refused, {reason}: {remedy}'
+        return ERROR, (
+            f'{commands} of {read} commands of joints {list(arrivals.robot_joints)} refused, '
+            f'{reason}: {remedy}'
+        )
     return None
 
 
@@ -96,27 +105,57 @@ def _some_lost(arrivals: Arrivals) -> tuple[int, str] | None:
     if arrivals.lost > _LOST_SHARE * (arrivals.received + arrivals.lost):
         return WARN, (
             f'{arrivals.lost} of {arrivals.received + arrivals.lost} messages on '
-            f'{arrivals.joint_states} are missing, judging by their period: the source paused, or '
+            f'{arrivals.joint_states} are missing, judging by their period, of joints '
+            f'{list(arrivals.losing_joints)}: the source paused, or '
             'messages were lost; raise qos.depth and the receive buffer of the socket, or reduce '
             'the load of computer and network'
         )
-    if arrivals.unreadable:
-        return WARN, f'{arrivals.unreadable} messages not readable: {arrivals.unreadable_reason}'
-    refused = {**arrivals.refused, **_prefixed(arrivals.commands_refused)}
-    if any(refused.values()):
-        text = ', '.join(f'{n} {name}' for name, n in refused.items() if n)
-        return WARN, f'refused: {text}'
-    if arrivals.read >= _FEW and arrivals.estimated == 0:
-        return WARN, (
-            f'{arrivals.read} joint states gave no equation: too few of them per '
-            'filter.window; increase it'
-        )
-    return None
+    return _some_unreadable(arrivals) or _some_refused(arrivals) or _no_equation(arrivals)
+
+
+def _some_unreadable(arrivals: Arrivals) -> tuple[int, str] | None:
+    if not arrivals.unreadable:
+        return None
+    return WARN, (
+        f'{arrivals.unreadable} messages on {arrivals.joint_states} or {arrivals.command} not '
+        f'readable: {arrivals.unreadable_reason}; mend what publishes them: '
+        f'{", ".join(arrivals.publishers)}'
+    )
+
+
+def _some_refused(arrivals: Arrivals) -> tuple[int, str] | None:
+    each = [
+        f'{count} of {arrivals.read} joint states refused, {reason}: '
+        f'{_state_remedy(reason, arrivals)}'
+        for reason, count in arrivals.refused.items()
+        if count
+    ] + [
+        f'{count} of {arrivals.commands_read} commands on {arrivals.command} refused, {reason}: '
+        f'{_command_remedy(reason, arrivals)}'
+        for reason, count in arrivals.commands_refused.items()
+        if count
+    ]
+    if not each:
+        return None
+    return WARN, f'joints {list(arrivals.robot_joints)}: {"; ".join(each)}'
+
+
+def _no_equation(arrivals: Arrivals) -> tuple[int, str] | None:
+    if arrivals.read < _FEW or arrivals.estimated:
+        return None
+    return WARN, (
+        f'{arrivals.read} joint states of joints {list(arrivals.robot_joints)} gave no equation: '
+        'too few of them per filter.window; increase it'
+    )
 
 
 def _nothing(arrivals: Arrivals) -> tuple[int, str]:
     if arrivals.unreadable:
-        return ERROR, f'no joint states could be read: {arrivals.unreadable_reason}'
+        return ERROR, (
+            f'none of {arrivals.unreadable} joint states could be read: '
+            f'{arrivals.unreadable_reason}; mend what publishes {arrivals.joint_states}: '
+            f'{", ".join(arrivals.publishers)}'
+        )
     if arrivals.received:
         return _no_state(arrivals)
     if not arrivals.publishers:
@@ -142,7 +181,11 @@ def _no_state(arrivals: Arrivals) -> tuple[int, str]:
             f'no message on {arrivals.joint_states} contains the joints {missing} of the robot; '
             f'publish them, or {remedy}'
         )
-    return WARN, f'one of {", ".join(arrivals.publishers)} has stopped: waiting for its joints'
+    return WARN, (
+        f'{arrivals.received} messages on {arrivals.joint_states}, none with joints '
+        f'{list(arrivals.silent_joints)}: one of {", ".join(arrivals.publishers)} has stopped; '
+        'start it again'
+    )
 
 
 def _state_remedy(reason: str, arrivals: Arrivals) -> str:
@@ -197,7 +240,3 @@ def _command_remedy(reason: str, arrivals: Arrivals) -> str:
 
 def _most(counts: Mapping[str, int]) -> tuple[str, int]:
     return max(counts.items(), key=lambda item: item[1], default=('', 0))
-
-
-def _prefixed(counts: Mapping[str, int]) -> dict[str, int]:
-    return {f'{name} command': n for name, n in counts.items()}

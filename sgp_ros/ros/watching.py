@@ -41,6 +41,8 @@ class Picture:
 
     def hear(self, message: Any) -> None:
         """Take a message of /diagnostics."""
+        if any(entry.name == f'{self._prefix}samples' for entry in message.status):
+            self.statuses = {}  # this is all that holds now
         for entry in message.status:
             status = _status(entry)
             if status.name.startswith(self._prefix):
@@ -100,9 +102,10 @@ def run_watch(
                     f'{others}; check ROS_DOMAIN_ID and --node NAME',
                 )  # fmt: skip
         if layouts is not None:
+            _settle(picture, turn)
             joints = [n.removeprefix('fit ') for n in picture.statuses if n.startswith('fit ')]
             Path(layouts).mkdir(parents=True, exist_ok=True)
-            write_live_layouts(Path(layouts), node, joints)
+            write_live_layouts(Path(layouts), node, joints, list(picture.parameters))
         if once:
             _settle(picture, turn)
             console.print(dashboard(picture))
@@ -175,7 +178,7 @@ def _head(picture: Picture) -> Any:
         f'{samples.get("rate_hz", "?")} Hz',
         f'{samples.get("used", "?")} states used, {samples.get("lost", "?")} lost',
         f'delay {timing.get("delay_s_p50", timing.get("delay_s_chosen", "?"))} s',
-        f'{timing.get("push_ms_p99", "?")} ms p99 a message',
+        f'{timing.get("callback_ms_p99", "?")} ms p99 a message',
     ]
     return _text(f'{", ".join(words)}\n{", ".join(numbers)}', 'bold')
 

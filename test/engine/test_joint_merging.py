@@ -124,6 +124,81 @@ def test_lost_messages_are_counted_by_the_period(jitter):
     assert abs(merger.lost - missing) <= (0 if jitter == 0.0 else 0.02 * missing)
 
 
+def _count(periods, period_ms=1):
+    merger = JointMerger(('a',))
+    for stamp in periods:
+        merger.take(_sample(round(stamp * period_ms * MS), a=0.0))
+    return merger.lost
+
+
+_N = 10_000
+_STEPS = np.arange(_N)
+
+
+def _slept(rng):
+    """Return the stamps of a publisher that sleeps, and sometimes too long."""
+    late = np.where(rng.uniform(size=_N) < 0.01, rng.uniform(0.2, 1.0, size=_N), 0.0)
+    return np.cumsum(1.006 + 0.03 * rng.exponential(size=_N) + late)
+
+
+def _woken_late(rng):
+    """Return the stamps of a timer that is late by most of a period, and makes up for it."""
+    late = np.where(rng.uniform(size=_N) < 0.03, rng.uniform(0.3, 0.95, size=_N), 0.0)
+    return _STEPS + 0.02 * rng.normal(size=_N) + late
+
+
+@pytest.mark.parametrize('seed', range(3))
+@pytest.mark.parametrize(
+    'stamps',
+    [
+        *(
+            lambda rng, jitter=jitter: _STEPS + jitter * rng.normal(size=_N)
+            for jitter in (0.1, 0.15, 0.2, 0.3)
+        ),
+        *(
+            lambda rng, width=width: _STEPS + rng.uniform(-width, width, size=_N)
+            for width in (0.1, 0.25, 0.4)
+        ),
+        *(
+            lambda rng, width=width: np.cumsum(1.0 + rng.uniform(-width, width, size=_N))
+            for width in (0.1, 0.3)
+        ),
+        lambda rng: np.cumsum(1.0 + 0.1 * np.sin(_STEPS / 2000)),
+        _woken_late,
+        pytest.param(_slept, id='slept'),
+    ],
+)
+def test_what_comes_early_or_late_is_not_lost(stamps, seed):
+    """Jitter of the stamps, of the spacings, a rate that drifts: below 0.3 % is called lost."""
+    assert _count(stamps(np.random.default_rng(seed))) < 0.003 * _N
+
+
+@pytest.mark.parametrize('seed', range(3))
+@pytest.mark.parametrize('jitter', [0.0, 0.02, 0.1, 0.2])
+@pytest.mark.parametrize('share', [0.01, 0.25, 'every fourth', 'bursts'])
+def test_losses_are_counted_whatever_their_share(share, jitter, seed):
+    """Exactly where stamps are regular; else to what their jitter leaves of a whole number."""
+    rng = np.random.default_rng(seed)
+    if share == 'bursts':
+        is_kept = ~(((_STEPS > 500) & (_STEPS < 4500)) | ((_STEPS > 6000) & (_STEPS < 8500)))
+    elif share == 'every fourth':
+        is_kept = _STEPS % 4 != 0
+    else:
+        is_kept = rng.uniform(size=_N) > share
+    is_kept[:100] = is_kept[-9:] = True
+    lost = int(np.sum(~is_kept))
+    found = _count((_STEPS + jitter * rng.normal(size=_N))[is_kept])
+    assert abs(found - lost) <= (0 if jitter == 0.0 else max(4, 0.005 * lost))
+
+
+@pytest.mark.parametrize('spacings', [(1, 2), (2, 1), (1, 1.3), (1.3, 1), (1, 5)])
+def test_a_rate_that_changes_is_called_loss_no_longer_than_it_takes_to_tell(spacings):
+    before, after = spacings
+    stamps = np.cumsum([before] * 1000 + [after] * 3000)
+    assert _count(stamps) <= 62 * max(after / before - 1.0, 0.0)
+    assert _count(np.append(stamps, stamps[-1] + after * np.array([2, 3]))) == _count(stamps) + 1
+
+
 @pytest.mark.parametrize('stamp_ns', [0, 10**18, 5 * 10**8])
 def test_one_wrong_message_takes_no_joint_away_for_long(stamp_ns):
     """Its name may be damaged, and its stamp of a far future."""

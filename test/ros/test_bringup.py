@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
@@ -108,6 +109,36 @@ def test_a_description_as_parameter_may_name_the_joints_that_move(graph: Graph) 
     graph.start('sgp_node', file=path)
     graph.wait_until(lambda: graph.message('fit arm_2_joint'), 'its joint')
     assert not graph.message('fit arm_1_joint')
+
+
+def _source(graph: Graph, robot: Path | str, *joints: str) -> RobotSource:
+    values = {'robot': str(robot), 'joints': list(joints)}
+    overrides = [Parameter(name, value=value) for name, value in values.items()]
+    node = Node('restricted', parameter_overrides=overrides)
+    try:
+        return RobotSource(node)
+    finally:
+        node.destroy_node()
+
+
+@pytest.mark.ros
+def test_a_file_of_the_robot_may_be_restricted_to_joints_too(graph: Graph) -> None:
+    """As a description is; a name that it lacks is refused as there."""
+    urdf = ROBOTS / 'tiago_arm.urdf'
+    source = _source(graph, urdf, 'arm_2_joint')
+    assert load_robot(source.robot).joint_names == ('arm_2_joint',)
+    assert _source(graph, urdf, '').robot == str(urdf)
+    with pytest.raises(ConfigError, match='arm_9_joint'):
+        load_robot(_source(graph, urdf, 'arm_9_joint').robot)
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize('robot', ['panda', ROBOTS / 'tiago_arm.yaml'])
+def test_joints_beside_a_robot_that_states_its_own_are_refused(
+    graph: Graph, robot: Path | str
+) -> None:
+    with pytest.raises(ConfigError, match='parameter joints beside robot'):
+        _source(graph, robot, 'arm_2_joint')
 
 
 def _overrides(**settings: Any) -> list[Parameter]:

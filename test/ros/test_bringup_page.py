@@ -7,7 +7,10 @@ JointTrajectoryController or of a controller of efforts.
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -93,6 +96,43 @@ def start(graph: Graph, tmp_path: Path) -> Callable[..., Robot]:
     return started
 
 
+@pytest.mark.parametrize('page', ['README.md', 'docs/bringup.md'])
+def test_the_commands_of_a_page_write_the_file_and_start_the_node_with_it(
+    page: str, tmp_path: Path
+) -> None:
+    """As they stand there, with this package in place of what pip installs on the path."""
+    text = (ROOT / page).read_text()
+    (block,) = re.findall(
+        r'```bash\n((?:(?!```).*\n)*sgp_node --parameters.*\n(?:.*\n)*?)```', text
+    )
+    lines = [line for line in block.splitlines() if line.startswith('sgp_node')]
+    write, start = lines
+    script = f'sgp_node() {{ {sys.executable} -m sgp_ros.ros.sgp_node "$@"; }}\n'
+    done = subprocess.run(
+        ['bash', '-ec', script + write], cwd=tmp_path, check=False, capture_output=True,
+        text=True, env={**os.environ, 'PYTHONPATH': str(ROOT)},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    (written,) = tmp_path.iterdir()
+    assert written.read_bytes() == (ROOT / 'config/bringup/ros2_control.yaml').read_bytes()
+    assert start.split('#')[0].split() == [
+        'sgp_node', '--ros-args', '--params-file', written.name,
+    ]  # fmt: skip
+
+
+def test_the_section_of_the_readme_names_what_is_installed_and_called() -> None:
+    """Extras of setup.py, and services and topics that the page on bringup explains."""
+    text = (ROOT / 'README.md').read_text()
+    section = text.split('## Beside a robot of ros2_control')[1].split('## ')[0]
+    (extras,) = re.findall(r"pip install '\.\[(.+?)\]'", section)
+    setup = (ROOT / 'setup.py').read_text()
+    assert all(f"'{extra}': [" in setup for extra in extras.split(','))
+    for call in re.findall('ros2 service call .*', section):
+        assert call in PAGE
+    assert re.search(r'^sgp watch$', section, re.MULTILINE)
+    assert len(text.splitlines()) < 150
+
+
 @pytest.mark.ros
 def test_the_file_of_the_page_works(
     graph: Graph, tmp_path: Path, start: Callable[..., Robot]
@@ -101,7 +141,9 @@ def test_the_file_of_the_page_works(
     start().move_until(lambda: graph.status('model').get('ready') == '1', 'a model')
     assert (tmp_path / 'sgp_node' / 'sgp_node_0.mcap').is_file()
     (delay,) = re.findall(r'after its stamp \(([\d.]+) s in the file above\)', PAGE)
-    assert float(graph.status('timing')['delay_s_chosen']) == float(delay)
+    timing = graph.status('timing')
+    assert float(timing['delay_s_chosen']) == float(delay)
+    assert float(timing['callback_ms_p50']) > float(timing['push_ms_p50'])
     assert graph.count('commands_read') == 0
 
 

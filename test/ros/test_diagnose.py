@@ -118,11 +118,15 @@ def test_a_diagnosis_of_the_recent_past_is_published(graph: Graph) -> None:
     graph.wait_until(
         lambda: graph.status('diagnosis').get('state') == 'done', 'a verdict', PATIENCE_S
     )
-    status = graph.wait_until(lambda: graph.status('diagnosis 1'), 'a finding')
+    status = graph.wait_until(lambda: graph.status('diagnosis torque_gain elbow'), 'a finding')
     assert (status['joint'], status['effect']) == ('elbow', 'torque_gain')
     assert abs(float(status['gain']) - 0.74824) < 0.01
     assert float(status['gain.std']) > 0.0
     assert 0.5 < float(status['probability']) <= 1.0
+    for name in ('diagnosis', 'diagnosis torque_gain elbow'):
+        assert 'on elbow' in graph.message(name)
+        assert 'gain 0.74' in graph.message(name)
+        assert 'correct the robot file' in graph.message(name)
     late = graph.collect(String, '/sgp_node/diagnosis', KEPT)
     graph.wait_until(lambda: late, 'the verdict')
     content = json.loads(late[0].data)

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import gc
+import re
+import time
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from sgp_ros.diagnosis.result import Finding
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import POSITION, CommandSample, JointSample, Reset, frozen_array
+from sgp_ros.recordings.messages import Status
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.ros.diagnosing import MOST_EVENTS, Diagnosing
+from sgp_ros.ros.diagnosis_outcome import DiagnosisFailed, told
+from sgp_ros.ros.verdict import OK, WARN
+from test.report.diagnoses import COULOMB, SPRING, UNKNOWN, diagnosis
 
 
 def _diagnosing(window_s: float, robot: str = 'reaction_wheel') -> Diagnosing:
@@ -100,3 +108,62 @@ def test_a_robot_that_never_moved_is_refused_with_the_reason() -> None:
     assert not started
     assert 'no joint of reaction_wheel moves' in message
     assert kept.statuses('node') == []
+
+
+def _statuses(kept: Diagnosing, verdict: str, *findings: Finding) -> list[Status]:
+    kept._outcome, kept._ended_s = told(diagnosis(verdict, findings)), time.monotonic()
+    return kept.statuses('left/node')
+
+
+def test_a_verdict_warns_with_number_joint_and_remedy() -> None:
+    """In the sentences of the report, with the joint at the end of the name of each finding."""
+    head, first, again, other = _statuses(
+        _diagnosing(60.0), 'missing_physics', COULOMB, COULOMB, SPRING
+    )
+    assert [s.level for s in (head, first, again, other)] == [WARN] * 4
+    assert head.name == 'left/node: diagnosis'
+    assert first.name == 'left/node: diagnosis coulomb_friction elbow'
+    assert again.name == 'left/node: diagnosis coulomb_friction 2 elbow'
+    assert other.name == 'left/node: diagnosis spring shoulder'
+    for status in (head, first):
+        assert 'on elbow: Coulomb friction, level 0.317' in status.message
+        assert 'sgp diagnose RECORD' in status.message
+    assert (first.values['level'], first.values['level.unit']) == ('0.317', 'N m')
+
+
+@pytest.mark.parametrize('verdict', ['parameters_only', 'unexplained', 'setup_error'])
+def test_every_verdict_but_no_mismatch_asks_for_something(verdict: str) -> None:
+    findings = [UNKNOWN] if verdict == 'unexplained' else []
+    head, *_ = _statuses(_diagnosing(60.0), verdict, *findings)
+    assert head.level == WARN
+    assert head.values['verdict'] == verdict
+    assert re.search('[Cc]orrect |Record a longer', head.message)
+
+
+def test_a_robot_without_mismatch_is_fine() -> None:
+    (head,) = _statuses(_diagnosing(60.0), 'no_mismatch')
+    assert head.level == OK
+    assert head.message.startswith('No mismatch: ')
+
+
+def test_a_certainty_that_is_not_stated_is_no_number() -> None:
+    kept = _diagnosing(60.0)
+    found = replace(diagnosis('unexplained', [UNKNOWN]), certainty=None)
+    kept._outcome, kept._ended_s = told(found), time.monotonic()
+    assert kept.statuses('node')[0].values['certainty'] == 'not stated'
+
+
+@pytest.mark.parametrize('is_failed', [True, False])
+def test_an_outcome_is_information_once_its_window_is_past(*, is_failed: bool) -> None:
+    """Its past is over then; its words stay."""
+    kept = _diagnosing(60.0)
+    before = _statuses(kept, 'missing_physics', COULOMB)
+    if is_failed:
+        kept._outcome = DiagnosisFailed('it ended with code -9')
+        before = kept.statuses('left/node')
+        assert 'call ~/diagnose again' in before[0].message
+    assert all(status.level for status in before)
+    kept._ended_s -= 61.0
+    after = kept.statuses('left/node')
+    assert [status.level for status in after] == [OK] * len(before)
+    assert [status.message for status in after] == [status.message for status in before]

@@ -12,7 +12,7 @@ from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.fitting import FitResult
 from sgp_ros.engine.joint_merging import JointMerger
 from sgp_ros.engine.replay import Swap
-from sgp_ros.engine.samples import CommandSample
+from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.gp.model import Model
 from sgp_ros.ros.fit_health import FitHealth
 from sgp_ros.ros.health import Health
@@ -142,6 +142,7 @@ def test_the_delay_is_what_the_settings_choose_and_what_was_measured(window, wai
         health.note_delay(delay_s)
     for waited_s in (0.0, 0.002):
         health.note_push(0.003 + waited_s, 0.003)
+        health.note_callback(0.01 + waited_s, 0.008)
     status = health.statuses(engine, 'node', 1.0, SOURCES)[1]
     assert status.name == 'node: timing'
     assert float(status.values['delay_s_chosen']) == pytest.approx(wait + 0.5 * window, abs=0.02)
@@ -149,3 +150,23 @@ def test_the_delay_is_what_the_settings_choose_and_what_was_measured(window, wai
     assert float(status.values['delay_s_max']) == pytest.approx(0.3)
     assert float(status.values['push_ms_max']) == pytest.approx(5.0)
     assert float(status.values['push_cpu_ms_max']) == pytest.approx(3.0)
+    assert float(status.values['callback_ms_max']) == pytest.approx(12.0)
+    assert float(status.values['callback_cpu_ms_max']) == pytest.approx(8.0)
+
+
+def test_only_joints_of_the_robot_are_told_to_have_no_effort():
+    """A gripper in the same message or in another needs none; what another driver brings stays."""
+    health = Health(JointMerger(('shoulder', 'elbow')))
+
+    def told(**efforts):
+        values = frozen_array([*efforts.values()])
+        known = None if np.isnan(values).all() else values
+        health.note_joints(JointSample(0, tuple(efforts), values, effort=known))
+        return health.without_effort
+
+    nan = np.nan
+    assert told(finger=nan, elbow=nan, shoulder=1.0) == ('elbow',)
+    assert told(finger=nan, elbow=nan, shoulder=nan) == ('shoulder', 'elbow')
+    assert told(finger=1.0) == told(finger=nan) == ('shoulder', 'elbow')
+    assert told(shoulder=1.0) == ('elbow',)
+    assert told(elbow=1.0) == ()

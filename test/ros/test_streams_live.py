@@ -114,17 +114,25 @@ def test_a_bag_that_is_played_in_a_loop_costs_nothing_that_was_learned(graph: Gr
 
 
 def test_lost_messages_are_counted(graph: Graph) -> None:
-    graph.start('sgp_node', **MEASURED)
+    """With the joints and the number, and the log says when the warning is over."""
+    node = graph.start('sgp_node', **MEASURED)
     states = graph.client.create_publisher(JointState, 'joint_states', 100)
 
     def send(i: int) -> None:
         if i < 100 or i % 4:
             states.publish(_state(i * STEP_NS))
 
-    _publish_until(
+    sent = _publish_until(
         graph, send, lambda: 'missing, judging by their period' in graph.message('samples')
     )
     assert graph.count('lost') > 0
+    assert "of joints ['pole', 'wheel']" in graph.message('samples')
+    sent *= STEP_NS
+    _publish_until(
+        graph,
+        lambda i: states.publish(_state(sent + i * STEP_NS)),
+        lambda: 'no warning any more: sgp_node: samples: all joint states' in node.stderr,
+    )
 
 
 @pytest.mark.parametrize('reliability', ['BEST_EFFORT', 'RELIABLE'])
@@ -241,25 +249,29 @@ def test_residual_lies_in_its_band_and_an_alarm_is_said(graph: Graph) -> None:
     residuals = graph.collect(JointState, '/sgp_node/residual')
     overlays = graph.collect(JointState, '/sgp_node/predicted_joint_states')
     bands = [graph.collect(JointState, f'/sgp_node/band/{end}') for end in ('lower', 'upper')]
+    efforts = graph.collect(JointState, '/sgp_node/measured_effort')
     values = graph.collect(JointState, '/sgp_node/parameter_values', KEPT)
     alarms = graph.collect(Bool, '/sgp_node/alarm', KEPT)
     stream = Stream(graph)
 
     def is_all_heard() -> bool:
         stream.publish(20)
-        return all((len(residuals) > 50, *bands, overlays, values, alarms))
+        return all((len(residuals) > 50, *bands, overlays, efforts, values, alarms))
 
     graph.wait_until(is_all_heard, 'every topic')
     lower, upper = ({str(m.header.stamp): m for m in band} for band in bands)
     predicted = {str(m.header.stamp): m for m in overlays}
+    measured = {str(m.header.stamp): m for m in efforts}
     inside = []
     for residual in residuals:
         key = str(residual.header.stamp)
-        if not {key} <= set(lower) & set(upper) & set(predicted):
+        if not {key} <= set(lower) & set(upper) & set(predicted) & set(measured):
             continue
         assert list(residual.name) == ['pole', 'wheel']
         low, high, mean = (np.array(m[key].effort) for m in (lower, upper, predicted))
         error, driven = np.array(residual.effort), ~np.isnan(mean)
+        known = np.array(measured[key].effort)[driven]
+        np.testing.assert_allclose(known, (mean + error)[driven], rtol=1e-9)
         assert driven.tolist() == [False, True]  # a passive joint has no effort
         assert (low <= mean)[driven].all()
         inside += ((low <= mean + error) & (mean + error <= high))[driven].tolist()

@@ -51,13 +51,21 @@ def test_all_is_well_when_every_state_is_used() -> None:
             ["['elbow']", "['pole', 'wheel']", 'robot file'],
         ),
         ({'received': 9, 'missing_joints': ('pole',)}, ERROR, ["contains the joints ['pole']"]),
-        ({'received': 9, 'publishers': ('/a', '/b')}, WARN, ['/a, /b', 'stopped']),
+        (
+            {'received': 9, 'publishers': ('/a', '/b'), 'silent_joints': ('pole',)},
+            WARN,
+            ['9 messages', "['pole']", '/a, /b', 'stopped', 'start it again'],
+        ),
         (
             {'read': 9, 'shared_joints': ('pole',), 'publishers': ('/a', '/b')},
             WARN,
             ["['pole']", '/a, /b'],
         ),
-        ({'read': 90, 'received': 90, 'lost': 10}, WARN, ['10 of 100', 'qos.depth']),
+        (
+            {'read': 90, 'received': 90, 'lost': 10, 'losing_joints': ('wheel',)},
+            WARN,
+            ['10 of 100', "['wheel']", 'qos.depth'],
+        ),
         (
             {'read': 9, 'commands_read': 9, 'commands_refused': {'wrong_kind': 9}},
             ERROR,
@@ -68,13 +76,30 @@ def test_all_is_well_when_every_state_is_used() -> None:
             ERROR,
             ['9 of 9 commands', 'command.joints'],
         ),
-        ({'read': 9, 'refused': {'gap': 1, 'late': 2}}, WARN, ['1 gap, 2 late']),
         (
-            {'read': 9, 'unreadable': 1, 'unreadable_reason': 'x'},
+            {
+                'read': 9,
+                'commands_read': 5,
+                'refused': {'gap': 1, 'late': 2, 'clock': 0},
+                'commands_refused': {'nonfinite': 1},
+            },
             WARN,
-            ['1 messages not readable'],
+            [
+                "joints ['pole', 'wheel']",
+                '1 of 9',
+                'raise max_gap',
+                '2 of 9',
+                'reorder_window',
+                '1 of 5 commands on /arm/command',
+                'check the controller',
+            ],
         ),
-        ({'read': 100, 'estimated': 0}, WARN, ['filter.window']),
+        (
+            {'read': 9, 'unreadable': 1, 'unreadable_reason': 'x', 'publishers': ('/a',)},
+            WARN,
+            ['1 messages on /arm/joint_states or /arm/command not readable: x', 'mend', '/a'],
+        ),
+        ({'read': 100, 'estimated': 0}, WARN, ['100 ', "['pole', 'wheel']", 'filter.window']),
     ],
 )
 def test_the_sentence_says_what_was_found_and_what_to_do(
@@ -87,11 +112,20 @@ def test_the_sentence_says_what_was_found_and_what_to_do(
 
 @pytest.mark.parametrize('reason', REFUSALS)
 def test_every_reason_for_which_states_are_refused_has_a_remedy(reason: str) -> None:
-    _, sentence = judge(_arrivals(read=1, refused={reason: 1}))
-    assert 'see docs' not in sentence
+    for read in (1, 9):
+        level, sentence = judge(_arrivals(read=read, refused={reason: 1}))
+        assert level == (ERROR if read == 1 else WARN)
+        assert 'see docs' not in sentence
+        assert f'1 of {read} joint states' in sentence
+        assert "['pole', 'wheel']" in sentence
 
 
 @pytest.mark.parametrize('reason', COMMAND_REFUSALS)
 def test_every_reason_for_which_commands_are_refused_is_named(reason: str) -> None:
-    _, sentence = judge(_arrivals(read=1, commands_read=1, commands_refused={reason: 1}))
-    assert reason in sentence
+    for read in (1, 9):
+        level, sentence = judge(_arrivals(read=9, commands_read=read,
+                                          commands_refused={reason: 1}))  # fmt: skip
+        assert level == (ERROR if read == 1 else WARN)
+        assert reason in sentence
+        assert 'see docs' not in sentence
+        assert "['pole', 'wheel']" in sentence

@@ -59,6 +59,19 @@ def test_joints_parameters_and_warnings_are_shown() -> None:
     assert picture.others == {'/right/sgp_node'}
 
 
+def test_what_a_report_leaves_out_is_shown_no_more() -> None:
+    """Such as the findings of an earlier diagnosis."""
+    picture = Picture('/sgp_node')
+    samples = Status('sgp_node: samples', 0, 'fine', 'arm', {})
+    finding = Status('sgp_node: diagnosis spring elbow', 1, 'on elbow: spring', 'arm', {})
+    picture.hear(_message(samples, finding))
+    assert 'on elbow: spring' in _shown(picture)
+    picture.hear(_message(Status('left/sgp_node: samples', 0, 'not ours', 'arm', {})))
+    assert 'on elbow: spring' in _shown(picture)
+    picture.hear(_message(samples))
+    assert 'on elbow: spring' not in _shown(picture)
+
+
 @pytest.mark.ros
 def test_a_running_node_is_shown(graph: Graph) -> None:
     """The command ends after one picture, with status 0."""
