@@ -26,8 +26,8 @@ LEAST_JUMP_S = 1.0
 as long: states in between are late."""
 MOST_PENDING = 200
 SHORTEST_ROUND = 16
-"""Fewest states between two jumps of a clock on average; else messages only came late. So many late
-ones in a row, in the order of their stamps, are of a clock that was set back."""
+"""Fewest states between two jumps of a clock on average; else messages only came late. So many
+late ones in a row, in the order of their stamps, are of a clock that was set back."""
 
 
 @dataclass(frozen=True, slots=True)
