@@ -49,7 +49,7 @@ coverage:
 
 oldest: $(OLDEST)/.made
 	$(OLDEST)/bin/python -c 'import numpy, scipy; print("numpy", numpy.__version__, "scipy", scipy.__version__)'
-	$(OLDEST)/bin/python $(PYTEST) -q $(NUMERIC)
+	NUMBA_CACHE_DIR=$(OLDEST)/numba $(OLDEST)/bin/python $(PYTEST) -q $(NUMERIC)
 
 bench: $(VENV)/.test
 	$(BIN)/sgp bench
