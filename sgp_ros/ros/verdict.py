@@ -11,7 +11,7 @@ OK, WARN, ERROR = 0, 1, 2
 """Levels of a DiagnosticStatus."""
 
 _FEW = 20
-_LOST_SHARE = 0.01
+LOST_SHARE = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ def _two_publishers(arrivals: Arrivals) -> tuple[int, str] | None:
 
 
 def _some_lost(arrivals: Arrivals) -> tuple[int, str] | None:
-    if arrivals.lost > _LOST_SHARE * (arrivals.received + arrivals.lost):
+    if arrivals.lost > LOST_SHARE * (arrivals.received + arrivals.lost):
         return WARN, (
             f'{arrivals.lost} of {arrivals.received + arrivals.lost} messages on '
             f'{arrivals.joint_states} are missing, judging by their period, of joints '
