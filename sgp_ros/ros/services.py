@@ -36,7 +36,6 @@ class Services:
         self._node = node
         self._session = session
         self._diagnosing = diagnosing
-        self._settings = settings
         self._file = save_file(str(settings['save.path']), node.get_fully_qualified_name())
         self._offered = [
             node.create_service(kind, f'~/{name}', partial(self._guarded, answer))
@@ -83,22 +82,18 @@ class Services:
     def autosave(self) -> None:
         """Save without keeping messages waiting; what fails is logged."""
         try:
-            self._session.save_beside(self._file, self._saved_settings())
+            self._session.save_beside(self._file)
         except OSError as error:
             self._node.get_logger().error(f'not saved: {error}')
 
     def _save(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
-            self._session.save(self._file, self._saved_settings())
+            self._session.save(self._file)
         except OSError as error:
             response.success, response.message = False, f'not saved: {error}'
         else:
             response.success, response.message = True, str(self._file)
         return response
-
-    def _saved_settings(self) -> dict[str, SettingValue]:
-        own = {name: self._settings[name] for name in ('robot', 'command.type')}
-        return own | self._session.engine.config.to_mapping()
 
     def _diagnose(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.success, response.message = self._diagnosing.start(self._session.engine.config)

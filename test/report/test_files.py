@@ -113,13 +113,13 @@ def test_every_writer_of_results_waits_for_the_others(tmp_path):
     """Models and recordings too, and none is lost on the way."""
     sample = JointSample(10**18, ('a',), np.zeros(1))
     with replacing_results(tmp_path, 'replay'):
-        save_model(tmp_path / 'model.npz', {'a': np.ones(3)}, {'learning.enabled': True})
+        save_model(tmp_path / 'model.npz', {'a': np.ones(3)})
         with RecordingWriter(tmp_path / 'x.mcap') as writer:
             writer.write_event(sample)
         write_text(tmp_path / 'x.json', '1')
         assert not list(tmp_path.glob('[a-z]*'))
     assert {path.name for path in tmp_path.glob('[a-z]*')} == {
-        'model.npz', 'model.yaml', 'x.mcap', 'x.json',
+        'model.npz', 'x.mcap', 'x.json',
     }  # fmt: skip
     assert load_model(tmp_path / 'model.npz')['a'].tolist() == [1.0, 1.0, 1.0]
     assert len(list(open_recording(tmp_path / 'x.mcap').events())) == 1

@@ -262,8 +262,8 @@ def test_a_saved_model_goes_on_in_another_node(graph: Graph, tmp_path: Path) -> 
     assert answer.success
     assert answer.message == str(path)
     assert node.stop() == 0
-    assert sorted(p.name for p in path.parent.iterdir()) == ['model.npz', 'model.yaml']
-    graph.start('sgp_node', file=path.with_suffix('.yaml'), model__path=path)
+    assert list(path.parent.iterdir()) == [path]
+    _start(graph, model__path=path)
     values = graph.answer(graph.parameters().get_parameters(['buffer.budget'])).values
     assert values[0].integer_value == 33
     graph.wait_until(lambda: graph.status('model').get('ready') == '1', 'the saved model')
