@@ -42,7 +42,7 @@ def write_text(path: Path, content: str) -> None:
 
 
 @contextlib.contextmanager
-def replacing_results(out: Path, command: str) -> Iterator[None]:
+def replacing_results(out: Path, command: str, *, keeps_others: bool = False) -> Iterator[None]:
     """Let the results that are written inside take the place of those of the last run.
 
     After an error or a kill those are as they were. Two runs into one folder would mix their
@@ -51,9 +51,11 @@ def replacing_results(out: Path, command: str) -> Iterator[None]:
     Args:
         out: folder of the results, which is made.
         command: whose results they are; those of other commands stay.
+        keeps_others: whether a file that the last run did not write, or that was changed since,
+            is an error instead of being replaced.
 
     Raises:
-        ConfigError: another run writes there.
+        ConfigError: another run writes there, or somebody else's file is in the way.
     """
     out.mkdir(parents=True, exist_ok=True)
     with _locked(out / f'.sgp_{command}.lock'):
@@ -62,6 +64,8 @@ def replacing_results(out: Path, command: str) -> Iterator[None]:
         try:
             with waiting_files(out) as waiting:
                 yield
+                if keeps_others:
+                    _require_ours(out, command, waiting)
             with _undisturbed():
                 _note_moves(out, command, waiting)
                 _make_moves(out, command)
@@ -116,6 +120,17 @@ def _undisturbed() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _require_ours(out: Path, command: str, waiting: Waiting) -> None:
+    listing = _read(out / f'.sgp_{command}.json')
+    for path in waiting:
+        mark = _mark(path)
+        if mark is not None and listing.get(path.name) != mark:
+            raise ConfigError(
+                f'{path} exists, and the last run did not write it or it was changed since',
+                'a new name', 'rename it, choose another --out, or add --force',
+            )  # fmt: skip
 
 
 def _note_moves(out: Path, command: str, waiting: Waiting) -> None:
