@@ -27,13 +27,16 @@ LAYERS = {
     'optional': {'errors'},
     'gp': NUMERIC | {'numba', 'errors'},
     'physics': {'numpy', 'numba', 'errors'},
-    'strangers': {'yaml', 'errors'},
+    'strangers': {'errors'},
+    'markup': {'yaml', 'strangers', 'errors'},
     'apart': {'strangers', 'errors'},
     'scratch': set(),
     'rigid': NUMERIC | {
-        'numba', 'pinocchio', 'clarabel', 'gp', 'physics', 'strangers', 'errors',
+        'numba', 'pinocchio', 'clarabel', 'gp', 'physics', 'markup', 'strangers', 'errors',
     },
-    'robots': {'numpy', 'yaml', 'physics', 'rigid', 'optional', 'apart', 'strangers', 'errors'},
+    'robots': {
+        'numpy', 'yaml', 'physics', 'rigid', 'optional', 'apart', 'markup', 'strangers', 'errors',
+    },
     'simulation': NUMERIC | {
         'mujoco', 'physics.catalogue', 'physics.effect', 'physics.effect_at', 'physics.example',
         'physics.parts', 'physics.law', 'physics.grammar', 'rigid', 'optional', 'errors',
@@ -44,7 +47,7 @@ LAYERS = {
     },
     'recordings': {
         'numpy', 'scipy', 'yaml', 'rosbags', 'mcap', 'lz4', 'zstandard', 'engine.samples',
-        'engine.results', 'optional', 'apart', 'scratch', 'strangers', 'errors',
+        'engine.results', 'optional', 'apart', 'scratch', 'markup', 'strangers', 'errors',
     },
     'diagnosis': NUMERIC | {
         'numba', 'gp', 'physics', 'rigid', 'robots', 'engine', 'batch', 'errors',
@@ -56,7 +59,7 @@ LAYERS = {
     },
     'ros': MESSAGES | {'optional', 'report.layouts'} | {
         'numpy', 'yaml', 'engine', 'physics', 'robots', 'simulation', 'diagnosis', 'recordings',
-        'strangers', 'errors',
+        'markup', 'strangers', 'errors',
     },
     'apps': {
         'numpy', 'yaml', 'matplotlib', 'gp', 'physics', 'rigid', 'robots', 'simulation', 'engine',

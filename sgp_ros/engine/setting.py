@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import cast
@@ -58,7 +59,8 @@ class Setting:
         numbers: Iterable[object] = value if isinstance(value, (list, tuple)) else (value,)
         for number in numbers:
             if isinstance(number, (int, float)) and not isinstance(number, bool):
-                if not math.isfinite(number) or not self.low <= number <= self.high:
+                is_finite = abs(number) <= sys.float_info.max  # also of an integer beyond it
+                if not is_finite or not self.low <= number <= self.high:
                     return prefix
             elif self.choices and number not in self.choices:
                 return prefix

@@ -16,14 +16,8 @@ import numpy as np
 import yaml
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.strangers import (
-    load_yaml,
-    read_text,
-    readable,
-    replace_file,
-    require_file,
-    require_within,
-)
+from sgp_ros.markup import load_yaml
+from sgp_ros.strangers import read_text, readable, replace_file, require_file, require_within
 
 NODE_ONLY = frozenset({
     'command.type', 'diagnosis.window', 'diagnostics.period', 'joints', 'model.path',

@@ -14,6 +14,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.markup import parse_xml
 from sgp_ros.rigid.urdf_model import (
     MOVING,
     Urdf,
@@ -21,7 +22,7 @@ from sgp_ros.rigid.urdf_model import (
     commanded_joints,
     mimic_parameters,
 )
-from sgp_ros.strangers import parse_xml, read_text, require_within
+from sgp_ros.strangers import read_text, require_within
 
 _KNOWN = (*MOVING, 'fixed')
 _INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')

@@ -19,8 +19,9 @@ import numpy as np
 import yaml
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.markup import load_yaml
 from sgp_ros.physics.drive import servo_parts
-from sgp_ros.strangers import load_yaml, read_text
+from sgp_ros.strangers import read_text
 
 _KEYS = ('kp', 'kd', 'feedforward')
 _FEEDFORWARD = ('none', 'gravity')

@@ -27,12 +27,13 @@ from typing import Any
 import yaml
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.markup import load_yaml
 from sgp_ros.robots.entries import Entries, is_finite
 from sgp_ros.robots.lumped import LUMPED_KEYS, build_lumped_robot
 from sgp_ros.robots.models.door import MODEL_ENDINGS, find_file, read_model
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.shipped import shipped_folder
-from sgp_ros.strangers import load_yaml, read_text, readable, require_file
+from sgp_ros.strangers import read_text, readable, require_file
 
 _KEYS = frozenset({'schema', 'robot', 'joints', 'parameters'})
 _URDF_KEYS = frozenset({
