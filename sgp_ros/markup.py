@@ -63,7 +63,7 @@ class _Keys:
         """Take the beginning of a key or of a value; they alternate."""
         if self._is_next and isinstance(event, yaml.ScalarEvent) and event.value != '<<':
             if event.value in self._seen:
-                line = event.start_mark.line + 1
+                line = 0 if event.start_mark is None else event.start_mark.line + 1
                 raise YAMLError(f'the key {event.value[:80]!r} stands there again in line {line}')
             self._seen.add(event.value)
         self._is_next = not self._is_next

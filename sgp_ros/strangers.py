@@ -83,7 +83,7 @@ def require_file(path: Path, name: str = '') -> None:
 def is_usable(value: object) -> bool:
     """Whether a value is a number that a model may have: of a magnitude up to `GREATEST`."""
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return is_number and abs(value) <= GREATEST  # type: ignore[operator]  # a number by now
+    return is_number and abs(value) <= GREATEST  # type: ignore[arg-type]  # a number by now
 
 
 def create_beside(path: Path) -> tuple[BinaryIO, Path]:

@@ -46,3 +46,47 @@ def test_a_setting_of_an_integer_that_no_float_holds_is_refused():
     for name in ('filter.window', 'hyper.pole.length_scales'):
         with pytest.raises(ConfigError, match=name):
             EngineConfig.from_mapping({name: int(LARGE)}, robot)
+
+
+URDF = """<robot name="x"><link name="b"/><joint name="a" type="revolute"><parent link="b"/>
+<child link="r"/><origin xyz="{place} 0 0"/><axis xyz="0 0 1"/><limit lower="-2" upper="{upper}"
+velocity="9" effort="9"/><dynamics damping="{damping}"/></joint><link name="r"><inertial>
+<origin xyz="0.1 0 0"/><mass value="{mass}"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0"
+iyz="0"/></inertial></link></robot>"""
+GIVEN = {'place': '0', 'upper': '2', 'damping': '0.1', 'mass': '1'}
+
+
+@pytest.mark.parametrize('what', ['place', 'damping', 'mass'])
+def test_numbers_of_a_urdf_beyond_what_products_hold_are_refused(tmp_path, what):
+    path = tmp_path / 'x.urdf'
+    path.write_text(URDF.format(**{**GIVEN, what: '1e308'}))
+    with pytest.raises(ConfigError, match=r'1e308.*a finite number up to 1e\+30'):
+        load_robot(str(path))
+    path.write_text(URDF.format(**{**GIVEN, what: '-1e-320'}))
+    load_robot(str(path))  # as without
+
+
+def test_a_limit_beyond_all_numbers_is_none(tmp_path):
+    """As programs write it that know of no other way."""
+    path = tmp_path / 'x.urdf'
+    path.write_text(URDF.format(**{**GIVEN, 'upper': '1.79769e+308'}))
+    assert load_robot(str(path)).joints[0].upper == float('inf')
+
+
+@pytest.mark.parametrize(
+    'entry',
+    [
+        'effort_gain: {a: 1.0e+308}', 'effort_gain: {a: 1.0e-308}', 'coulomb_width: 1.0e-308',
+        'parameters: {a.coulomb: {value: 1.0e+308}}',
+        'parameters: {a.coulomb: {value: 1.0, std: 1.0e-308}}',
+        'payload: {link: r, mass: 1.0e+308}', 'prior: {inertial: {spread: 1.0e+308}}',
+        'effects: [{effect: spring, joint: a, parameters: {stiffness: {value: 1.0e+308}}}]',
+    ],
+)  # fmt: skip
+def test_numbers_of_a_robot_file_beyond_what_products_hold_are_refused(tmp_path, entry):
+    (tmp_path / 'x.urdf').write_text(URDF.format(**GIVEN))
+    path = tmp_path / 'x.yaml'
+    path.write_text(f'schema: 1\nurdf: x.urdf\n{entry}\n')
+    with pytest.raises(ConfigError, match=r'1e[+-]308') as caught:
+        load_robot(str(path))
+    assert '\n' not in str(caught.value)
