@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
@@ -39,6 +40,7 @@ class Setting:
         low, high: inclusive range of a number.
         choices: the only values of a string, empty for any.
         read_only: whether a running node refuses to change it.
+        pattern: regular expression that a string must match as a whole, empty for any.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Setting:
     high: float = math.inf
     choices: Collection[str] = ()
     read_only: bool = False
+    pattern: str = ''
 
     def problem(self, value: object) -> str | None:
         """Say what is wrong with `value`, or None."""
@@ -62,7 +65,9 @@ class Setting:
                 is_finite = abs(number) <= sys.float_info.max  # also of an integer beyond it
                 if not is_finite or not self.low <= number <= self.high:
                     return prefix
-            elif self.choices and number not in self.choices:
+            elif (self.choices and number not in self.choices) or (
+                self.pattern and not re.fullmatch(self.pattern, str(number))
+            ):
                 return prefix
         return None
 
@@ -80,6 +85,8 @@ class Setting:
         text = KINDS[self.kind]
         if self.choices:
             text += ', one of ' + ', '.join(self.choices)
+        if self.pattern:
+            text += f' that matches {self.pattern}'
         if math.isfinite(self.low) and math.isfinite(self.high):
             text += f' from {self.low:g} to {self.high:g}'
         elif math.isfinite(self.low):

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from sgp_ros.errors import ConfigError
+from sgp_ros.errors import ConfigError, SgpError
 from sgp_ros.markup import load_yaml
 from sgp_ros.strangers import read_text, readable, replace_file, require_file, require_within
 
@@ -23,7 +23,7 @@ NODE_ONLY = frozenset({
     'command.type', 'diagnosis.window', 'diagnostics.period', 'joints', 'model.path',
     'monitor.duration', 'monitor.false_alarms', 'parameters.period', 'qos.depth', 'record.path',
     'record.split.age', 'record.split.size', 'robot', 'robot_description', 'save.path',
-    'save.period', 'save.restore', 'start_type_description_service', 'use_sim_time',
+    'save.name', 'save.period', 'save.restore', 'start_type_description_service', 'use_sim_time',
 })  # fmt: skip
 """Parameters of the node that mean nothing to a command; a test holds them to the node's."""
 
@@ -44,6 +44,16 @@ def save_model(path: Path, snapshot: Mapping[str, np.ndarray]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     arrays: dict[str, Any] = {**snapshot, _HASH: np.array(_hash(snapshot))}
     replace_file(path, lambda file: np.savez(file, **arrays))
+
+
+def is_model(path: Path) -> bool:
+    """Whether a file has the entries that `save_model` writes, of which none is read."""
+    try:
+        require_file(path)
+        with zipfile.ZipFile(path) as archive:
+            return {f'{_HASH}.npy', 'json.npy'} <= set(archive.namelist())
+    except (SgpError, OSError, ValueError, zipfile.BadZipFile):
+        return False
 
 
 def load_model(path: Path) -> dict[str, np.ndarray]:

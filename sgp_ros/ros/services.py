@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
@@ -11,9 +12,11 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
 from sgp_ros.engine.samples import SettingValue
+from sgp_ros.recordings.model_files import is_model
 from sgp_ros.ros.diagnosing import Diagnosing
 from sgp_ros.ros.record import save_file
 from sgp_ros.ros.session import Session
+from sgp_ros.ros.settings import SAVE_NAME
 
 
 class Services:
@@ -87,12 +90,16 @@ class Services:
             self._node.get_logger().error(f'not saved: {error}')
 
     def _save(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        name = self._node.get_parameter(SAVE_NAME.name).value
+        path = self._file.with_name(f'{name}.npz') if name else self._file
         try:
-            self._session.save(self._file)
+            if name and os.path.lexists(path) and not is_model(path):
+                raise FileExistsError(f'{path} exists and is no saved model')
+            self._session.save(path)
         except OSError as error:
             response.success, response.message = False, f'not saved: {error}'
         else:
-            response.success, response.message = True, str(self._file)
+            response.success, response.message = True, str(path)
         return response
 
     def _diagnose(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
