@@ -89,8 +89,10 @@ def _run(arguments: dict[str, Any]) -> int:
     is_new = out is not None and not out.exists()
     try:
         _load('sgp_ros.scratch:sweep')()
-        if name == BESIDE_INPUT and not is_forced:
-            require_own_recording(arguments['table'], out)
+        if name == BESIDE_INPUT:
+            arguments['is_forced'] = is_forced
+            if not is_forced:
+                require_own_recording(arguments['table'], out)
         elif out is not None and not is_forced:
             require_own_folder(out)
         with _text_to(is_quiet=is_quiet, prints_json=prints_json):

@@ -13,10 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any, BinaryIO
-from xml.etree import ElementTree as ET
-
-import yaml
+from typing import BinaryIO
 
 from sgp_ros.errors import SgpError
 
@@ -31,16 +28,15 @@ of one chunk of a recording [MB]; how many times its own size a recording unpack
 a recording that are held at once [MB]; numbers of messages of a recording, of rows and of cells of
 a table; nesting, entries and aliases of YAML or XML; links of a robot; characters of a line; time
 for a file that is read in a process of its own [s]."""
-_QUOTED = ('"', "'", '|', '>')
 _MEGABYTE = 1 << 20
 _GROWING = '.sgp_growing_'
-YAMLError = yaml.YAMLError
-_LOADER: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-_LIBYAML_DEPTH = 1000
-"""The one in C is ten times as fast."""
 Waiting = dict[Path, Path]
 """Name in the end to the name of the complete file that waits for it."""
 _WAITING: ContextVar[tuple[Path, Waiting] | None] = ContextVar('_WAITING', default=None)
+
+
+GREATEST, LEAST = 1e30, 1e-30
+"""Magnitudes between which numbers of models lie: what is computed of them still is a number."""
 
 
 class TooMuchError(SgpError):
@@ -82,6 +78,12 @@ def require_file(path: Path, name: str = '') -> None:
         raise TooMuchError(f'{path} is not a regular file', 'a file', 'copy its content to a file')
     if name:
         require_within(found.st_size / _MEGABYTE, name, f'size of {path} in MB')
+
+
+def is_usable(value: object) -> bool:
+    """Whether a value is a number that a model may have: of a magnitude up to `GREATEST`."""
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return is_number and abs(value) <= GREATEST  # type: ignore[arg-type]  # a number by now
 
 
 def create_beside(path: Path) -> tuple[BinaryIO, Path]:
@@ -212,71 +214,6 @@ def read_lines(path: Path, name: str) -> Iterator[str]:
             if len(text) > most:
                 require_within(len(text), 'LINE', f'length of a line of {path}')
             yield text
-
-
-def load_yaml(text: str) -> Any:
-    """Return what a YAML text holds.
-
-    Raises:
-        TooMuchError: more nesting, entries or aliases than a settings file has.
-        yaml.YAMLError: no YAML.
-    """
-    try:
-        _require_bounded(text)
-    except YAMLError as error:
-        if 'nesting depth' in str(error):  # libyaml has a limit of its own, and looks ahead
-            require_within(_LIBYAML_DEPTH, 'DEPTH', 'nesting depth of the YAML')
-        raise
-    try:
-        return yaml.load(text, Loader=_LOADER)  # noqa: S506  # a safe one
-    except (ValueError, TypeError, OverflowError) as error:  # such as a date of month 13
-        raise YAMLError(' '.join(str(error).split())) from error
-
-
-def _require_bounded(text: str) -> None:
-    """Refuse a YAML text beyond a bound; an alias counts as all that it stands for."""
-    aliases = entries = 0
-    inside: list[tuple[str | None, int]] = []
-    sizes: dict[str | None, int] = {}
-    for event in yaml.parse(text, Loader=_LOADER):
-        if isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent)):
-            inside.append((event.anchor, entries))
-            require_within(len(inside), 'DEPTH', 'nesting depth of the YAML')
-        elif isinstance(event, (yaml.MappingEndEvent, yaml.SequenceEndEvent)):
-            anchor, before = inside.pop()
-            sizes[anchor] = entries - before
-        elif isinstance(event, yaml.ScalarEvent):
-            sizes[event.anchor] = 1
-            if event.style not in _QUOTED:  # it is tried as a number
-                require_within(len(event.value), 'LINE', 'length of an entry in the YAML')
-        elif isinstance(event, yaml.AliasEvent):
-            aliases += 1
-            require_within(aliases, 'ALIASES', 'number of aliases in the YAML')
-            if event.anchor not in sizes:
-                raise YAMLError(f'the alias {event.anchor} stands for nothing before it')
-            entries += sizes[event.anchor]
-        entries += 1
-        require_within(entries, 'ENTRIES', 'number of entries in the YAML')
-
-
-def parse_xml(text: str) -> ET.Element:
-    """Return the root of an XML text without entities.
-
-    Raises:
-        TooMuchError: more nesting or elements than a robot has.
-        ET.ParseError: no XML.
-    """
-    parser: Any = ET.XMLPullParser(('start', 'end'))
-    depth = entries = 0
-    for start in range(0, len(text), _MEGABYTE):
-        parser.feed(text[start : start + _MEGABYTE])
-        for kind, _ in parser.read_events():
-            depth += 1 if kind == 'start' else -1
-            entries += 1
-            require_within(depth, 'DEPTH', 'nesting depth of the XML')
-            require_within(entries, 'ENTRIES', 'number of elements in the XML')
-    parser.close()
-    return ET.fromstring(text)  # noqa: S314  # callers refuse document types and entities
 
 
 @contextmanager

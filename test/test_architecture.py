@@ -27,13 +27,16 @@ LAYERS = {
     'optional': {'errors'},
     'gp': NUMERIC | {'numba', 'errors'},
     'physics': {'numpy', 'numba', 'errors'},
-    'strangers': {'yaml', 'errors'},
+    'strangers': {'errors'},
+    'markup': {'yaml', 'strangers', 'errors'},
     'apart': {'strangers', 'errors'},
     'scratch': set(),
     'rigid': NUMERIC | {
-        'numba', 'pinocchio', 'clarabel', 'gp', 'physics', 'strangers', 'errors',
+        'numba', 'pinocchio', 'clarabel', 'gp', 'physics', 'markup', 'strangers', 'errors',
     },
-    'robots': {'numpy', 'yaml', 'physics', 'rigid', 'optional', 'apart', 'strangers', 'errors'},
+    'robots': {
+        'numpy', 'yaml', 'physics', 'rigid', 'optional', 'apart', 'markup', 'strangers', 'errors',
+    },
     'simulation': NUMERIC | {
         'mujoco', 'physics.catalogue', 'physics.effect', 'physics.effect_at', 'physics.example',
         'physics.parts', 'physics.law', 'physics.grammar', 'rigid', 'optional', 'errors',
@@ -44,7 +47,7 @@ LAYERS = {
     },
     'recordings': {
         'numpy', 'scipy', 'yaml', 'rosbags', 'mcap', 'lz4', 'zstandard', 'engine.samples',
-        'engine.results', 'optional', 'apart', 'scratch', 'strangers', 'errors',
+        'engine.results', 'optional', 'apart', 'scratch', 'markup', 'strangers', 'errors',
     },
     'diagnosis': NUMERIC | {
         'numba', 'gp', 'physics', 'rigid', 'robots', 'engine', 'batch', 'errors',
@@ -57,7 +60,7 @@ LAYERS = {
     'ros': MESSAGES | {
         'optional', 'report.layouts', 'report.verdict', 'report.diagnosis_text',
         'numpy', 'yaml', 'engine', 'physics', 'robots', 'simulation', 'diagnosis', 'recordings',
-        'strangers', 'errors',
+        'markup', 'strangers', 'errors',
     },
     'apps': {
         'numpy', 'yaml', 'matplotlib', 'gp', 'physics', 'rigid', 'robots', 'simulation', 'engine',
@@ -144,7 +147,7 @@ def _texts(path):
 
 def test_files_of_strangers_are_read_through_one_door():
     """`strangers.read_text` refuses pipes and what is too large; the others read their own."""
-    own = {'strangers.py', 'page.py', 'files.py', 'live_processes.py', 'campaign.py',
+    own = {'strangers.py', 'page.py', 'live_processes.py', 'campaign.py',
            'listing.py', 'cli.py'}  # fmt: skip
     found = {path.name for path in MODULES if '.read_text(' in path.read_text(encoding='utf-8')}
     assert found == own

@@ -373,6 +373,33 @@ def test_an_import_replaces_its_own_recording_alone(tmp_path, capsys):
     assert recording.exists()
 
 
+@pytest.mark.parametrize('given', ['nothing', 'map'])
+def test_an_import_keeps_maps_and_gains_that_it_did_not_write(tmp_path, capsys, given):
+    """Nor one that was corrected since."""
+    table, own = tmp_path / 'log.csv', tmp_path / 'log_map.yaml'
+    rows = ''.join(f'{0.01 * i:.2f},{np.sin(0.1 * i):.6f},0.1\n' for i in range(50))
+    table.write_text('t,q,v\n' + rows)
+    command = ['import', table, '--out', tmp_path]
+    if given == 'map':
+        q, v = (f'{{position: {{column: {name}, unit: rad}}}}' for name in 'qv')
+        own.write_text(
+            f'time: {{column: t, unit: s}}\njoints: {{a: {q}}}\ntargets: {{a: {v}}}\n'
+            'gains: {kp: {a: 3.0}, kd: {a: 1.0}}\n'
+        )
+        command, own = [*command, '--map', own], tmp_path / 'log_gains.yaml'
+    own.write_text('mine')
+    assert f'{own.name} exists' in _refused(command, capsys)
+    assert own.read_text() == 'mine'
+    assert not (tmp_path / 'log.mcap').exists()
+    command = [str(word) for word in command]
+    assert main([*command, '--force']) == 0
+    assert main(command) == 0
+    capsys.readouterr()
+    own.write_text('corrected')
+    assert f'{own.name} exists' in _refused(command, capsys)
+    assert own.read_text() == 'corrected'
+
+
 def test_a_reader_that_has_seen_enough_is_no_error():
     """As in `sgp effects | head -1`: nothing is complained of."""
     done = subprocess.run(

@@ -134,7 +134,7 @@ def _add_replay(add: AddCommand) -> None:
         'sgp replay robot.mcap --robot linear_axis --out out/replay',
     )  # fmt: skip
     _add_recording(parser)
-    parser.add_argument('--params', metavar='YAML', help="ROS 2 parameters (default: the robot's)")
+    parser.add_argument('--params', metavar='FILE', help="parameters or model (default: robot's)")
     parser.add_argument('--model', metavar='NPZ', help='continue from a saved model')
     parser.add_argument('--frozen', dest='is_learning', action='store_false',
                         help='predict and score without learning')  # fmt: skip

@@ -97,6 +97,8 @@ def run_campaign(
     found = find_recordings(bag)
     table = read_covariates(chosen.covariates, tuple(found), remarks)
     jobs = _jobs(found, robot, chosen)
+    if (out / RESULTS).is_symlink():
+        raise ConfigError(f'{out / RESULTS} is a link', 'no link there', 'remove it')
     (out / RESULTS).mkdir(parents=True, exist_ok=True)
     mark_folder(out, 'campaign')  # an interrupted run has left its sign
     with replacing_results(out, 'campaign'):

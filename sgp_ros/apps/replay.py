@@ -50,7 +50,7 @@ class ReplayOptions:
         joint_states: topic of the states; None chooses it.
         command: topic of the commands; None chooses it, `none` takes no commands.
         effort: the effort that acts, a key of `EFFORT_SOURCES`; `auto` leaves the settings.
-        params: ROS 2 parameter file; None takes the shipped one of the robot, if there is one.
+        params: ROS 2 parameter file, or saved model; None takes the robot's, if one is shipped.
         model: saved model to continue from; None starts anew.
         is_learning: whether to learn, or only to predict and score.
         truth: `truth.json` of a simulation to compare the parameters with.

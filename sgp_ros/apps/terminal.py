@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import json
 import os
+import stat
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -55,13 +56,21 @@ def require_own_folder(out: Path) -> None:
     if not out.is_dir():
         return
     names = sorted({path.name for path in out.iterdir()} - _imported(out))
-    if names and not any(name.startswith(_LISTING) for name in names):
+    if not all(name.startswith(_LISTING) for name in names) and not _is_marked(out, names):
         shown = ', '.join(names[:3]) + (', ...' if len(names) > 3 else '')
         raise ConfigError(
             f'{out} contains files that sgp did not write ({shown})',
             'a new folder, or one that sgp wrote',
             'choose another --out, or add --force',
         )  # fmt: skip
+
+
+def _is_marked(out: Path, names: Sequence[str]) -> bool:
+    """Whether a folder has the listing of a command, or the note of one that was killed."""
+    from sgp_ros.report.files import was_cut_off  # noqa: PLC0415 - it takes time
+
+    listings = [name for name in names if name.startswith(_LISTING) and name.endswith('.json')]
+    return any(stat.S_ISREG((out / name).lstat().st_mode) for name in listings) or was_cut_off(out)
 
 
 def require_own_recording(table: str, out: Path) -> None:
@@ -104,12 +113,12 @@ def mark_folder(out: Path, command: str) -> None:
     What runs that were killed have left there is removed.
     """
     if out.is_dir():
-        from sgp_ros.strangers import remove_growing  # noqa: PLC0415 - it takes time
+        from sgp_ros.strangers import remove_growing, replace_file  # noqa: PLC0415 - as above
 
         remove_growing(out)
         listing = out / f'{_LISTING}{command}.json'
         if not listing.exists():
-            listing.write_text('{}\n', encoding='utf-8')
+            replace_file(listing, lambda stream: stream.write(b'{}\n'))
 
 
 def run_robots(out: Path | None, progress: Callable[[float], None]) -> dict[str, Any]:  # noqa: ARG001 - it writes nothing

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+import sys
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import cast
@@ -38,6 +40,7 @@ class Setting:
         low, high: inclusive range of a number.
         choices: the only values of a string, empty for any.
         read_only: whether a running node refuses to change it.
+        pattern: regular expression that a string must match as a whole, empty for any.
     """
 
     name: str
@@ -49,6 +52,7 @@ class Setting:
     high: float = math.inf
     choices: Collection[str] = ()
     read_only: bool = False
+    pattern: str = ''
 
     def problem(self, value: object) -> str | None:
         """Say what is wrong with `value`, or None."""
@@ -58,9 +62,12 @@ class Setting:
         numbers: Iterable[object] = value if isinstance(value, (list, tuple)) else (value,)
         for number in numbers:
             if isinstance(number, (int, float)) and not isinstance(number, bool):
-                if not math.isfinite(number) or not self.low <= number <= self.high:
+                is_finite = abs(number) <= sys.float_info.max  # also of an integer beyond it
+                if not is_finite or not self.low <= number <= self.high:
                     return prefix
-            elif self.choices and number not in self.choices:
+            elif (self.choices and number not in self.choices) or (
+                self.pattern and not re.fullmatch(self.pattern, str(number))
+            ):
                 return prefix
         return None
 
@@ -78,6 +85,8 @@ class Setting:
         text = KINDS[self.kind]
         if self.choices:
             text += ', one of ' + ', '.join(self.choices)
+        if self.pattern:
+            text += f' that matches {self.pattern}'
         if math.isfinite(self.low) and math.isfinite(self.high):
             text += f' from {self.low:g} to {self.high:g}'
         elif math.isfinite(self.low):

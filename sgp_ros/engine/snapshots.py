@@ -16,20 +16,13 @@ import numpy as np
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.estimator import Estimator
+from sgp_ros.engine.event_text import decode, decode_state, encode, encode_state
 from sgp_ros.engine.gate import Before, Gate
 from sgp_ros.engine.held_commands import CommandHistory
 from sgp_ros.engine.hyperparameters import kernel_named
-from sgp_ros.engine.intake import State
 from sgp_ros.engine.prior_knowledge import empty_baseline, empty_regression
-from sgp_ros.engine.samples import (
-    EFFORT,
-    CommandSample,
-    Event,
-    JointSample,
-    Reset,
-    SettingsChange,
-    frozen_array,
-)
+from sgp_ros.engine.samples import JointSample, frozen_array
+from sgp_ros.engine.snapshot_shapes import require_arrays
 from sgp_ros.errors import ConfigError
 from sgp_ros.gp.kernel import Kernel
 from sgp_ros.gp.model import Model
@@ -37,6 +30,8 @@ from sgp_ros.gp.regression import Regression
 from sgp_ros.robots.robot import Robot
 
 VERSION = 11
+_TRIED = 40
+"""Samples that a model must go on for before it is taken."""
 _WAITING = ('U', 'F', 'y', 'held')
 
 
@@ -77,17 +72,17 @@ def _plain(engine: Engine) -> dict[str, Any]:
         if order.released_ns is None
         else [order.released_ns, order.released_rank],
         'newest_ns': order.newest_ns,
-        'pending': [_encode(event) for event in order.pending],
-        'suspects': [_encode(event) for event in engine.clock.pending],
+        'pending': [encode(event) for event in order.pending],
+        'suspects': [encode(event) for event in engine.clock.pending],
         'behind': list(engine.clock.behind),
         'began_ns': engine.began_ns,
         'commands': _held(intake.commands),
         'targets': _held(intake.targets),
-        'states': [_encode_state(state) for state in engine.filter.windows.states],
+        'states': [encode_state(state) for state in engine.filter.windows.states],
         'next_ns': engine.filter.windows.next_ns,
         'trial': None
         if engine.filter.trial is None
-        else [None if s is None else _encode_state(s) for s in engine.filter.trial.states],
+        else [None if s is None else encode_state(s) for s in engine.filter.trial.states],
         'last_state_ns': intake.last_state_ns,
         'is_measured': intake.is_measured,
         'impossible': intake.limits.impossible,
@@ -114,24 +109,56 @@ def snapshot_config(snapshot: Mapping[str, np.ndarray], robot: Robot) -> EngineC
             f'a snapshot of robot {text["robot"]} with parameters {text["coefficients"]}',
             f'robot {robot.name} with parameters {names}',
         )
+    if not isinstance(text['settings'], dict):
+        raise ConfigError(f'a snapshot with the settings {text["settings"]!r}', 'a mapping')
     return EngineConfig.from_mapping(text['settings'], robot)
 
 
 def restored(robot: Robot, snapshot: Mapping[str, np.ndarray]) -> Engine:
     """Return an engine that continues exactly where `snapshot` was taken, with its settings.
 
+    Another one goes on for a few samples first: parts that do not fit each other show in use.
+
     Raises:
-        ConfigError: no snapshot, or one of another version or robot.
+        ConfigError: no snapshot, one of another version or robot, or one that cannot be used.
     """
-    engine = Engine(robot, snapshot_config(snapshot, robot))
+    config = snapshot_config(snapshot, robot)
+    tried = Engine(robot, config)
+    require_arrays(snapshot, len(robot.joints), tried.estimator.prior.size)
     try:
+        with np.errstate(all='ignore'):
+            _fill(tried, snapshot)
+            _use(tried)
+        engine = Engine(robot, config)
         _fill(engine, snapshot)
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
+    except Exception as error:
+        said = ' '.join(f'{type(error).__name__}: {error}'.split())[:200]
         raise ConfigError(
-            f'a snapshot whose parts do not fit each other ({type(error).__name__}: {error})',
+            f'a snapshot whose parts do not fit each other ({said})',
             'a model saved by this version',
         ) from error
     return engine
+
+
+def _use(engine: Engine) -> None:
+    """Let an engine that is then thrown away predict, learn and tell what it knows."""
+    robot, config = engine.robot, engine.config
+    states = engine.filter.windows.states
+    start = states[-1].position if states else np.zeros(len(robot.joints))
+    begin_ns = max(engine.order.newest_ns or 0, 0)
+    engine.begin_stream()
+    step_ns = max(round(min(config.filter_window / 8.0, 0.01) * 1e9), 1)
+    for i in range(_TRIED):
+        x = frozen_array(start + 1e-3 * np.sin(0.7 * i))
+        state = JointSample(begin_ns + (i + 1) * step_ns, robot.joint_names, x, effort=x)
+        for failure in engine.push(state).failures:
+            raise failure.error
+    for failure in engine.flush().failures:
+        raise failure.error
+    for tell in (engine.parameters, engine.scores, engine.hyper_settings,
+                 engine.physics_parameters, engine.process_weights):  # fmt: skip
+        tell()
+    take_snapshot(engine)
 
 
 def _held(history: CommandHistory) -> list[Any]:
@@ -153,11 +180,11 @@ def _fill(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
     for history, name in ((intake.commands, 'commands'), (intake.targets, 'targets')):
         for stamp, values in text.get(name, ()):
             history.add(stamp, np.array(values))
-    engine.filter.windows.states = [_decode_state(state) for state in text['states']]
+    engine.filter.windows.states = [decode_state(state) for state in text['states']]
     engine.filter.windows.next_ns = text['next_ns']
     if engine.filter.trial is not None:
         for entry in text['trial']:
-            engine.filter.trial.add(None if entry is None else _decode_state(entry))
+            engine.filter.trial.add(None if entry is None else decode_state(entry))
     intake.last_state_ns = text['last_state_ns']
     intake.is_measured = text['is_measured']
     intake.limits.impossible = text['impossible']
@@ -165,9 +192,9 @@ def _fill(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
     engine.order.resume(
         None if released is None else (released[0], released[1]),
         text['newest_ns'],
-        [_decode(event) for event in text['pending']],
+        [decode(event) for event in text['pending']],
     )
-    engine.clock.pending = [_decode(event) for event in text['suspects']]
+    engine.clock.pending = [decode(event) for event in text['suspects']]
     count, last_ns = text['behind']
     engine.clock.behind = int(count), int(last_ns)
     engine.began_ns = text['began_ns']
@@ -230,58 +257,3 @@ def _text(snapshot: Mapping[str, np.ndarray]) -> dict[str, Any]:
     if not isinstance(text, dict) or not {'robot', 'coefficients', 'settings'} <= set(text):
         raise ConfigError('a snapshot with another description', 'a saved model')
     return text
-
-
-def _listed(values: np.ndarray | None) -> list[float] | None:
-    return None if values is None else [float(value) for value in values]
-
-
-def _encode(event: Event) -> dict[str, Any]:
-    if isinstance(event, JointSample):
-        return {
-            'kind': 'state', 'stamp_ns': event.stamp_ns, 'names': event.names,
-            'position': _listed(event.position), 'velocity': _listed(event.velocity),
-            'effort': _listed(event.effort),
-        }  # fmt: skip
-    if isinstance(event, CommandSample):
-        return {
-            'kind': 'command', 'stamp_ns': event.stamp_ns, 'names': event.names,
-            'effort': _listed(event.effort), 'asks': event.kind,
-            'velocity': _listed(event.velocity),
-        }  # fmt: skip
-    if isinstance(event, SettingsChange):
-        return {'kind': 'change', 'stamp_ns': event.stamp_ns, 'settings': dict(event.settings)}
-    return {'kind': 'reset', 'stamp_ns': event.stamp_ns}
-
-
-def _decode(entry: dict[str, Any]) -> Event:
-    stamp = entry['stamp_ns']
-    if entry['kind'] == 'state':
-        velocity, effort = (
-            None if entry[name] is None else frozen_array(entry[name])
-            for name in ('velocity', 'effort')
-        )
-        names = tuple(entry['names'])
-        return JointSample(stamp, names, frozen_array(entry['position']), velocity, effort)
-    if entry['kind'] == 'command':
-        known = None if entry['names'] is None else tuple(entry['names'])
-        rates = entry.get('velocity')
-        return CommandSample(
-            stamp, frozen_array(entry['effort']), known, entry.get('asks', EFFORT),
-            None if rates is None else frozen_array(rates),
-        )  # fmt: skip
-    if entry['kind'] == 'change':
-        return SettingsChange(stamp, entry['settings'])
-    return Reset(stamp)
-
-
-def _encode_state(state: State) -> list[Any]:
-    return [
-        state.stamp_ns, _listed(state.position), _listed(state.velocity), _listed(state.effort)
-    ]  # fmt: skip
-
-
-def _decode_state(entry: list[Any]) -> State:
-    position, velocity, effort = (None if x is None else np.array(x) for x in entry[1:])
-    assert position is not None
-    return State(entry[0], position, velocity, effort)

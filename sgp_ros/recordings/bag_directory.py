@@ -13,12 +13,13 @@ import yaml
 import zstandard
 
 from sgp_ros.errors import RecordingError
+from sgp_ros.markup import load_yaml
 from sgp_ros.recordings.bag_source import SqliteSource
 from sgp_ros.recordings.mcap_source import McapSource
 from sgp_ros.recordings.topics import RawMessage, Source, Topic
 from sgp_ros.recordings.unpacking import Unpacking
 from sgp_ros.scratch import Scratch
-from sgp_ros.strangers import load_yaml, read_text, require_file
+from sgp_ros.strangers import read_text, require_file
 
 _KINDS: dict[str, type[McapSource | SqliteSource]] = {'.mcap': McapSource, '.db3': SqliteSource}
 _PACKED = '.zstd'

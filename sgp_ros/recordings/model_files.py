@@ -1,11 +1,12 @@
 """Files of saved models and of settings: written whole or not at all, read with every check.
 
-Settings stand in ROS 2 parameter files, the same for the node and for the commands.
+Settings stand in ROS 2 parameter files, the same for the node and for the commands, and in models.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,22 +15,15 @@ from typing import Any
 import numpy as np
 import yaml
 
-from sgp_ros.engine.samples import SettingValue
-from sgp_ros.errors import ConfigError
-from sgp_ros.strangers import (
-    load_yaml,
-    read_text,
-    readable,
-    replace_file,
-    require_file,
-    require_within,
-)
+from sgp_ros.errors import ConfigError, SgpError
+from sgp_ros.markup import load_yaml
+from sgp_ros.strangers import read_text, readable, replace_file, require_file, require_within
 
 NODE_ONLY = frozenset({
     'command.type', 'diagnosis.window', 'diagnostics.period', 'joints', 'model.path',
     'monitor.duration', 'monitor.false_alarms', 'parameters.period', 'qos.depth', 'record.path',
     'record.split.age', 'record.split.size', 'robot', 'robot_description', 'save.path',
-    'save.period', 'save.restore', 'start_type_description_service', 'use_sim_time',
+    'save.name', 'save.period', 'save.restore', 'start_type_description_service', 'use_sim_time',
 })  # fmt: skip
 """Parameters of the node that mean nothing to a command; a test holds them to the node's."""
 
@@ -37,27 +31,29 @@ _HASH = 'sha256'
 _EXPECTED = 'a ROS 2 parameter file: /**: ros__parameters: name: value'
 
 
-def save_model(
-    path: Path,
-    snapshot: Mapping[str, np.ndarray],
-    settings: Mapping[str, SettingValue] | None = None,
-) -> None:
-    """Write the snapshot (.npz) and, beside it, the settings as a parameter file (.yaml).
+def save_model(path: Path, snapshot: Mapping[str, np.ndarray]) -> None:
+    """Write the snapshot (.npz) as the one file that it is, settings within.
 
     Args:
         path: of the .npz; missing folders are made.
         snapshot: arrays without objects.
-        settings: by dotted name; None writes no parameter file.
 
     Raises:
         OSError: the folder cannot be written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    if settings is not None:
-        text = yaml.safe_dump(_parameter_file(settings), sort_keys=False)
-        replace_file(path.with_suffix('.yaml'), lambda file: file.write(text.encode()))
     arrays: dict[str, Any] = {**snapshot, _HASH: np.array(_hash(snapshot))}
     replace_file(path, lambda file: np.savez(file, **arrays))
+
+
+def is_model(path: Path) -> bool:
+    """Whether a file has the entries that `save_model` writes, of which none is read."""
+    try:
+        require_file(path)
+        with zipfile.ZipFile(path) as archive:
+            return {f'{_HASH}.npy', 'json.npy'} <= set(archive.namelist())
+    except (SgpError, OSError, ValueError, zipfile.BadZipFile):
+        return False
 
 
 def load_model(path: Path) -> dict[str, np.ndarray]:
@@ -111,7 +107,7 @@ def _hash(arrays: Mapping[str, np.ndarray]) -> str:
 
 
 def load_parameters(path: str | Path) -> dict[str, object]:
-    """Return the settings of a ROS 2 parameter file by dotted name.
+    """Return the settings of a ROS 2 parameter file, or of a saved model, by dotted name.
 
     Raises:
         ConfigError: no such file, no YAML, or another structure; all problems in one error.
@@ -119,6 +115,10 @@ def load_parameters(path: str | Path) -> dict[str, object]:
     source = Path(path)
     if not source.is_file():
         raise ConfigError(f'no parameter file {source}', _EXPECTED)
+    if source.suffix == '.npz':
+        arrays = load_model(source)
+        with readable(source, ConfigError, 'a saved model'):
+            return dict(json.loads(str(arrays['json']))['settings'])
     with readable(source, ConfigError, _EXPECTED):
         return _parameters_of(source)
 
@@ -153,16 +153,3 @@ def _flatten(prefix: str, entries: dict[Any, Any], settings: dict[str, object]) 
             _flatten(f'{name}.', value, settings)
         else:
             settings[name] = value
-
-
-def _parameter_file(settings: Mapping[str, SettingValue]) -> dict[str, object]:
-    tree: dict[str, object] = {}
-    for name, value in settings.items():
-        *parents, last = name.split('.')
-        branch = tree
-        for parent in parents:
-            child = branch.setdefault(parent, {})
-            assert isinstance(child, dict)
-            branch = child
-        branch[last] = list(value) if isinstance(value, tuple) else value
-    return {'/**': {'ros__parameters': tree}}

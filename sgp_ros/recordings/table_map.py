@@ -41,11 +41,12 @@ import numpy as np
 
 from sgp_ros.engine.samples import CommandSample
 from sgp_ros.errors import ConfigError
+from sgp_ros.markup import YAMLError, load_yaml
 from sgp_ros.recordings.command_types import COMMAND_TYPES, FLOAT64_ARRAY
 from sgp_ros.recordings.messages import JOINT_STATE
 from sgp_ros.recordings.table_files import Columns
 from sgp_ros.recordings.typestore import new_message
-from sgp_ros.strangers import YAMLError, load_yaml, read_text
+from sgp_ros.strangers import read_text
 
 _ANGLE = math.pi / 180.0
 _KGF = 9.80665
@@ -193,8 +194,7 @@ class _Check:
                 self.problems.append(f'{place}: unknown key {key!r}, known are {sorted(known)}')
 
     def time(self, content: dict[str, object]) -> TimeBase:
-        start = self._number('time', content, 'start', 0.0)
-        start_ns = round(Decimal(str(start)) * 1_000_000_000)
+        start_ns = round(Decimal(str(self._number('time', content, 'start', 0.0))) * 10**9)
         content = {key: value for key, value in content.items() if key != 'start'}
         if 'rate' not in content:
             self.keys('time', content, {'column', 'unit', 'index', 'rate', 'start', 'episode'})
@@ -277,7 +277,7 @@ class _Check:
     def _number(self, place: str, content: dict[str, object], key: str, default: float) -> float:
         value = content.get(key, default)
         if isinstance(value, (int, float, str)) and not isinstance(value, bool):
-            with suppress(ValueError):
+            with suppress(ValueError, OverflowError):
                 number = float(value)  # also of a text, because YAML reads 1e-3 as one
                 if math.isfinite(number):
                     return number

@@ -8,7 +8,7 @@ the map.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from decimal import Decimal, InvalidOperation, Overflow
@@ -220,6 +220,7 @@ def _stamps(path: Path, columns: Columns, time: TimeBase, n: int) -> tuple[int, 
     """Return the stamps [ns]; integers and decimal texts are converted without rounding."""
     if time.quantity is None:
         period_ns = 10**9 / Decimal(str(time.rate_hz))
+        _require_held(path, (time.start_ns, time.start_ns + (n - 1) * period_ns))
         return tuple(time.start_ns + round(row * period_ns) for row in range(n))
     unit_ns = Decimal(str(time.quantity.factor))
     stamps = []
@@ -232,7 +233,19 @@ def _stamps(path: Path, columns: Columns, time: TimeBase, n: int) -> tuple[int, 
                 'correct the table, or set time.unit and time.start in the map',
             )
         stamps.append(stamp_ns)
-    return _one_after_another(stamps, columns[time.episode]) if time.episode else tuple(stamps)
+    found = _one_after_another(stamps, columns[time.episode]) if time.episode else tuple(stamps)
+    _require_held(path, found)
+    return found
+
+
+def _require_held(path: Path, stamps_ns: Iterable[int | Decimal]) -> None:
+    """Refuse stamps that no message can hold."""
+    wrong = next((s for s in stamps_ns if not 0 <= s < _LATEST_NS), None)
+    if wrong is not None:
+        raise RecordingError(
+            f'{path}: a row at {Decimal(wrong) / 10**9:.6g} s', 'times between 0 s and 2^31 s',
+            'correct time.rate, time.start or time.episode in the map',
+        )  # fmt: skip
 
 
 def _one_after_another(stamps: list[int], episode: np.ndarray) -> tuple[int, ...]:

@@ -16,6 +16,7 @@ import fcntl
 import json
 import os
 import signal
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,9 @@ from sgp_ros.strangers import (
     replace_file,
     waiting_files,
 )
+
+_LONGEST_NOTE = 1 << 22
+"""Above this size [bytes] no note is ours."""
 
 
 def write_bytes(path: Path, content: bytes) -> None:
@@ -42,7 +46,7 @@ def write_text(path: Path, content: str) -> None:
 
 
 @contextlib.contextmanager
-def replacing_results(out: Path, command: str) -> Iterator[None]:
+def replacing_results(out: Path, command: str, *, keeps_others: bool = False) -> Iterator[None]:
     """Let the results that are written inside take the place of those of the last run.
 
     After an error or a kill those are as they were. Two runs into one folder would mix their
@@ -51,20 +55,23 @@ def replacing_results(out: Path, command: str) -> Iterator[None]:
     Args:
         out: folder of the results, which is made.
         command: whose results they are; those of other commands stay.
+        keeps_others: whether a file that the last run did not write, or that was changed since,
+            is an error instead of being replaced.
 
     Raises:
-        ConfigError: another run writes there.
+        ConfigError: another run writes there, or somebody else's file is in the way.
     """
     out.mkdir(parents=True, exist_ok=True)
     with _locked(out / f'.sgp_{command}.lock'):
-        _make_moves(out, command)
+        _make_moves(out, command, _read(out / f'.sgp_{command}.moves'))
         remove_growing(out)
         try:
             with waiting_files(out) as waiting:
                 yield
+                if keeps_others:
+                    _require_ours(out, command, waiting)
             with _undisturbed():
-                _note_moves(out, command, waiting)
-                _make_moves(out, command)
+                _make_moves(out, command, _note_moves(out, command, waiting))
         except BaseException:  # a signal may come between the making of a file and its care
             if not (out / f'.sgp_{command}.moves').exists():
                 remove_growing(out, of=os.getpid())
@@ -118,45 +125,94 @@ def _undisturbed() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _note_moves(out: Path, command: str, waiting: Waiting) -> None:
-    """Note the new names of files, and which results of the last run are to go."""
+def _require_ours(out: Path, command: str, waiting: Waiting) -> None:
+    listing = _read(out / f'.sgp_{command}.json')
+    for path in waiting:
+        mark = _mark(path)
+        if mark is not None and listing.get(path.name) != mark:
+            raise ConfigError(
+                f'{path} exists, and the last run did not write it or it was changed since',
+                'a new name', 'rename it, choose another --out, or add --force',
+            )  # fmt: skip
+
+
+def _note_moves(out: Path, command: str, waiting: Waiting) -> dict[str, Any]:
+    """Note the new names of files and which results of the last run are to go; return the note.
+
+    Beside each name stands the mark of the file that has it now, so that a note that is found
+    later reaches nothing else.
+    """
     new = {path.name: _mark(growing) for path, growing in waiting.items()}
     old = _read(out / f'.sgp_{command}.json')
     content = {
-        'moves': {growing.name: path.name for path, growing in waiting.items()},
-        'stale': [
-            name for name, mark in old.items() if name not in new and _mark(out / name) == mark
-        ],
+        'moves': {growing.name: [path.name, _mark(path)] for path, growing in waiting.items()},
+        'stale': {name: mark for name, mark in old.items() if name not in new},
         'listing': new,
     }
     write_text(out / f'.sgp_{command}.moves', json.dumps(content) + '\n')
+    return content
 
 
-def _make_moves(out: Path, command: str) -> None:
-    """Give files their names as noted; nothing where nothing is noted."""
-    note = out / f'.sgp_{command}.moves'
-    content = _read(note)
+def _make_moves(out: Path, command: str, content: dict[str, Any]) -> None:
+    """Give files their names as noted; nothing where nothing is noted.
+
+    A note may be a stranger's: of what it names only those files change that are as it says.
+    """
     moves, stale, listing = (content.get(key) for key in ('moves', 'stale', 'listing'))
-    if isinstance(moves, dict) and isinstance(stale, list):
-        for growing, name in moves.items():
-            if is_growing(growing) and _is_plain(name) and (out / growing).exists():
+    if isinstance(moves, dict) and isinstance(stale, dict) and isinstance(listing, dict):
+        for growing, (name, mark) in filter(_is_pair, moves.items()):
+            is_ours = is_growing(growing) and _is_plain(name) and _mark(out / name) == mark
+            if is_ours and listing.get(name) == _mark(out / growing) is not None:
                 (out / growing).replace(out / name)
-        for name in filter(_is_plain, stale):
-            (out / name).unlink(missing_ok=True)
+        for name, mark in stale.items():
+            if _is_plain(name) and mark == _mark(out / name) is not None:
+                (out / name).unlink(missing_ok=True)
         write_text(out / f'.sgp_{command}.json', json.dumps(listing, indent=1) + '\n')
-    note.unlink(missing_ok=True)
+    (out / f'.sgp_{command}.moves').unlink(missing_ok=True)
+
+
+def was_cut_off(out: Path) -> bool:
+    """Whether a run was killed there between the names of its results; the next completes it."""
+    for note in out.glob('.sgp_*.moves'):
+        moves, listing = (_read(note).get(key) for key in ('moves', 'listing'))
+        if isinstance(moves, dict) and isinstance(listing, dict):
+            for growing, (name, _) in filter(_is_pair, moves.items()):
+                found = [_mark(out / one) for one in (growing, name) if _is_plain(one)]
+                if listing.get(name) is not None and listing[name] in found:
+                    return True
+    return False
+
+
+def _is_pair(move: tuple[str, object]) -> bool:
+    """Whether a noted move is to a name with a mark."""
+    to = move[1]
+    return isinstance(to, list) and len(to) == 2 and isinstance(to[0], str)
 
 
 def _is_plain(name: object) -> bool:
     """Whether a name is that of a file in the folder itself."""
-    return isinstance(name, str) and Path(name).name == name
+    if not isinstance(name, str) or name in {'', '..'} or '\0' in name:
+        return False
+    return Path(name).name == name
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """Return the content of one of our notes; empty where there is none."""
-    with contextlib.suppress(OSError, ValueError):
-        content = json.loads(path.read_text(encoding='utf-8'))
-        return content if isinstance(content, dict) else {}
+    """Return the content of one of our notes; empty where there is none.
+
+    A note is a file of our user, or of who owns its folder, and no link, pipe or device.
+    """
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    except OSError:
+        return {}
+    with os.fdopen(handle, 'rb') as stream:
+        found = os.fstat(handle)
+        is_ours = found.st_uid in (os.geteuid(), path.parent.stat().st_uid)
+        if not (is_ours and stat.S_ISREG(found.st_mode) and found.st_size <= _LONGEST_NOTE):
+            return {}
+        with contextlib.suppress(ValueError, RecursionError):
+            content = json.loads(stream.read(_LONGEST_NOTE))
+            return content if isinstance(content, dict) else {}
     return {}
 
 
@@ -164,6 +220,6 @@ def _mark(path: Path) -> list[int] | None:
     """Return time of change [ns] and size of a file, which no renaming changes."""
     try:
         found = path.lstat()
-    except OSError:
+    except (OSError, ValueError):
         return None
     return [found.st_mtime_ns, found.st_size]

@@ -14,6 +14,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.markup import parse_xml
 from sgp_ros.rigid.urdf_model import (
     MOVING,
     Urdf,
@@ -21,7 +22,7 @@ from sgp_ros.rigid.urdf_model import (
     commanded_joints,
     mimic_parameters,
 )
-from sgp_ros.strangers import parse_xml, read_text, require_within
+from sgp_ros.strangers import GREATEST, LEAST, is_usable, read_text, require_within
 
 _KNOWN = (*MOVING, 'fixed')
 _INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
@@ -215,16 +216,19 @@ class _Reading:
             if math.isnan(default):
                 raise self._error(f'{where} states no {key}', 'a number')
             return default
-        return self._float(text, f'{where}: {key}')
+        return self._float(text, f'{where}: {key}', default)
 
-    def _float(self, text: str, where: str) -> float:
+    def _float(self, text: str, where: str, default: float = 0.0) -> float:
+        """Return a number, 0 where it is too small; a limit that is too large is none."""
         try:
             value = float(text)
         except ValueError:
             value = math.nan
-        if not math.isfinite(value):
-            raise self._error(f'{where} is {text!r}', 'a finite number')
-        return value
+        if math.isinf(default) and GREATEST < abs(value) < math.inf:
+            return default
+        if not is_usable(value):
+            raise self._error(f'{where} is {text!r}', f'a finite number up to {GREATEST:g}')
+        return value if abs(value) >= LEAST else 0.0
 
     def _error(self, found: str, expected: str, remedy: str = '') -> ConfigError:
         return ConfigError(f'{self.place}: {found}', expected, remedy)

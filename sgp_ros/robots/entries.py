@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.formula import Formula, read_formula
+from sgp_ros.strangers import LEAST, is_usable
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,8 @@ class Entries:
         """Return a mapping from names to finite numbers, possibly empty."""
         value = self.document.get(key, {})
         if not isinstance(value, dict) or not all(
-            isinstance(name, str) and is_finite(number) for name, number in value.items()
+            isinstance(name, str) and is_usable(number) and (number == 0.0 or abs(number) >= LEAST)
+            for name, number in value.items()
         ):
             return self._wrong(key, value, 'a mapping from names to numbers', {})
         return {name: float(number) for name, number in value.items()}
@@ -66,7 +67,7 @@ class Entries:
     def positive(self, key: str, default: float | None) -> float:
         """Return a positive number; without a default it must be there."""
         value = self.document.get(key, default)
-        if not is_finite(value) or value <= 0.0:
+        if not is_positive(value):
             return self._wrong(key, value, 'a positive number', 1.0)
         return float(value)
 
@@ -87,7 +88,7 @@ class Entries:
     def vector(self, key: str, size: int) -> tuple[float, ...]:
         """Return a list of finite numbers; zeros where there is none."""
         value = self.document.get(key, [0.0] * size)
-        if not isinstance(value, list) or len(value) != size or not all(map(is_finite, value)):
+        if not isinstance(value, list) or len(value) != size or not all(map(is_usable, value)):
             return self._wrong(key, value, f'{size} numbers', (0.0,) * size)
         return tuple(float(number) for number in value)
 
@@ -96,7 +97,6 @@ class Entries:
         return default
 
 
-def is_finite(value: object) -> bool:
-    """Whether a value of a YAML file is a finite number."""
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return is_number and math.isfinite(value)  # type: ignore[arg-type]  # a number by now
+def is_positive(value: object) -> bool:
+    """Whether a value of a YAML file is a positive number that one can divide by."""
+    return is_usable(value) and value >= LEAST  # type: ignore[operator]  # a number by now

@@ -9,7 +9,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,8 +18,9 @@ import numpy as np
 import yaml
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.markup import load_yaml
 from sgp_ros.physics.drive import servo_parts
-from sgp_ros.strangers import load_yaml, read_text
+from sgp_ros.strangers import GREATEST, is_usable, read_text
 
 _KEYS = ('kp', 'kd', 'feedforward')
 _FEEDFORWARD = ('none', 'gravity')
@@ -145,9 +145,9 @@ def _column(
         raise ConfigError(f'{place}: {key} of {sorted(map(str, table))}',
                           f'one number for each of {sorted(actuated)}')  # fmt: skip
     for joint, x in table.items():
-        is_number = isinstance(x, int | float) and not isinstance(x, bool)
-        if not is_number or not math.isfinite(x) or x < 0.0:
-            raise ConfigError(f'{place}: {key} of {joint} is {x!r}', 'a number of at least 0')
+        if not is_usable(x) or x < 0.0:
+            expected = f'a number from 0 to {GREATEST:g}'
+            raise ConfigError(f'{place}: {key} of {joint} is {x!r}', expected)
     return np.array([float(table.get(joint, 0.0)) for joint in joints])
 
 

@@ -20,12 +20,13 @@ import numpy as np
 import yaml
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.markup import load_yaml
 from sgp_ros.rigid.pseudo_inertia import is_consistent
 from sgp_ros.rigid.urdf_writer import write_urdf
 from sgp_ros.robots.entries import Entries
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.urdf_robot import nominal_tree, urdf_text
-from sgp_ros.strangers import load_yaml, read_text
+from sgp_ros.strangers import read_text
 
 _EXAMPLE = 'such as link: {mass: 0.2, com: [0, 0, 0.04], inertia: [xx, xy, yy, xz, yz, zz]}'
 

@@ -22,7 +22,6 @@ formulas is that of `physics.formula`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -35,6 +34,7 @@ from sgp_ros.physics.term import Coefficient, Joint, Motion, Term
 from sgp_ros.robots.bodies import read_bodies
 from sgp_ros.robots.entries import Entries
 from sgp_ros.robots.robot import Robot
+from sgp_ros.strangers import is_usable
 
 LUMPED_KEYS = frozenset({
     'schema', 'name', 'description', 'source', 'target', 'joints', 'constants', 'coefficients',
@@ -133,7 +133,7 @@ def _value(entries: Entries, key: str, names: Mapping[str, float]) -> float:
     """Return the number of a formula of known names."""
     formula = entries.formula(key, names)
     value = 1.0 if formula is None else formula.value(names)
-    if not math.isfinite(value):
+    if not is_usable(value):
         entries.problems.append(f'{entries.prefix}{key} has the value {value}')
     return value
 

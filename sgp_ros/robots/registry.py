@@ -27,12 +27,13 @@ from typing import Any
 import yaml
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.robots.entries import Entries, is_finite
+from sgp_ros.markup import load_yaml
+from sgp_ros.robots.entries import Entries, is_positive
 from sgp_ros.robots.lumped import LUMPED_KEYS, build_lumped_robot
 from sgp_ros.robots.models.door import MODEL_ENDINGS, find_file, read_model
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.shipped import shipped_folder
-from sgp_ros.strangers import load_yaml, read_text, readable, require_file
+from sgp_ros.strangers import is_usable, read_text, readable, require_file
 
 _KEYS = frozenset({'schema', 'robot', 'joints', 'parameters'})
 _URDF_KEYS = frozenset({
@@ -193,8 +194,8 @@ def _read_parameters(entries: Any, problems: list[str]) -> dict[str, tuple[float
             continue
         value, std = entry['value'], entry.get('std')
         std = math.inf if std is None else std
-        is_spread = std == math.inf or (is_finite(std) and std > 0)
-        if not is_finite(value) or not is_spread:
+        is_spread = std == math.inf or is_positive(std)
+        if not is_usable(value) or not is_spread:
             problems.append(f'parameter {name}: {entry!r} has no finite value or no positive std')
             continue
         prior[str(name)] = (float(value), float(std))

@@ -21,10 +21,11 @@ from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.law import NAME as LAW
 from sgp_ros.physics.parts import BASE, LAST, SIDES, TOOL, Quantity, Value
 from sgp_ros.rigid.tree import Tree
-from sgp_ros.robots.entries import Entries, is_finite
+from sgp_ros.robots.entries import Entries, is_positive
 from sgp_ros.robots.nominal_prior import stated_dynamics
 from sgp_ros.robots.observed_motion import ObservedMotion
 from sgp_ros.robots.stated_laws import read_law
+from sgp_ros.strangers import is_usable
 
 
 def read_effects(entry: object, tree: Tree, problems: list[str]) -> tuple[EffectAt, ...]:
@@ -149,10 +150,10 @@ def _numbers(
             problems.append(f'{where}: {name} is {entry!r}, not {{value, std, unit}}')
             continue
         value, spread = entry['value'], entry.get('std')
-        if not is_finite(value) or (quantity.is_positive and value <= 0.0):
+        if not (is_positive if quantity.is_positive else is_usable)(value):
             sort = 'positive' if quantity.is_positive else 'finite'
             problems.append(f'{where}: {name} is {value!r}, not a {sort} number')
-        elif spread is not None and not (is_finite(spread) and spread > 0.0):
+        elif spread is not None and not is_positive(spread):
             problems.append(f'{where}: std of {name} is {spread!r}, not positive')
         elif entry.get('unit', quantity.unit) != quantity.unit:
             problems.append(f'{where}: {name} in {entry["unit"]!r}, not in {quantity.unit!r}')

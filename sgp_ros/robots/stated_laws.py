@@ -24,7 +24,8 @@ from sgp_ros.physics.law import NAME, FormulaLaw
 from sgp_ros.physics.parts import LawParameter
 from sgp_ros.physics.units import read_unit, unit_of, unit_text
 from sgp_ros.rigid.tree import Tree
-from sgp_ros.robots.entries import Entries, is_finite
+from sgp_ros.robots.entries import Entries, is_positive
+from sgp_ros.strangers import is_usable
 
 _KEYS = {'value', 'start', 'unit', 'range', 'std'}
 _PARAMETER = '{value or start, unit, range, std}'
@@ -140,11 +141,11 @@ def _parameter(
     start: Any = entry.get('value', entry.get('start'))
     ends: Any = entry.get('range', [-math.inf, math.inf])
     is_range = isinstance(ends, list) and len(ends) == 2 and all(map(_is_number, ends))
-    if not is_finite(start):
+    if not is_usable(start):
         problems.append(f'{where} is {start!r}, not a finite number')
     elif not is_range or not ends[0] <= start <= ends[1] or ends[0] == ends[1]:
         problems.append(f'{where}: the range is {ends!r}, not [low, high] around {start:g}')
-    elif 'std' in entry and not (is_finite(entry['std']) and entry['std'] > 0.0):
+    elif 'std' in entry and not is_positive(entry['std']):
         problems.append(f'{where}: std is {entry["std"]!r}, not positive')
     else:
         return _read(entry, where, float(start), ends, problems)

@@ -23,13 +23,14 @@ from std_msgs.msg import String
 
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.errors import ConfigError, SgpError
+from sgp_ros.markup import load_yaml
 from sgp_ros.recordings.messages import Status, diagnostics_message
 from sgp_ros.robots.models.door import MODEL_ENDINGS, find_file, read_model
 from sgp_ros.ros.messages import new_message
 from sgp_ros.ros.parameters import declare
 from sgp_ros.ros.settings import FIRST, node_settings
 from sgp_ros.ros.verdict import ERROR, WARN
-from sgp_ros.strangers import load_yaml, read_text
+from sgp_ros.strangers import read_text
 
 _TOPIC = 'robot_description'
 _PERIOD_S = 1.0

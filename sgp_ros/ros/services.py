@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
@@ -11,9 +12,11 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
 from sgp_ros.engine.samples import SettingValue
+from sgp_ros.recordings.model_files import is_model
 from sgp_ros.ros.diagnosing import Diagnosing
 from sgp_ros.ros.record import save_file
 from sgp_ros.ros.session import Session
+from sgp_ros.ros.settings import SAVE_NAME
 
 
 class Services:
@@ -36,7 +39,6 @@ class Services:
         self._node = node
         self._session = session
         self._diagnosing = diagnosing
-        self._settings = settings
         self._file = save_file(str(settings['save.path']), node.get_fully_qualified_name())
         self._offered = [
             node.create_service(kind, f'~/{name}', partial(self._guarded, answer))
@@ -83,22 +85,22 @@ class Services:
     def autosave(self) -> None:
         """Save without keeping messages waiting; what fails is logged."""
         try:
-            self._session.save_beside(self._file, self._saved_settings())
+            self._session.save_beside(self._file)
         except OSError as error:
             self._node.get_logger().error(f'not saved: {error}')
 
     def _save(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        name = self._node.get_parameter(SAVE_NAME.name).value
+        path = self._file.with_name(f'{name}.npz') if name else self._file
         try:
-            self._session.save(self._file, self._saved_settings())
+            if name and os.path.lexists(path) and not is_model(path):
+                raise FileExistsError(f'{path} exists and is no saved model')
+            self._session.save(path)
         except OSError as error:
             response.success, response.message = False, f'not saved: {error}'
         else:
-            response.success, response.message = True, str(self._file)
+            response.success, response.message = True, str(path)
         return response
-
-    def _saved_settings(self) -> dict[str, SettingValue]:
-        own = {name: self._settings[name] for name in ('robot', 'command.type')}
-        return own | self._session.engine.config.to_mapping()
 
     def _diagnose(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.success, response.message = self._diagnosing.start(self._session.engine.config)

@@ -121,20 +121,20 @@ class Session:
             self.health.note_fit(swap.fit, swap.refusal)
             self._swap = None
 
-    def save(self, path: Path, settings: Mapping[str, SettingValue]) -> None:
-        """Save model and settings.
+    def save(self, path: Path) -> None:
+        """Save the model, its settings within.
 
         Raises:
-            OSError: the files cannot be written.
+            OSError: the file cannot be written.
         """
         self._end_saving()
-        save_model(path, take_snapshot(self.engine), settings)
+        save_model(path, take_snapshot(self.engine))
 
-    def save_beside(self, path: Path, settings: Mapping[str, SettingValue]) -> None:
-        """Save model and settings in a thread, which writes a copy while messages are served.
+    def save_beside(self, path: Path) -> None:
+        """Save the model in a thread, which writes a copy while messages are served.
 
         Raises:
-            OSError: the files of the last call could not be written.
+            OSError: the file of the last call could not be written.
         """
         if self._saving is not None and self._saving.is_alive():
             return
@@ -143,7 +143,7 @@ class Session:
 
         def save() -> None:
             try:
-                save_model(path, model, settings)
+                save_model(path, model)
             except OSError as error:
                 self._save_problem = error
 

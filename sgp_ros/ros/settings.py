@@ -27,6 +27,12 @@ MODEL_PATH = Setting(
     'Empty: start without a model.',
     read_only=True,
 )  # fmt: skip
+SAVE_NAME = Setting(
+    'save.name', 'str', '',
+    'Name under which the service save writes NAME.npz into the folder of save.path; letters, '
+    'digits, _, . and - after the first. Empty: the file at save.path.',
+    pattern=r'([A-Za-z0-9_][A-Za-z0-9_.-]{0,99})?',
+)  # fmt: skip
 FIRST = (ROBOT, DESCRIPTION, JOINTS, MODEL_PATH)
 """Those that decide which others there are."""
 
@@ -58,6 +64,7 @@ _OTHERS = (
         'File (.npz) that the service save writes; may contain {node}. Empty: {node}.npz in the '
         'working directory.', read_only=True,
     ),
+    SAVE_NAME,
     Setting(
         'save.period', 'float', 0.0,
         'Interval of automatic saves, with one more at shutdown; 0: save only on request.',

@@ -160,6 +160,20 @@ def test_rate_replaces_a_time_column(tmp_path):
     assert [stamp - start for stamp in table.stamps_ns] == [0, 3_333_333, 6_666_667, 10_000_000]
 
 
+@pytest.mark.parametrize(
+    'time',
+    [
+        {'rate': 1e-10}, {'rate': 1e-300}, {'rate': 1.0, 'start': -5},
+        {'rate': 1.0, 'start': 1e300},
+        {'rate': 1.0, 'start': 2**31 - 1},
+        {'column': 't', 'unit': 's', 'start': 2**31 - 3, 'episode': 'part'},
+    ],
+)  # fmt: skip
+def test_rows_at_times_that_no_message_holds_are_refused(time, tmp_path):
+    with pytest.raises(RecordingError, match='a row at'):
+        read_table(_csv(tmp_path, 't,q,part\n1,0,0\n2,0,1\n'), {**MAP, 'time': time})
+
+
 def test_time_that_does_not_grow_is_written_as_it_is(tmp_path):
     """The engine counts such samples; a repaired table would hide them."""
     table = read_table(_csv(tmp_path, 't,q\n2,0\n1,0\n1,0\n'), MAP)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sgp_ros.apps.terminal import mark_folder, require_own_folder
 from sgp_ros.engine.samples import JointSample
 from sgp_ros.errors import ConfigError
 from sgp_ros.recordings.model_files import load_model, save_model
@@ -113,13 +115,13 @@ def test_every_writer_of_results_waits_for_the_others(tmp_path):
     """Models and recordings too, and none is lost on the way."""
     sample = JointSample(10**18, ('a',), np.zeros(1))
     with replacing_results(tmp_path, 'replay'):
-        save_model(tmp_path / 'model.npz', {'a': np.ones(3)}, {'learning.enabled': True})
+        save_model(tmp_path / 'model.npz', {'a': np.ones(3)})
         with RecordingWriter(tmp_path / 'x.mcap') as writer:
             writer.write_event(sample)
         write_text(tmp_path / 'x.json', '1')
         assert not list(tmp_path.glob('[a-z]*'))
     assert {path.name for path in tmp_path.glob('[a-z]*')} == {
-        'model.npz', 'model.yaml', 'x.mcap', 'x.json',
+        'model.npz', 'x.mcap', 'x.json',
     }  # fmt: skip
     assert load_model(tmp_path / 'model.npz')['a'].tolist() == [1.0, 1.0, 1.0]
     assert len(list(open_recording(tmp_path / 'x.mcap').events())) == 1
@@ -141,6 +143,8 @@ def test_the_next_run_completes_what_was_cut_off_between_two_names(tmp_path, mon
     with pytest.raises(KeyboardInterrupt):
         _replace(tmp_path, a='new', c='new')
     assert {path.name for path in tmp_path.glob('[a-c]')} == {'a', 'b'}
+    (tmp_path / '.sgp_replay.json').unlink()
+    require_own_folder(tmp_path)  # by the note alone
     with pytest.raises(ZeroDivisionError):
         _fail(tmp_path)
     assert {path.name: path.read_text() for path in tmp_path.glob('[a-c]')} == {
@@ -163,6 +167,53 @@ def test_a_note_of_moves_reaches_no_other_folder(tmp_path):
         pass
     assert victim.read_text() == 'mine'
     assert not (out / 'y').exists()
+
+
+NOTES = {
+    'others': {
+        'moves': {'.sgp_growing_1_x': ['theirs.txt', None], '.sgp_growing_1_y': 'z'},
+        'stale': {'mine.txt': [1, 5]},
+        'listing': {'theirs.txt': None, 'mine.txt': [1, 5]},
+    },
+    'as it was': {
+        'moves': {'.sgp_growing_1_x': 'mine.txt'}, 'stale': ['mine.txt'], 'listing': {},
+    },
+    'names': {'moves': {}, 'stale': {'..': [], 'a\0b': [], '': None, '.': 1}, 'listing': {}},
+    'kinds': {'moves': {'.sgp_growing_1_x': [[], 1]}, 'stale': {'mine.txt': None}, 'listing': {}},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('kind', [*NOTES, 'deep', 'large', 'pipe', 'link', 'listing'])
+def test_a_strangers_note_changes_no_file_of_the_folder(tmp_path, kind):
+    """Nor does it hold a run up, end it, or make the folder one that a command may write to."""
+    note = tmp_path / '.sgp_replay.moves'
+    (tmp_path / 'mine.txt').write_text('mine')
+    (tmp_path / '.sgp_growing_1_x').write_text('theirs')
+    if kind == 'pipe':
+        os.mkfifo(note)
+    elif kind == 'link':
+        note.symlink_to('/dev/zero')
+    elif kind == 'listing':
+        note.with_suffix('.json').symlink_to(tmp_path / 'nowhere')
+    elif kind == 'deep':
+        note.write_text('[' * 100_000)
+    else:
+        note.write_text(json.dumps(NOTES.get(kind, {})) + ' ' * (kind == 'large') * (5 << 20))
+    with pytest.raises(ConfigError, match='did not write'):
+        require_own_folder(tmp_path)
+    _replace(tmp_path, metrics='{}')
+    assert (tmp_path / 'mine.txt').read_text() == 'mine'
+    assert {path.name for path in tmp_path.iterdir()} == {
+        'mine.txt', 'metrics', '.sgp_growing_1_x', '.sgp_replay.json',
+    }  # fmt: skip
+    require_own_folder(tmp_path)
+
+
+def test_a_sign_is_not_left_through_a_link(tmp_path):
+    (tmp_path / '.sgp_campaign.json').symlink_to(tmp_path / 'nowhere')
+    mark_folder(tmp_path, 'campaign')
+    assert [path.name for path in tmp_path.iterdir()] == ['.sgp_campaign.json']
+    assert (tmp_path / '.sgp_campaign.json').read_text() == '{}\n'
 
 
 @pytest.mark.parametrize('moment', ['beside a growing file', 'before the names'])
@@ -190,11 +241,11 @@ def test_an_interrupt_takes_nothing_that_has_a_name_to_come(tmp_path, monkeypatc
     """Noted moves are completed by the next run."""
     make_moves, calls = files._make_moves, []
 
-    def cut_off(out, command):
+    def cut_off(out, command, content):
         calls.append(command)
         if len(calls) == 2:
             raise OSError('no space')
-        make_moves(out, command)
+        make_moves(out, command, content)
 
     monkeypatch.setattr(files, '_make_moves', cut_off)
     with pytest.raises(OSError, match='no space'), replacing_results(tmp_path, 'replay'):

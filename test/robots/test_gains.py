@@ -33,6 +33,7 @@ def test_joints_without_a_drive_have_no_gain(tmp_path):
         ('kp: {a: 1, b: x}\nkd: {a: 1, b: 1}\n', "kp of b is 'x'"),
         ('kp: {a: 1, b: -1}\nkd: {a: 1, b: 1}\n', 'kp of b is -1'),
         ('kp: {a: 1, b: .nan}\nkd: {a: 1, b: 1}\n', 'kp of b is nan'),
+        ('kp: {a: 1, b: 1.0e+308}\nkd: {a: 1, b: 1}\n', 'from 0 to 1e\\+30'),
         ('kp: {a: 1, b: 1}\nkd: {a: 1, b: 1}\nki: 3\n', 'the keys'),
         ('kp: {a: 1, b: 1}\nkd: {a: 1, b: 1}\nfeedforward: magic\n', "feedforward 'magic'"),
         ('- 1\n', 'no mapping'),

@@ -262,11 +262,41 @@ def test_a_saved_model_goes_on_in_another_node(graph: Graph, tmp_path: Path) -> 
     assert answer.success
     assert answer.message == str(path)
     assert node.stop() == 0
-    assert sorted(p.name for p in path.parent.iterdir()) == ['model.npz', 'model.yaml']
-    graph.start('sgp_node', file=path.with_suffix('.yaml'), model__path=path)
+    assert list(path.parent.iterdir()) == [path]
+    _start(graph, model__path=path)
     values = graph.answer(graph.parameters().get_parameters(['buffer.budget'])).values
     assert values[0].integer_value == 33
     graph.wait_until(lambda: graph.status('model').get('ready') == '1', 'the saved model')
+
+
+def test_a_model_is_saved_by_name_in_the_folder_of_save_path(graph: Graph, tmp_path: Path) -> None:
+    """No name leads out of it, and none takes the file of somebody else."""
+    folder = tmp_path / 'models'
+    folder.mkdir()
+    (folder / 'mine.npz').write_text('mine')
+    _start(graph, save__path=folder / 'model.npz')
+    client = graph.parameters()
+
+    def rename(name: str) -> Any:
+        wanted = [Parameter('save.name', value=name), Parameter('buffer.budget', value=33)]
+        return graph.answer(client.set_parameters_atomically(wanted)).result
+
+    for name in ('../x', '/x', '.x', '-x', 'a b', 'a\nb', 'x' * 101):
+        answer = rename(name)
+        assert not answer.successful
+        assert 'save.name' in answer.reason
+        assert '\n' not in answer.reason
+    (value,) = graph.answer(client.get_parameters(['buffer.budget'])).values
+    assert value.integer_value != 33
+    assert rename('arm-2.b').successful
+    for _ in range(2):
+        assert graph.call(Trigger, '/sgp_node/save').message == str(folder / 'arm-2.b.npz')
+    assert rename('mine').successful
+    assert 'no saved model' in graph.call(Trigger, '/sgp_node/save').message
+    assert (folder / 'mine.npz').read_text() == 'mine'
+    assert rename('').successful
+    assert graph.call(Trigger, '/sgp_node/save').message == str(folder / 'model.npz')
+    assert {p.name for p in tmp_path.rglob('*.npz')} == {'mine.npz', 'arm-2.b.npz', 'model.npz'}
 
 
 def test_a_killed_fit_is_reported_and_the_node_goes_on(graph: Graph) -> None:

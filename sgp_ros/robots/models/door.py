@@ -15,10 +15,11 @@ from xml.etree import ElementTree as ET
 
 from sgp_ros.apart import read_apart
 from sgp_ros.errors import ConfigError
+from sgp_ros.markup import parse_xml
 from sgp_ros.optional import optional_package
 from sgp_ros.robots.models.mjcf import read_mjcf
 from sgp_ros.robots.models.sdf import read_sdf
-from sgp_ros.strangers import parse_xml, read_text
+from sgp_ros.strangers import read_text
 
 READ = (
     ('link; inertial mass, origin, inertia', 'link with mass, centre and inertia'),

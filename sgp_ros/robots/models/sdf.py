@@ -17,11 +17,12 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.markup import parse_xml
 from sgp_ros.physics.catalogue import SPRING
 from sgp_ros.rigid.rotations import of_quaternion, of_rpy
 from sgp_ros.rigid.tree import GRAVITY
 from sgp_ros.robots.models.model import Body, Model, ModelJoint, Pose, counted, stated
-from sgp_ros.strangers import parse_xml, read_text, require_within
+from sgp_ros.strangers import read_text, require_within
 
 READ = (
     ('link; inertial mass, inertia, pose', 'link with mass, centre and inertia'),
@@ -278,8 +279,7 @@ class _Reading:
         return {'kp': kp, 'kd': kd} if kp else {}
 
     def _check_gravity(self, world: ET.Element | None) -> None:
-        gravity = None if world is None else world.find('gravity')
-        found = self._numbers(gravity, GRAVITY, 'gravity')
+        found = self._numbers(None if world is None else world.find('gravity'), GRAVITY, 'gravity')
         if not np.allclose(found, GRAVITY, atol=0.02):
             self.dropped[LEFT['gravity']].append(' '.join(f'{x:g}' for x in found))
 
@@ -291,7 +291,7 @@ class _Reading:
     ) -> tuple[float, ...]:
         words = [] if element is None else (element.text or '').split()
         try:
-            numbers = tuple(float(word) for word in words)
+            numbers = tuple(map(float, words))
         except ValueError:
             raise self.error(f'{where}: {" ".join(words)!r}', 'numbers') from None
         bounded = np.isfinite(default).all()  # a limit may be infinite
