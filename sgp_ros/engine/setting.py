@@ -58,7 +58,7 @@ class Setting:
         numbers: Iterable[object] = value if isinstance(value, (list, tuple)) else (value,)
         for number in numbers:
             if isinstance(number, (int, float)) and not isinstance(number, bool):
-                if not math.isfinite(number) or not self.low <= number <= self.high:
+                if not _is_finite(number) or not self.low <= number <= self.high:
                     return prefix
             elif self.choices and number not in self.choices:
                 return prefix
@@ -83,6 +83,14 @@ class Setting:
         elif math.isfinite(self.low):
             text += f' of at least {self.low:g}'
         return f'{text} [{self.unit}]' if self.unit else text
+
+
+def _is_finite(number: float) -> bool:
+    """Whether a number has a finite float; an integer may be too large for one."""
+    try:
+        return math.isfinite(number)
+    except OverflowError:
+        return False
 
 
 def has_kind(value: object, kind: str) -> bool:

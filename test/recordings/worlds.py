@@ -57,7 +57,7 @@ def plain_commands(longest: int = 4) -> st.SearchStrategy[CommandSample]:
 _SETTINGS = st.dictionaries(
     st.text(max_size=10),
     st.booleans()
-    | st.integers()
+    | st.integers(1 - 2**63, 2**63 - 1)
     | st.floats(allow_nan=False)
     | st.text(max_size=10)
     | st.lists(st.floats(allow_nan=False), max_size=4).map(tuple)
