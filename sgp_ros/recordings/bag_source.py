@@ -9,7 +9,8 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import closing, contextmanager
 from functools import partial
-from pathlib import Path
+from io import BufferedReader, FileIO
+from pathlib import Path, PosixPath
 from typing import Any
 
 from rosbags.rosbag1.reader import Chunk, IndexData, Reader, decompressors
@@ -166,11 +167,32 @@ class Ros1Source:
             ) from error  # fmt: skip
 
 
+class _Bounded(BufferedReader):
+    """A file of which no more is read at once than a chunk may hold."""
+
+    def read(self, size: int | None = -1) -> bytes:
+        """Return the next bytes."""
+        require_within((size or 0) / (1 << 20), 'CHUNK_MB', 'size of a record in MB')
+        return super().read(size)
+
+    def readline(self, _size: int | None = -1) -> bytes:
+        """Return the first line, which is short."""
+        return super().readline(_LINE)
+
+
+class _BoundedPath(PosixPath):
+    """A path whose file is read within bounds."""
+
+    def open(self, *_: Any, **_named: Any) -> _Bounded:  # type: ignore[override]  # one mode
+        """Return the file."""
+        return _Bounded(FileIO(str(self)))
+
+
 class _Ros1Reader(Reader):
     """A reader whose chunks and index are read within bounds."""
 
     def __init__(self, path: Path) -> None:
-        super().__init__(path)
+        super().__init__(_BoundedPath(path))
         self._unpacking = Unpacking(path.stat().st_size)
         self._held = 0
 
@@ -203,6 +225,8 @@ class _Ros1Reader(Reader):
 
 _INDEX_HEAD, _INDEX_BYTES = struct.Struct('<51xI'), 12
 """Of a record of the index: its size behind its head, and the size of an entry."""
+_LINE = 80
+"""Bytes of a first line, at most."""
 _OBJECT = 256
 """Bytes that an entry takes."""
 

@@ -33,6 +33,7 @@ from sgp_ros.recordings.mcap_records import (
     Walk,
     read_records,
     read_stamps,
+    require_chunk,
     state_of_summary,
 )
 from sgp_ros.recordings.topics import RawMessage, Topic
@@ -124,6 +125,7 @@ class McapSource:
         path = self._paths[segment.file]
         channels = self._files[segment.file].channels
         names = {number: channel[0] for number, channel in channels.items() if channel in wanted}
+        require_chunk(segment.length)
         with path.open('rb') as stream:
             stream.seek(segment.offset)
             data = stream.read(segment.length)

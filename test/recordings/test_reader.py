@@ -465,3 +465,25 @@ def test_a_log_time_that_no_clock_has_does_not_become_a_stamp(tmp_path):
     recording = open_recording(path)
     assert [event.stamp_ns for event in recording.events()] == [5]
     assert '1 messages of x.mcap could not be read: /joint_states: a stamp' in recording.remarks[0]
+
+
+def test_an_attachment_of_any_size_costs_no_memory_without_an_index(tmp_path, monkeypatch):
+    """It is passed in blocks, and counts in the checksum of the data."""
+    monkeypatch.setenv('SGP_MOST_CHUNK_MB', '1')
+    path, (topic, kind, data) = tmp_path / 'x.mcap', worlds.message_of(EVENTS[1])
+    with path.open('wb') as stream:
+        writer = McapWriter(stream, use_chunking=False, enable_data_crcs=True)
+        writer.start()
+        schema = writer.register_schema(full_type(kind), 'ros2msg', b'')
+        channel = writer.register_channel(topic, 'cdr', schema)
+        for stamp in (EVENTS[1].stamp_ns, EVENTS[3].stamp_ns):
+            writer.add_message(channel, stamp, data, stamp)
+            writer.add_attachment(stamp, stamp, 'film', 'video/mp4', bytes(5 << 20))
+        writer.finish()
+    recording = open_recording(path)
+    assert len(list(recording.events())) == 2
+    assert recording.remarks == ()
+    content = bytearray(path.read_bytes())
+    content[3 << 20] ^= 1
+    path.write_bytes(content)
+    assert 'checksum' in open_recording(path).remarks[0]
