@@ -13,8 +13,8 @@ import yaml
 import zstandard
 
 from sgp_ros.errors import RecordingError
-from sgp_ros.recordings.bag_source import SqliteSource
 from sgp_ros.recordings.mcap_source import McapSource
+from sgp_ros.recordings.sqlite_source import SqliteSource
 from sgp_ros.recordings.topics import RawMessage, Source, Topic
 from sgp_ros.recordings.unpacking import Unpacking
 from sgp_ros.scratch import Scratch

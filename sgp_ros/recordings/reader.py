@@ -15,7 +15,6 @@ from typing import TypeVar, cast
 from sgp_ros.engine.samples import CommandSample, Event, JointSample, Reset, SettingsChange
 from sgp_ros.errors import MessageError, RecordingError
 from sgp_ros.recordings.bag_directory import read_directory
-from sgp_ros.recordings.bag_source import Ros1Source, SqliteSource
 from sgp_ros.recordings.command_types import COMMAND_TYPES
 from sgp_ros.recordings.mcap_records import MAGIC
 from sgp_ros.recordings.mcap_source import McapSource
@@ -26,6 +25,8 @@ from sgp_ros.recordings.messages import (
     joint_sample,
     require_stamp,
 )
+from sgp_ros.recordings.ros1_source import Ros1Source
+from sgp_ros.recordings.sqlite_source import SqliteSource
 from sgp_ros.recordings.topics import (
     CHANGES_TOPIC,
     Source,
