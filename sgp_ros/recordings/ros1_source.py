@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -13,7 +14,7 @@ from typing import Any
 from rosbags.rosbag1.reader import Chunk, IndexData, Reader, decompressors
 
 from sgp_ros.errors import RecordingError, SgpError
-from sgp_ros.recordings.topics import RawMessage, Topic
+from sgp_ros.recordings.topics import RawMessage, Topic, merged_topics
 from sgp_ros.recordings.typestore import short_type
 from sgp_ros.recordings.unpacking import Unpacking
 from sgp_ros.strangers import require_within
@@ -29,21 +30,24 @@ class Ros1Source:
         RecordingError: what rosbags says about a broken one.
     """
 
-    remarks: tuple[str, ...] = ()
-
     def __init__(self, path: Path) -> None:
         self._path = path
         with self._reader() as reader:
-            self.topics = tuple(
-                Topic(name, short_type(info.msgtype or ''), info.msgcount, 'ros1')
-                for name, info in sorted(reader.topics.items())
+            counts = Counter[int]()
+            for info in reader.chunk_infos:
+                counts.update(info.connection_counts)
+            self.topics, self.remarks = merged_topics(
+                ((c.topic, short_type(c.msgtype), 'ros1'), counts[c.id])
+                for c in reader.connections
             )
 
     def messages(self, topics: Collection[Topic]) -> Iterator[RawMessage]:
         """Yield the messages of `topics` by log time."""
-        names = {topic.name for topic in topics}
+        wanted = {(topic.name, topic.type) for topic in topics}
         with self._reader() as reader:
-            connections = [c for c in reader.connections if c.topic in names]
+            connections = [
+                c for c in reader.connections if (c.topic, short_type(c.msgtype)) in wanted
+            ]
             for connection, log_ns, data in reader.messages(connections):
                 yield RawMessage(log_ns, connection.topic, data)
 
