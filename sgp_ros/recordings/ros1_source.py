@@ -14,6 +14,7 @@ from typing import Any
 from rosbags.rosbag1.reader import Chunk, IndexData, Reader, decompressors
 
 from sgp_ros.errors import RecordingError, SgpError
+from sgp_ros.recordings.ros1_walk import Found, walk
 from sgp_ros.recordings.topics import RawMessage, Topic, merged_topics
 from sgp_ros.recordings.typestore import short_type
 from sgp_ros.recordings.unpacking import Unpacking
@@ -32,18 +33,78 @@ class Ros1Source:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        with self._reader() as reader:
-            counts = Counter[int]()
-            for info in reader.chunk_infos:
-                counts.update(info.connection_counts)
-            self.topics, self.remarks = merged_topics(
-                ((c.topic, short_type(c.msgtype), 'ros1'), counts[c.id])
-                for c in reader.connections
-            )
+        self._has_index, self._said = True, list[str]()
+        counts: list[tuple[tuple[str, str, str], int]] = []
+        try:
+            with self._reader() as reader:
+                number = Counter[int]()
+                for info in reader.chunk_infos:
+                    number.update(info.connection_counts)
+                counts += [
+                    ((c.topic, short_type(c.msgtype), 'ros1'), number[c.id])
+                    for c in reader.connections
+                ]
+        except _DamagedError as error:
+            counts = self._recovered(error)
+        self.topics, said = merged_topics(counts)
+        self._said += said
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Damage of the file and what is not read of it, one sentence each."""
+        return tuple(dict.fromkeys(self._said))
 
     def messages(self, topics: Collection[Topic]) -> Iterator[RawMessage]:
         """Yield the messages of `topics` by log time."""
         wanted = {(topic.name, topic.type) for topic in topics}
+        latest_ns = None
+        try:
+            for message in self._indexed(wanted) if self._has_index else self._walked(wanted):
+                latest_ns = message.log_ns
+                yield message
+        except _DamagedError as error:
+            if latest_ns is None:
+                self._recovered(error)
+                yield from self._walked(wanted)
+            else:
+                self._said.append(f'{self._path.name} is damaged ({error.__cause__}): nothing '
+                                  f'after {latest_ns / 1e9:.9f} s is read')  # fmt: skip
+
+    def _recovered(self, error: _DamagedError) -> list[tuple[tuple[str, str, str], int]]:
+        """Return the number of messages of each topic and type that a walk finds.
+
+        Raises:
+            RecordingError: there is none.
+        """
+        counts, latest_ns = Counter[tuple[str, str, str]](), 0
+        for x in self._walk():
+            counts[x.topic, x.type, 'ros1'] += 1
+            latest_ns = max(latest_ns, x.log_ns)
+        if not counts:
+            raise error
+        self._has_index = False
+        self._said.append(f'{self._path.name} is damaged ({error.__cause__}): recovered '
+                          f'{counts.total()} messages, up to {latest_ns / 1e9:.9f} s')  # fmt: skip
+        return list(counts.items())
+
+    def _walk(self) -> Iterator[Found]:
+        unpacking = Unpacking(self._path.stat().st_size)
+        with _BoundedPath(self._path).open() as stream:
+            for found in walk(stream, unpacking):
+                unpacking.count_messages(1)
+                yield found
+
+    def _walked(self, wanted: Collection[tuple[str, str]]) -> Iterator[RawMessage]:
+        """Yield messages of a bag without an index; chunks may overlap in time."""
+        found, held = list[RawMessage](), 0
+        for x in self._walk():
+            if (x.topic, x.type) in wanted:
+                found.append(RawMessage(x.log_ns, x.topic, x.data))
+                held += len(x.data) + _OBJECT
+                require_within(held / (1 << 20), 'HELD_MB', 'size of a bag without index in MB')
+        yield from sorted(found, key=lambda x: x.log_ns)
+
+    def _indexed(self, wanted: Collection[tuple[str, str]]) -> Iterator[RawMessage]:
         with self._reader() as reader:
             connections = [
                 c for c in reader.connections if (c.topic, short_type(c.msgtype)) in wanted
@@ -59,10 +120,14 @@ class Ros1Source:
         except SgpError:
             raise
         except Exception as error:  # the library raises what its parsers do
-            raise RecordingError(
+            raise _DamagedError(
                 f'{self._path} cannot be read ({error})', 'an intact bag',
                 'repair it with `rosbag reindex`',
             ) from error  # fmt: skip
+
+
+class _DamagedError(RecordingError):
+    """A bag that is not as a recorder writes it."""
 
 
 class _Bounded(BufferedReader):

@@ -7,6 +7,7 @@ import sqlite3
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer as Ros1Writer
@@ -180,6 +181,36 @@ def test_no_damaged_page_of_a_database_is_passed_without_a_word(tmp_path):
         said += bool(recording.remarks)
         assert found == EXPECTED or recording.remarks, page
     assert said > 10
+
+
+@pytest.mark.parametrize('kind', [None, *Ros1Writer.CompressionFormat])
+def test_a_ros_1_bag_that_was_cut_off_gives_its_first_messages(kind, tmp_path):
+    path = tmp_path / 'x.bag'
+    worlds.write_ros1(path, EVENTS, kind)
+    whole = path.read_bytes()
+    for size in np.linspace(0.4, 0.99, 6) * len(whole):
+        path.write_bytes(whole[: int(size)])
+        recording = open_recording(path)
+        found = worlds.everything(recording)
+        assert found == EXPECTED[: len(found)]
+        assert re.match(rf'x.bag is damaged \(.*\): recovered {len(found)} ', recording.remarks[0])
+
+
+def test_no_damaged_block_of_a_ros_1_bag_is_passed_without_a_word(tmp_path):
+    path = tmp_path / 'x.bag'
+    worlds.write_ros1(path, EVENTS[:200])
+    whole = path.read_bytes()
+    said = 0
+    for place in range(4100, len(whole), 1500):
+        path.write_bytes(whole[:place] + bytes(40) + whole[place + 40 :])
+        try:
+            recording = open_recording(path)
+            found = worlds.everything(recording)
+        except RecordingError:
+            continue
+        said += bool(recording.remarks)
+        assert len(found) == 200 or recording.remarks, place
+    assert said > 3
 
 
 def test_a_database_with_an_unfinished_transaction_says_so(tmp_path):

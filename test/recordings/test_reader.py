@@ -13,7 +13,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mcap.opcode import Opcode
 from mcap.writer import Writer as McapWriter
-from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
@@ -49,24 +48,7 @@ def _directory(path, plugin, compression=CompressionMode.NONE):
 
 
 def _ros1(path):
-    store = get_typestore(Stores.ROS1_NOETIC)
-    with Ros1Writer(path) as writer:
-        connections = {}
-        for event in EVENTS:
-            topic, kind, data = worlds.message_of(event)
-            full = kind.replace('/', '/msg/')
-            if topic not in connections:
-                connections[topic] = writer.add_connection(topic, full, typestore=store)
-            message = get_typestore(Stores.ROS2_JAZZY).deserialize_cdr(data, full)
-            if isinstance(event, JointSample):
-                header = store.types['std_msgs/msg/Header'](
-                    seq=0, stamp=message.header.stamp, frame_id=''
-                )
-                message = store.types[full](
-                    header, message.name, message.position, message.velocity, message.effort
-                )
-            writer.write(connections[topic], event.stamp_ns, store.serialize_ros1(message, full))
-    return path
+    return worlds.write_ros1(path, EVENTS)
 
 
 def _split(path, parts=11):
