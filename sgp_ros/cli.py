@@ -5,7 +5,8 @@ the names of the arguments of its command, with `out` and `progress` besides. Ot
 commands by an entry point of the group `sgp_ros.commands`, see `AddCommand`.
 
 Results go to stdout, remarks and progress to stderr; with `--json` the JSON has stdout for itself,
-and the text goes to stderr. What a user can cause ends in one line on stderr and exit status 2.
+and the text goes to stderr. What a user can cause ends in one line on stderr and exit status 2;
+what only a bug can cause in one line and status 70, or with `SGP_DEBUG=1` in its traceback.
 """
 
 from __future__ import annotations
@@ -45,6 +46,8 @@ from sgp_ros.apps.terminal import (  # noqa: E402 - as above
 )
 from sgp_ros.errors import ConfigError, SgpError  # noqa: E402 - the environment above comes first
 
+_LONGEST = 300
+"""Characters of an internal error that are shown."""
 GROUP = 'sgp_ros.commands'
 """Entry-point group of functions that take an `AddCommand` and add commands with it."""
 
@@ -52,11 +55,15 @@ TABLES = ('.csv', '.npz', '.mat', '.parquet', '.h5', '.json', '.jsonl')
 MODELS = ('.urdf', '.xacro', '.xml', '.mjcf', '.sdf', '.yaml', '.yml')
 
 BAD_INPUT = 2
+INTERNAL_ERROR = 70
+"""`EX_SOFTWARE` of sysexits.h."""
 INTERRUPTED = 130
+DEBUG = 'SGP_DEBUG'
+"""Environment variable under which an internal error is raised, with its traceback."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit status: 0, or 2 on bad input."""
+    """Run one command and return its exit status: 0, 2 on bad input, 70 on a bug."""
     given = list(sys.argv[1:] if argv is None else argv)
     try:
         parser = _parser(given)
@@ -75,8 +82,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:  # also while it cleans up
         sys.stderr.write(f'sgp {name}: interrupted\n')
         return INTERRUPTED
+    except Exception as error:
+        if os.environ.get(DEBUG):
+            raise
+        sys.stderr.write(f'sgp {name}: {_internal(error)}\n')
+        return INTERNAL_ERROR
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+def _internal(error: Exception) -> str:
+    """Return one line on an error that only a bug can cause."""
+    text = ' '.join(f'{type(error).__name__}: {error}'.split())
+    text = f'{text[:_LONGEST]}...' if len(text) > _LONGEST else text
+    return f'internal error: {text}; please report it with what {DEBUG}=1 prints'
 
 
 def _run(arguments: dict[str, Any]) -> int:

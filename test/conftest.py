@@ -21,7 +21,8 @@ settings.load_profile(os.environ.get('HYPOTHESIS_PROFILE', 'dev'))
 
 @pytest.fixture(autouse=True)
 def _bugs_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have an engine raise what it would count in the field."""
+    """Have an engine and a command raise what they would count, or say, in the field."""
+    monkeypatch.setenv('SGP_DEBUG', '1')
     monkeypatch.setattr('sgp_ros.engine.engine.RAISES_FAILURES', True)
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sgp_ros.cli import INTERRUPTED, Progress, main
+from sgp_ros.cli import INTERNAL_ERROR, INTERRUPTED, Progress, main
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.writer import RecordingWriter
@@ -518,3 +518,23 @@ def test_the_recording_in_the_repository_is_identified(tmp_path):
     for parameter in metrics['parameters']:
         error = abs(parameter['value'] - true[parameter['name']]['value'])
         assert error < 5 * parameter['std'], parameter
+
+
+@pytest.mark.parametrize(
+    'error', [KeyError('a\nb'), RecursionError('deep'), ValueError('x' * 9999)]
+)
+def test_an_internal_error_is_one_line_and_a_traceback_where_asked_for(error, monkeypatch, capsys):
+    """Its status differs from that of bad input, so that what looks for bugs sees it."""
+
+    def broken(**_):
+        raise error
+
+    monkeypatch.setattr('sgp_ros.cli._load', lambda _place: broken)
+    with pytest.raises(type(error)):
+        main(['robots'])
+    monkeypatch.delenv('SGP_DEBUG')
+    assert main(['robots']) == INTERNAL_ERROR
+    said = capsys.readouterr().err
+    assert said.count('\n') == 1
+    assert said.startswith(f'sgp robots: internal error: {type(error).__name__}')
+    assert len(said) < 500

@@ -164,6 +164,24 @@ def ros1(
             writer.write(connection, stamp, b'')
 
 
+def sparse(path: Path, opcode: int = 5, head: bytes = _MAGIC) -> None:
+    """Write one record of 2.5 GB that takes no room on the disk."""
+    size = 5 << 29
+    path.write_bytes(head + struct.pack('<BQ', opcode, size))
+    os.truncate(path, len(head) + 9 + size)
+
+
+def sparse_ros1(path: Path) -> None:
+    """Write a ROS 1 bag whose first header has 2.5 GB, on no disk."""
+    path.write_bytes(b'#ROSBAG V2.0\n' + struct.pack('<I', 5 << 29))
+    os.truncate(path, 6 << 29)
+
+
+def _endless_line(path: Path) -> None:
+    path.write_bytes(b'#ROSBAG V2.0')
+    os.truncate(path, 5 << 29)
+
+
 def _device(path: Path) -> None:
     path.symlink_to('/dev/zero')
 
@@ -178,6 +196,11 @@ RECORDINGS: dict[str, Make] = {
     'loose.mcap': lambda path: path.write_bytes(_MAGIC + _CHANNEL + _message(b'') * 3_000_000),
     'same_time.mcap': partial(same_time, n=300_000),
     'liar.mcap': liar,
+    'sparse.mcap': sparse,
+    'sparse_chunk.mcap': partial(sparse, opcode=6),
+    'sparse_behind.mcap': partial(sparse, head=_MAGIC + _CHANNEL),
+    'sparse.bag': sparse_ros1,
+    'line.bag': _endless_line,
     'zeros.mcap': lambda path: path.write_bytes(_MAGIC + bytes(1 << 20)),
     'view.db3': view,
     'twice.db3': lambda path: tables(path, 'data', 1, 1),

@@ -106,6 +106,7 @@ def run_campaign(
         print(f'{len(jobs)} recordings, {len(jobs) - len(open_jobs)} of them finished before')
         broken = _compute(out, open_jobs, scheduler, workers, progress)
         results = [_result(out, job, table[job['recording']], broken) for job in jobs]
+        remarks += [f'{r["recording"]}: {x}' for r in results for x in r.get('remarks', ())]
         content = write_campaign(out, results, remarks)
     _print_summary(content, out)
     progress(1.0)

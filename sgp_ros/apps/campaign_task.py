@@ -17,7 +17,7 @@ from sgp_ros.campaign.table import Row, diagnosis_rows, identification_rows
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.engine.samples import JointSample
 from sgp_ros.errors import RecordingError, SgpError
-from sgp_ros.recordings.reader import open_recording
+from sgp_ros.recordings.reader import Recording, open_recording
 from sgp_ros.report.metrics import versions
 
 _FIELDS = ('data', 'temperature', 'relative_humidity', 'fluid_pressure', 'voltage')
@@ -25,7 +25,7 @@ _FIELDS = ('data', 'temperature', 'relative_humidity', 'fluid_pressure', 'voltag
 
 
 def examine_recording(job: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the result of one recording: rows or a failure by task, and their cost.
+    """Return the result of one recording: rows or a failure by task, their cost, remarks.
 
     It runs in a worker. An error that the recording causes is a result too, in one line.
     """
@@ -34,9 +34,11 @@ def examine_recording(job: Mapping[str, Any]) -> dict[str, Any]:
     result['versions'] = ', '.join(f'{name} {x}' for name, x in versions().items())
     result |= {'robot': Path(job['robot']).stem, 'covariates': {}}
     try:
-        result |= _span(job)
-        result['covariates'] = {topic: mean_of_topic(job['path'], topic)
+        recording = open_recording(job['path'])
+        result |= _span(recording, next(iter(job['arguments'].values())))
+        result['covariates'] = {topic: mean_of_topic(recording, topic)
                                 for topic in job['topics']}  # fmt: skip
+        result['remarks'] = list(recording.remarks)
     except (SgpError, OSError) as error:
         failure = {'failure': ' '.join(str(error).split())}
         return result | {'tasks': dict.fromkeys(job['arguments'], failure)}
@@ -62,29 +64,29 @@ def _rows(task: str, job: Mapping[str, Any], options: Mapping[str, Any]) -> list
     return list(diagnosis_rows(diagnosis_mapping(examined.found)))
 
 
-def _span(job: Mapping[str, Any]) -> dict[str, Any]:
+def _span(recording: Recording, options: Mapping[str, Any]) -> dict[str, Any]:
     """Return the first stamp [ns] and the length [s] of a recording."""
-    topics = {k: next(iter(job['arguments'].values()))[k] for k in ('joint_states', 'command')}
-    events = open_recording(job['path']).events(**topics)
+    events = recording.events(options['joint_states'], options['command'])
     stamps = [event.stamp_ns for event in events if isinstance(event, JointSample)]
     if not stamps:
-        raise RecordingError(f'{job["path"]} contains no states', 'joint states')
+        raise RecordingError(f'{recording.path} contains no states', 'joint states')
     return {'start_ns': min(stamps), 'duration_s': 1e-9 * (max(stamps) - min(stamps))}
 
 
-def mean_of_topic(path: str, topic: str) -> float:
+def mean_of_topic(recording: Recording, topic: str) -> float:
     """Return the mean of the numbers of a topic: `data`, `temperature` or another single field.
 
     Raises:
         RecordingError: no such topic, or no number in its messages.
     """
     values = []
-    for _, message in open_recording(path).messages(topic):
+    for _, message in recording.messages(topic):
         found = [getattr(message, name, None) for name in _FIELDS]
         values += [float(x) for x in found if isinstance(x, Real)][:1]
     if not values or not np.isfinite(values).any():
         raise RecordingError(
-            f'{topic} of {path} contains no numbers', 'messages with data or temperature',
+            f'{topic} of {recording.path} contains no numbers',
+            'messages with data or temperature',
             'give its values with --covariates',
         )  # fmt: skip
     return float(np.nanmean(np.where(np.isfinite(values), values, np.nan)))

@@ -53,7 +53,7 @@ def run_check(
     events = read_events(bag, joint_states, command, remarks)
     nominal, known, unknown = _known(model, gains, events, effort, remarks)
     found = check_recording(events, model, None if known is None else known.gains)
-    print_check(Path(bag).name, found)
+    print_check(Path(bag).name, found, remarks)
     content: dict[str, Any] = {'recording': Path(bag).name, 'robot': model.name,
                                **found.content()}  # fmt: skip
     content['remarks'] += [*remarks, *found.refusals]
@@ -106,8 +106,8 @@ def _known(
     return nominal, Knowledge(nominal.robot, nominal.stated, config, stated), ''
 
 
-def print_check(name: str, found: RecordingCheck) -> None:
-    """Print what a recording holds."""
+def print_check(name: str, found: RecordingCheck, remarks: Sequence[str] = ()) -> None:
+    """Print what a recording holds, and what was said when it was read."""
     print(f'{name}: {found.states} states in {found.seconds:.4g} s, {found.rate_hz:.4g} Hz, '
           f'jitter {100.0 * found.jitter:.2f} %')  # fmt: skip
     if found.commands:
@@ -119,7 +119,7 @@ def print_check(name: str, found: RecordingCheck) -> None:
         print(f'  joint     {joint}: {j.lower:.4g} to {j.upper:.4g}{share}, {j.reversals} '
               f'reversals, rms speed {j.speed:.3g}; position'
               f'{"".join(f", {c}" for c in channels)}')  # fmt: skip
-    for remark in found.remarks:
+    for remark in (*found.remarks, *remarks):
         print(f'  remark    {remark}')
 
 

@@ -68,7 +68,8 @@ def run_demo(
     )
     comparison = compare(bag, history.estimates)
     truth = _truth(seed)
-    metrics = collect_metrics(engine, bag.name, timing=timing, seed=seed)
+    remarks = recording.remarks
+    metrics = collect_metrics(engine, bag.name, timing=timing, seed=seed, remarks=remarks)
     metrics['live_equals_replay'] = comparison.to_mapping()
     with replacing_results(out, 'demo'):
         write_text(out / 'metrics.json', json.dumps(metrics, indent=1, allow_nan=False) + '\n')

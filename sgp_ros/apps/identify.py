@@ -85,14 +85,17 @@ class IdentifiedRecording:
     Attributes:
         found: the identification.
         findings: the content of identification.json.
-        remarks: on the recordings.
         robot: as it was given.
     """
 
     found: Identification
     findings: dict[str, Any]
-    remarks: tuple[str, ...]
     robot: str
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Remarks on the recordings."""
+        return tuple(self.findings['remarks'])
 
 
 def run_identify(
@@ -148,9 +151,9 @@ def identify_recording(
         counts |= {f'{what} refused: {reason}': n for reason, n in refused.items() if n}
     if signals.left_out:
         counts['states in stretches too short to be filtered'] = signals.left_out
-    findings = collect_findings(found, Path(bag).name, rollouts, counts)
+    findings = collect_findings(found, Path(bag).name, rollouts, counts, remarks)
     progress(1.0)
-    return IdentifiedRecording(found, findings, tuple(remarks), robot)
+    return IdentifiedRecording(found, findings, robot)
 
 
 def write_identified_recording(out: Path, identified: IdentifiedRecording) -> None:
@@ -169,7 +172,7 @@ def write_identified_recording(out: Path, identified: IdentifiedRecording) -> No
             from sgp_ros.robots.urdf_robot import nominal_tree  # noqa: PLC0415 - loads Pinocchio
 
             tree = nominal_tree(found.robot)
-        write_identification(out, found, findings, identified.remarks, steps, tree)
+        write_identification(out, found, findings, steps, tree)
 
 
 def _steps(out: Path, identified: IdentifiedRecording) -> Steps:
@@ -261,6 +264,8 @@ def print_findings(findings: Mapping[str, Any]) -> None:
         print(f'a motion that would determine more: {text}')
     for text in cautions(findings):
         print(warned(f'caution: {text}'))
+    for text in findings['remarks']:
+        print(warned(f'remark: {text}'))
 
 
 def _print_scores(findings: Mapping[str, Any]) -> None:

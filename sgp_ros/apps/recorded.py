@@ -14,7 +14,7 @@ from sgp_ros.batch.contradictions import require_sense, require_shared_motion
 from sgp_ros.batch.recording_check import RecordingCheck, check_recording
 from sgp_ros.engine.samples import CommandSample, Event
 from sgp_ros.errors import RecordingError
-from sgp_ros.recordings.messages import joint_sample
+from sgp_ros.recordings.messages import JOINT_STATE
 from sgp_ros.recordings.reader import Recording, open_recording
 from sgp_ros.recordings.topics import GAINS_TOPIC
 from sgp_ros.robots.gains import Gains, checked_gains, read_gains
@@ -37,21 +37,20 @@ def read_events(
     """
     recording = open_recording(bag)
     _refuse_moving_base(recording)
-    events = _with_gains(recording, list(recording.events(joint_states, command)))
+    events = list(recording.events(joint_states, command))
+    types = {topic.name: topic.type for topic in recording.topics}
+    if types.get(GAINS_TOPIC) == JOINT_STATE:
+        events = _with_gains(recording, events)
+    elif GAINS_TOPIC in types:
+        remarks.append(f'{GAINS_TOPIC} is not used: its type is {types[GAINS_TOPIC]}, '
+                       f'not {JOINT_STATE}')  # fmt: skip
     remarks += recording.remarks
-    remarks += [
-        f'{count} messages of {recording.path.name} could not be read: {why}'
-        for why, count in recording.unreadable.items()
-    ]
     return events
 
 
 def _with_gains(recording: Recording, events: list[Event]) -> list[Event]:
     """Return events whose targets have the gains that are recorded beside them."""
-    if GAINS_TOPIC not in [topic.name for topic in recording.topics]:
-        return events
-    rows = [joint_sample(message, log_ns) for log_ns, message in recording.messages(GAINS_TOPIC)]
-    rows.sort(key=lambda x: x.stamp_ns)
+    rows = sorted(recording.joint_samples(GAINS_TOPIC), key=lambda x: x.stamp_ns)
     stamps = [x.stamp_ns for x in rows]
     found: list[Event] = []
     for e in events:

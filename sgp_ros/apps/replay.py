@@ -116,10 +116,7 @@ def _replay_into(
 
         run_events(engine, recording, options, keep, timing, progress)
         _check_use(engine, recording, options)
-    remarks = [*recording.remarks]
-    remarks += [f'{count} messages could not be read: {reason}'
-                for reason, count in recording.unreadable.items()]  # fmt: skip
-    remarks += stream_remarks(engine, failures)
+    remarks = [*recording.remarks, *stream_remarks(engine, failures)]
     remark = write_identified_robot(out, engine)
     remarks += [remark] if remark else []
     remarks += model_remarks(engine, asked=asked)

@@ -25,11 +25,10 @@ _EFFORTS = {
     'revolute': (('kgf cm', 100.0 / 9.80665), ('N cm', 100.0), ('N mm', 1e3)),
     'prismatic': (('kgf', 1.0 / 9.80665), ('mN', 1e3)),
 }
-_RATES = {
-    'revolute': (('degrees', 180.0 / math.pi), ('turns', 0.5 / math.pi), ('rpm', 30.0 / math.pi)),
-    'prismatic': (('millimetres', 1e3),),
-}
+_RATES = {'revolute': (*_TURNING, ('rpm', 30.0 / math.pi)), 'prismatic': _SLIDING}
 """Names of units and their numbers per SI unit."""
+_FARTHEST = {'revolute': 1e5, 'prismatic': 1e4}
+"""Range of positions beyond which they are hardly SI: 16 000 turns, 10 km [rad or m]."""
 _OUTSIDE = 0.5
 """Ranges beyond the limits from which on positions are in another unit: stops give way by less."""
 _BEYOND = 5.0
@@ -66,6 +65,9 @@ def unit_contradictions(
             f'are {joint.lower:.3g} to {joint.upper:.3g} {joint.unit("position")}: '
             f'they would fit in {unit}'
         )
+    elif not (span := ends[1] - ends[0]) < _FARTHEST[joint.kind]:
+        said = f'the positions of {joint.name} span {span:.3g} {joint.unit("position")}'
+        open_ones.append(f'{said}: counts or {_RATES[joint.kind][0][0]}?')
     slope = _slope_of_velocity(states, joint.name)
     if not 1.0 / _NEAR < slope < _NEAR:
         said = f'the velocity of {joint.name} is {slope:.3g} times the slope of its position'

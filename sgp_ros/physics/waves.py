@@ -20,6 +20,8 @@ _ROWS_A_WAVE = 5.0
 _BINS_A_WAVE = 8
 _FINER = 4
 """Rates per width of a peak."""
+_LEAST_SIZE, _SIZE_A_ROW = 1 << 20, 8
+"""Of the transform, below which none is too long; rows that resolve a wave need 6.4 a row."""
 
 
 def per_turn(motion: SeenMotion, joint: int) -> float:
@@ -72,6 +74,9 @@ class Wave:
         parts = [a[rows] / sigma for a in self.amplitudes]
         width = 2.0 * math.pi / max(float(phase.max()), 1e-9)
         bin_width = 2.0 * math.pi / (_BINS_A_WAVE * self.high)
+        wanted = _FINER * (2.0 * math.pi / width / bin_width + 2.0)
+        if not wanted < max(_LEAST_SIZE, _SIZE_A_ROW * len(phase)):
+            return np.array([[self.low], [self.high]])  # rows are far too few for such waves
         bins = np.rint(phase / bin_width).astype(int)
         size = _FINER * int(np.ceil(2.0 * math.pi / width / bin_width) + 1)
         step = 2.0 * math.pi / (size * bin_width)

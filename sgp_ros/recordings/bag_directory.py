@@ -12,10 +12,10 @@ from pathlib import Path
 import yaml
 import zstandard
 
-from sgp_ros.errors import RecordingError
+from sgp_ros.errors import RecordingError, SgpError
 from sgp_ros.markup import load_yaml
-from sgp_ros.recordings.bag_source import SqliteSource
 from sgp_ros.recordings.mcap_source import McapSource
+from sgp_ros.recordings.sqlite_source import SqliteSource
 from sgp_ros.recordings.topics import RawMessage, Source, Topic
 from sgp_ros.recordings.unpacking import Unpacking
 from sgp_ros.scratch import Scratch
@@ -23,6 +23,7 @@ from sgp_ros.strangers import read_text, require_file
 
 _KINDS: dict[str, type[McapSource | SqliteSource]] = {'.mcap': McapSource, '.db3': SqliteSource}
 _PACKED = '.zstd'
+_LONGEST = 100
 
 
 def read_directory(path: Path) -> tuple[Source, tuple[str, ...]]:
@@ -35,9 +36,11 @@ def read_directory(path: Path) -> tuple[Source, tuple[str, ...]]:
     metadata = _read_metadata(path)
     missing = [name for name in metadata.files if not (path / name).exists()]
     remarks = [f'metadata.yaml lists {", ".join(missing)}, which is missing'] if missing else []
-    files = [path / name for name in metadata.files if name not in missing] or sorted(
-        (file for file in path.iterdir() if _kind(file) in _KINDS), key=_natural_order
-    )
+    there = sorted((file for file in path.iterdir() if _kind(file) in _KINDS), key=_natural_order)
+    files = [path / name for name in dict.fromkeys(metadata.files) if name not in missing] or there
+    if metadata.damage:
+        remarks.append(f'metadata.yaml is damaged ({metadata.damage}): {len(files)} files in its '
+                       'folder are read without it')  # fmt: skip
     kinds = {_kind(file) for file in files}
     if len(kinds) != 1 or not kinds <= set(_KINDS):
         raise RecordingError(
@@ -51,13 +54,38 @@ def read_directory(path: Path) -> tuple[Source, tuple[str, ...]]:
     source: Source = _of_packed(files, kind) if has_packed_files else kind(files)
     if metadata.is_compressed and not has_packed_files:
         source = _PackedMessages(source, _size(files))
+    remarks += [
+        f'{file.name} is not read, because metadata.yaml does not list it ({_content(file)})'
+        for file in there if file not in files
+    ]  # fmt: skip
+    return source, (*remarks, *_differences(metadata, source))
+
+
+def _content(file: Path) -> str:
+    """Return what a file that is not read contains, in words."""
+    if file.suffix == _PACKED:
+        return 'compressed'
+    try:
+        require_file(file)
+        source = _KINDS[file.suffix]([file])
+    except (SgpError, OSError) as error:
+        return ' '.join(str(error).split())[:200]
+    return f'{sum(topic.count for topic in source.topics)} messages'
+
+
+def _differences(metadata: _Metadata, source: Source) -> list[str]:
+    """Say where the files contain another number of messages than metadata.yaml counts."""
     found = {topic.name: topic.count for topic in source.topics}
-    remarks += (
+    remarks = [
         f'metadata.yaml counts {count} messages on {name}, the files contain {found.get(name, 0)}'
         for name, count in metadata.counts.items()
         if found.get(name, 0) != count
-    )
-    return source, tuple(remarks)
+    ]
+    number = sum(found.values())
+    if metadata.total not in {None, number}:
+        remarks.append(f'the files contain {number} of the {metadata.total} messages that '
+                       'metadata.yaml counts')  # fmt: skip
+    return remarks
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,11 +140,15 @@ class _Metadata:
         files: names of the files.
         is_compressed: whether messages or files are.
         counts: topic to number of messages.
+        total: number of all messages; None where it is not stated.
+        damage: why it cannot be read; empty where it can.
     """
 
     files: Sequence[str] = ()
     is_compressed: bool = False
     counts: Mapping[str, int] = field(default_factory=dict)
+    total: int | None = None
+    damage: str = ''
 
 
 def _read_metadata(path: Path) -> _Metadata:
@@ -128,11 +160,18 @@ def _read_metadata(path: Path) -> _Metadata:
             str(entry['topic_metadata']['name']): int(entry['message_count'])
             for entry in information.get('topics_with_message_count') or ()
         }
-        return _Metadata(names, bool(information.get('compression_format')), counts)
-    except (
-        FileNotFoundError, yaml.YAMLError, KeyError, TypeError, AttributeError, ValueError,
-    ):  # fmt: skip
+        total = information.get('message_count')
+        return _Metadata(
+            names, bool(information.get('compression_format')), counts,
+            None if total is None else int(total),
+        )  # fmt: skip
+    except FileNotFoundError:
         return _Metadata()
+    except (
+        yaml.YAMLError, KeyError, TypeError, AttributeError, ValueError, OverflowError,
+    ) as error:  # fmt: skip
+        reason = ' '.join(f'{type(error).__name__}: {error}'.split())
+        return _Metadata(damage=reason[:_LONGEST])
 
 
 def _kind(file: Path) -> str:

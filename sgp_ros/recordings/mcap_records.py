@@ -21,6 +21,7 @@ from mcap.records import Channel, Chunk, Schema
 from mcap.stream_reader import CRCValidationError
 
 from sgp_ros.recordings.unpacking import Unpacking
+from sgp_ros.strangers import require_within
 
 MAGIC = b'\x89MCAP0\r\n'
 DAMAGE = (
@@ -61,6 +62,19 @@ class Stamps(NamedTuple):
 _READERS: dict[int, Callable[[ReadDataStream], Schema | Channel]] = {
     Opcode.SCHEMA: Schema.read, Opcode.CHANNEL: Channel.read,
 }  # fmt: skip
+
+
+_WALKED = (Opcode.MESSAGE, Opcode.CHUNK, *_READERS)
+"""Records whose content is looked at."""
+
+
+def require_chunk(size: int) -> None:
+    """Refuse to read more at once than a chunk may hold, before it is read.
+
+    Raises:
+        TooMuchError: more than `CHUNK_MB`.
+    """
+    require_within(size / (1 << 20), 'CHUNK_MB', 'size of a record or an index in MB')
 
 
 class _Run:
@@ -122,6 +136,11 @@ class Walk:
             if opcode == Opcode.CHUNK:
                 yield start, self._read(start, end)
                 start = end
+            elif opcode not in _WALKED and end - offset > _LOOSE_BYTES:
+                if start < offset:
+                    yield start, self._read(start, offset)
+                self._pass(offset, end)
+                start = end
             offset = end
 
     @property
@@ -141,9 +160,15 @@ class Walk:
         return opcode, length
 
     def _read(self, start: int, end: int) -> bytes:
+        require_chunk(end - start)
         data = self._at(start, end)
         self._sum = zlib.crc32(data, self._sum)
         return data
+
+    def _pass(self, start: int, end: int) -> None:
+        """Add to the checksum what nobody needs, such as an attachment of any size."""
+        for place in range(start, end, _LOOSE_BYTES):
+            self._sum = zlib.crc32(self._at(place, min(place + _LOOSE_BYTES, end)), self._sum)
 
     def _at(self, start: int, end: int) -> bytes:
         self._stream.seek(start)
@@ -164,6 +189,7 @@ def state_of_summary(stream: IO[bytes]) -> str:
     if stream.read() != MAGIC or not (start == 0 or len(MAGIC) <= start <= place):
         return DAMAGED
     begin, end, found = start or place, place + _FOOTER.size - 4, 0
+    require_chunk(end - begin)
     stream.seek(begin)
     while stated and begin < end:
         data = stream.read(min(_LOOSE_BYTES, end - begin))

@@ -33,9 +33,10 @@ from sgp_ros.recordings.mcap_records import (
     Walk,
     read_records,
     read_stamps,
+    require_chunk,
     state_of_summary,
 )
-from sgp_ros.recordings.topics import RawMessage, Topic
+from sgp_ros.recordings.topics import RawMessage, Topic, merged_topics
 from sgp_ros.recordings.typestore import short_type
 from sgp_ros.recordings.unpacking import Unpacking
 from sgp_ros.strangers import bound, require_within
@@ -71,18 +72,11 @@ class McapSource:
         count = sum(file.counts.total() for file in self._files)
         require_within(count, 'MESSAGES', 'number of messages')
         self._damage: dict[tuple[int, int], str] = {}
-
-    @property
-    def topics(self) -> tuple[Topic, ...]:
-        """The topics of all files, by name; a topic with two types keeps the first."""
-        found: dict[str, Topic] = {}
-        for file in self._files:
-            for channel, (name, kind, encoding) in sorted(file.channels.items()):
-                known = found.get(name, Topic(name, kind, 0, encoding))
-                if (known.type, known.encoding) == (kind, encoding):
-                    count = known.count + file.counts[channel]
-                    found[name] = Topic(name, kind, count, encoding)
-        return tuple(found[name] for name in sorted(found))
+        self.topics, self._not_read = merged_topics(
+            (described, file.counts[channel])
+            for file in self._files
+            for channel, described in sorted(file.channels.items())
+        )
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -90,7 +84,7 @@ class McapSource:
         damage = [*self._damage.values()]
         if len(damage) > _LISTED:
             damage[_LISTED:] = [f'{len(damage) - _LISTED} more places are damaged']
-        return (*(file.remark for file in self._files if file.remark), *damage)
+        return (*(x.remark for x in self._files if x.remark), *self._not_read, *damage)
 
     def messages(self, topics: Collection[Topic]) -> Iterator[RawMessage]:
         """Yield the messages of `topics` by log time; equal times keep the order of the file.
@@ -124,6 +118,7 @@ class McapSource:
         path = self._paths[segment.file]
         channels = self._files[segment.file].channels
         names = {number: channel[0] for number, channel in channels.items() if channel in wanted}
+        require_chunk(segment.length)
         with path.open('rb') as stream:
             stream.seek(segment.offset)
             data = stream.read(segment.length)
@@ -211,9 +206,11 @@ def _index_file(path: Path, number: int, unpacking: Unpacking) -> _FileIndex:
             state, summary = DAMAGED, None
         index = _indexed(summary, number) if summary else None
         if index is None:
-            index = _scan(stream, path, number, unpacking)
-            if summary is not None and summary.statistics is not None:
-                index.counts.update(_missing(summary.statistics.channel_message_counts, index))
+            stated = summary.statistics if summary else None
+            total = stated.message_count if stated else None
+            index = _scan(stream, path, number, unpacking, total)
+            if stated is not None:
+                index.counts.update(_missing(stated.channel_message_counts, index))
         if state == DAMAGED and not index.remark:
             index.remark = f'{path.name}: its index is damaged; the whole file was read without it'
         return index
@@ -249,7 +246,9 @@ def _indexed(summary: Summary, number: int) -> _FileIndex | None:
     return _FileIndex(channels, counts, segments)
 
 
-def _scan(stream: IO[bytes], path: Path, number: int, unpacking: Unpacking) -> _FileIndex:
+def _scan(
+    stream: IO[bytes], path: Path, number: int, unpacking: Unpacking, total: int | None
+) -> _FileIndex:
     """Walk the records of a file without index, up to the last complete segment."""
     index = _FileIndex()
     schemas: dict[int, Schema] = {}
@@ -275,11 +274,12 @@ def _scan(stream: IO[bytes], path: Path, number: int, unpacking: Unpacking) -> _
                 latest_ns = max(latest_ns, last_ns)
     except DAMAGE:
         walk.is_complete = False
-    index.remark = _state_of(walk, path.name, index.counts.total(), latest_ns)
+    known = str(index.counts.total()) + ('' if total is None else f' of {total}')
+    index.remark = _state_of(walk, path.name, known, latest_ns)
     return index
 
 
-def _state_of(walk: Walk, name: str, found: int, latest_ns: int) -> str:
+def _state_of(walk: Walk, name: str, found: str, latest_ns: int) -> str:
     """Return what the user should know of a file that was walked through; may be empty."""
     if walk.is_complete:
         if walk.is_sound:

@@ -30,6 +30,9 @@ TEXT = 'std_msgs/String'
 
 _NONE = np.zeros(0)
 _SECOND_NS = 1_000_000_000
+_MOST_NS = 1 << 62
+"""Greatest stamp and least: differences fit into 64 bits; headers hold up to 1 << 32 seconds."""
+_MOST_INTEGER = 1 << 63
 _CHANGE = '{"change": "settings" or "reset", "stamp_ns": integer, "settings": {...}}'
 
 
@@ -91,6 +94,16 @@ def stamp_ns(message: Message, receipt_ns: int) -> int:
     """Return the header stamp of `message`, or `receipt_ns` where it is zero [ns]."""
     stamp = message.header.stamp
     return int(stamp.sec) * _SECOND_NS + int(stamp.nanosec) or receipt_ns
+
+
+def require_stamp(stamp_ns: int) -> None:
+    """Refuse a stamp [ns] that no clock has; arithmetic with it would overflow.
+
+    Raises:
+        MessageError: it is more than 146 years from 1970.
+    """
+    if abs(stamp_ns) > _MOST_NS:
+        raise MessageError('a stamp after the year 2116', 'nanoseconds since 1970')
 
 
 def joint_names(names: Sequence[str]) -> tuple[str, ...]:
@@ -206,14 +219,15 @@ def change_from_text(text: str) -> SettingsChange | Reset:
     """Return the change that `change_to_text` wrote.
 
     Raises:
-        MessageError: the text is something else.
+        MessageError: the text is something else, or holds numbers beyond 64 bits.
     """
     try:
         content = json.loads(text)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise MessageError('a settings change that is not JSON', _CHANGE) from error
     if not isinstance(content, dict) or type(content.get('stamp_ns')) is not int:
         raise MessageError('a settings change without a stamp', _CHANGE)
+    require_stamp(content['stamp_ns'])
     if content.get('change') == 'reset':
         return Reset(content['stamp_ns'])
     settings = content.get('settings')
@@ -224,6 +238,9 @@ def change_from_text(text: str) -> SettingsChange | Reset:
 
 
 def _setting(name: str, value: object) -> SettingValue:
+    values = value if isinstance(value, list) else [value]
+    if any(isinstance(x, int) and abs(x) >= _MOST_INTEGER for x in values):
+        raise MessageError(f'setting {name} with an integer beyond 64 bits', 'a smaller one')
     if isinstance(value, (bool, int, float, str)):
         return value
     if isinstance(value, list):

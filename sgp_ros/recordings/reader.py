@@ -8,18 +8,25 @@ from __future__ import annotations
 
 import struct
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
-from typing import cast
+from typing import TypeVar, cast
 
-from sgp_ros.engine.samples import Event, Reset, SettingsChange
+from sgp_ros.engine.samples import CommandSample, Event, JointSample, Reset, SettingsChange
 from sgp_ros.errors import MessageError, RecordingError
 from sgp_ros.recordings.bag_directory import read_directory
-from sgp_ros.recordings.bag_source import Ros1Source, SqliteSource
 from sgp_ros.recordings.command_types import COMMAND_TYPES
 from sgp_ros.recordings.mcap_records import MAGIC
 from sgp_ros.recordings.mcap_source import McapSource
-from sgp_ros.recordings.messages import TEXT, Message, change_from_text, joint_sample
+from sgp_ros.recordings.messages import (
+    TEXT,
+    Message,
+    change_from_text,
+    joint_sample,
+    require_stamp,
+)
+from sgp_ros.recordings.ros1_source import Ros1Source
+from sgp_ros.recordings.sqlite_source import SqliteSource
 from sgp_ros.recordings.topics import (
     CHANGES_TOPIC,
     Source,
@@ -39,11 +46,15 @@ _WRONG = (
     AttributeError,
     TypeError,
     MemoryError,
+    RecursionError,
 )
 """Exceptions from decoding a damaged message, beside `MessageError`."""
 _HOPELESS, _MOST, _LONGEST = 20_000, 0.9, 200
 """Unreadable messages, and their share, beyond which no more are tried; length of a reason."""
 _KINDS = 'an .mcap file, a rosbag2 directory or a ROS 1 .bag'
+_T = TypeVar('_T')
+_E = TypeVar('_E', JointSample, CommandSample)
+_Convert = Callable[[Message, int], Event]
 
 
 class Recording:
@@ -52,8 +63,6 @@ class Recording:
     Attributes:
         path: where it lies.
         topics: its topics with type and number of messages.
-        unreadable: "topic: reason" to the number of messages that the latest pass of `events`
-            skipped.
     """
 
     def __init__(self, path: Path, source: Source, remarks: tuple[str, ...]) -> None:
@@ -62,12 +71,24 @@ class Recording:
         self.topics = source.topics
         self._remarks = remarks
         self._missing: dict[str, str] = {}
-        self.unreadable: Counter[str] = Counter()
+        self._skipped: dict[str, Counter[str]] = {}
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Sentences for the user: what was recovered of the file, what the last pass missed."""
-        return (*self._remarks, *self._source.remarks, *self._missing.values())
+        """Sentences for the user: what was recovered of the file, what the last passes missed.
+
+        They are complete once the topics that are wanted have been read to their ends.
+        """
+        skipped = [
+            f'{count} messages of {self.path.name} could not be read: {why}'
+            for why, count in self.unreadable.items()
+        ]
+        return (*self._remarks, *self._source.remarks, *self._missing.values(), *skipped)
+
+    @property
+    def unreadable(self) -> Counter[str]:
+        """Number of messages that the last pass over each topic skipped, by "topic: reason"."""
+        return sum(self._skipped.values(), Counter())
 
     def events(
         self,
@@ -88,35 +109,44 @@ class Recording:
                 one message could be read.
         """
         states = choose_joint_states(self.topics, joint_states)
-        chosen: dict[str, tuple[Topic, Callable[[Message, int], Event]]] = {}
+        chosen: dict[str, tuple[Topic, _Convert]] = {}
         commands = choose_command(self.topics, states, command)
         if commands:
-            chosen[commands.name] = commands, COMMAND_TYPES[commands.type].decode
+            chosen[commands.name] = commands, _stamped(COMMAND_TYPES[commands.type].decode)
         for topic in self.topics:
             if topic.name == changes and topic.type == TEXT:
                 chosen[topic.name] = topic, _change
-        chosen[states.name] = states, joint_sample
+        chosen[states.name] = states, _stamped(joint_sample)
         return self._convert(chosen)
+
+    def joint_samples(self, name: str) -> Iterator[JointSample]:
+        """Yield the messages of one topic of joint states, in the order of log time.
+
+        Raises:
+            RecordingError: no such topic, or not one message of it could be read.
+        """
+        yield from self._convert({name: (self._topic(name), _stamped(joint_sample))})
 
     def messages(self, name: str) -> Iterator[tuple[int, Message]]:
         """Yield log time [ns] and message of one topic, in the order of log time.
 
         Raises:
-            RecordingError: no such topic.
+            RecordingError: no such topic, or not one message of it could be read.
         """
-        topics = [topic for topic in self.topics if topic.name == name]
-        if not topics:
-            found = [topic.name for topic in self.topics]
-            raise RecordingError(f'{self.path} has the topics {found}', f'topic {name}')
-        decode = decoder(topics[0].type, topics[0].encoding)
-        with readable(self.path, RecordingError, _KINDS):
-            for log_ns, _, data in self._source.messages(topics):
-                yield log_ns, decode(data)
+        yield from self._convert({name: (self._topic(name), lambda message, ns: (ns, message))})
+
+    def _topic(self, name: str) -> Topic:
+        for topic in self.topics:
+            if topic.name == name:
+                return topic
+        found = [topic.name for topic in self.topics]
+        raise RecordingError(f'{self.path} has the topics {found}', f'topic {name}')
 
     def _convert(
-        self, chosen: dict[str, tuple[Topic, Callable[[Message, int], Event]]]
-    ) -> Iterator[Event]:
-        unreadable = self.unreadable = Counter[str]()
+        self, chosen: Mapping[str, tuple[Topic, Callable[[Message, int], _T]]]
+    ) -> Iterator[_T]:
+        """Yield what messages become; those that become nothing are counted and skipped."""
+        self._skipped |= {name: Counter() for name in chosen}
         decoders = {
             name: decoder(topic.type, topic.encoding) for name, (topic, _) in chosen.items()
         }
@@ -131,7 +161,7 @@ class Recording:
                     reason = (
                         error.found if isinstance(error, MessageError) else type(error).__name__
                     )
-                    unreadable[f'{name}: {reason[:_LONGEST]}'] += 1
+                    self._skipped[name][f'{name}: {reason[:_LONGEST]}'] += 1
                     wrong += 1
                     if wrong > _HOPELESS and wrong > _MOST * found.total():
                         raise self._hopeless(wrong, found.total()) from None
@@ -150,14 +180,16 @@ class Recording:
 
     def _compare(self, topics: Collection[Topic], found: Counter[str]) -> None:
         """Say where the file holds another number of messages than it says it does."""
-        self._missing = {
+        missing = {
             topic.name: f'{topic.name}: only {found[topic.name]} of {topic.count} messages read'
             for topic in topics
             if topic.count is not None and found[topic.name] != topic.count
         }
-        if self._missing and not found.total():
+        read = {topic.name for topic in topics}
+        self._missing = {n: x for n, x in self._missing.items() if n not in read} | missing
+        if missing and not found.total():
             raise RecordingError(
-                f'{self.path}: {"; ".join((*self._missing.values(), *self._source.remarks))}',
+                f'{self.path}: {"; ".join((*missing.values(), *self._source.remarks))}',
                 'an intact recording',
             )
 
@@ -199,6 +231,17 @@ def _file_source(path: Path) -> Source:
     raise RecordingError(
         f'{path} is not a recording (it starts with {head[:8]!r})', _KINDS, remedy
     )
+
+
+def _stamped(convert: Callable[[Message, int], _E]) -> Callable[[Message, int], _E]:
+    """Return a conversion that refuses stamps that no clock has."""
+
+    def converted(message: Message, receipt_ns: int) -> _E:
+        event = convert(message, receipt_ns)
+        require_stamp(event.stamp_ns)
+        return event
+
+    return converted
 
 
 def _change(message: Message, _receipt_ns: int) -> SettingsChange | Reset:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -43,6 +43,30 @@ class Topic:
     def last_name(self) -> str:
         """Part of the name after the last slash."""
         return self.name.rsplit('/', 1)[-1]
+
+
+def merged_topics(
+    counts: Iterable[tuple[tuple[str, str, str], int]],
+) -> tuple[tuple[Topic, ...], tuple[str, ...]]:
+    """Return the topics by name, each with the type that most messages have, and remarks.
+
+    Args:
+        counts: name, type and encoding, with a number of messages; they may repeat.
+    """
+    total: dict[tuple[str, str, str], int] = {}
+    for key, count in counts:
+        total[key] = total.get(key, 0) + count
+    found: dict[str, Topic] = {}
+    for (name, kind, encoding), count in total.items():
+        if name not in found or count > found[name].count:
+            found[name] = Topic(name, kind, count, encoding)
+    remarks = [
+        f'{name}: {count} messages of type {kind or "none"} ({encoding or "no encoding"}) are '
+        f'not read, beside {found[name].count} of type {found[name].type or "none"}'
+        for (name, kind, encoding), count in total.items()
+        if count and (kind, encoding) != (found[name].type, found[name].encoding)
+    ]
+    return tuple(found[name] for name in sorted(found)), tuple(remarks)
 
 
 class RawMessage(NamedTuple):

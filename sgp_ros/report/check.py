@@ -112,14 +112,15 @@ def position_charts(events: Sequence[Event], robot: Robot) -> dict[str, Chart]:
             for s in states
             if joint.name in s.names and len(s.position) == len(s.names)
         ]
+        own = sorted((t, x) for t, x in own if np.isfinite(x))
         if len(own) < 2:
             continue
-        stamps, q = (np.array(x) for x in zip(*sorted(own), strict=True))
+        stamps, q = (np.array(x) for x in zip(*own, strict=True))
         time, unit = (stamps - stamps[0]) * 1e-9, joint.unit('position')
         rows = kept([q])
         charts[f'position {joint.name}'] = Chart(
             f'Position of {joint.name}',
-            f'Between {spoken(np.nanmin(q))} and {spoken(np.nanmax(q))} {unit}.',
+            f'Between {spoken(q.min())} and {spoken(q.max())} {unit}.',
             'time [s]', f'position [{unit}]', time[rows],
             [Series('measured', q[rows], 'final')], group='check',
         )  # fmt: skip

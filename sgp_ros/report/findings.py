@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ def collect_findings(
     recording: str,
     rollouts: Mapping[str, tuple[RolloutScore, ...]],
     counts: Mapping[str, Any],
+    remarks: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Return all numbers of an identification.
 
@@ -33,6 +34,7 @@ def collect_findings(
         recording: name of the recording.
         rollouts: by name of the recording, one score per horizon.
         counts: states and commands read and refused.
+        remarks: on the recordings.
     """
     names = found.robot.joint_names
     regions = _regions(found)
@@ -48,6 +50,7 @@ def collect_findings(
         },
         'held_out': list(found.held),
         'counts': dict(counts),
+        'remarks': list(remarks),
         'filter': _filter(found),
         'rows': {name: len(data.time) for name, data in regions.items()},
         'scores': {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -39,7 +39,6 @@ def write_identification(
     out: Path,
     found: Identification,
     findings: Mapping[str, Any],
-    remarks: Sequence[str],
     steps: Steps = (),
     tree: Tree | None = None,
 ) -> None:
@@ -49,7 +48,6 @@ def write_identification(
         out: folder.
         found: the identification.
         findings: its numbers.
-        remarks: on the recordings.
         steps: what to do next.
         tree: of the robot, for its picture; None for none.
     """
@@ -60,9 +58,7 @@ def write_identification(
     charts = identification_charts(found, drawn(found.fits))
     charts['filter'] = filter_chart(findings['filter'])
     picture = '' if tree is None else picture_of(found, findings, tree)
-    page = render(
-        found.robot.description, findings, figures, remarks, charts, steps, picture=picture
-    )
+    page = render(found.robot.description, findings, figures, charts, steps, picture=picture)
     write_text(out / 'report.html', page)
 
 
@@ -70,7 +66,6 @@ def render(
     description: str,
     findings: Mapping[str, Any],
     figures: Mapping[str, bytes],
-    remarks: Sequence[str],
     charts: Mapping[str, Chart] = MappingProxyType({}),
     steps: Steps = (),
     *,
@@ -111,7 +106,7 @@ def render(
         base=[_base(b) for b in findings['base_parameters']],
         filter=filter_sentence(findings['filter']),
         counts=', '.join(f'{value} {key}' for key, value in findings['counts'].items()) + '.',
-        remarks=list(remarks),
+        remarks=findings['remarks'],
         next_steps=list(steps),
         versions=list(findings['versions'].items()),
     )  # fmt: skip

@@ -192,3 +192,14 @@ def test_a_robot_without_any_inertia_is_checked(tmp_path):
     assert main(['simulate', robot, '--duration', '4', '--out', out, '--quiet']) == 0
     bag = str(tmp_path / 'revolute_axis.mcap')
     assert main(['check', bag, '--robot', robot, '--out', out, '--quiet']) == 0
+
+
+@pytest.mark.parametrize('value', [np.nan, np.inf])
+def test_a_recording_without_a_finite_position_is_checked(value, tmp_path, capsys):
+    with RecordingWriter(tmp_path / 'x.mcap') as writer:
+        for state in _states(T, np.full(len(T), value), np.cos(T)):
+            writer.write_event(state)
+    words = ['check', str(tmp_path / 'x.mcap'), '--robot', _robot(tmp_path)]
+    assert main([*words, '--out', str(tmp_path / 'out')]) == 0
+    assert 'No motion above the noise, so not diagnosed: hinge' in capsys.readouterr().out
+    assert '<td data-label="to">none' in (tmp_path / 'out' / 'report.html').read_text()

@@ -10,8 +10,10 @@ from sgp_ros.apps.recorded import gains_of, read_events
 from sgp_ros.cli import main
 from sgp_ros.diagnosis.compare.trajectory import Bandwidth, collect, observe
 from sgp_ros.diagnosis.setup.correction import Correction
-from sgp_ros.engine.samples import CommandSample
+from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
 from sgp_ros.errors import RecordingError
+from sgp_ros.recordings.typestore import full_type
+from sgp_ros.recordings.writer import RecordingWriter
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.registry import load_robot
 
@@ -94,6 +96,20 @@ def test_a_recording_without_gains_beside_one_with_is_refused(bag, robot):
     ]
     with pytest.raises(RecordingError, match='gains of no joint with the targets; expected kp'):
         collect(bare, nominal.robot, gains=gains)
+
+
+@pytest.mark.parametrize('kind', ['std_msgs/Float64MultiArray', 'std_msgs/String', 'acme/Gains'])
+def test_a_topic_of_gains_of_another_type_is_said_and_not_used(kind, tmp_path):
+    path = tmp_path / 'x.mcap'
+    state = JointSample(10**18, ('hinge',), frozen_array([0.5]))
+    with RecordingWriter(path) as writer:
+        writer.write_event(state)
+        schema = writer._writer.register_schema(full_type(kind), 'ros2msg', b'')
+        channel = writer._writer.register_channel('/gains', 'cdr', schema)
+        writer._writer.add_message(channel, 10**18, b'anything', 10**18)
+    remarks = []
+    assert read_events(str(path), None, None, remarks)[0].stamp_ns == state.stamp_ns
+    assert remarks == [f'/gains is not used: its type is {kind}, not sensor_msgs/JointState']
 
 
 def test_gains_of_the_wrong_length_are_refused(robot, tmp_path, capsys):

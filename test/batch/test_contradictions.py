@@ -63,6 +63,14 @@ def test_units_that_limits_contradict_are_named():
     assert 'slope' not in _remarks(q=shaken, velocity=rate)
 
 
+def test_positions_that_span_what_no_joint_does_are_named():
+    """Also where no limits are known: counts of an encoder."""
+    robot = Robot('arm', tuple(map(Joint, NAMES)), 'effort', (), ((), ()))
+    for scale, said in ((1e4, False), (1e6, True), (1e29, True)):
+        remarks = ' '.join(check_recording(_events(scale * Q), robot).remarks)
+        assert ('rad: counts or degrees?' in remarks) is said
+
+
 def test_a_table_with_a_wrong_unit_is_refused():
     require_units(_events(1.9 * Q), ROBOT)
     with pytest.raises(RecordingError, match='expected the units stated'):

@@ -11,6 +11,7 @@ from sgp_ros.campaign.recordings import TableRow, find_recordings, read_covariat
 from sgp_ros.engine.samples import CommandSample, frozen_array
 from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.recordings.command_types import FLOAT64, FLOAT64_ARRAY
+from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.writer import RecordingWriter
 
 
@@ -88,7 +89,7 @@ def test_the_mean_of_a_topic_is_a_covariate(tmp_path):
         with RecordingWriter(tmp_path / f'{name}.mcap', command_type=kind) as writer:
             for i, value in enumerate((20.0, 24.0, math.nan)):
                 writer.write_event(CommandSample(10**9 * (1 + i), frozen_array([value])))
-    assert mean_of_topic(str(tmp_path / 'one.mcap'), '/command') == 22.0
+    assert mean_of_topic(open_recording(tmp_path / 'one.mcap'), '/command') == 22.0
     for name, topic in (('more', '/command'), ('one', '/temperature')):
         with pytest.raises(RecordingError, match=topic):
-            mean_of_topic(str(tmp_path / f'{name}.mcap'), topic)
+            mean_of_topic(open_recording(tmp_path / f'{name}.mcap'), topic)

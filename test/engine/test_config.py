@@ -32,6 +32,7 @@ def _problems(**settings):
         ('learning.enabled', 1, 'true or false'),
         ('command.joints', 'wheel', 'a list of strings'),
         ('command.joints', ['elbow'], 'elbow'),
+        ('filter.window', 10**400, 'a number'),
         ('filter.windw', 0.1, 'unknown setting'),
         ('hyper.pole.lengthscales', [1.0, 2.0, 3.0], '2 positive'),
         ('hyper.pole.lengthscales', [1.0, 0.0], '2 positive'),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import sqlite3
@@ -12,7 +13,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mcap.opcode import Opcode
 from mcap.writer import Writer as McapWriter
-from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
@@ -20,7 +20,11 @@ from rosbags.typesys import Stores, get_typestore
 from sgp_ros.engine.samples import CommandSample, JointSample
 from sgp_ros.errors import RecordingError, SgpError
 from sgp_ros.recordings import mcap_source
+from sgp_ros.recordings.messages import TEXT
 from sgp_ros.recordings.reader import open_recording
+from sgp_ros.recordings.topics import CHANGES_TOPIC
+from sgp_ros.recordings.typestore import full_type, new_message
+from sgp_ros.recordings.writer import RecordingWriter
 from test.recordings import worlds
 
 EVENTS = worlds.swing(30)
@@ -44,24 +48,7 @@ def _directory(path, plugin, compression=CompressionMode.NONE):
 
 
 def _ros1(path):
-    store = get_typestore(Stores.ROS1_NOETIC)
-    with Ros1Writer(path) as writer:
-        connections = {}
-        for event in EVENTS:
-            topic, kind, data = worlds.message_of(event)
-            full = kind.replace('/', '/msg/')
-            if topic not in connections:
-                connections[topic] = writer.add_connection(topic, full, typestore=store)
-            message = get_typestore(Stores.ROS2_JAZZY).deserialize_cdr(data, full)
-            if isinstance(event, JointSample):
-                header = store.types['std_msgs/msg/Header'](
-                    seq=0, stamp=message.header.stamp, frame_id=''
-                )
-                message = store.types[full](
-                    header, message.name, message.position, message.velocity, message.effort
-                )
-            writer.write(connections[topic], event.stamp_ns, store.serialize_ros1(message, full))
-    return path
+    return worlds.write_ros1(path, EVENTS)
 
 
 def _split(path, parts=11):
@@ -418,3 +405,67 @@ def test_an_index_that_names_a_chunk_twice_is_not_believed(tmp_path, monkeypatch
 
     monkeypatch.setattr(mcap_source, '_read_summary', doubled)
     assert worlds.everything(open_recording(path)) == EXPECTED
+
+
+def _settings(values, stamp_ns=1):
+    return json.dumps({'change': 'settings', 'stamp_ns': stamp_ns, 'settings': values})
+
+
+@pytest.mark.parametrize(
+    ('text', 'reason'),
+    [
+        (_settings({}, 10**400), 'a stamp after'),
+        (json.dumps({'change': 'reset', 'stamp_ns': -(10**400)}), 'a stamp after'),
+        ('[' * 100_000, 'not JSON'),
+        (_settings({'a': 10**400}), 'beyond 64 bits'),
+        (_settings({'a': [10**40]}), 'beyond 64 bits'),
+    ],
+)
+def test_a_recorded_change_that_no_run_made_is_counted_and_skipped(text, reason, tmp_path):
+    with RecordingWriter(tmp_path / 'x.mcap') as writer:
+        writer.write_event(EVENTS[1])
+        writer._write(CHANGES_TOPIC, TEXT, EVENTS[1].stamp_ns, new_message(TEXT, data=text))
+    recording = open_recording(tmp_path / 'x.mcap')
+    assert worlds.everything(recording) == EXPECTED[1:2]
+    assert recording.unreadable.total() == 1
+    assert reason in recording.remarks[-1]
+
+
+def test_a_log_time_that_no_clock_has_does_not_become_a_stamp(tmp_path):
+    """It would stand for the stamp of a message without one; differences of 64 bits overflow."""
+    path = tmp_path / 'x.mcap'
+    topic, kind, data = worlds.message_of(JointSample(0, ('pole',), worlds.array([1.0])))
+    with path.open('wb') as stream:
+        writer = McapWriter(stream)
+        writer.start()
+        channel = writer.register_channel(
+            topic, 'cdr', writer.register_schema(full_type(kind), 'ros2msg', b'')
+        )
+        for stamp in (5, 2**64 - 1):
+            writer.add_message(channel, stamp, data, stamp)
+        writer.finish()
+    recording = open_recording(path)
+    assert [event.stamp_ns for event in recording.events()] == [5]
+    assert '1 messages of x.mcap could not be read: /joint_states: a stamp' in recording.remarks[0]
+
+
+def test_an_attachment_of_any_size_costs_no_memory_without_an_index(tmp_path, monkeypatch):
+    """It is passed in blocks, and counts in the checksum of the data."""
+    monkeypatch.setenv('SGP_MOST_CHUNK_MB', '1')
+    path, (topic, kind, data) = tmp_path / 'x.mcap', worlds.message_of(EVENTS[1])
+    with path.open('wb') as stream:
+        writer = McapWriter(stream, use_chunking=False, enable_data_crcs=True)
+        writer.start()
+        schema = writer.register_schema(full_type(kind), 'ros2msg', b'')
+        channel = writer.register_channel(topic, 'cdr', schema)
+        for stamp in (EVENTS[1].stamp_ns, EVENTS[3].stamp_ns):
+            writer.add_message(channel, stamp, data, stamp)
+            writer.add_attachment(stamp, stamp, 'film', 'video/mp4', bytes(5 << 20))
+        writer.finish()
+    recording = open_recording(path)
+    assert len(list(recording.events())) == 2
+    assert recording.remarks == ()
+    content = bytearray(path.read_bytes())
+    content[3 << 20] ^= 1
+    path.write_bytes(content)
+    assert 'checksum' in open_recording(path).remarks[0]

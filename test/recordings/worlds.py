@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.typesys import Stores, get_typestore
 
 from sgp_ros.engine.samples import CommandSample, Event, JointSample, Reset, SettingsChange
 from sgp_ros.recordings.command_types import COMMAND_TYPES
@@ -57,7 +60,7 @@ def plain_commands(longest: int = 4) -> st.SearchStrategy[CommandSample]:
 _SETTINGS = st.dictionaries(
     st.text(max_size=10),
     st.booleans()
-    | st.integers()
+    | st.integers(1 - 2**63, 2**63 - 1)
     | st.floats(allow_nan=False)
     | st.text(max_size=10)
     | st.lists(st.floats(allow_nan=False), max_size=4).map(tuple)
@@ -133,4 +136,30 @@ def write_chunks(
                 writer.add_message(channels[topic], event.stamp_ns, data, event.stamp_ns)
             writer.flush()
         writer.finish()
+    return path
+
+
+def write_ros1(path: Path, events: list[Event], kind: Any = None) -> Path:
+    """Write a ROS 1 bag, with chunks compressed as `kind` says."""
+    store, new = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_JAZZY)
+    writer = Ros1Writer(path)
+    if kind is not None:
+        writer.set_compression(kind)
+        writer.chunk_threshold = 10_000
+    with writer:
+        connections = {}
+        for event in events:
+            topic, kind, data = message_of(event)
+            full = kind.replace('/', '/msg/')
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, full, typestore=store)
+            message = new.deserialize_cdr(data, full)
+            if isinstance(event, JointSample):
+                header = store.types['std_msgs/msg/Header'](
+                    seq=0, stamp=message.header.stamp, frame_id=''
+                )
+                message = store.types[full](
+                    header, message.name, message.position, message.velocity, message.effort
+                )
+            writer.write(connections[topic], event.stamp_ns, store.serialize_ros1(message, full))
     return path

@@ -71,9 +71,8 @@ class _Cells(HTMLParser):
 
 
 def _page(findings, remarks=(), description='An axis'):
-    return render(
-        description, findings, {'filter': b'png', 'prediction_held_out': b'png'}, remarks
-    )
+    said = {**findings, 'remarks': list(remarks)}
+    return render(description, said, {'filter': b'png', 'prediction_held_out': b'png'})
 
 
 def _numbers(value):
@@ -181,7 +180,7 @@ def test_the_page_draws_the_robot_and_says_errors_in_units_first(found, findings
     picture = picture_of(found, findings, read_urdf(AXIS))
     assert 'axis 100 %' in picture
     assert 'share of what the physics alone leaves' in picture
-    page = render('', findings, {}, [], picture=picture)
+    page = render('', findings, {}, picture=picture)
     physics, both = (findings['scores'][m]['held out']['joints']['axis']['rmse']
                      for m in ('PR', 'SGP'))  # fmt: skip
     assert f'<strong>{physics:.3g} → {both:.3g} N</strong>' in page
