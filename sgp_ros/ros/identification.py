@@ -149,16 +149,14 @@ class Identification:
             (self._node.get_parameter('diagnostics.period').value, self._report),
             (self._node.get_parameter('parameters.period').value, self._publish_parameters),
         ):
-            self._timers.append(
-                self._node.create_timer(
-                    period_s, partial(self._guarded, action), clock=self._steady
-                )
-            )
-
+            self._every(period_s, action)
         save_s = float(str(self._settings['save.period']))
         if save_s:
-            save = partial(self._guarded, self._services.autosave)
-            self._timers.append(self._node.create_timer(save_s, save, clock=self._steady))
+            self._every(save_s, self._services.autosave)
+
+    def _every(self, period_s: float, action: Callable[[], None]) -> None:
+        guarded = partial(self._guarded, action)
+        self._timers.append(self._node.create_timer(period_s, guarded, clock=self._steady))
 
     def _guarded(self, action: Callable[..., None], *given: Any) -> None:
         """Do what a message or a timer asks for; an error by a bug does not end the node."""
