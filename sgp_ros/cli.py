@@ -104,9 +104,12 @@ def _run(arguments: dict[str, Any]) -> int:
         arguments.pop(f'_{k}') for k in ('name', 'function', 'json', 'quiet', 'force')
     )
     warnings.filterwarnings('ignore', category=RuntimeWarning, module=r'scipy\.')
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a file name may be no text
+        sys.stdout.reconfigure(errors='backslashreplace')
     out = arguments['out']
-    is_new = out is not None and not out.exists()
+    is_new = False
     try:
+        is_new = out is not None and not out.exists()
         _load('sgp_ros.scratch:sweep')()
         if name == BESIDE_INPUT:
             arguments['is_forced'] = is_forced

@@ -400,6 +400,25 @@ def test_an_import_keeps_maps_and_gains_that_it_did_not_write(tmp_path, capsys, 
     assert own.read_text() == 'corrected'
 
 
+def test_a_path_that_is_too_long_is_refused(tmp_path, capsys):
+    out = '/'.join([str(tmp_path), *['d' * 200] * 25])
+    assert 'too long' in _refused(['effects', '--out', out], capsys)
+
+
+def test_a_file_name_that_is_no_text_is_shown_escaped(tmp_path, capfd):
+    path = str(tmp_path / 'swing\udcff.mcap')
+    with RecordingWriter(tmp_path / 'x.mcap') as writer:
+        for i in range(300):
+            x = frozen_array(np.sin(0.05 * i + np.arange(2.0)))
+            stamp = 10**18 + i * 10**7
+            writer.write_event(JointSample(stamp, ('pole', 'wheel'), x, effort=x))
+    shutil.move(tmp_path / 'x.mcap', path)
+    for command in ('check', 'replay'):
+        out = tmp_path / command
+        assert main([command, path, '--robot', 'reaction_wheel', '--out', str(out)]) == 0
+        assert 'swing\\udcff' in next(out.glob('*.html')).read_text()
+
+
 def test_a_reader_that_has_seen_enough_is_no_error():
     """As in `sgp effects | head -1`: nothing is complained of."""
     done = subprocess.run(

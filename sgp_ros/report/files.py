@@ -41,8 +41,8 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def write_text(path: Path, content: str) -> None:
-    """Write `content` as UTF-8, as `write_bytes` does."""
-    write_bytes(path, content.encode('utf-8'))
+    """Write `content` as UTF-8, as `write_bytes` does, escaping what is no text in file names."""
+    write_bytes(path, content.encode('utf-8', 'backslashreplace'))
 
 
 @contextlib.contextmanager
