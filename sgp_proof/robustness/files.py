@@ -3,8 +3,10 @@
     python -m sgp_proof.robustness.files --seeds 0:1000
 
 Each seed takes a real file of one format, damages it (bytes flipped, cut, zeroed, repeated, put
-in; numbers made large) and has it read as the commands do. Everything that is no `SgpError` or
-`OSError` is a fault, and so is more than ten seconds or one gibibyte.
+in; numbers made large) and has it read as the commands do. Recordings that can be read go through
+`check`, `replay` and `identify`, odd ones that are intact too. Everything that is no `SgpError` or
+`OSError` is a fault; so are fewer messages than stated without a remark in each result, more than
+ten seconds to read a file, and one gibibyte.
 """
 
 from __future__ import annotations
@@ -30,9 +32,9 @@ from scipy.io import savemat
 
 from sgp_proof.result_files import ROOT, make_parser, read_result, seed_range, write_result
 from sgp_proof.robustness.events import LONGEST_S, MOST_KILOBYTES, Faults, place_of
+from sgp_proof.robustness.read_bags import faults_of_commands, read_bag, states, write_odd
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
-from sgp_ros.engine.samples import JointSample
 from sgp_ros.engine.snapshots import restored, take_snapshot
 from sgp_ros.errors import SgpError
 from sgp_ros.recordings.model_files import load_model, load_parameters, save_model
@@ -43,7 +45,9 @@ from sgp_ros.recordings.tables import read_table
 from sgp_ros.recordings.writer import RecordingWriter
 from sgp_ros.robots.registry import load_robot
 
-N = 60
+N, STATES = 60, 200
+"""Rows of tables, states of recordings."""
+BAGS = ('mcap', 'db3', 'bag', 'odd')
 MAP = {
     'time': {'column': 't', 'unit': 's'},
     'joints': {'hinge': {'position': {'column': 'q', 'unit': 'rad'}}},
@@ -83,11 +87,11 @@ def make_samples(folder: Path) -> dict[str, Path]:
     (folder / 'x.json').write_text(json.dumps({'t': t.tolist(), 'q': q.tolist()}))
     robot = load_robot('toy_pendulum')
     with RecordingWriter(folder / 'x.mcap') as writer:
-        for a, b in zip(t, q, strict=True):
-            stamp = 10**18 + round(a * 1e9)
-            writer.write_event(JointSample(stamp, robot.joint_names, np.array([b])))
+        for event in states(STATES):
+            writer.write_event(event)
     _write_db3(folder / 'x.db3', folder / 'x.mcap')
-    _write_ros1(folder / 'x.bag', q)
+    _write_ros1(folder / 'x.bag')
+    (folder / 'odd.mcap').write_bytes((folder / 'x.mcap').read_bytes())
     (folder / 'x.urdf').write_bytes((ROOT / 'config/robots/panda.urdf').read_bytes())
     (folder / 'x.xml').write_text(MJCF)
     (folder / 'x.sdf').write_text(SDF)
@@ -104,7 +108,11 @@ def make_samples(folder: Path) -> dict[str, Path]:
     names = ('x.csv', 'x.npz', 'x.mat', 'x.mcap', 'x.db3', 'x.bag', 'x.urdf', 'x.yaml', 'x.h5',
              'x.parquet', 'x.json', 'x.xml', 'x.sdf', 'x.xacro')  # fmt: skip
     found = {name[2:]: folder / name for name in names}
-    found |= {'params': folder / 'params.yaml', 'map': folder / 'map.yaml'}
+    found |= {
+        'odd': folder / 'odd.mcap',
+        'params': folder / 'params.yaml',
+        'map': folder / 'map.yaml',
+    }
     return found | {'model': folder / 'model.npz'}
 
 
@@ -123,7 +131,7 @@ def _write_db3(path: Path, mcap: Path) -> None:
     base.close()
 
 
-def _write_ros1(path: Path, q: np.ndarray) -> None:
+def _write_ros1(path: Path) -> None:
     store = get_typestore(Stores.ROS1_NOETIC)
     state, header, stamp = (
         store.types[name]
@@ -132,13 +140,11 @@ def _write_ros1(path: Path, q: np.ndarray) -> None:
     )  # fmt: skip
     with Ros1Writer(path) as writer:
         connection = writer.add_connection('/joint_states', state.__msgtype__, typestore=store)
-        for i, b in enumerate(q):
-            message = state(
-                header(i, stamp(10**9, i * 10**7), ''), ['hinge'], np.array([b]), np.zeros(0),
-                np.zeros(0),
-            )  # fmt: skip
+        for i, s in enumerate(states(STATES)):
+            head = header(i, stamp(*divmod(s.stamp_ns, 10**9)), '')
+            message = state(head, list(s.names), s.position, s.velocity, s.effort)
             data = store.serialize_ros1(message, state.__msgtype__)
-            writer.write(connection, 10**18 + i * 10**7, data)
+            writer.write(connection, s.stamp_ns, data)
 
 
 def damaged(content: bytes, rng: np.random.Generator) -> bytes:
@@ -183,8 +189,8 @@ def read(kind: str, path: Path) -> None:
         load_columns(path, remarks)
         if kind == 'csv':
             read_table(path, MAP)
-    elif kind in ('mcap', 'db3', 'bag'):
-        list(open_recording(path).events(None, 'none'))
+    elif kind in BAGS:
+        read_bag(path, 0 if kind == 'odd' else STATES)
     elif kind in ('urdf', 'yaml', 'xml', 'sdf', 'xacro'):
         load_robot(str(path))
     elif kind == 'params':
@@ -221,13 +227,18 @@ def _text_of(content: dict[str, Any]) -> dict[str, np.ndarray]:
     return {'json': np.array(json.dumps(content))}
 
 
-def run(seed: int, samples: dict[str, Path], folder: Path, faults: Faults) -> tuple[str, str]:
+def run(
+    seed: int, samples: dict[str, Path], folder: Path, faults: Faults, *, has_commands: bool = True
+) -> tuple[str, str]:
     """Damage and read one file; return its format and what came of it."""
     rng = np.random.default_rng((seed, 4))
     share = np.array([WEIGHTS.get(kind, 1.0) for kind in samples])
     kind = str(rng.choice(list(samples), p=share / share.sum()))
     path = folder / f'damaged{samples[kind].suffix}'
-    path.write_bytes(damaged(samples[kind].read_bytes(), rng))
+    if kind == 'odd':
+        write_odd(path, STATES, rng)
+    else:
+        path.write_bytes(damaged(samples[kind].read_bytes(), rng))
     began = sum(os.times()[:4])
     try:
         read(kind, path)
@@ -242,12 +253,28 @@ def run(seed: int, samples: dict[str, Path], folder: Path, faults: Faults) -> tu
         outcome = 'read'
     if sum(os.times()[:4]) - began > LONGEST_S:  # of this process and its children
         faults.note(f'{kind}: longer than 10 s', seed)
+    if has_commands and outcome == 'read' and kind in BAGS:
+        _go_through(kind, path, samples, seed, faults)
     return kind, outcome
+
+
+def _go_through(
+    kind: str, path: Path, samples: dict[str, Path], seed: int, faults: Faults
+) -> None:
+    """Run the commands on a recording that can be read."""
+    remarks = read_bag(path, 0)
+    with tempfile.TemporaryDirectory() as out:
+        try:
+            for fault in faults_of_commands(path, str(samples['sdf']), Path(out), remarks):
+                faults.note(f'{kind}: {fault}', seed)
+        except Exception as error:  # noqa: BLE001 - as above
+            faults.note(f'{kind}: {place_of(error)}', seed)
 
 
 def main() -> None:
     """Run the seeds and add what came of them to the result."""
     parser = make_parser(__doc__, 'robust_files')
+    parser.add_argument('--bags', action='store_true', help='recordings only')
     parser.add_argument('--seeds', type=seed_range, default=range(200), metavar='FIRST:LAST+1')
     arguments = parser.parse_args()
     before = read_result(arguments.out)
@@ -255,6 +282,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         samples = make_samples(folder)
+        if arguments.bags:
+            samples = {kind: samples[kind] for kind in (*BAGS, 'sdf')}
         for seed in arguments.seeds:
             total[' '.join(run(seed, samples, folder, faults))] += 1
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -33,7 +33,6 @@ from sgp_ros.ros.publishers import Publishers
 from sgp_ros.ros.record import Record, Topics, filled_name
 from sgp_ros.ros.services import Services
 from sgp_ros.ros.session import Session
-from sgp_ros.ros.settings import SAVE_NAME
 from sgp_ros.ros.start import build_engine
 from sgp_ros.ros.verdict import OK, WARN
 
@@ -272,8 +271,7 @@ class Identification:
             self._logged[status.name] = (status.level, now_ns)
 
     def _on_set_parameters(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
-        names = (p.value for p in parameters if p.name == SAVE_NAME.name)
-        if problem := next(filter(None, map(SAVE_NAME.problem, names)), None):
+        if problem := self._services.problem_of(parameters):
             return SetParametersResult(successful=False, reason=problem)
         settings = {p.name: from_ros(p) for p in parameters if p.name in self._engine_settings}
         if settings and not self._is_writing_back:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any
 
@@ -81,6 +81,12 @@ class Services:
         self._session.reset()
         response.success, response.message = True, 'everything learned was reset'
         return response
+
+    @staticmethod
+    def problem_of(parameters: Iterable[Parameter[Any]]) -> str | None:
+        """Return why parameters to be set name no file to save in, or None."""
+        names = (p.value for p in parameters if p.name == SAVE_NAME.name)
+        return next(filter(None, map(SAVE_NAME.problem, names)), None)
 
     def autosave(self) -> None:
         """Save without keeping messages waiting; what fails is logged."""

@@ -52,9 +52,27 @@ def test_damaged_files_are_read_or_refused_in_one_line(samples, tmp_path):
     """Seeds of the formats that are read in this process."""
     faults = Faults()
     others = {kind: path for kind, path in samples.items() if kind not in files.APART}
-    outcomes = [files.run(seed, others, tmp_path, faults)[1] for seed in range(120)]
+    outcomes = [
+        files.run(seed, others, tmp_path, faults, has_commands=False)[1] for seed in range(120)
+    ]
     assert dict(faults) == {}
     assert {'read', 'refused'} == set(outcomes)
+
+
+def test_recordings_that_can_be_read_go_through_the_commands(samples, tmp_path):
+    """Each says what of them was not read, and prints it."""
+    faults = Faults()
+    bags_only = {kind: samples[kind] for kind in (*files.BAGS, 'sdf')}
+    outcomes = [files.run(seed, bags_only, tmp_path, faults) for seed in range(14)]
+    assert dict(faults) == {}
+    assert any(outcome == 'read' for kind, outcome in outcomes if kind in files.BAGS)
+
+
+def test_a_recording_that_is_read_short_in_silence_is_a_fault(samples):
+    """Of the fuzzer itself."""
+    files.read_bag(samples['mcap'], files.STATES)
+    with pytest.raises(AssertionError, match='200 of 201 read in silence'):
+        files.read_bag(samples['mcap'], files.STATES + 1)
 
 
 def _read_all(path):
