@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -117,3 +120,29 @@ TRUTHS: dict[str, Make] = {
     'large.json': _written(json.dumps('x' * (17 << 20))),
     **{f'{name}.json': make for name, make in PIPES.items()},
 }  # fmt: skip
+
+
+def crafted_models(model: dict[str, np.ndarray]) -> Iterator[tuple[str, dict[str, np.ndarray]]]:
+    """Yield what is wrong with a model, and that model: each array and each entry of its text."""
+    for name in (name for name in model if name != 'json'):
+        x = model[name]
+        wrong = {
+            'complex': np.full(x.shape, np.nan + 0j), 'half': np.zeros(x.shape, np.float16),
+            'text': np.full(x.shape, 'x'), 'empty': np.zeros(0), 'scalar': np.array(1.0),
+            'bigger': np.zeros((7, *x.shape)), 'zeros': np.zeros_like(x), 'negative': -x,
+            '1e300': np.full(x.shape, 1e300), 'short': x[: len(x) // 2] if x.ndim else x,
+        }  # fmt: skip
+        yield from ((f'{name} {what}', {**model, name: array}) for what, array in wrong.items())
+        yield f'{name} gone', {n: array for n, array in model.items() if n != name}
+    text = json.loads(str(model['json']))
+    bad = (None, 'x', -1, 10**400, 1e308, math.nan, [], {}, [None], [[1]], True, 2**63)
+    for key, entry in text.items():
+        for value in bad:
+            yield f'{key} = {value!r:.9}', model | _text_of({**text, key: value})
+            for inner in entry if isinstance(entry, dict) else ():
+                given = {**text, key: {**entry, inner: value}}
+                yield f'{key}.{inner} = {value!r:.9}', model | _text_of(given)
+
+
+def _text_of(content: dict[str, Any]) -> dict[str, np.ndarray]:
+    return {'json': np.array(json.dumps(content))}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sgp_proof.robustness.files import crafted_models
+from sgp_proof.robustness.harmful_files import crafted_models
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.replay import replay
