@@ -14,6 +14,7 @@ from sgp_ros.batch.fit import OfflineFit
 from sgp_ros.batch.identification import Identification
 from sgp_ros.batch.regression_data import FilteredData
 from sgp_ros.batch.rollout_scores import RolloutScore
+from sgp_ros.errors import NumericalError
 from sgp_ros.gp.scores import coverage95, nlpd
 from sgp_ros.report.metrics import versions
 
@@ -35,6 +36,9 @@ def collect_findings(
         rollouts: by name of the recording, one score per horizon.
         counts: states and commands read and refused.
         remarks: on the recordings.
+
+    Raises:
+        NumericalError: numbers so large that no error of them is finite.
     """
     names = found.robot.joint_names
     regions = _regions(found)
@@ -118,6 +122,12 @@ def _consistency(found: Identification) -> dict[str, Any] | None:
 
 def _filter(found: Identification) -> dict[str, Any]:
     choice = found.choice
+    finite = [c for c in choice.candidates if math.isfinite(c.regret) and math.isfinite(c.error)]
+    if choice.candidates and not finite:
+        raise NumericalError(
+            f'{found.robot.name}: no low-pass leaves a finite error', 'numbers that a robot has',
+            'check the units of the recording',
+        )  # fmt: skip
     return {
         'cutoff_hz': choice.plan.cutoff,
         'state_cutoff_hz': choice.plan.state_cutoff,
@@ -135,7 +145,7 @@ def _filter(found: Identification) -> dict[str, Any]:
                 'regret': c.regret,
                 'error': c.error,
             }
-            for c in choice.candidates
+            for c in finite
         ],
     }
 

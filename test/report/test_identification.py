@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import math
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 from sgp_ros.batch.blocks import distance_to
 from sgp_ros.batch.identification import IdentificationOptions, identify
 from sgp_ros.batch.regression_data import FilteredData
+from sgp_ros.errors import NumericalError
 from sgp_ros.report.findings import collect_findings, far_half
 from sgp_ros.report.identification import draw_filter, draw_prediction, picture_of, render
 from sgp_ros.report.identification_text import cautions, excitation, verdict
@@ -86,6 +88,13 @@ def _numbers(value):
 def test_findings_are_json_without_nan(findings):
     assert json.loads(json.dumps(findings, allow_nan=False)) == findings
     assert all(math.isfinite(x) for x in _numbers(findings))
+
+
+def test_numbers_of_which_no_error_is_finite_are_refused(found):
+    lost = tuple(replace(c, regret=math.nan, error=math.nan) for c in found.choice.candidates)
+    wrong = replace(found, choice=replace(found.choice, candidates=lost))
+    with pytest.raises(NumericalError, match='no low-pass leaves a finite error'):
+        collect_findings(wrong, 'axis.mcap', {}, {})
 
 
 def test_scores_are_those_of_the_predictions(found, findings):
