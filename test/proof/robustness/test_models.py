@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from sgp_proof.robustness.harmful_files import crafted_models
 from sgp_ros.engine.config import EngineConfig
@@ -58,3 +59,16 @@ def _restored(robot, path):
 
 def _all_well(step, what):
     assert not step.failures, what
+
+
+def test_a_model_with_a_sample_that_has_no_neighbour_is_read_back():
+    """Its distance is infinite; no other number of a model may be."""
+    robot = load_robot('reaction_wheel')
+    settings = {'buffer.budget': 20, 'learning.initial': 20, 'buffer.policy': 'coverage'}
+    engine = Engine(robot, EngineConfig.from_mapping(settings, robot))
+    replay(engine, list(_states(robot.joint_names, 120)), lambda _: None)
+    model = take_snapshot(engine)
+    (name,) = (n for n in model if n.endswith('_gap'))
+    assert restored(robot, {**model, name: np.full_like(model[name], np.inf)}).is_ready
+    with pytest.raises(ConfigError, match='gap'):
+        restored(robot, {**model, name: np.full_like(model[name], np.nan)})
