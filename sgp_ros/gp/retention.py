@@ -94,11 +94,15 @@ class LeastInformative:
         self._precision = grown + _squares(columns, -1)
 
     def choose(self, factors: Sequence[GrowingFactor]) -> int:
-        """Return the sample with the largest product of `C_ii`; the first of equals."""
+        """Return the sample with the largest product of `C_ii`; the first of equals.
+
+        A precision that rounding left without a logarithm is of a sample beside its copy.
+        """
         if not self._precision.size:
             return 0
         outputs = np.array([factor.outputs for factor in factors if factor.lower.size])
-        return int((outputs[:, None] * np.log(self._precision)).sum(axis=0).argmax())
+        known = np.where(self._precision > 0.0, self._precision, np.inf)
+        return int((outputs[:, None] * np.log(known)).sum(axis=0).argmax())
 
     def drop(self, factors: Sequence[GrowingFactor], m: int) -> None:
         """Take the column of sample m off."""

@@ -201,3 +201,15 @@ def test_rounding_does_not_gather_in_the_diagonal_of_the_inverse():
     K = model.kernels[0].matrix(online.buffer.U) + 1e-4 * np.eye(30)
     expected = np.diag(np.linalg.inv(K))
     np.testing.assert_allclose(online.state()['retention_precision'][0], expected, rtol=1e-6)
+
+
+def test_a_precision_that_rounding_made_negative_is_of_the_sample_to_drop():
+    """Nothing is warned of, and the others stay."""
+    kernel = SquaredExponential(1.0, (0.5,), (0,))
+    factor = GrowingFactor(OutputGroup(kernel, 0.1, (0,), (1.0,)), 0, 4)
+    retention = RETENTIONS['least_informative']()
+    for x in (0.0, 1.0, 2.0):
+        factor.append(factor.whiten(np.array([x])), np.zeros((1, 1)))
+        retention.append([factor], np.array([x]))
+    retention._precision[0, 1] = -1e-3
+    assert retention.choose([factor]) == 1
