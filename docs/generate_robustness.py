@@ -137,7 +137,7 @@ def text() -> str:
     gate_time, summary = _load('robust_gate_time'), gates['summary']
     harm = _load('robust_harmful')
     rate = summary['falsely_refused'] / summary['equations']
-    machine = events['environment']
+    machine, other = events['environment'], files['environment']
     known = {x.name: x.default for x in fields(EngineConfig)}
     period, budget = known['refit_period'], known['buffer_budget']
     many = _load('many_joints')
@@ -160,7 +160,7 @@ def text() -> str:
         HARM_LIMIT=LONGEST_S, HARM_COMMANDS=_readers(harm['cases']), GATE_TIME=_gate_time(gate_time), KILLS=kills['number'], KILL_FAULTS=_faults(kills), KILL_COUNTS=_kills(kills),
         KEPT='; '.join(f'{n} {kept}' for kept, n in kills['kept'].items()),
         LOST=f'{kills["most_lost_s"]:.2f}', DISK=_disk(disk),
-        MACHINE=f'{machine["processor"]}, Python {machine["python"]}, NumPy {machine["numpy"]}',
+        MACHINE=f'{machine["processor"]} (events), {other["processor"]} (the rest), Python {machine["python"]}, NumPy {machine["numpy"]}',
     )  # fmt: skip
 
 
