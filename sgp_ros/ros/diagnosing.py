@@ -28,7 +28,7 @@ from sgp_ros.ros.diagnosis_outcome import (
     DiagnosisDone,
     DiagnosisFailed,
     outcome_statuses,
-    told,
+    with_sentences,
 )
 from sgp_ros.ros.fit_process import yield_to_others
 from sgp_ros.ros.past import Command, State, is_state, packed, samples, unpacked
@@ -132,7 +132,7 @@ def _outcome(
             events, nominal.robot, nominal.tree, {}, stated=nominal.stated, config=config,
             is_thinned=True, progress=lambda share: connection.send(float(share)),
         )  # fmt: skip
-        return told(found)
+        return with_sentences(found)
     except SgpError as error:
         return DiagnosisFailed(' '.join(str(error).split()))
 

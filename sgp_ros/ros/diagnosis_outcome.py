@@ -52,7 +52,7 @@ class DiagnosisFailed:
     reason: str
 
 
-def told(found: Diagnosis) -> DiagnosisDone:
+def with_sentences(found: Diagnosis) -> DiagnosisDone:
     """Return a diagnosis with its sentences; what they need is loaded here."""
     from sgp_ros.diagnosis.mapping import diagnosis_mapping
     from sgp_ros.report.diagnosis_text import phrase, place

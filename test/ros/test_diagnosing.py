@@ -16,7 +16,7 @@ from sgp_ros.engine.samples import POSITION, CommandSample, JointSample, Reset, 
 from sgp_ros.recordings.messages import Status
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.ros.diagnosing import MOST_EVENTS, Diagnosing
-from sgp_ros.ros.diagnosis_outcome import DiagnosisFailed, told
+from sgp_ros.ros.diagnosis_outcome import DiagnosisFailed, with_sentences
 from sgp_ros.ros.verdict import OK, WARN
 from test.report.diagnoses import COULOMB, SPRING, UNKNOWN, diagnosis
 
@@ -111,7 +111,7 @@ def test_a_robot_that_never_moved_is_refused_with_the_reason() -> None:
 
 
 def _statuses(kept: Diagnosing, verdict: str, *findings: Finding) -> list[Status]:
-    kept._outcome, kept._ended_s = told(diagnosis(verdict, findings)), time.monotonic()
+    kept._outcome, kept._ended_s = with_sentences(diagnosis(verdict, findings)), time.monotonic()
     return kept.statuses('left/node')
 
 
@@ -149,7 +149,7 @@ def test_a_robot_without_mismatch_is_fine() -> None:
 def test_a_certainty_that_is_not_stated_is_no_number() -> None:
     kept = _diagnosing(60.0)
     found = replace(diagnosis('unexplained', [UNKNOWN]), certainty=None)
-    kept._outcome, kept._ended_s = told(found), time.monotonic()
+    kept._outcome, kept._ended_s = with_sentences(found), time.monotonic()
     assert kept.statuses('node')[0].values['certainty'] == 'not stated'
 
 
