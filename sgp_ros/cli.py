@@ -103,7 +103,8 @@ def _run(arguments: dict[str, Any]) -> int:
     name, function, prints_json, is_quiet, is_forced = (
         arguments.pop(f'_{k}') for k in ('name', 'function', 'json', 'quiet', 'force')
     )
-    warnings.filterwarnings('ignore', category=RuntimeWarning, module=r'scipy\.')
+    # Absurd numbers overflow; results are checked to be finite. Behind the filters of a caller.
+    warnings.filterwarnings('ignore', category=RuntimeWarning, append=True)
     if isinstance(sys.stdout, io.TextIOWrapper):  # a file name may be no text
         sys.stdout.reconfigure(errors='backslashreplace')
     out = arguments['out']

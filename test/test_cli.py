@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -557,3 +558,21 @@ def test_an_internal_error_is_one_line_and_a_traceback_where_asked_for(error, mo
     assert said.count('\n') == 1
     assert said.startswith(f'sgp robots: internal error: {type(error).__name__}')
     assert len(said) < 500
+
+
+def test_numbers_that_overflow_print_no_warning_of_numpy(monkeypatch):
+    """A caller who filters warnings himself has his way."""
+
+    def overflowing(**_):
+        warnings.warn_explicit('overflow', RuntimeWarning, 'x.py', 1)
+        return {}
+
+    monkeypatch.setattr('sgp_ros.cli._load', lambda _place: overflowing)
+    with warnings.catch_warnings(record=True) as printed:
+        warnings.resetwarnings()
+        assert main(['robots']) == 0
+    assert not printed
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        with pytest.raises(RuntimeWarning):
+            main(['robots'])

@@ -4,7 +4,8 @@
 
 Each seed takes a real file of one format, damages it (bytes flipped, cut, zeroed, repeated, put
 in; numbers made large) and has it read as the commands do. Recordings that can be read go through
-`check`, `replay` and `identify`, odd ones that are intact too. Everything that is no `SgpError` or
+`check`, `replay` and `identify`, odd ones that are intact too; models with wrong content and a
+right hash are given a stream. Everything that is no `SgpError` or
 `OSError` is a fault; so are fewer messages than stated without a remark in each result, more than
 ten seconds to read a file, and one gibibyte.
 """
@@ -30,6 +31,7 @@ from scipy.io import savemat
 from sgp_proof.result_files import ROOT, make_parser, read_result, seed_range, write_result
 from sgp_proof.robustness.events import LONGEST_S, MOST_KILOBYTES, Faults, place_of
 from sgp_proof.robustness.read_bags import faults_of_commands, read_bag, states, write_odd
+from sgp_proof.robustness.read_models import taught, use_model, write_crafted
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.snapshots import restored, take_snapshot
@@ -102,6 +104,7 @@ def make_samples(folder: Path) -> dict[str, Path]:
     (folder / 'map.yaml').write_text(json.dumps(MAP))
     engine = Engine(robot, EngineConfig.from_mapping({}, robot))
     save_model(folder / 'model.npz', take_snapshot(engine))
+    save_model(folder / 'crafted.npz', taught())
     names = ('x.csv', 'x.npz', 'x.mat', 'x.mcap', 'x.db3', 'x.bag', 'x.urdf', 'x.yaml', 'x.h5',
              'x.parquet', 'x.json', 'x.xml', 'x.sdf', 'x.xacro')  # fmt: skip
     found = {name[2:]: folder / name for name in names}
@@ -110,7 +113,7 @@ def make_samples(folder: Path) -> dict[str, Path]:
         'params': folder / 'params.yaml',
         'map': folder / 'map.yaml',
     }
-    return found | {'model': folder / 'model.npz'}
+    return found | {'model': folder / 'model.npz', 'crafted': folder / 'crafted.npz'}
 
 
 def _write_db3(path: Path, mcap: Path) -> None:
@@ -194,6 +197,8 @@ def read(kind: str, path: Path) -> None:
         EngineConfig.from_mapping(load_parameters(path), load_robot('reaction_wheel'))
     elif kind == 'map':
         read_map(path)
+    elif kind == 'crafted':
+        use_model(path)
     else:
         restored(load_robot('toy_pendulum'), load_model(path))
 
@@ -208,6 +213,9 @@ def run(
     path = folder / f'damaged{samples[kind].suffix}'
     if kind == 'odd':
         write_odd(path, STATES, rng)
+    elif kind == 'crafted':
+        path.write_bytes(samples[kind].read_bytes())
+        write_crafted(path, rng)
     else:
         path.write_bytes(damaged(samples[kind].read_bytes(), rng))
     began = sum(os.times()[:4])
