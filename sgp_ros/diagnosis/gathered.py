@@ -9,7 +9,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.settled import collect_settled
 from sgp_ros.diagnosis.compare.several import join
-from sgp_ros.diagnosis.compare.sufficiency import at_rest, require_motion
+from sgp_ros.diagnosis.compare.sufficiency import at_rest, require_motion, require_rows
 from sgp_ros.diagnosis.compare.thinning import thinned
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
@@ -188,9 +188,11 @@ def setup_remarks(events: Iterable[Event], tree: Tree, known: Knowledge) -> tupl
     """
     try:
         raw = known.collected(events)
+        bandwidth = choose_bandwidth(raw, tree)
+        require_rows(raw, bandwidth)
     except RecordingError:
         return ()
-    probe = Probe(raw, tree, choose_bandwidth(raw, tree))
+    probe = Probe(raw, tree, bandwidth)
     left = probe.agreement(Correction.none(tree.size)).left.max()
     if left < COUNTED_SHARE or not probe.full.effort.any():
         return ()

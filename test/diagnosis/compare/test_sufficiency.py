@@ -12,7 +12,9 @@ import pytest
 from sgp_ros.diagnosis.compare.sufficiency import motion_to_noise, require_signed, still_joints
 from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.criteria import LEAST_MOTION, LEAST_ROWS
+from sgp_ros.diagnosis.gathered import Knowledge, setup_remarks
 from sgp_ros.diagnosis.pipeline import diagnose
+from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import JointSample, frozen_array
 from sgp_ros.errors import RecordingError
 from test.diagnosis.worlds import CHAINS, PERIOD, World, events_of, simulate
@@ -158,3 +160,13 @@ def test_efforts_without_their_sign_are_refused_and_a_positive_load_is_not(robot
     lowered = world.command**2 / np.mean(world.command**2) + 0.05
     raw = collect(events_of(world, effort=lowered, commands=False), robot)
     require_signed(raw, tree.moving_names)
+
+
+@pytest.mark.parametrize('jump', [0.001, 0.02, 0.1])
+def test_no_connection_is_searched_where_the_filters_leave_too_few_rows(robots, jump):
+    """A short recording in which one position jumps: its noise puts the cut-off low."""
+    robot, tree = robots[1]
+    world = simulate(CHAINS[1], 1, 0.8)
+    world.position[40] += jump
+    known = Knowledge(robot, (), EngineConfig())
+    assert setup_remarks(events_of(world), tree, known) == ()
