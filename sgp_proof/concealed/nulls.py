@@ -31,7 +31,8 @@ from sgp_ros.apps.simulation import write_simulated
 from sgp_ros.diagnosis.compare.equations import joint_name, make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.decide.cross_validation import structure
-from sgp_ros.diagnosis.decide.decision import Scale, decide
+from sgp_ros.diagnosis.decide.decision import decide
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
 from sgp_ros.physics.drawing import UnsuitableError

@@ -22,8 +22,8 @@ from sgp_ros.diagnosis.criteria import (
     PER_EFFECT,
     TEMPER,
 )
-from sgp_ros.diagnosis.decide.decision import Scale
 from sgp_ros.diagnosis.decide.differences import Several, decide_several
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.gathered import Recordings
 from sgp_ros.diagnosis.result import Equivalent, Finding
 from sgp_ros.diagnosis.setup.correction import Correction

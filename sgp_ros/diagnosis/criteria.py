@@ -66,6 +66,9 @@ COLOURED_REST = 0.1
 It does not come back with the motion: no law of the motion can do better, and a law of the list
 that stood for a disturbance in time would leave most of it.
 """
+FORCE_ACCURACY = 0.1
+"""Part of inertial forces to which motors, gears and clocks let efforts be known [1]. Convention.
+"""
 SLIGHT_REST = 0.1 * LEAST_SHARE
 """Rest that is adequate in any case, as a share of the mean squared effort [1]. Nulls."""
 INDEPENDENT_ROWS = 100.0

@@ -20,8 +20,8 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations, joint_name
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, LEAST_SHARE, MOST_CERTAIN, PER_EFFECT, TEMPER
-from sgp_ros.diagnosis.decide.decision import Scale
 from sgp_ros.diagnosis.decide.differences import Several
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
 from sgp_ros.diagnosis.explain.regression import Columns

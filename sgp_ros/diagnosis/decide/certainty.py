@@ -26,9 +26,10 @@ from sgp_ros.diagnosis.criteria import (
     TEMPER,
 )
 from sgp_ros.diagnosis.decide.cross_validation import without
-from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision, Scale, calm
+from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision, calm
 from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.credibility import is_credible

@@ -7,7 +7,8 @@ parameters is asserted, if each of its effects predicts parts of the recording t
 
 It is adequate, joint by joint, when what it leaves is small against what it explains there: as far
 as the motion predicts it (`repeatable`), for another law would explain that, and, less strictly,
-as far as earlier rows do. Effects of a joint that it does not describe are not asserted; those of
+as far as earlier rows do. Where large forces cancel in an effort, their accuracy is what counts
+(`cancelling`). Effects of a joint that it does not describe are not asserted; those of
 the others stand, if together they explain more of the efforts than is left open: `missing_physics`
 with an unknown beside it, else `unexplained`.
 """
@@ -21,22 +22,18 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import (
-    ADEQUATE_REST,
-    COLOURED_REST,
     COUNTED_SHARE,
     EVIDENCE,
-    FLOOR_SHARE,
-    INDEPENDENT_ROWS,
     LEAST_SHARE,
     NEARLY,
     NOTHING_EXPLAINED,
     PER_EFFECT,
-    PER_PARAMETER,
-    SHAPE_ERROR,
     SLIGHT_REST,
     UNNAMED_EXCESS,
 )
+from sgp_ros.diagnosis.decide.cancelling import within_accuracy
 from sgp_ros.diagnosis.decide.cross_validation import repeatable, structure, supported, without
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.credibility import is_credible, is_sound
 from sgp_ros.diagnosis.explain.fitted_model import Model
@@ -76,112 +73,6 @@ class Decision:
         """Return the decision with the reason why its model is not asserted after all."""
         model = self.tentative or self.model
         return replace(self, refusals={model.key: why} | dict(self.refusals))
-
-
-@dataclass(frozen=True, eq=False)
-class Scale:
-    """Reference powers for mean squares.
-
-    Attributes:
-        power: (k,) mean squared efforts.
-        error: (k,) what filters and smoothing leave of a perfect model, as mean squares.
-        base: rest of the best model without effects, (k,) shares.
-        nominal: discrepancy of the nominal robot, (k,) shares.
-        rows: that count as independent.
-        shape_error: part of `nominal` that the right column may leave.
-    """
-
-    power: np.ndarray
-    error: np.ndarray
-    base: np.ndarray
-    nominal: np.ndarray
-    rows: float
-    shape_error: float = SHAPE_ERROR
-
-    @classmethod
-    def of(cls, equations: Equations, comparison: Comparison) -> Scale:
-        """Return the scale of a recording."""
-        power, error = equations.power, equations.model_error
-        base, nominal = comparison.base.left, comparison.nominal.mean_square / power
-        return cls(power, error, base, nominal, min(INDEPENDENT_ROWS, len(equations.d)))
-
-    @property
-    def floor(self) -> np.ndarray:
-        """Largest rest that the right model may leave, (k,) shares."""
-        return np.asarray(FLOOR_SHARE + self.shape_error * self.nominal + self.error / self.power)
-
-    def of_forms(self) -> Scale:
-        """Return the scale for forces whose form the data chose: they have no shape to err in."""
-        return replace(self, shape_error=0.0)
-
-    def explained(self, model: Model) -> float:
-        """Return the size of the force to explain.
-
-        That is the rest of the parameters, or the effects where changed parameters could imitate
-        them, but never more than the nominal robot leaves.
-        """
-        effects = min(model.net_share, float(self.nominal.sum()))
-        return max(float(self.base.sum()), effects, 1e-12)
-
-    def rest(self, model: Model, structured: np.ndarray | float = 1.0) -> float:
-        """Return the rest of a model relative to what it explains; `structured` (k,) of it."""
-        return float((structured * model.left).sum()) / self.explained(model)
-
-    def found(self, model: Model) -> np.ndarray:
-        """Return the force to explain at each joint, (k,) shares, as in `explained`."""
-        net = sum(model.forces, np.zeros_like(model.residual))
-        effects = np.minimum((net**2).mean(axis=0) / self.power, self.nominal)
-        return np.asarray(np.maximum(self.base, effects))
-
-    def excess(self, model: Model, predictable: np.ndarray | None = None) -> np.ndarray:
-        """Return what a model leaves at each joint, relative to what an adequate one may, (k,).
-
-        A joint with effects of its own is measured relative to the force that they had to explain;
-        others relative to all that is explained there, or to the least share of physics if larger.
-
-        Args:
-            model: fitted.
-            predictable: (2, k) share of the rest that motion and earlier rows predict, see
-                `repeatable`; None for all of it.
-        """
-        predictable = np.ones((2, len(self.power))) if predictable is None else predictable
-        owned = [s.place.joint for s in model.effects if s.effect.site in {JOINT, MOTOR}]
-        is_own = np.isin(np.arange(len(self.power)), owned)
-        explained = np.where(is_own, self.found(model), self.explained(model))
-        slight = np.where(is_own, SLIGHT_REST, LEAST_SHARE)
-        limits = np.maximum(np.multiply.outer([ADEQUATE_REST, COLOURED_REST], explained), slight)
-        return np.asarray((predictable * model.left / limits).max(axis=0))
-
-    def counts(self, model: Model) -> bool:
-        """Return whether effects are large enough, credible, and do not cancel each other."""
-        return self.is_large(model) and is_credible(model)
-
-    @staticmethod
-    def is_large(model: Model) -> bool:
-        """Return whether effects are large enough and visible; each rare law by itself."""
-        counted = zip(model.effects, model.shares, model.filtered_shares, strict=True)
-        small = [s.effect for s, x, seen in counted if x <= COUNTED_SHARE or seen <= SLIGHT_REST]
-        return len(small) < len(model.effects) and all(e.is_usual for e in small)
-
-    def fit(self, model: Model) -> float:
-        """Return the tempered log likelihood, with the prior of the bodies' change [nats].
-
-        It is one of the motion, which is what was measured: a residual of effort, and what a
-        perfect model would leave of it, grows with the inertia of a model.
-        """
-        return self.likelihood(model) - 0.5 * float(model.w @ model.w)
-
-    def likelihood(self, model: Model) -> float:
-        """Return the fit without that prior [nats]."""
-        floor = self.floor * np.exp(2.0 * np.maximum(model.inertia, -50.0))
-        share = model.mean_square / self.power + floor
-        return self.rows * (model.log_inertia - 0.5 * float(np.log(share).sum()))
-
-    def worth(self, model: Model) -> float:
-        """Return the fit of a model, less the price of its freedom [nats]."""
-        unlikely = sum(s.effect.surprise(s) for s in model.effects)
-        price = model.law_price + PER_PARAMETER * model.freedom
-        return self.fit(model) - price - unlikely
 
 
 def _ranked(comparison: Comparison, scale: Scale) -> list[Model]:
@@ -241,7 +132,7 @@ def _judged(
     """Return the verdict on the best model: which joints it describes, and whether most."""
     base = comparison.base
     predictable = repeatable(equations, best.residual, scale.excess(best) >= 1.0)
-    excess = scale.excess(best, predictable)
+    best, excess = within_accuracy(equations, best, scale.excess(best, predictable))
     if not (excess >= 1.0).any():
         worst = int(np.argmax(scale.base))
         return Decision('missing_physics', best, rivals, excess, worst, against=base.score)

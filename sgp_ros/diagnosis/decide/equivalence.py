@@ -15,7 +15,8 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations, joint_name
 from sgp_ros.diagnosis.criteria import ADEQUATE_REST, ALIKE, CLEARER, LEAST_SHARE
-from sgp_ros.diagnosis.decide.decision import Decision, Scale
+from sgp_ros.diagnosis.decide.decision import Decision
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model, imbalance
 from sgp_ros.diagnosis.result import Equivalent

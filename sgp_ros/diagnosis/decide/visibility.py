@@ -19,7 +19,8 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations, joint_name
 from sgp_ros.diagnosis.compare.settled import shows as may_show
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, PER_EFFECT, PER_PARAMETER
-from sgp_ros.diagnosis.decide.decision import Decision, Scale
+from sgp_ros.diagnosis.decide.decision import Decision
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import split
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model

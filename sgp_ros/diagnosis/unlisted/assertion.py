@@ -16,8 +16,9 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import LACKING, LEAST_LAW, SIGNIFICANT
 from sgp_ros.diagnosis.decide.certainty import probabilities
-from sgp_ros.diagnosis.decide.decision import Decision, Scale, decide, refused
+from sgp_ros.diagnosis.decide.decision import Decision, decide, refused
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, moved
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors

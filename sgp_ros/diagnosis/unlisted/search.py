@@ -17,7 +17,7 @@ from scipy import stats
 from sgp_ros.batch.least_squares import correlation_factor
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import ALIKE, CLEARER, NEARLY, PER_PARAMETER
-from sgp_ros.diagnosis.decide.decision import Scale
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns

@@ -9,8 +9,8 @@ import numpy as np
 
 from sgp_ros.batch.least_squares import correlation_factor
 from sgp_ros.diagnosis.criteria import ALIKE, INTERVAL, LEAST_SHARE
-from sgp_ros.diagnosis.decide.decision import Scale
 from sgp_ros.diagnosis.decide.differences import Several
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.shown import LawSearch, TriedFormula
 from sgp_ros.diagnosis.unlisted.assertion import Explained, with_laws

@@ -23,8 +23,9 @@ from sgp_ros.diagnosis.decide.certainty import (
     rests_on,
     settled,
 )
-from sgp_ros.diagnosis.decide.decision import UNKNOWN, Scale, decide
+from sgp_ros.diagnosis.decide.decision import UNKNOWN, decide
 from sgp_ros.diagnosis.decide.reasons import why_not
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.findings import doubted_if_none
 from sgp_ros.diagnosis.result import Finding, Location, Parameter

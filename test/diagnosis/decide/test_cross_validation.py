@@ -15,7 +15,8 @@ from sgp_ros.diagnosis.decide.cross_validation import (
     support,
     supported,
 )
-from sgp_ros.diagnosis.decide.decision import Scale, decide
+from sgp_ros.diagnosis.decide.decision import decide
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.locate.remainder import PARTS, PIECES, parts_of

@@ -17,7 +17,8 @@ from sgp_ros.diagnosis.criteria import (
     SHARE_TOLERANCE,
     SLIGHT_REST,
 )
-from sgp_ros.diagnosis.decide.decision import Scale, decide
+from sgp_ros.diagnosis.decide.decision import decide
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import added_inertia, fit
 from sgp_ros.diagnosis.explain.comparison import Comparison, compare_models
 from sgp_ros.diagnosis.explain.credibility import is_sound

@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE
-from sgp_ros.diagnosis.decide.decision import Decision, Scale, decide, refused
+from sgp_ros.diagnosis.decide.decision import Decision, decide, refused
 from sgp_ros.diagnosis.decide.reasons import apart, why_not
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from test.diagnosis.fitted_models import fitted
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.criteria import LACKING, SIGNIFICANT
-from sgp_ros.diagnosis.decide.decision import Scale, decide
+from sgp_ros.diagnosis.decide.decision import decide
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.diagnosis.explain.regression import Columns
