@@ -42,11 +42,11 @@ ROWS_PER_COLUMN = 2
 
 def within_accuracy(
     equations: Equations, model: Model, excess: np.ndarray
-) -> tuple[Model, np.ndarray]:
-    """Return a model and its excess (k,), below one where the rest is within the accuracy.
+) -> tuple[Model, np.ndarray, np.ndarray]:
+    """Return a model, its excess (k,), below one where its laws stand, and where it is accurate.
 
-    That is so for joints with laws of their own that stand beside Z. The other laws of such a
-    joint are left out.
+    Laws stand beside Z at joints where the rest is within the accuracy of the forces, (k,) of
+    bool. The other laws of a joint where one stands are left out.
 
     Args:
         equations: of the recording.
@@ -63,8 +63,8 @@ def within_accuracy(
         lambda s: s in _own(model, s.place.joint) and s not in standing.get(s.place.joint, [s]),
     )  # fmt: skip
     share = _share(equations, fewer)
-    is_within = np.array([j in standing and share[j] < 1.0 for j in range(len(share))])
-    return fewer, np.where(is_within, share, excess)
+    stands = np.isin(np.arange(len(share)), list(standing)) & (share < 1.0)
+    return fewer, np.where(stands, share, excess), share < 1.0
 
 
 def _own(model: Model, joint: int) -> list[EffectAt]:

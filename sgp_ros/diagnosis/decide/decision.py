@@ -132,11 +132,14 @@ def _judged(
     """Return the verdict on the best model: which joints it describes, and whether most."""
     base = comparison.base
     predictable = repeatable(equations, best.residual, scale.excess(best) >= 1.0)
-    best, excess = within_accuracy(equations, best, scale.excess(best, predictable))
-    if not (excess >= 1.0).any():
+    excess = scale.excess(best, predictable)
+    standing, kept, is_accurate = within_accuracy(equations, best, excess)
+    if not (kept >= 1.0).any():
         worst = int(np.argmax(scale.base))
-        return Decision('missing_physics', best, rivals, excess, worst, against=base.score)
-    opened = _opened(equations, scale, comparison, best, rivals, excess)
+        return Decision('missing_physics', standing, rivals, kept, worst, against=base.score)
+    opened = _opened(equations, scale, comparison, standing, rivals, kept, is_accurate)
+    if standing is not best and opened.verdict != 'missing_physics':
+        opened = _opened(equations, scale, comparison, best, rivals, excess)
     times = f'{max(excess.max(), 1.01):.3g} times what an adequate model may leave'
     return replace(opened, refusals={best.key: f'the part that is not noise is {times}'})
 
@@ -164,8 +167,13 @@ def _opened(
     best: Model,
     rivals: tuple[Model, ...],
     excess: np.ndarray,
+    is_accurate: np.ndarray | None = None,
 ) -> Decision:
-    """Return the verdict where the best model does not describe the joints with an excess."""
+    """Return the verdict where the best model does not describe the joints with an excess.
+
+    What is left open at joints where the rest is within the accuracy of forces need not be less
+    than what is named.
+    """
     base = comparison.base
     open_, worst = np.flatnonzero(excess >= 1.0), int(np.argmax(scale.base))
     known = without(
@@ -173,7 +181,8 @@ def _opened(
     )
     named = scale.found(best)
     is_open = np.isin(np.arange(len(named)), open_)
-    if known.effects and is_credible(known) and named[~is_open].sum() > named[is_open].sum():
+    unsaid = named[is_open if is_accurate is None else is_open & ~is_accurate].sum()
+    if known.effects and is_credible(known) and named[~is_open].sum() > unsaid:
         unknown = _ordered(np.where(is_open, excess, 0.0), int(np.argmax(excess)))
         return Decision('missing_physics', known, (best, *rivals), excess, unknown[0], unknown,
                         against=base.score)  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from sgp_ros.diagnosis.criteria import FORCE_ACCURACY
 from sgp_ros.diagnosis.decide.cancelling import within_accuracy
 from sgp_ros.diagnosis.decide.decision import decide
 from sgp_ros.diagnosis.explain.comparison import Comparison
+from sgp_ros.physics.parts import Place
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
 
@@ -25,7 +27,7 @@ def _swinging(equations, error, force=0.0):
 
     Args:
         equations: of a driven chain.
-        error: of its inertial forces, a smooth function of the motion [1].
+        error: of the inertial forces of its joints, a smooth function of their motion [1].
         force: that no law of the list describes, (N,) [N m].
     """
     motion = equations.motion
@@ -83,9 +85,25 @@ def test_only_what_stands_beside_the_process_is_kept(rubbed):
     """Friction does; a rotor, which the body of the joint says as well, does not."""
     equations = _swinging(rubbed, 0.5 * FORCE_ACCURACY)
     model = fitted(equations, 'coulomb_friction', 'armature')
-    found, excess = within_accuracy(equations, model, np.array([3.0]))
+    found, excess, _ = within_accuracy(equations, model, np.array([3.0]))
     assert [s.name for s in found.effects] == ['coulomb_friction']
     assert excess[0] < 1.0
+
+
+def test_a_joint_where_no_law_stands_stays_open_beside_one_where_a_law_does(equations_for):
+    """However much it leaves, for that is within the accuracy of the forces."""
+
+    def friction(_t, _q, v):
+        return -LEVEL * math.tanh(v[0] / 0.02), 0.0
+
+    world = simulate(CHAINS[2], 5, 40.0, force=friction, reach=2.5)
+    equations = _swinging(equations_for(world)[1], FORCE_ACCURACY * np.array([0.2, 0.6]))
+    decision = _decided(equations, 'coulomb_friction')
+    left = decision.model.left
+    assert left[1] > 2.0 * left[0]
+    assert decision.verdict == 'missing_physics'
+    assert [s.key for s in decision.model.effects] == [('coulomb_friction', Place(0))]
+    assert decision.unknown == (1,)
 
 
 def test_few_rows_let_nothing_stand(rubbed):
@@ -93,6 +111,6 @@ def test_few_rows_let_nothing_stand(rubbed):
     model = fitted(equations, 'coulomb_friction')
     few = replace(equations, d=equations.d[:4], bases=(equations.bases[0][:4],))
     short = replace(model, residual=model.residual[:4], forces=(model.forces[0][:4],))
-    found, excess = within_accuracy(few, short, np.array([3.0]))
+    found, excess, _ = within_accuracy(few, short, np.array([3.0]))
     assert found is short
     assert excess[0] == 3.0
