@@ -7,7 +7,7 @@ there is adequate up to `FORCE_ACCURACY` of the inertial forces, if its laws do 
 model being complete: each must be there beside a process Z of position, velocity and acceleration
 that takes whatever it can of the effort, and beside bodies of any kind (the semi-parametric model
 of the paper). Dry friction changes with the sign of a velocity, which no smooth Z does; a law that
-Z can say as well is not asserted.
+Z can say as well is not asserted, nor one that few joints have: it needs an adequate model.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import EVIDENCE, FORCE_ACCURACY
 from sgp_ros.diagnosis.decide.cross_validation import LEARNED, without
-from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.fitted_model import Model, adds_to_usual
 from sgp_ros.diagnosis.locate.remainder import (
     PARTS,
     parts_of,
@@ -116,7 +116,8 @@ def _standing(equations: Equations, model: Model, joint: int) -> list[EffectAt]:
     jackknife = (PARTS - 1) * np.var(others, axis=0)
     std = np.sqrt(np.maximum(np.diag(whole.covariance)[own], jackknife))
     is_there = whole.coefficients[own] > np.sqrt(2.0 * EVIDENCE) * std
-    return [s for s, stands in zip(laws, is_there, strict=True) if stands]
+    return [s for s, is_seen in zip(laws, is_there, strict=True)
+            if is_seen and adds_to_usual(s.effect)]  # fmt: skip
 
 
 def _states(equations: Equations, joint: int) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.criteria import FORCE_ACCURACY
+from sgp_ros.diagnosis.decide import cancelling
 from sgp_ros.diagnosis.decide.cancelling import within_accuracy
 from sgp_ros.diagnosis.decide.decision import decide
 from sgp_ros.diagnosis.explain.comparison import Comparison
@@ -88,6 +89,15 @@ def test_only_what_stands_beside_the_process_is_kept(rubbed):
     found, excess, _ = within_accuracy(equations, model, np.array([3.0]))
     assert [s.name for s in found.effects] == ['coulomb_friction']
     assert excess[0] < 1.0
+
+
+def test_a_law_that_few_joints_have_does_not_stand(rubbed, monkeypatch):
+    """The same one, if few joints had it."""
+    model = fitted(_swinging(rubbed, 0.5 * FORCE_ACCURACY), 'coulomb_friction')
+    monkeypatch.setattr(cancelling, 'adds_to_usual', lambda _law: False)
+    found, excess, _ = within_accuracy(model.frame.equations, model, np.array([3.0]))
+    assert found is model
+    assert excess[0] == 3.0
 
 
 def test_a_joint_where_no_law_stands_stays_open_beside_one_where_a_law_does(equations_for):
