@@ -147,22 +147,6 @@ def settings(machine):
             f'{refused}; {seconds}.')  # fmt: skip
 
 
-def nearest(machine):
-    """Return the best model that was not asserted, and the share of the effort that it leaves.
-
-    Beside what is asserted no other model is of interest.
-    """
-    if machine['verdict'] == 'missing_physics':
-        return 'asserted', ''
-    top = machine['alternatives'][0]
-    together = [
-        f'{plain_name(f["effect"])} on {f["joint"]}'
-        for f in machine['alternatives']
-        if f['log_bayes_factor'] == top['log_bayes_factor']
-    ]
-    return ', '.join(together), top['why'].removeprefix('leaves ').partition(' of ')[0]
-
-
 def best_family(design):
     """Return the columns with which least is left of the runs left out, and how much less, (k,)."""
     known = design['known']['left_out']
@@ -172,13 +156,6 @@ def best_family(design):
     }
     best = min(ratios, key=lambda family: sum(ratios[family]))
     return best, [1.0 - ratio for ratio in ratios[best]]
-
-
-def of(machine, joint, effect, kind='findings'):
-    """Return the parameters of an effect on a joint."""
-    return next(
-        f['parameters'] for f in machine[kind] if (f['joint'], f['effect']) == (joint, effect)
-    )
 
 
 def judgement(machine):
@@ -197,9 +174,9 @@ def tally(machines):
 
 def pages():
     """Return the text of each page by its path."""
-    result, double, rest = (
+    result, rest = (
         json.loads((RESULTS / f'{name}.json').read_text(encoding='utf-8'))
-        for name in ('real_diagnosis', 'double_pendulum_diagnosis', 'double_pendulum_rest')
+        for name in ('real_diagnosis', 'double_pendulum_rest')
     )
     templates = Environment(  # noqa: S701 - Markdown, and nothing in it is from outside
         loader=FileSystemLoader(DOCS / 'templates' / 'real_machines'), undefined=StrictUndefined,
@@ -209,14 +186,13 @@ def pages():
         f.__name__: f
         for f in (percent, quantity, parts, worst, named, effects, bodies, equivalents, scores,
                   settings,
-                  best_family, nearest, of, judgement, tally)
+                  best_family, judgement, tally)
     }  # fmt: skip
     templates.globals |= {'titles': TITLES, 'captions': CAPTIONS, 'least_share': LEAST_SHARE}
     versions = ', '.join(f'{k} {v}' for k, v in result['versions'].items())
     place, machines = result['environment'], result['machines']
     environment = f'{place["cores"]} cores of {place["processor"]}, {versions}'
-    context = {'environment': environment, 'machines': machines, 'double': double,
-               'rest': rest}  # fmt: skip
+    context = {'environment': environment, 'machines': machines, 'rest': rest}  # fmt: skip
     paths = {'overview': DOCS / 'diagnosis_real.md'}
     paths |= {name: DOCS / 'real_machines' / f'{name}.md' for name in machines}
     return {

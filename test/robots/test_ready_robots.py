@@ -18,7 +18,6 @@ TIAGO = ROOT.parent / 'shared' / 'data' / 'tiago' / 'tiago_48_schunk.urdf'
 READY = {
     'emps_symmetric': ('axis',),
     'emps_viscous': ('axis',),
-    'double_pendulum_a0_rotors': ('shoulder', 'elbow'),
     'panda': tuple(f'panda_joint{i}' for i in range(1, 8)),
     'tiago_arm': tuple(f'arm_{i}_joint' for i in range(1, 5)),
 }
