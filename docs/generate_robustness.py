@@ -130,6 +130,16 @@ def _gate_time(result):
     return '\n'.join(lines)
 
 
+def _machines(results):
+    """Return what was measured on which machine, with its versions."""
+    found = {}
+    for name, result in results.items():
+        x = result['environment']
+        machine = f'{x["processor"]}, Python {x["python"]}, NumPy {x["numpy"]}'
+        found.setdefault(machine, []).append(name)
+    return '; '.join(f'{machine} ({", ".join(names)})' for machine, names in found.items())
+
+
 def text() -> str:
     """Return the page."""
     events, files, gates = (_load(f'robust_{n}') for n in ('events', 'files', 'gates'))
@@ -137,10 +147,9 @@ def text() -> str:
     gate_time, summary = _load('robust_gate_time'), gates['summary']
     harm = _load('robust_harmful')
     rate = summary['falsely_refused'] / summary['equations']
-    machine, other = events['environment'], files['environment']
+    many = _load('many_joints')
     known = {x.name: x.default for x in fields(EngineConfig)}
     period, budget = known['refit_period'], known['buffer_budget']
-    many = _load('many_joints')
     return TEMPLATE.read_text(encoding='utf-8').format(
         EVENTS=events['events'], EVENT_RUNS=len(events['runs']), EVENT_FAULTS=_faults(events),
         EVENT_MB=events['peak_megabytes'], EVENT_COUNTS=_table('event', events['counts']),
@@ -160,7 +169,11 @@ def text() -> str:
         HARM_LIMIT=LONGEST_S, HARM_COMMANDS=_readers(harm['cases']), GATE_TIME=_gate_time(gate_time), KILLS=kills['number'], KILL_FAULTS=_faults(kills), KILL_COUNTS=_kills(kills),
         KEPT='; '.join(f'{n} {kept}' for kept, n in kills['kept'].items()),
         LOST=f'{kills["most_lost_s"]:.2f}', DISK=_disk(disk),
-        MACHINE=f'{machine["processor"]} (events), {other["processor"]} (the rest), Python {machine["python"]}, NumPy {machine["numpy"]}',
+        MACHINE=_machines({
+            'events': events, 'messages': messages, 'files': files, 'files made to harm': harm,
+            'kills': kills, 'disks': disk, 'gates': gates, 'their cost': gate_time,
+            'thirty joints': many,
+        }),
     )  # fmt: skip
 
 
