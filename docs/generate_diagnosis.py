@@ -29,6 +29,7 @@ NULLS = [ROOT / f'sgp_proof/results/nulls_{tier}.json' for tier in ('a', 'b')]
 LISTED, UNLISTED = 'one effect of the list', 'unlisted effect'
 MACHINES = ROOT / 'sgp_proof/results/concealed_c.json'
 PAPER = ROOT / 'sgp_proof/results/concealed_paper.json'
+CANCELLING = ROOT / 'sgp_proof/results/cancelling.json'
 TEMPLATE = Path(__file__).parent / 'templates' / 'diagnosis.txt'
 
 
@@ -274,16 +275,40 @@ def _gains(worlds, name):
     return [max(w[name]['gain'], 0.0) if w[name] else 0.0 for w in worlds]
 
 
+def _cancelling(report):
+    """Return what is named where large forces cancel, by what was concealed, and wrong names."""
+    count = report['summary']
+    lines = [
+        '| concealed | worlds | named rightly, before | anything wrong, before |',
+        '|---|---|---|---|',
+    ]
+    kinds = dict.fromkeys(w['kind'] for w in report['worlds'])
+    for kind in kinds:
+        cells = [f'{count[f"{kind}: {what}"]}, {count[f"{kind}: {what} before"]}'
+                 for what in ('right', 'wrong')]  # fmt: skip
+        lines.append(f'| {kind} | {count[kind]} | {" | ".join(cells)} |')
+    wrong = [w for w in report['worlds'] if w['is_wrong']]
+    if wrong:
+        lines += ['\nWrong names:\n']
+    for w in wrong:
+        named = ', '.join(f'{name} ({p:.2f})' for name, _, _, p in w['named'])
+        lines.append(f'* world {w["seed"]}, {w["concealed"]}: {named}')
+    return '\n'.join(lines)
+
+
 def text():
     """Return the page."""
     reports = [json.loads(path.read_text(encoding='utf-8')) for path in RESULTS.values()]
     nulls = [w for path in NULLS for w in json.loads(path.read_text(encoding='utf-8'))['worlds']]
+    cancelling = json.loads(CANCELLING.read_text(encoding='utf-8'))
     parts = {
         'tiers': ''.join(map(_tier, reports)),
         'machines': _machines(json.loads(MACHINES.read_text(encoding='utf-8'))),
         'paper': _paper(json.loads(PAPER.read_text(encoding='utf-8'))),
         'nulls': _nulls(nulls),
         'effects': '\n'.join(_effects(nulls)),
+        'cancelling': _cancelling(cancelling),
+        'cancelling_seeds': '{}:{}'.format(*cancelling['seeds']),
     }
     page = TEMPLATE.read_text(encoding='utf-8')
     for name, part in parts.items():
