@@ -1,4 +1,4 @@
-"""What is named where large forces cancel in an effort, and these are not known exactly.
+"""Names where large forces cancel in an effort, and these are not known exactly.
 
     python -m sgp_proof.concealed.cancelling --seeds 0:60
 
