@@ -101,6 +101,12 @@ class Equations:
         """Return the force of a change of the bodies, w (p,), in the rows, (N, k) [N m or N]."""
         return np.stack([base @ w for base in self.bases], axis=1)
 
+    def with_bodies(self, motion: ObservedMotion, w: np.ndarray) -> ObservedMotion:
+        """Return a motion of a robot with changed bodies, w (p,)."""
+        change = (w @ self.directions).reshape(motion.tree.parameters.shape)
+        tree = replace(motion.tree, parameters=motion.tree.parameters + change)
+        return replace(motion, tree=tree)
+
     def compact(self, columns: np.ndarray, joint: int, *, is_inertial: bool) -> np.ndarray:
         """Return columns (n, m) of one joint as its rows (N, m), or (n, k, m) as (N, k, m).
 

@@ -12,8 +12,6 @@ Z can say as well is not asserted, nor one that few joints have: it needs an ade
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
@@ -53,18 +51,20 @@ def within_accuracy(
         model: the best one.
         excess: what it leaves at each joint, relative to what an adequate one may.
     """
-    standing = {
+    if not (excess >= 1.0).any():
+        return model, excess, np.zeros(len(excess), dtype=bool)
+    share = _share(equations, model)
+    found = {
         int(j): _standing(equations, model, int(j))
-        for j in np.flatnonzero((excess >= 1.0) & (_share(equations, model) < 1.0))
+        for j in np.flatnonzero((excess >= 1.0) & (share < 1.0))
     }
-    standing = {j: laws for j, laws in standing.items() if laws}
-    fewer = without(
-        equations, model,
-        lambda s: s in _own(model, s.place.joint) and s not in standing.get(s.place.joint, [s]),
-    )  # fmt: skip
-    share = _share(equations, fewer)
+    standing = {j: laws for j, laws in found.items() if laws}
+    left_out = [s for j, laws in standing.items() for s in _own(model, j) if s not in laws]
+    if left_out:
+        model = without(equations, model, lambda s: s in left_out)
+        share = _share(equations, model)
     stands = np.isin(np.arange(len(share)), list(standing)) & (share < 1.0)
-    return fewer, np.where(stands, share, excess), share < 1.0
+    return model, np.where(stands, share, excess), share < 1.0
 
 
 def _own(model: Model, joint: int) -> list[EffectAt]:
@@ -78,10 +78,8 @@ def _share(equations: Equations, model: Model) -> np.ndarray:
 
     Inertial forces are those of each joint's own acceleration, with the fitted bodies.
     """
-    motion = equations.motion
-    change = (model.w @ equations.directions).reshape(motion.tree.parameters.shape)
-    tree = replace(motion.tree, parameters=motion.tree.parameters + change)
-    force = equations.filter(replace(motion, tree=tree).mass_diagonal * motion.acceleration)
+    motion = equations.with_bodies(equations.motion, model.w)
+    force = equations.filter(motion.mass_diagonal * motion.acceleration)
     allowed = FORCE_ACCURACY**2 * (force**2).mean(axis=0)
     return np.asarray(model.mean_square / (allowed + 1e-300))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -211,9 +211,6 @@ def imbalance(model: Model, equations: Equations, motion: ObservedMotion) -> np.
         equations: of the training recording.
         motion: n rows of any recording.
     """
-    change = (model.w @ equations.directions).reshape(motion.tree.parameters.shape)
-    changed = replace(
-        motion, tree=replace(motion.tree, parameters=motion.tree.parameters + change)
-    )
+    changed = equations.with_bodies(motion, model.w)
     needed = changed.effort_for(motion.position, motion.velocity, motion.acceleration)
     return np.asarray(needed - motion.effort - extra_force(model, changed))
