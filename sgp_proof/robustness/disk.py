@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from sgp_proof.result_files import ROOT, make_parser, read_result, write_result
-from sgp_proof.robustness.kills import ROBOT, broken_in, litter_in, make_recordings, results_in
+from sgp_proof.robustness.kills import ROBOT, make_recordings
+from sgp_proof.robustness.result_folders import broken_in, litter_in, results_in
 
 NAMES = ('simulate', 'import', 'export', 'effects', 'check', 'replay', 'identify', 'diagnose')
 SIZE_MB, LEFT_BYTES = 8, (0, 6000)

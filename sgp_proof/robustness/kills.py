@@ -2,17 +2,18 @@
 
     python -m sgp_proof.robustness.kills --seeds 0:100
 
-Each seed starts the node or one of three commands and ends it with SIGKILL, SIGTERM or SIGINT at a
-random moment: anywhere in its run, or while it writes. A command writes into a folder that holds
-the results of a run before; these must be untouched, or all replaced, and after the next run no
-other file may be there. What a node had published before must be in its record, but for what was
-made in the last second before a SIGKILL.
+Each seed starts the node or one of three commands and ends it and all processes of its group with
+SIGKILL, SIGTERM or SIGINT at a random moment: anywhere in its run, while it writes, or while its
+results take their names. A command writes into a folder that holds the results of a run before;
+these must be untouched, or all replaced, and after the next run no other file may be there. What a
+node had published before must be in its record, but for what was made in the last second before a
+SIGKILL.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -28,8 +29,13 @@ import numpy as np
 
 from sgp_proof.result_files import ROOT, make_parser, read_result, seed_range, write_result
 from sgp_proof.robustness.events import Faults
-from sgp_ros.recordings.model_files import load_model
-from sgp_ros.recordings.reader import open_recording
+from sgp_proof.robustness.result_folders import (
+    TURN_S,
+    broken_in,
+    litter_in,
+    results_in,
+    wait_until_settled,
+)
 
 COMMANDS = ('replay', 'identify', 'diagnose')
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
@@ -40,7 +46,6 @@ RECORDED_S = 6.0
 DEADLINE_S = 300.0
 NEXT_RUN = 3
 """Kills of a command after which it runs undisturbed."""
-_TURN_S = 0.0005
 
 
 def run_command(name: str, bag: Path, out: Path) -> subprocess.Popen[bytes]:
@@ -49,6 +54,7 @@ def run_command(name: str, bag: Path, out: Path) -> subprocess.Popen[bytes]:
         [sys.executable, '-m', 'sgp_ros.cli', name, str(bag), '--robot', str(ROBOT), '--out',
          str(out), '--quiet'],
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL,
+        start_new_session=True,
     )  # fmt: skip
 
 
@@ -62,47 +68,6 @@ def make_recordings(folder: Path) -> list[Path]:
              '--duration', str(RECORDED_S), '--out', str(place), '--quiet'], check=True,
         )  # fmt: skip
         found.append(next(place.glob('*.mcap')))
-    return found
-
-
-def results_in(out: Path) -> dict[str, str]:
-    """Return the results in a folder with what they hold."""
-    return {
-        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in out.iterdir()
-        if not path.name.startswith('.')
-    }
-
-
-def litter_in(out: Path) -> list[str]:
-    """Return the names of hidden files that only a run that goes on may have."""
-    return sorted(
-        path.name for path in out.iterdir()
-        if path.name.startswith('.') and not path.name.endswith('.json')
-    )  # fmt: skip
-
-
-def broken_in(out: Path) -> list[str]:
-    """Return the results that are not whole, as their readers see them."""
-    found = []
-    for path in out.iterdir():
-        if path.name.startswith('.'):
-            continue
-        try:
-            if path.suffix == '.json':
-                json.loads(path.read_text(encoding='utf-8'))
-            elif path.name == 'model.npz':
-                load_model(path)
-            elif path.suffix == '.npz':
-                with np.load(path, allow_pickle=False) as arrays:
-                    _ = [arrays[name] for name in arrays.files]
-            elif path.suffix == '.mcap':
-                assert not open_recording(path).remarks
-            else:
-                ends = {'.html': b'</html>', '.png': b'IEND\xaeB`\x82', '.urdf': b'</robot>'}
-                assert path.read_bytes().rstrip().endswith(ends.get(path.suffix, b''))
-        except Exception as error:  # noqa: BLE001 - whatever a half file does to its reader
-            found.append(f'{path.name}: {type(error).__name__}')
     return found
 
 
@@ -136,7 +101,8 @@ class CommandKills:
         process = self._start()
         try:
             self._wait(process, moment, rng)
-            process.send_signal(number)
+            if process.poll() is None:
+                os.killpg(process.pid, number)
             _, said = process.communicate(timeout=10.0)
         except subprocess.TimeoutExpired:
             faults.append('lives 10 s after the signal')
@@ -149,12 +115,15 @@ class CommandKills:
             faults.append(f'status {status}')
         if status == 130 and text.count('\n') != 1:
             faults.append('not one line')
+        faults += wait_until_settled(self._out)
         after = results_in(self._out)
         is_cut = any(name.endswith('.moves') for name in litter_in(self._out))
         kept = 'old' if after == before else 'new'
         listing = json.loads((self._out / f'.sgp_{self.name}.json').read_text(encoding='utf-8'))
         if is_cut:
-            kept = 'between, completed by the next run'
+            kept = 'new, once the next run has completed them'
+            if after != before:
+                faults.append('old results beside new ones, until the next run')
         elif kept == 'new' and (set(listing) != set(after) or self._is_mixed(before, after)):
             faults.append('old results beside new ones')
         faults += [f'half a file: {name}' for name in broken_in(self._out)]
@@ -192,13 +161,13 @@ class CommandKills:
             self._until(process, f'.sgp_{self.name}.moves', end)
             return
         while time.monotonic() < end and process.poll() is None:
-            time.sleep(_TURN_S)
+            time.sleep(TURN_S)
 
     def _until(self, process: subprocess.Popen[bytes], beginning: str, end: float) -> None:
         while time.monotonic() < end and process.poll() is None:
             if next(self._out.glob(f'{beginning}*'), None) is not None:
                 return
-            time.sleep(_TURN_S)
+            time.sleep(TURN_S)
 
     def _undisturbed(self) -> Timed:
         """Run once to the end."""

@@ -4,8 +4,9 @@ What a run of a command wrote is listed in `.sgp_<command>.json` beside it. The 
 command into the same folder removes what is listed there and not written anew, such as pictures of
 an earlier verdict. A file that was changed since is somebody else's and stays.
 
-The files of a run are renamed one after the other at its end. What is to be renamed is noted
-first, in `.sgp_<command>.moves`, so that the next run completes what a kill cuts off there.
+The files of a run are renamed one after the other at its end, by a process of its own, so that a
+kill of the command leaves all of them new or none. What is to be renamed is noted first, in
+`.sgp_<command>.moves`: where that process is cut off too, the next run completes its work.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import json
 import os
 import signal
 import stat
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -32,6 +34,8 @@ from sgp_ros.strangers import (
 
 _LONGEST_NOTE = 1 << 22
 """Above this size [bytes] no note is ours."""
+_LONGEST_MOVES_S = 10
+"""After which a process that renames is given up."""
 
 
 def write_bytes(path: Path, content: bytes) -> None:
@@ -71,7 +75,7 @@ def replacing_results(out: Path, command: str, *, keeps_others: bool = False) ->
                 if keeps_others:
                     _require_ours(out, command, waiting)
             with _undisturbed():
-                _make_moves(out, command, _note_moves(out, command, waiting))
+                _make_moves_apart(out, command, _note_moves(out, command, waiting))
         except BaseException:  # a signal may come between the making of a file and its care
             if not (out / f'.sgp_{command}.moves').exists():
                 remove_growing(out, of=os.getpid())
@@ -169,6 +173,24 @@ def _make_moves(out: Path, command: str, content: dict[str, Any]) -> None:
                 (out / name).unlink(missing_ok=True)
         write_text(out / f'.sgp_{command}.json', json.dumps(listing, indent=1) + '\n')
     (out / f'.sgp_{command}.moves').unlink(missing_ok=True)
+
+
+def _make_moves_apart(out: Path, command: str, content: dict[str, Any]) -> None:
+    """Make the moves in a child that outlives this process and its group; it shares the lock."""
+    with warnings.catch_warnings():  # of other threads, which this child does not need
+        warnings.simplefilter('ignore', DeprecationWarning)
+        child = os.fork()
+    if not child:
+        status = 1
+        try:
+            os.setsid()
+            signal.alarm(_LONGEST_MOVES_S)
+            _make_moves(out, command, content)
+            status = 0
+        finally:
+            os._exit(status)
+    if os.waitpid(child, 0)[1]:
+        _make_moves(out, command, content)  # the rest of them, or the error that stops them
 
 
 def was_cut_off(out: Path) -> bool:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -130,18 +132,17 @@ def test_every_writer_of_results_waits_for_the_others(tmp_path):
 def test_the_next_run_completes_what_was_cut_off_between_two_names(tmp_path, monkeypatch):
     """Also where that run fails: the results of one run are whole again."""
     _replace(tmp_path, a='old', b='old')
-    replace, count = Path.replace, 0
+    replace = Path.replace
 
     def cut_off(self, target):
-        nonlocal count
-        count += target.name in ('a', 'c')
-        if count == 2:
+        if target.name == 'c':
             raise KeyboardInterrupt
         return replace(self, target)
 
     monkeypatch.setattr(Path, 'replace', cut_off)
     with pytest.raises(KeyboardInterrupt):
         _replace(tmp_path, a='new', c='new')
+    monkeypatch.undo()
     assert {path.name for path in tmp_path.glob('[a-c]')} == {'a', 'b'}
     (tmp_path / '.sgp_replay.json').unlink()
     require_own_folder(tmp_path)  # by the note alone
@@ -152,6 +153,34 @@ def test_the_next_run_completes_what_was_cut_off_between_two_names(tmp_path, mon
     }  # fmt: skip
     assert not list(tmp_path.glob('.sgp_growing_*'))
     assert not list(tmp_path.glob('.sgp_*.moves'))
+
+
+def test_results_take_their_places_also_without_their_run(tmp_path, monkeypatch):
+    """A kill of the run and its group, while the names change, leaves the results of one run."""
+    _replace(tmp_path, a='old', b='old')
+    replace = Path.replace
+    reader, writer = os.pipe()
+
+    def slowly(self, target):
+        if target.name == 'a':
+            os.kill(-os.getpgid(os.getppid()), signal.SIGKILL)
+            time.sleep(0.2)
+        os.write(writer, b'x')
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, 'replace', slowly)
+    if not (child := os.fork()):
+        os.setpgrp()
+        _replace(tmp_path, a='new', c='new')
+        os._exit(0)
+    os.close(writer)
+    assert os.waitpid(child, 0)[1] == signal.SIGKILL
+    with os.fdopen(reader, 'rb') as stream:
+        stream.read()  # until the last process that has the other end is gone
+    assert {path.name: path.read_text() for path in tmp_path.glob('[a-c]')} == {
+        'a': 'new', 'c': 'new',
+    }  # fmt: skip
+    assert [path.name for path in tmp_path.glob('.sgp_*.moves')] == []
 
 
 def test_a_note_of_moves_reaches_no_other_folder(tmp_path):

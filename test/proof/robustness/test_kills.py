@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import signal
 import subprocess
@@ -10,7 +11,12 @@ import time
 
 import pytest
 
-from sgp_proof.robustness.kills import broken_in, litter_in, results_in
+from sgp_proof.robustness.result_folders import (
+    broken_in,
+    litter_in,
+    results_in,
+    wait_until_settled,
+)
 from sgp_ros.report.files import replacing_results
 
 NAMES = [f'{i}.json' for i in range(12)]
@@ -31,11 +37,11 @@ for turn in range(1_000_000):
 
 @pytest.mark.parametrize('seed', range(6))
 def test_a_kill_leaves_the_results_of_one_run(tmp_path, seed):
-    """Those before or those after; what is cut off between two names, the next run completes."""
+    """Those before or those after, whatever moment it comes at."""
     rng = random.Random(seed)
     process = subprocess.Popen(
         [sys.executable, '-c', PROGRAM, str(tmp_path)], stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL, start_new_session=True,
     )  # fmt: skip
     try:
         assert process.stdout is not None
@@ -44,13 +50,14 @@ def test_a_kill_leaves_the_results_of_one_run(tmp_path, seed):
         while len(results_in(tmp_path)) < len(NAMES):
             assert time.monotonic() < limit
         time.sleep(rng.uniform(0.0, 0.1))
-        process.send_signal((signal.SIGKILL, signal.SIGKILL, signal.SIGTERM)[seed % 3])
+        os.killpg(process.pid, (signal.SIGKILL, signal.SIGKILL, signal.SIGTERM)[seed % 3])
         process.wait(timeout=10.0)
     finally:
         process.kill()
         process.communicate()
-    if not any(name.endswith('.moves') for name in litter_in(tmp_path)):
-        assert len(set(results_in(tmp_path).values())) == 1
+    assert wait_until_settled(tmp_path) == []
+    assert not any(name.endswith('.moves') for name in litter_in(tmp_path))
+    assert len(set(results_in(tmp_path).values())) == 1
     with pytest.raises(ZeroDivisionError):
         _fail(tmp_path)
     found = results_in(tmp_path)
@@ -63,6 +70,6 @@ def test_a_kill_leaves_the_results_of_one_run(tmp_path, seed):
 
 
 def _fail(out):
-    """A run that comes upon an error: it completes what was cut off and adds nothing."""
+    """A run that comes upon an error: it adds nothing."""
     with replacing_results(out, 'replay'):
         1 / 0  # noqa: B018 - any error
