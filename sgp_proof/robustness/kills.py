@@ -121,7 +121,7 @@ class CommandKills:
         kept = 'old' if after == before else 'new'
         listing = json.loads((self._out / f'.sgp_{self.name}.json').read_text(encoding='utf-8'))
         if is_cut:
-            kept = 'new, once the next run has completed them'
+            kept = 'old, and new once the next run begins'
             if after != before:
                 faults.append('old results beside new ones, until the next run')
         elif kept == 'new' and (set(listing) != set(after) or self._is_mixed(before, after)):
