@@ -176,21 +176,22 @@ def _make_moves(out: Path, command: str, content: dict[str, Any]) -> None:
 
 
 def _make_moves_apart(out: Path, command: str, content: dict[str, Any]) -> None:
-    """Make the moves in a child that outlives this process and its group; it shares the lock."""
-    with warnings.catch_warnings():  # of other threads, which this child does not need
-        warnings.simplefilter('ignore', DeprecationWarning)
-        child = os.fork()
-    if not child:
-        status = 1
-        try:
-            os.setsid()
-            signal.alarm(_LONGEST_MOVES_S)
-            _make_moves(out, command, content)
-            status = 0
-        finally:
-            os._exit(status)
-    if os.waitpid(child, 0)[1]:
-        _make_moves(out, command, content)  # the rest of them, or the error that stops them
+    """Make the moves in a child that outlives this process and its group; it shares the lock.
+
+    What it leaves, this process makes: all where no child is to be had, or what stops at an error.
+    """
+    with contextlib.suppress(OSError), warnings.catch_warnings():
+        warnings.simplefilter('ignore', DeprecationWarning)  # the child needs no other thread
+        if not (child := os.fork()):
+            try:
+                os.setsid()
+                signal.alarm(_LONGEST_MOVES_S)
+                _make_moves(out, command, content)
+            finally:
+                os._exit(0)
+        os.waitpid(child, 0)
+    if (out / f'.sgp_{command}.moves').exists():
+        _make_moves(out, command, content)
 
 
 def was_cut_off(out: Path) -> bool:

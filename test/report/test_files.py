@@ -158,12 +158,12 @@ def test_the_next_run_completes_what_was_cut_off_between_two_names(tmp_path, mon
 def test_results_take_their_places_also_without_their_run(tmp_path, monkeypatch):
     """A kill of the run and its group, while the names change, leaves the results of one run."""
     _replace(tmp_path, a='old', b='old')
-    replace = Path.replace
+    replace, run = Path.replace, []
     reader, writer = os.pipe()
 
     def slowly(self, target):
         if target.name == 'a':
-            os.kill(-os.getpgid(os.getppid()), signal.SIGKILL)
+            os.killpg(run[0], signal.SIGKILL)
             time.sleep(0.2)
         os.write(writer, b'x')
         return replace(self, target)
@@ -171,6 +171,7 @@ def test_results_take_their_places_also_without_their_run(tmp_path, monkeypatch)
     monkeypatch.setattr(Path, 'replace', slowly)
     if not (child := os.fork()):
         os.setpgrp()
+        run.append(os.getpid())
         _replace(tmp_path, a='new', c='new')
         os._exit(0)
     os.close(writer)
@@ -181,6 +182,22 @@ def test_results_take_their_places_also_without_their_run(tmp_path, monkeypatch)
         'a': 'new', 'c': 'new',
     }  # fmt: skip
     assert [path.name for path in tmp_path.glob('.sgp_*.moves')] == []
+
+
+@pytest.mark.parametrize('why', ['no process', 'nobody waits'])
+def test_results_take_their_places_without_another_process_too(tmp_path, monkeypatch, why):
+    """A system out of memory gives none; a parent may have left ended children to nobody."""
+    before = signal.getsignal(signal.SIGCHLD)
+    if why == 'no process':
+        monkeypatch.setattr(os, 'fork', lambda: Path('/nowhere').stat())
+    else:
+        signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    try:
+        _replace(tmp_path, a='new')
+    finally:
+        signal.signal(signal.SIGCHLD, before)
+    assert (tmp_path / 'a').read_text() == 'new'
+    assert [path.name for path in tmp_path.glob('.*')] == ['.sgp_replay.json']
 
 
 def test_a_note_of_moves_reaches_no_other_folder(tmp_path):
