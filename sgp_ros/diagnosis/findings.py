@@ -246,11 +246,11 @@ def parameter_errors(
     if not model.is_free:
         return ()
     C = model.frame.covariance
-    change = (model.w @ equations.directions).reshape(-1, 10)
+    changed = equations.with_bodies(equations.motion, model.w).tree.parameters
     D = equations.directions.reshape(len(model.w), -1, 10)
     found = []
     for body, link in enumerate(tree.link_names):
-        before, after = tree.parameters[body], tree.parameters[body] + change[body]
+        before, after = tree.parameters[body], changed[body]
         if after[0] <= 0.0 or before[0] <= 0.0 or body in unstated:
             continue
         slopes = {'mass': D[:, body, 0]}

@@ -178,8 +178,8 @@ class Equations:
             return np.zeros(self.motion.tree.size)
         tree, q = self.motion.tree, self.poses[0].position
         nominal = mass_matrix(tree, tree.parameters, q)
-        changed = tree.parameters + (w @ self.directions).reshape(tree.parameters.shape)
-        M = mass_matrix(tree, changed, q) + added
+        changed = self.with_bodies(self.poses[0], w).tree
+        M = mass_matrix(changed, changed.parameters, q) + added
         if np.linalg.eigvalsh(M)[:, 0].min() <= 0.0:
             return np.full(M.shape[1], -np.inf)
         if (np.diagonal(nominal, 0, 1, 2) <= 0.0).any():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -62,10 +62,7 @@ class Columns:
                     other.forget()
             if too_many:
                 self._motions.clear()
-            tree = motion.tree
-            change = (w @ self._equations[frozenset()].directions).reshape(tree.parameters.shape)
-            changed = replace(tree, parameters=tree.parameters + change)
-            self._motions[key] = replace(motion, tree=changed)
+            self._motions[key] = self._equations[frozenset()].with_bodies(motion, w)
         return self._motions[key]
 
     def of(

@@ -198,8 +198,7 @@ def dynamics_of(
     remainders: tuple[Remainder, ...] = (),
 ) -> DiagnosedDynamics:
     """Return the dynamics of a model fitted on `equations` for the recording of a motion."""
-    change = (model.w @ equations.directions).reshape(motion.tree.parameters.shape)
-    tree = replace(motion.tree, parameters=motion.tree.parameters + change)
+    tree = equations.with_bodies(motion, model.w).tree
     local, stated = _part(model, _is_local), _chosen(motion.stated, _is_local)
     return DiagnosedDynamics(local, tree, motion.step, remainders, stated)
 
