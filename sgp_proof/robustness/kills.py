@@ -2,12 +2,12 @@
 
     python -m sgp_proof.robustness.kills --seeds 0:100
 
-Each seed starts the node or one of three commands and ends it and all processes of its group with
-SIGKILL, SIGTERM or SIGINT at a random moment: anywhere in its run, while it writes, or while its
-results take their names. A command writes into a folder that holds the results of a run before;
-these must be untouched, or all replaced, and after the next run no other file may be there. What a
-node had published before must be in its record, but for what was made in the last second before a
-SIGKILL.
+Each seed starts the node or one of three commands and ends it, a command with all processes of its
+group, with SIGKILL, SIGTERM or SIGINT at a random moment: anywhere in its run, while it writes, or
+while its results take their names. A command writes into a folder that holds the results of a run
+before; these must be untouched, or all replaced, and after the next run no other file may be
+there. What a node had published before must be in its record, but for what was made in the last
+second before a SIGKILL.
 """
 
 from __future__ import annotations

@@ -14,8 +14,8 @@ import numpy as np
 from sgp_ros.recordings.model_files import load_model
 from sgp_ros.recordings.reader import open_recording
 
-SETTLED_S = 1.0
-"""Within which results take their names after a kill."""
+SETTLED_S = 10.0
+"""Within which results take their names after a kill, on a computer however busy."""
 TURN_S = 0.0005
 
 
