@@ -26,6 +26,8 @@ pytestmark = pytest.mark.ros
 KEPT = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 MEASURED = {**QUICK, 'command__type': 'none'}
 STEP_NS = 10**7
+KNOWN_AFTER = 100
+"""Messages after which the node knows the period, and has counted what was lost before."""
 
 
 def _state(t_ns: int, names: str = 'pole wheel', shift: float = 0.0, **fields: Any) -> JointState:
@@ -205,11 +207,19 @@ def test_every_message_of_a_burst_is_read_or_counted(
 
     def is_period_known() -> bool:
         send(1)
-        return graph.count('messages') > 50
+        return graph.count('messages') > KNOWN_AFTER
+
+    def is_last_read() -> bool:
+        """Send one when nothing is on its way: with it, all lost before it are counted."""
+        seen, read = len(told), graph.count('messages')
+        send(1)
+        graph.wait_until(lambda: len(told) > seen + 3, 'what was on its way')
+        return graph.count('messages') > read
 
     graph.wait_until(is_period_known, 'the first messages')
     known = len(told)
     graph.wait_until(lambda: len(told) > known + 3, 'what was on its way')
+    graph.wait_until(is_last_read, 'a message that is read')
     before, lost = accounted() - sent, graph.count('lost')
     os.kill(node.process.pid, signal.SIGSTOP)
     send(count)
