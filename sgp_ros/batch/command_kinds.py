@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -111,14 +111,13 @@ def are_efforts(accepted: Accepted, robot: Robot) -> bool:
     stamps, effort, position = (
         x[rows] for x in (accepted.stamps_ns, accepted.effort, accepted.position)
     )
-    delays = np.round(np.linspace(0.0, _LONGEST_LAG_S * 1e9, _LAGS)).astype(np.int64)
-    commands = np.array([accepted.commands.at(stamps - delay) for delay in delays])
     follows = []
     for j, joint in enumerate(robot.joints):
-        u = commands[:, :, j]
-        if joint.is_actuated and (np.ptp(u) > 0.0 or np.ptp(effort[:, j]) > 0.0):
-            explained, slope = best_line(u, effort[:, j])
-            rival, _ = best_line(u, position[:, j])
+        commands = HeldCommands(accepted.commands.stamps_ns, accepted.commands.effort[:, [j]])
+        changes = np.ptp(commands.at(stamps)) > 0.0 or np.ptp(effort[:, j]) > 0.0
+        if joint.is_actuated and changes:
+            explained, slope = best_line(_delayed(commands, stamps), effort[:, j])
+            rival, _ = best_line(_delayed(commands, stamps), position[:, j])
             is_unit = _GAINS[0] <= slope <= _GAINS[1]
             follows.append(is_unit and explained > max(_LEAST_EXPLAINED, rival))
     return bool(follows) and float(np.mean(follows)) > _COMMON_SHARE
@@ -155,26 +154,30 @@ def followed(accepted: Accepted, i: int, j: int, least: float = _NEAR_TARGET) ->
         least: share of the position that is explained.
     """
     assert accepted.commands is not None
-    delays = np.round(np.linspace(0.0, _LONGEST_LAG_S * 1e9, _LAGS)).astype(np.int64)
+    commands = HeldCommands(accepted.commands.stamps_ns, accepted.commands.effort[:, [j]])
     stamps, q = accepted.stamps_ns, accepted.position[:, i]
-    u = np.array([accepted.commands.at(stamps - delay)[:, j] for delay in delays])
-    explained, slope = best_line(u, q)
-    apart = abs(float(u.mean() - q.mean())) < _NEAR * float(q.std())
-    return _UNIT[0] <= slope <= _UNIT[1] and apart and explained > least
+    explained, slope = best_line(_delayed(commands, stamps), q)
+    is_near = abs(float(commands.at(stamps).mean() - q.mean())) < _NEAR * float(q.std())
+    return _UNIT[0] <= slope <= _UNIT[1] and is_near and explained > least
 
 
-def best_line(u: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Return the share of the variance of y (n,) that a line on a row of u (m, n) explains.
+def _delayed(commands: HeldCommands, stamps_ns: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield the commands of one joint as they were in force up to 0.2 s before, (n,) each."""
+    for delay in np.round(np.linspace(0.0, _LONGEST_LAG_S * 1e9, _LAGS)).astype(np.int64):
+        yield commands.at(stamps_ns - delay)[:, 0]
+
+
+def best_line(rows: Iterable[np.ndarray], y: np.ndarray) -> tuple[float, float]:
+    """Return the share of the variance of y (n,) that a line on one of some rows (n,) explains.
 
     The best row is taken, and its slope returned.
     """
-    du, dy = u - u.mean(axis=1, keepdims=True), y - y.mean()
-    powers, power = (du * du).sum(axis=1), float(dy @ dy)
-    products = du @ dy
-    valid = powers > 0.0
-    if power == 0.0 or not valid.any():
-        return 0.0, 0.0
-    slopes = products[valid] / powers[valid]
-    shares = slopes * products[valid] / power
-    best = int(shares.argmax())
-    return float(shares[best]), float(slopes[best])
+    dy = y - y.mean()
+    power = float(dy @ dy)
+    share = slope = 0.0
+    for row in rows:
+        du = row - row.mean()
+        product, square = float(du @ dy), float(du @ du)
+        if square > 0.0 and product * product > share * square * power:
+            share, slope = product * product / (square * power), product / square
+    return share, slope

@@ -42,6 +42,24 @@ POSES = 32
 
 
 @dataclass(frozen=True, eq=False)
+class Held:
+    """Rows of a joint where dry friction takes up any force while the joint rests.
+
+    Attributes:
+        change: what is taken from its discrepancy, (N,) [N m or N].
+        base: of it, (N, p).
+    """
+
+    change: np.ndarray
+    base: np.ndarray
+
+    @cached_property
+    def factor(self) -> Factor:
+        """Base, factored."""
+        return Factor.of(self.base)
+
+
+@dataclass(frozen=True, eq=False)
 class Equations:
     """N rows of k joints.
 
@@ -80,12 +98,13 @@ class Equations:
 
     @cached_property
     def factors(self) -> tuple[Factor, ...]:
-        """Base of each joint; those that dry friction does not change are shared."""
-        found = []
-        for j, base in enumerate(self.bases):
-            is_same = self.free is not None and np.array_equal(base, self.free.bases[j])
-            found.append(self.free.factors[j] if is_same and self.free else Factor.of(base))
-        return tuple(found)
+        """Base of each joint, factored; a hypothesis of what is held shares those of others."""
+        if self.free is None:
+            return tuple(Factor.of(base) for base in self.bases)
+        return tuple(
+            self.free.factors[j] if base is self.free.bases[j] else self.free.held(j).factor
+            for j, base in enumerate(self.bases)
+        )
 
     @property
     def size(self) -> int:
@@ -126,23 +145,38 @@ class Equations:
         held = [j for j in sorted(joints) if self.moving[self.rests[:, j], j].any()]
         if not held:
             return self
-        motion, tree = self.motion, self.motion.tree
         d, bases, moving = self.d.copy(), list(self.bases), self.moving.copy()
         for j in held:
-            rows = self.rests[:, j]
-            q = motion.position[rows]
-            v, a = motion.velocity[rows].copy(), motion.acceleration[rows].copy()
-            v[:, j] = 0.0
-            a[:, j] = 0.0
-            needed = np.zeros(len(motion.time))
-            acting = motion.effort[rows, j] + motion.stated_force[rows, j]
-            needed[rows] = motion.effort_for(q, v, a)[:, j] - acting
-            d[:, j] -= self.filter(needed)
-            Y = np.zeros((len(motion.time), len(self.directions)))
-            Y[rows] = torque_regressor(tree, q, v, a)[:, j] @ self.directions.T
-            bases[j] = bases[j] + self.filter(Y)
-            moving[rows, j] = 0.0
+            known = self.held(j)
+            d[:, j] -= known.change
+            bases[j] = known.base
+            moving[self.rests[:, j], j] = 0.0
         return replace(self, d=d, bases=tuple(bases), moving=moving, free=self)
+
+    def held(self, j: int) -> Held:
+        """Return what changes for a joint that dry friction may hold, whatever others do."""
+        if j not in self._held:
+            motion, rests = self.motion, self.rests[:, j]
+            change, base = np.empty(len(self.d)), self.bases[j].copy()
+            for rows, out in self.filter.blocks(_BLOCK):
+                at = rests[rows]
+                q = motion.position[rows][at]
+                v, a = motion.velocity[rows][at], motion.acceleration[rows][at]
+                v[:, j] = a[:, j] = 0.0
+                needed = np.zeros((len(at), 1 + self.size))
+                acting = (motion.effort[rows, j] + motion.stated_force[rows, j])[at]
+                needed[at, 0] = motion.effort_for(q, v, a)[:, j] - acting
+                Y = torque_regressor(motion.tree, q, v, a)[:, j]
+                needed[at, 1:] = Y @ self.directions.T
+                found = self.filter.piece(needed, out)
+                change[out] = found[:, 0]
+                base[out] += found[:, 1:]
+            self._held[j] = Held(change, base)
+        return self._held[j]
+
+    @cached_property
+    def _held(self) -> dict[int, Held]:
+        return {}
 
     @cached_property
     def poses(self) -> tuple[ObservedMotion, ...]:
