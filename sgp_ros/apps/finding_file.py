@@ -36,7 +36,7 @@ from sgp_ros.report.verdict import verdict_sentence
 from sgp_ros.rigid.tree import Tree
 
 NAME = 'finding.mcap'
-MARKERS_HZ, _MOST_ROWS, _MOST_ENTRIES = 20.0, 50_000, 1000
+_MARKERS_HZ, _MOST_MARKERS, _MOST_ROWS, _MOST_ENTRIES = 20.0, 4000, 50_000, 1000
 _LINE_LIST, _INFO, WARN = 5, 20, 30
 _WIDTH_SHARE = 0.03
 """Width of a link in the picture, relative to the robot's extent."""
@@ -76,7 +76,7 @@ def write_finding(path: Path, found: Diagnosis, tree: Tree, start_ns: int) -> No
                 writer.write_joint_state(topic, sample)
             state = (traces.position[i], traces.velocity[i], traces.effort[i])
             writer.write_joint_state('/joint_states', JointSample(stamps[i], found.joints, *state))
-        for i in rows_at(traces.time, MARKERS_HZ):
+        for i in marked_rows(traces.time):
             message = _markers(found, tree, traces.position[i], stamps[i])
             writer.write('/finding/markers', 'visualization_msgs/MarkerArray', stamps[i], message)
         for i, level, name, text in entries(found):
@@ -84,8 +84,9 @@ def write_finding(path: Path, found: Diagnosis, tree: Tree, start_ns: int) -> No
             writer.write('/finding/events', 'rcl_interfaces/Log', stamps[i], log)
 
 
-def rows_at(time: np.ndarray, rate_hz: float) -> list[int]:
-    """Return the first row of each period."""
+def marked_rows(time: np.ndarray) -> list[int]:
+    """Return the rows at which the robot is drawn: 20 a second, fewer of a long recording."""
+    rate_hz = min(_MARKERS_HZ, _MOST_MARKERS / max(float(np.ptp(time)), 1e-9))
     return np.unique(np.floor(time * rate_hz), return_index=True)[1].tolist()
 
 

@@ -19,13 +19,12 @@ from typing import Any
 import numpy as np
 
 from sgp_ros.apps.finding_file import (
-    MARKERS_HZ,
     WARN,
     colour_of,
     coloured_links,
     entries,
     half_band,
-    rows_at,
+    marked_rows,
 )
 from sgp_ros.diagnosis.result import Diagnosis
 from sgp_ros.optional import optional_package
@@ -61,7 +60,7 @@ def write_rerun(path: Path, found: Diagnosis, tree: Tree, start_ns: int) -> None
         stream.disable_timeline('log_time')
         stream.disable_timeline('log_tick')
         _write_residuals(rerun, stream, found, stamps)
-        for i in rows_at(found.traces.time, MARKERS_HZ):
+        for i in marked_rows(found.traces.time):
             stream.set_time(TIMELINE, timestamp=np.datetime64(int(stamps[i]), 'ns'))
             links = list(coloured_links(found, tree, found.traces.position[i]))
             stream.log('robot', rerun.LineStrips3D(

@@ -9,7 +9,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 
-from sgp_ros.apps.finding_file import write_finding
+from sgp_ros.apps.finding_file import marked_rows, write_finding
 from sgp_ros.diagnosis.result import Location
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.rigid.tree import read_urdf
@@ -43,6 +43,14 @@ def test_residuals_and_band_are_those_of_the_diagnosis(written):
     upper = [m.effort for _, m in recording.messages('/finding/band/upper')]
     inside = np.mean(np.abs(found.traces.after) <= np.array(upper))
     assert 0.9 < inside <= 1.0
+
+
+@pytest.mark.parametrize(('seconds', 'rate_hz'), [(60.0, 20.0), (1000.0, 4.0)])
+def test_the_robot_is_drawn_less_often_in_a_long_recording(seconds, rate_hz):
+    time = np.arange(0.0, seconds, 0.02)
+    rows = marked_rows(time)
+    assert np.diff(time[rows]) == pytest.approx(1.0 / rate_hz, abs=0.021)
+    assert len(rows) == pytest.approx(seconds * rate_hz, abs=1)
 
 
 def test_links_have_the_colour_of_their_share(written):
