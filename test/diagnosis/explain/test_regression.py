@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis.compare import equations as compared
 from sgp_ros.diagnosis.criteria import INDEPENDENT_ROWS
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
@@ -16,6 +17,7 @@ from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
+from sgp_ros.rigid.rigid_body import torque_regressor
 from test.diagnosis.worlds import CHAINS, simulate
 
 NONE = np.zeros(0)
@@ -66,10 +68,37 @@ def test_frames_of_any_scale_share_the_factors_of_the_joints(equations_for, heav
         rows = np.concatenate([(equations.base / sigma[:, None]).reshape(N * k, p), prior])
         np.testing.assert_allclose(frame.Q.T @ frame.Q, np.eye(p), atol=1e-12)
         np.testing.assert_allclose(frame.Q @ frame.R, rows, atol=1e-11 * np.abs(rows).max())
-    bases = equations.bases[0], 2.0 * equations.bases[1]
-    held = replace(equations, bases=bases, free=equations)
-    assert held.factors[0] is equations.factors[0]
-    np.testing.assert_allclose(held.factors[1].Q @ held.factors[1].R, bases[1], atol=1e-11)
+    rests = np.zeros_like(equations.rests)
+    rests[100:200], rests[300:400, 1] = True, True
+    free = replace(equations, rests=rests)
+    held, both = (free.with_dry_friction(frozenset(joints)) for joints in ({1}, {0, 1}))
+    assert held.factors[0] is free.factors[0]
+    assert both.factors[1] is held.factors[1]
+    assert both.factors[0] is not free.factors[0]
+    for base, factor in zip(both.bases, both.factors, strict=True):
+        np.testing.assert_allclose(factor.Q @ factor.R, base, atol=1e-11)
+
+
+def test_a_held_joint_tells_nothing_where_it_rests(equations_for, heavy, monkeypatch):
+    """Its discrepancy and base are the filtered ones of the other rows, in blocks of any size."""
+    _, equations = equations_for(heavy[2])
+    rests = np.zeros_like(equations.rests)
+    rests[100:200, 1] = True
+    still = replace(
+        equations.motion,
+        velocity=np.where(rests, 0.0, equations.motion.velocity),
+        acceleration=np.where(rests, 0.0, equations.motion.acceleration),
+    )
+    Y = torque_regressor(still.tree, still.position, still.velocity, still.acceleration)[:, 1]
+    needed = still.effort_for(still.position, still.velocity, still.acceleration) - still.effort
+    change = equations.filter(np.where(rests, needed, 0.0))[:, 1]
+    base = equations.bases[1] + equations.filter(rests[:, [1]] * (Y @ equations.directions.T))
+    for block in (7, 2000):
+        monkeypatch.setattr(compared, '_BLOCK', block)
+        held = replace(equations, rests=rests).with_dry_friction(frozenset({1}))
+        np.testing.assert_allclose(held.d[:, 1], equations.d[:, 1] - change, atol=1e-12)
+        np.testing.assert_allclose(held.bases[1], base, atol=1e-12)
+        np.testing.assert_array_equal(held.d[:, 0], equations.d[:, 0])
 
 
 def test_what_remains_is_told_apart_by_joint(equations_for, heavy):
