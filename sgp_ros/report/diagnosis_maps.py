@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from sgp_ros.diagnosis.criteria import LEAST_SHARE
@@ -18,6 +19,8 @@ from sgp_ros.report.figures import GREY, PREDICTED
 _FEWEST_CELLS, _MOST_CELLS = 8, 24
 _LARGE, _IMPORTANT = 3, 0.1
 _SMALL_COLUMNS = 6
+_SIGNED = LinearSegmentedColormap.from_list('signed', ['#0060a8', '#ffffff', '#c44900'], 257)
+"""Below and above zero, in the colours of the page, whose words name them."""
 
 
 def important_joints(found: Diagnosis) -> list[int]:
@@ -133,7 +136,7 @@ def cells_of(
 def _map(axes: Axes, found: Diagnosis, j: int, values: np.ndarray, reach: float) -> QuadMesh:
     x, y, mean = cells_of(found, j, values)
     axes.set_facecolor('#D4D4D4')
-    return axes.pcolormesh(x, y, mean.T, cmap='RdBu_r', vmin=-reach, vmax=reach, rasterized=True)
+    return axes.pcolormesh(x, y, mean.T, cmap=_SIGNED, vmin=-reach, vmax=reach, rasterized=True)
 
 
 VARIABLES = ('position', 'velocity', 'effort', 'time')

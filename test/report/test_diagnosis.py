@@ -253,6 +253,16 @@ def test_before_and_after_share_one_scale():
     assert before[0] == -before[1]
 
 
+def test_maps_have_the_colours_that_the_page_names():
+    """Blue below zero, orange above: in the picture, which is printed, as on the page."""
+    found = diagnosis('missing_physics', [COULOMB])
+    mesh = draw_location(found).axes[0].collections[0]
+    low, high = mesh.get_clim()
+    page = render(found, {})
+    for name, value in (('below', low), ('zero', 0.0), ('above', high)):
+        assert re.search(rf'--{name}: (#\w+)', page)[1] == to_hex(mesh.to_rgba(value))
+
+
 def test_noise_is_not_drawn_as_physics():
     """Where nothing is missing, colours end at the least that would count."""
     found = diagnosis('no_mismatch')
