@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
+from operator import itemgetter
 
 import numpy as np
 
@@ -113,11 +114,10 @@ def are_efforts(accepted: Accepted, robot: Robot) -> bool:
     )
     follows = []
     for j, joint in enumerate(robot.joints):
-        commands = HeldCommands(accepted.commands.stamps_ns, accepted.commands.effort[:, [j]])
-        changes = np.ptp(commands.at(stamps)) > 0.0 or np.ptp(effort[:, j]) > 0.0
-        if joint.is_actuated and changes:
-            explained, slope = best_line(_delayed(commands, stamps), effort[:, j])
-            rival, _ = best_line(_delayed(commands, stamps), position[:, j])
+        u = _delayed(accepted.commands, j, stamps)
+        if joint.is_actuated and (np.ptp(u) > 0.0 or np.ptp(effort[:, j]) > 0.0):
+            explained, slope = best_line(u, effort[:, j])
+            rival, _ = best_line(u, position[:, j])
             is_unit = _GAINS[0] <= slope <= _GAINS[1]
             follows.append(is_unit and explained > max(_LEAST_EXPLAINED, rival))
     return bool(follows) and float(np.mean(follows)) > _COMMON_SHARE
@@ -154,30 +154,33 @@ def followed(accepted: Accepted, i: int, j: int, least: float = _NEAR_TARGET) ->
         least: share of the position that is explained.
     """
     assert accepted.commands is not None
-    commands = HeldCommands(accepted.commands.stamps_ns, accepted.commands.effort[:, [j]])
     stamps, q = accepted.stamps_ns, accepted.position[:, i]
-    explained, slope = best_line(_delayed(commands, stamps), q)
-    is_near = abs(float(commands.at(stamps).mean() - q.mean())) < _NEAR * float(q.std())
+    u = _delayed(accepted.commands, j, stamps)
+    explained, slope = best_line(u, q)
+    is_near = abs(float(u.mean() - q.mean())) < _NEAR * float(q.std())
     return _UNIT[0] <= slope <= _UNIT[1] and is_near and explained > least
 
 
-def _delayed(commands: HeldCommands, stamps_ns: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield the commands of one joint as they were in force up to 0.2 s before, (n,) each."""
-    for delay in np.round(np.linspace(0.0, _LONGEST_LAG_S * 1e9, _LAGS)).astype(np.int64):
-        yield commands.at(stamps_ns - delay)[:, 0]
+def _delayed(commands: HeldCommands, j: int, stamps_ns: np.ndarray) -> np.ndarray:
+    """Return the commands of joint j, delayed by up to 0.2 s, at some times (n,), (m, n)."""
+    own = HeldCommands(commands.stamps_ns, commands.effort[:, [j]])
+    delays = np.round(np.linspace(0.0, _LONGEST_LAG_S * 1e9, _LAGS)).astype(np.int64)
+    return np.array([own.at(stamps_ns - delay)[:, 0] for delay in delays])
 
 
-def best_line(rows: Iterable[np.ndarray], y: np.ndarray) -> tuple[float, float]:
-    """Return the share of the variance of y (n,) that a line on one of some rows (n,) explains.
+def best_line(u: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """Return the share of the variance of y (n,) that a line on a row of u (m, n) explains.
 
-    The best row is taken, and its slope returned.
+    The best row is taken, and its slope returned. Each row in turn, for u of a long recording is
+    large.
     """
     dy = y - y.mean()
     power = float(dy @ dy)
-    share = slope = 0.0
-    for row in rows:
+    best = 0.0, 0.0
+    for row in u:
         du = row - row.mean()
-        product, square = float(du @ dy), float(du @ du)
-        if square > 0.0 and product * product > share * square * power:
-            share, slope = product * product / (square * power), product / square
-    return share, slope
+        square, product = float(du @ du), float(du @ dy)
+        if square > 0.0 and power > 0.0:
+            slope = product / square
+            best = max(best, (slope * product / power, slope), key=itemgetter(0))
+    return best
