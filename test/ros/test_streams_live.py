@@ -209,16 +209,19 @@ def test_every_message_of_a_burst_is_read_or_counted(
         send(1)
         return graph.count('messages') > KNOWN_AFTER
 
+    def wait_for_what_is_on_its_way() -> None:
+        seen = len(told)
+        graph.wait_until(lambda: len(told) > seen + 3, 'what was on its way')
+
     def is_last_read() -> bool:
         """Send one when nothing is on its way: with it, all lost before it are counted."""
-        seen, read = len(told), graph.count('messages')
+        read = graph.count('messages')
         send(1)
-        graph.wait_until(lambda: len(told) > seen + 3, 'what was on its way')
+        wait_for_what_is_on_its_way()
         return graph.count('messages') > read
 
     graph.wait_until(is_period_known, 'the first messages')
-    known = len(told)
-    graph.wait_until(lambda: len(told) > known + 3, 'what was on its way')
+    wait_for_what_is_on_its_way()
     graph.wait_until(is_last_read, 'a message that is read')
     before, lost = accounted() - sent, graph.count('lost')
     os.kill(node.process.pid, signal.SIGSTOP)
