@@ -61,13 +61,15 @@ def _ring(
     t = step * np.arange(len(thrust))
     swing = rate * math.sqrt(max(1.0 - ratio**2, 0.0)) * t
     phases = np.exp(-ratio * rate * t) * np.stack([np.cos(swing), np.sin(swing)])
-    m, k = seen.shape
-    offsets = np.tile(np.eye(k), (m, 1))
-    columns = [(seen * x[:m, None]).ravel() for x in (thrust, *phases)]
-    A, y = np.column_stack([*columns, offsets])[edge * k :], left.ravel()[edge * k :]
-    if not (np.isfinite(A).all() and np.isfinite(y).all()):  # of a roll-out that diverges
-        return np.zeros_like(thrust)
-    mobility, *sizes = np.linalg.lstsq(A, y, rcond=None)[0][:3]
+    x = np.stack([thrust, *phases])[:, edge : len(seen)]
+    seen, left = seen[edge:], left[edge:]
+    if not x.size or not all(np.isfinite(part).all() for part in (x, seen, left)):
+        return np.zeros_like(thrust)  # too short, or of a roll-out that diverges
+    per_joint, offset = x @ seen / x.shape[1], left.mean(axis=0)
+    G = (x * (seen**2).sum(axis=1)) @ x.T - x.shape[1] * per_joint @ per_joint.T
+    b = x @ (seen * (left - offset)).sum(axis=1)
+    size = np.sqrt(np.maximum(np.diag(G), 1e-300))
+    mobility, *sizes = np.linalg.lstsq(G / np.outer(size, size), b / size, rcond=1e-12)[0] / size
     ring = np.asarray(sizes @ phases)
     if mobility * float(np.abs(thrust).max()) * _LARGEST_RING <= float(np.abs(ring).max()):
         return np.zeros_like(thrust)
