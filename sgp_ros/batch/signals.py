@@ -15,7 +15,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import interpolate
+import scipy  # its parts load when they are used
 
 from sgp_ros.batch.acceptance import USUAL, Accepted, accept
 from sgp_ros.batch.zero_phase import sharpened
@@ -127,7 +127,7 @@ class _Part:
         known = (stamps - stamps[0]) * 1e-9
         n = int(known[-1] / step + 1e-6) + 1
         grid = np.minimum(np.arange(n) * step, known[-1])
-        path = interpolate.CubicSpline(known, accepted.position[rows])
+        path = scipy.interpolate.CubicSpline(known, accepted.position[rows])
         velocity, effort, command = None, None, None
         if accepted.velocity is not None:
             velocity = _velocity(grid, known, accepted.velocity[rows], path)
@@ -161,7 +161,7 @@ class _Part:
 
 
 def _velocity(
-    grid: np.ndarray, known: np.ndarray, measured: np.ndarray, path: interpolate.CubicSpline
+    grid: np.ndarray, known: np.ndarray, measured: np.ndarray, path: scipy.interpolate.CubicSpline
 ) -> np.ndarray:
     """Return the velocity on a grid; states without one are passed over."""
     has = np.isfinite(measured).all(axis=1)

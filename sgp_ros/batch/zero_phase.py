@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage, signal
+import scipy  # its parts load when they are used
 
 from sgp_ros.errors import ConfigError
 
@@ -43,12 +43,12 @@ def first_derivative(x: np.ndarray, rate: float) -> np.ndarray:
 
     `REACH` samples at either end see values repeated beyond the end.
     """
-    return ndimage.correlate1d(x, _FIRST, axis=0, mode='nearest') * rate
+    return scipy.ndimage.correlate1d(x, _FIRST, axis=0, mode='nearest') * rate
 
 
 def second_derivative(x: np.ndarray, rate: float) -> np.ndarray:
     """Return the second time derivative of x (n, ...) sampled at `rate` [Hz]; ends as above."""
-    return ndimage.correlate1d(x, _SECOND, axis=0, mode='nearest') * rate**2
+    return scipy.ndimage.correlate1d(x, _SECOND, axis=0, mode='nearest') * rate**2
 
 
 def sharpened(average: np.ndarray) -> np.ndarray:
@@ -59,7 +59,7 @@ def sharpened(average: np.ndarray) -> np.ndarray:
     was averaged with the hat and sharpened has therefore passed exactly the filter that the
     acceleration has passed, at every frequency.
     """
-    return ndimage.correlate1d(average, _SHARPEN, axis=0, mode='nearest')
+    return scipy.ndimage.correlate1d(average, _SHARPEN, axis=0, mode='nearest')
 
 
 _DECAYED = 1e-3
@@ -114,9 +114,9 @@ class ZeroPhase:
 
         Beyond either end the signal is continued by its point reflection.
         """
-        sections = signal.butter(self.order, self.cutoff, fs=self.rate, output='sos')
+        sections = scipy.signal.butter(self.order, self.cutoff, fs=self.rate, output='sos')
         padding = min(3 * self.trim, len(x) - 1)
-        return np.asarray(signal.sosfiltfilt(sections, x, axis=0, padlen=padding))
+        return np.asarray(scipy.signal.sosfiltfilt(sections, x, axis=0, padlen=padding))
 
     def states(
         self, position: np.ndarray, velocity: np.ndarray | None = None

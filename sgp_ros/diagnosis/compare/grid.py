@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy import interpolate
+import scipy  # its parts load when they are used
 
 from sgp_ros.batch.acceptance import Accepted
 
@@ -46,7 +46,7 @@ class Stretch:
         n = int((known[-1] - known[0]) / step + 1e-6) + 1
         t = known[0] + step * np.arange(n)
         inner = np.minimum(t, known[-1])
-        path = interpolate.CubicSpline(known, accepted.position[rows])
+        path = scipy.interpolate.CubicSpline(known, accepted.position[rows])
         velocity, effort = None, None
         if accepted.velocity is not None:
             velocity = path(inner, 1)

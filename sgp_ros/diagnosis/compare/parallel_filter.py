@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy  # its parts load when they are used
 from numba import njit
-from scipy import signal
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class ParallelFilter:
         if self.cutoff >= 0.45 * self.rate:
             return np.ones(1)
         return np.asarray(
-            signal.firwin(2 * half + 1, self.cutoff, window=('kaiser', 5.0), fs=self.rate)
+            scipy.signal.firwin(2 * half + 1, self.cutoff, window=('kaiser', 5.0), fs=self.rate)
         )
 
     def correlations(self, count: int) -> np.ndarray:
@@ -87,7 +87,7 @@ class ParallelFilter:
 def _weighed(taps: np.ndarray, x: np.ndarray, first: np.ndarray) -> np.ndarray:
     """Return the weighted sums of the windows of x (n, c) that begin at `first`, (N, c)."""
     found = np.empty((len(first), x.shape[1]))
-    _weigh(taps, np.array(x, dtype=np.float64, order='C', ndmin=2), first, found)
+    _weigh(taps, np.ascontiguousarray(x, dtype=np.float64), first, found)
     return found
 
 

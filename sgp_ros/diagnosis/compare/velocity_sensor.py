@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize, signal
+import scipy  # its parts load when they are used
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
@@ -54,7 +54,7 @@ def lagged(v: np.ndarray, time_constant: float, step: float) -> np.ndarray:
     ramp = (1.0 - decay) / x
     b = [1.0 - ramp, ramp - decay]
     start = [decay * v[0] + b[1] * v[0]]
-    return np.asarray(signal.lfilter(b, [1.0, -decay], v, zi=start)[0])
+    return np.asarray(scipy.signal.lfilter(b, [1.0, -decay], v, zi=start)[0])
 
 
 def known_lag(raw: RawTrajectory, motion: ObservedMotion, joint: int) -> np.ndarray:
@@ -78,7 +78,7 @@ def sensor_lags(raw: RawTrajectory, equations: Equations) -> list[SensorLag]:
         def rest(T: float, true: np.ndarray = true, shown: np.ndarray = shown) -> float:
             return float(((shown - low(lagged(true, T, motion.step))) ** 2).mean())
 
-        best = optimize.minimize_scalar(rest, bounds=(0.0, 0.3), method='bounded',
+        best = scipy.optimize.minimize_scalar(rest, bounds=(0.0, 0.3), method='bounded',
                                         options={'xatol': 1e-6})  # fmt: skip
         T = float(best.x)
         before, after = rest(0.0), rest(T)
