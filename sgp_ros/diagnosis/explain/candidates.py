@@ -10,17 +10,9 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors, price_of
 from sgp_ros.diagnosis.explain.frame import Frame
-from sgp_ros.diagnosis.explain.regression import (
-    Columns,
-    dry_joints,
-    shape_bounds,
-    shape_scales,
-    with_shapes,
-)
+from sgp_ros.diagnosis.explain.regression import Columns, dry_joints
+from sgp_ros.diagnosis.explain.shape_search import UNSEEN, searched
 from sgp_ros.physics.effect_at import EffectAt
-
-UNSEEN = 1e-12
-"""A column that is this much smaller than the largest acts on nothing; its coefficient is zero."""
 
 
 def fit(
@@ -50,8 +42,7 @@ def fit(
     frame = Frame.of(equations, sigma, is_free=is_free)
     model = None
     for _ in range(rounds):
-        moved = _searched(frame, columns, candidates, steps, w, still)
-        candidates = (*candidates[:still], *moved)
+        candidates = searched(frame, columns, candidates, steps, w, still)
         model = _solved(frame, columns, candidates, w)
         w = model.w if is_free else None
         frame = Frame.of(equations, model.sigma, is_free=is_free)
@@ -60,44 +51,14 @@ def fit(
     return _solved(frame, columns, candidates, w)
 
 
-class _Projected:
-    """Projected columns of candidates in one frame, with all but one shape held.
-
-    Args:
-        frame: that projects.
-        columns: of the recording.
-        w: (p,) change of the bodies; None for none.
-    """
-
-    def __init__(self, frame: Frame, columns: Columns, w: np.ndarray | None) -> None:
-        self.frame, self._columns, self._w = frame, columns, w
-        self._known: dict[tuple[object, bytes], np.ndarray] = {}
-
-    def of(self, candidate: EffectAt, among: int) -> np.ndarray:
-        """Return those of one of so many candidates, (N k + p, m)."""
-        key = candidate.key, candidate.shape.tobytes()
-        if key not in self._known:
-            if len(self._known) > 4 * among:
-                self._known.clear()
-            x = self._columns.of(candidate, self.frame.equations, self._w)
-            self._known[key] = self.frame.projected(x)
-        return self._known[key]
-
-
 def split(
     frame: Frame, columns: Columns, candidates: tuple[EffectAt, ...], w: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, list[int]]:
     """Return target less given effects, free columns (projected), and their widths."""
-    return _split(_Projected(frame, columns, w), candidates)
-
-
-def _split(
-    projected: _Projected, candidates: tuple[EffectAt, ...]
-) -> tuple[np.ndarray, np.ndarray, list[int]]:
-    y = projected.frame.y
+    y = frame.y
     free, widths = [], []
     for candidate in candidates:
-        x = projected.of(candidate, len(candidates))
+        x = frame.projected(columns.of(candidate, frame.equations, w))
         if candidate.effect.is_given:
             y = y - x[:, 0]
             widths.append(0)
@@ -115,59 +76,6 @@ def _least(A: np.ndarray, y: np.ndarray) -> np.ndarray:
     scale[scale <= UNSEEN * scale.max()] = np.inf
     c = np.linalg.lstsq(A / scale, y, rcond=1e-7)[0]
     return np.asarray(c / scale)
-
-
-def _residual(projected: _Projected, candidates: tuple[EffectAt, ...]) -> np.ndarray:
-    """Return the scaled residual, (N k + p,)."""
-    y, A, _ = _split(projected, candidates)
-    return y - A @ _least(A, y)
-
-
-def _searched(
-    frame: Frame,
-    columns: Columns,
-    candidates: tuple[EffectAt, ...],
-    steps: int,
-    w: np.ndarray | None,
-    still: int,
-) -> tuple[EffectAt, ...]:
-    """Improve the shapes of candidates after the first ones by Levenberg-Marquardt in bounds."""
-    fixed, candidates = candidates[:still], candidates[still:]
-    low, high = shape_bounds(frame.equations, candidates)
-    if not len(low):
-        return candidates
-    if fixed:
-        frame = frame.beyond(*split(frame, columns, fixed, w)[:2])
-    x = np.clip(np.concatenate([s.shape for s in candidates]), low, high)
-    span = np.maximum(shape_scales(frame.equations, candidates), 1e-12)
-    projected = _Projected(frame, columns, w)
-    r = _residual(projected, with_shapes(candidates, x))
-    cost, damping = float(r @ r), 1e-2
-    for _ in range(steps):
-        J = np.empty((len(r), len(x)))
-        for i in range(len(x)):
-            h = 2e-4 * span[i] if x[i] + 2e-4 * span[i] <= high[i] else -2e-4 * span[i]
-            moved = x.copy()
-            moved[i] += h
-            J[:, i] = (_residual(projected, with_shapes(candidates, moved)) - r) / (h / span[i])
-        H, g = J.T @ J, J.T @ r
-        improved = False
-        for _ in range(6):
-            step = -np.linalg.solve(
-                H + damping * (np.diag(np.diag(H)) + 1e-12 * np.eye(len(x))), g
-            )
-            trial = np.clip(x + np.clip(step, -0.2, 0.2) * span, low, high)
-            r1 = _residual(projected, with_shapes(candidates, trial))
-            c1 = float(r1 @ r1)
-            if c1 < cost:
-                gain = (cost - c1) / cost
-                x, r, cost, improved = trial, r1, c1, True
-                damping = max(damping / 5.0, 1e-8)
-                break
-            damping *= 6.0
-        if not improved or gain < 1e-6:
-            break
-    return with_shapes(candidates, x)
 
 
 def added_inertia(candidates: Sequence[EffectAt], equations: Equations) -> np.ndarray:

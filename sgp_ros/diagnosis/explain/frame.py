@@ -11,7 +11,7 @@ are searched.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -31,8 +31,6 @@ class Frame:
         R: (p, p) upper triangular, `Q R = [B / sigma; sqrt(weight) I]`.
         is_free: whether inertial parameters may differ; else p is 0 here.
         weight: of the prior, in rows.
-        own: (N k + p, m) more orthonormal columns that are projected out.
-        given: (N k + p,) what is left of the target, where it is known.
     """
 
     equations: Equations
@@ -41,8 +39,6 @@ class Frame:
     R: np.ndarray
     is_free: bool
     weight: float
-    own: np.ndarray | None = None
-    given: np.ndarray | None = None
 
     @classmethod
     def of(
@@ -59,19 +55,16 @@ class Frame:
 
     @property
     def Q(self) -> np.ndarray:  # noqa: N802  # as in the equations
-        """Orthonormal basis of what is projected out, (N k + p, p) or with `own` more columns."""
+        """Orthonormal basis of what is projected out, (N k + p, p)."""
         N, k = self.equations.d.shape
         rows = np.empty((N, k, self.R.shape[1]))
         for j, factor in enumerate(self.equations.factors):
             rows[:, j] = factor.Q @ self.S[j]
-        Q = np.concatenate([rows.reshape(N * k, -1), self.S[-1]])
-        return Q if self.own is None else np.concatenate([Q, self.own], axis=1)
+        return np.concatenate([rows.reshape(N * k, -1), self.S[-1]])
 
     @cached_property
     def y(self) -> np.ndarray:
         """Rest of the target, (N k + p,)."""
-        if self.given is not None:
-            return self.given
         return self.projected(self.equations.d[:, :, None])[:, 0]
 
     def projected(self, columns: np.ndarray) -> np.ndarray:
@@ -80,33 +73,19 @@ class Frame:
         x = np.zeros((N * k + len(self.S[-1]), m))
         scaled = np.divide(columns, self.sigma[:, None], out=x[: N * k].reshape(N, k, m))
         if self.is_free:
-            u = self._explained(scaled)
+            u = self.explained(scaled)
             for j, factor in enumerate(self.equations.factors):
                 scaled[:, j] -= factor.Q @ (self.S[j] @ u)
             x[N * k :] = -self.S[-1] @ u
-        return x if self.own is None else x - self.own @ (self.own.T @ x)
+        return x
 
-    def _explained(self, scaled: np.ndarray) -> np.ndarray:
+    def explained(self, scaled: np.ndarray) -> np.ndarray:
         """Return the products of the basis with scaled columns (N, k, m), (p, m)."""
         u = np.zeros((self.R.shape[1], scaled.shape[2]))
         for j, factor in enumerate(self.equations.factors):
             if scaled[:, j].any():
                 u += self.S[j].T @ (factor.Q.T @ scaled[:, j])
         return u
-
-    def beyond(self, y: np.ndarray, A: np.ndarray) -> Frame:
-        """Return the frame that also projects out columns A (N k + p, m), which this one did.
-
-        For searches beside effects that keep their shapes; `R` stays that of the bodies.
-
-        Args:
-            y: (N k + p,) target, less forces that are given.
-            A: columns.
-        """
-        if not A.shape[1]:
-            return replace(self, given=y)
-        own = np.linalg.qr(A / np.sqrt((A * A).sum(axis=0) + 1e-300))[0]
-        return replace(self, own=own, given=y - own @ (own.T @ y))
 
     def by_joint(self, residual: np.ndarray) -> np.ndarray:
         """Return the mean squares of a residual (N k + p,) per joint, unscaled, (k,)."""
@@ -117,7 +96,7 @@ class Frame:
         """Return w (p,) that explains best what effects (N, k) leave of the target."""
         if not self.is_free:
             return np.zeros(self.equations.size)
-        u = self._explained((unexplained / self.sigma)[:, :, None])
+        u = self.explained((unexplained / self.sigma)[:, :, None])
         return np.linalg.solve(self.R, u[:, 0])
 
     @property

@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 
 from sgp_ros.batch.least_squares import correlation_factor
-from sgp_ros.diagnosis.explain.candidates import UNSEEN
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.regression import Columns, shape_bounds, shape_scales, with_shapes
+from sgp_ros.diagnosis.explain.shape_search import UNSEEN
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.robots.observed_motion import ObservedMotion
 

@@ -15,7 +15,7 @@ from sgp_ros.diagnosis.criteria import (
     SLIGHT_REST,
 )
 from sgp_ros.diagnosis.decide.cross_validation import support
-from sgp_ros.diagnosis.explain.candidates import _Projected, _residual, fit
+from sgp_ros.diagnosis.explain.candidates import fit, split
 from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import beyond_plain, floors
 from sgp_ros.diagnosis.explain.frame import Frame
@@ -97,10 +97,9 @@ def test_a_screened_gain_is_that_of_the_fit(equations):
         if len(candidate.shape):
             continue
         frame = Frame.of(equations, base.sigma, is_free=True)
-        before, after = (
-            frame.by_joint(r) + floors(equations)
-            for r in (frame.y, _residual(_Projected(frame, columns, base.w), (candidate,)))
-        )
+        y, A, _ = split(frame, columns, (candidate,), base.w)
+        left = y - A @ np.linalg.lstsq(A, y, rcond=None)[0]
+        before, after = (frame.by_joint(r) + floors(equations) for r in (y, left))
         expected = 0.5 * len(equations.d) * np.log(before / after).sum()
         size = columns.of(candidate, equations).shape[-1]
         expected -= 0.5 * size * np.log(len(equations.d))

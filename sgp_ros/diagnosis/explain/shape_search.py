@@ -1,0 +1,226 @@
+"""Search of the shapes of candidates in small products.
+
+Linear coefficients and inertial parameters are solved for at every shape (variable projection,
+Golub and Pereyra 1973). Residuals, and their slopes by the shapes, are sums of target and columns;
+so their squares follow from the products of these, and the N rows are gone through once for each
+column.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from sgp_ros.diagnosis.explain.frame import Frame
+from sgp_ros.diagnosis.explain.regression import (
+    Columns,
+    Seen,
+    shape_bounds,
+    shape_scales,
+    with_shapes,
+)
+from sgp_ros.physics.effect_at import EffectAt
+
+UNSEEN = 1e-12
+"""A column that is this much smaller than the largest acts on nothing; its coefficient is zero."""
+_EXPLAINED = 1e-13
+"""Part of a column's square below which it counts as explained by the bodies."""
+_COLLINEAR = 1e-13
+"""Part of the largest eigenvalue of scaled products below which columns are the same."""
+_REMEMBERED = 100
+"""Columns that a search holds before it forgets them."""
+_STEP = 2e-4
+"""Step of differences by a shape, in its scales."""
+_LARGEST = 0.2
+"""Largest change of a shape in one step of the search, in its scales."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Columns of one candidate with their products with the basis of the bodies.
+
+    Attributes:
+        seen: filtered columns.
+        u: what the bodies explain of them, (p, m).
+        is_given: whether they have no coefficient.
+    """
+
+    seen: Seen
+    u: np.ndarray
+    is_given: bool
+
+
+class Bench:
+    """Residuals of candidates beside one frame, as sums of target and columns.
+
+    Args:
+        frame: whose bodies are projected out.
+        columns: of the recording.
+        w: (p,) change of the bodies that columns start from; None for none.
+    """
+
+    def __init__(self, frame: Frame, columns: Columns, w: np.ndarray | None) -> None:
+        self._frame, self._columns, self._w = frame, columns, w
+        self._target = frame.equations.d / frame.sigma
+        self._u = frame.explained(self._target[:, :, None])
+        self._known: dict[tuple[object, bytes], _Part] = {}
+
+    def cost(self, candidates: Sequence[EffectAt]) -> float:
+        """Return the squares of the scaled residual."""
+        parts = self._parts(candidates)
+        G = self._products(parts)
+        weights = _weights(G, *_split(parts, _places(parts)))
+        return float(weights @ G @ weights)
+
+    def slopes(
+        self, candidates: Sequence[EffectAt], moved: Sequence[tuple[int, EffectAt, float]]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return products of the slopes of the residual with themselves (s, s), with it (s,).
+
+        Args:
+            candidates: as they are.
+            moved: for each shape the index of the candidate that has it, this one with the shape
+                moved, and how far.
+        """
+        parts, others = self._parts(candidates), self._parts([s for _, s, _ in moved])
+        G = self._products([*parts, *others])
+        places = _places([*parts, *others])
+        own, shifted = places[: len(parts)], places[len(parts) :]
+        r = _weights(G, *_split(parts, own))
+        J = np.empty((len(G), len(moved)))
+        for i, (which, _, h) in enumerate(moved):
+            changed = [shifted[i] if n == which else at for n, at in enumerate(own)]
+            J[:, i] = (_weights(G, *_split(parts, changed)) - r) / h
+        return J.T @ G @ J, J.T @ G @ r
+
+    def _parts(self, candidates: Sequence[EffectAt]) -> list[_Part]:
+        """Return the columns of candidates; those asked for before are remembered."""
+        if len(self._known) > _REMEMBERED:
+            self._known.clear()
+        return [self._part(s) for s in candidates]
+
+    def _part(self, s: EffectAt) -> _Part:
+        key = s.key, s.shape.tobytes()
+        if key not in self._known:
+            frame = self._frame
+            motion = self._columns.corrected(self._w if s.effect.uses_bodies else None)
+            seen = self._columns.seen(s, frame.equations, motion)
+            u = np.zeros((frame.R.shape[1], seen.x.shape[-1]))
+            if len(u):
+                for j, explained in seen.explained.items():
+                    u += frame.S[j].T @ explained / frame.sigma[j]
+            self._known[key] = _Part(seen, u, s.effect.is_given)
+        return self._known[key]
+
+    def _products(self, parts: Sequence[_Part]) -> np.ndarray:
+        """Return the products of the target and all columns with one another, (1 + m, 1 + m)."""
+        frame = self._frame
+        u = np.concatenate([self._u, *(part.u for part in parts)], axis=1)
+        G = np.zeros((u.shape[1], u.shape[1]))
+        ends = np.cumsum([1, *(part.u.shape[1] for part in parts)])
+        for j in range(self._target.shape[1]):
+            here = [i for i, part in enumerate(parts) if j in part.seen.rows]
+            at = [0, *(a for i in here for a in range(ends[i], ends[i + 1]))]
+            x = np.empty((len(at), len(self._target)))
+            x[0], first = self._target[:, j], 1
+            for i in here:
+                last = first + parts[i].u.shape[1]
+                np.divide(parts[i].seen.rows[j].T, frame.sigma[j], out=x[first:last])
+                first = last
+            G[np.ix_(at, at)] += x @ x.T
+        left = G - u.T @ u
+        explained = np.flatnonzero(np.diag(left) <= _EXPLAINED * np.diag(G))
+        left[explained, explained] = 0.0
+        return left
+
+
+def _weights(G: np.ndarray, free: np.ndarray, given: np.ndarray) -> np.ndarray:
+    """Return the residual as weights of target and columns, (1 + m,), from their products.
+
+    Args:
+        G: products, (1 + m, 1 + m).
+        free: indices of columns with a coefficient.
+        given: those of columns without.
+    """
+    weights = np.zeros(len(G))
+    weights[0] = 1.0
+    weights[given] = -1.0
+    if len(free):
+        size = np.sqrt(np.maximum(G[free, free], 0.0))
+        size[size <= UNSEEN * size.max()] = np.inf
+        b = (G[free] @ weights) / size
+        values, V = np.linalg.eigh(G[np.ix_(free, free)] / np.outer(size, size))
+        used = values > _COLLINEAR * max(values[-1], 1e-300)
+        weights[free] = -(V[:, used] @ (V[:, used].T @ b / values[used])) / size
+    return weights
+
+
+def _places(parts: Sequence[_Part]) -> list[np.ndarray]:
+    """Return the indices of the columns of each part, after the target."""
+    ends = np.cumsum([1, *(part.u.shape[1] for part in parts)])
+    return [np.arange(a, b) for a, b in pairwise(ends)]
+
+
+def _split(parts: Sequence[_Part], places: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the indices of all free columns, and of all given ones."""
+    free = [at for part, at in zip(parts, places, strict=True) if not part.is_given]
+    given = [at for part, at in zip(parts, places, strict=True) if part.is_given]
+    none = [np.zeros(0, dtype=int)]
+    return np.concatenate(free or none), np.concatenate(given or none)
+
+
+def searched(
+    frame: Frame,
+    columns: Columns,
+    candidates: tuple[EffectAt, ...],
+    steps: int,
+    w: np.ndarray | None,
+    still: int,
+) -> tuple[EffectAt, ...]:
+    """Return candidates with better shapes, by Levenberg-Marquardt in bounds.
+
+    Args:
+        frame: scaled equations.
+        columns: of the recording.
+        candidates: with the shapes to start from.
+        steps: of the search.
+        w: (p,) change of the bodies to start from; None for none.
+        still: so many of the first candidates keep their shapes.
+    """
+    fixed, free = candidates[:still], candidates[still:]
+    low, high = shape_bounds(frame.equations, free)
+    if not len(low):
+        return candidates
+    x = np.clip(np.concatenate([s.shape for s in free]), low, high)
+    span = np.maximum(shape_scales(frame.equations, free), 1e-12)
+    owner = np.repeat(np.arange(len(free)), [len(s.shape) for s in free])
+    bench = Bench(frame, columns, w)
+    candidates = *fixed, *with_shapes(free, x)
+    cost, damping = bench.cost(candidates), 1e-2
+    for _ in range(steps):
+        moved = []
+        for i, which in enumerate(owner):
+            h = _STEP if x[i] + _STEP * span[i] <= high[i] else -_STEP
+            shifted = with_shapes(free, x + h * span * (np.arange(len(x)) == i))[which]
+            moved.append((still + int(which), shifted, h))
+        H, g = bench.slopes(candidates, moved)
+        improved = False
+        for _ in range(6):
+            step = -np.linalg.solve(
+                H + damping * (np.diag(np.diag(H)) + 1e-12 * np.eye(len(x))), g
+            )
+            trial = np.clip(x + np.clip(step, -_LARGEST, _LARGEST) * span, low, high)
+            tried = *fixed, *with_shapes(free, trial)
+            after = bench.cost(tried)
+            if after < cost:
+                gain = (cost - after) / cost
+                x, candidates, cost, improved = trial, tried, after, True
+                damping = max(damping / 5.0, 1e-8)
+                break
+            damping *= 6.0
+        if not improved or gain < 1e-6:
+            break
+    return candidates
