@@ -72,6 +72,16 @@ class Rest:
         return self.frame.equations
 
     @cached_property
+    def by_joint(self) -> tuple[np.ndarray, ...]:
+        """Part of the basis that effects add, joint by joint, (m, N) each."""
+        return tuple(np.ascontiguousarray(part.T) for part in self.own.transpose(1, 0, 2))
+
+    @cached_property
+    def left_over(self) -> np.ndarray:
+        """Residual joint by joint, (k, N)."""
+        return np.ascontiguousarray(self.r.T)
+
+    @cached_property
     def left(self) -> np.ndarray:
         """Mean squares of the residual, (k,) [N^2 m^2 or N^2]."""
         return np.asarray((self.r**2).mean(axis=0) * self.frame.sigma**2)
@@ -86,11 +96,13 @@ class Rest:
 class Products:
     """Products of columns, less what the model explains of them, with themselves and the residual.
 
+    Those of S candidates with m columns each, every candidate by itself.
+
     Attributes:
-        own: (k, m, m), joint by joint.
-        cross: (k, m) with the residual, joint by joint.
-        G: (m, m) over all rows.
-        b: (m,) with the residual over all rows.
+        own: (S, k, m, m), joint by joint.
+        cross: (S, k, m) with the residual, joint by joint.
+        G: (S, m, m) over all rows.
+        b: (S, m) with the residual over all rows.
     """
 
     own: np.ndarray
@@ -101,30 +113,39 @@ class Products:
     @classmethod
     def of(cls, rest: Rest, seen: Seen) -> Products:
         """Return those of filtered columns."""
-        frame, m = rest.frame, seen.x.shape[-1]
+        frame, S = rest.frame, seen.count
         k, P = rest.Br.shape
-        p = frame.R.shape[1]
-        Bx, xx, xr = np.zeros((k, P, m)), np.zeros((k, m, m)), np.zeros((k, m))
+        p, m = frame.R.shape[1], seen.x.shape[-1] // S
+        xx, xr = np.zeros((S, k, m, m)), np.zeros((S, k, m))
+        Bx = {}
         for j, x in seen.rows.items():
             s = frame.sigma[j]
+            Bx[j] = np.empty((P, S, m))
             if p:
-                Bx[j, :p] = frame.S[j].T @ seen.explained[j] / s
-            Bx[j, p:], xr[j] = rest.own[:, j].T @ x / s, x.T @ rest.r[:, j] / s
-            xx[j] = seen.squares[j] / s**2
-        u = Bx.sum(axis=0)  # (P, m)
-        shared = Bx.transpose(0, 2, 1) @ u  # (k, m, m)
-        own = xx - shared - shared.transpose(0, 2, 1) + u.T @ (rest.BB @ u)
-        G = xx.sum(axis=0) - u.T @ u
-        G[np.diag_indices(m)] = np.where(
-            np.diag(G) > _UNSEEN * np.diag(xx.sum(axis=0)), np.diag(G), np.inf
-        )
-        return cls(own, xr - rest.Br @ u, G, xr.sum(axis=0))
+                Bx[j][:p] = (frame.S[j].T @ (seen.explained[j] / s)).reshape(p, S, m)
+            Bx[j][p:] = (rest.by_joint[j] @ x / s).reshape(P - p, S, m)
+            xr[:, j] = (rest.left_over[j] @ x / s).reshape(S, m)
+            xx[:, j] = seen.squares[j] / s**2
+        u = sum(Bx.values(), np.zeros((P, S, m)))
+        among = (rest.BB @ u.reshape(P, S * m)).reshape(k, P, S, m)
+        own = xx + np.einsum('psa,jpsb->sjab', u, among)
+        for j, part in Bx.items():
+            shared = np.einsum('psa,psb->sab', part, u)
+            own[:, j] -= shared + shared.transpose(0, 2, 1)
+        whole = xx.sum(axis=1)
+        G, at = whole - np.einsum('psa,psb->sab', u, u), np.arange(m)
+        left = G[:, at, at]
+        G[:, at, at] = np.where(left > _UNSEEN * whole[:, at, at], left, np.inf)
+        cross = xr - np.einsum('jp,psa->sja', rest.Br, u)
+        return cls(own, cross, G, xr.sum(axis=1))
 
     def coefficients(self) -> np.ndarray:
-        """Return the least squares (m,); zero for columns that are explained already."""
-        if len(self.b) == 1:
-            return self.b / self.G[0]
-        size = np.sqrt(np.diag(self.G))
-        G = np.where(np.isfinite(self.G), self.G, 0.0) / np.outer(size, size)
-        G[np.diag_indices(len(size))] = np.isfinite(size)
-        return np.asarray(np.linalg.lstsq(G, self.b / size, rcond=_UNSEEN)[0] / size)
+        """Return the least squares (S, m); zero for columns that are explained already."""
+        if self.b.shape[1] == 1:
+            return self.b / self.G[:, 0]
+        size = np.sqrt(np.diagonal(self.G, 0, 1, 2))
+        G = np.where(np.isfinite(self.G), self.G, 0.0) / (size[:, :, None] * size[:, None, :])
+        at = np.arange(size.shape[1])
+        G[:, at, at] = np.isfinite(size)
+        inverse = np.linalg.pinv(G, rcond=_UNSEEN, hermitian=True)
+        return np.asarray((inverse @ (self.b / size)[:, :, None])[:, :, 0] / size)

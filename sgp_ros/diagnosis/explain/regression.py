@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,7 +12,7 @@ from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.compare.sample import sampled
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place, SmallEffect
+from sgp_ros.physics.parts import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 MOST_HELD = 30_000_000
@@ -87,13 +87,29 @@ class Columns:
             key, equations, joint, lambda: candidate.columns(motion), is_inertial=is_inertial
         )
 
-    def small(
-        self, start: EffectAt, small: SmallEffect, equations: Equations, motion: ObservedMotion
+    def bank(
+        self, starts: Sequence[EffectAt], equations: Equations, motion: ObservedMotion
     ) -> Seen:
-        """Return the filtered columns of a small effect, to first order in its size."""
-        key = (*start.key, start.shape.tobytes(), motion, 'small')
-        place, shape = start.place, start.shape
-        return self._kept(key, equations, place.joint, lambda: small.columns(motion, place, shape))
+        """Return the filtered columns of several shapes of one law at one place, side by side.
+
+        Those of a law that is small are to first order in its size.
+        """
+        place, effect = starts[0].place, starts[0].effect
+        small = effect.small
+
+        def columns() -> np.ndarray:
+            made = [
+                s.columns(motion) if small is None else small.columns(motion, place, s.shape)
+                for s in starts
+            ]
+            assert len({x.shape for x in made}) == 1
+            return np.concatenate(made, axis=-1)
+
+        key = (*starts[0].key, np.stack([s.shape for s in starts]).tobytes(), motion, 'bank')
+        is_inertial = effect.is_inertial and small is None
+        return self._kept(
+            key, equations, place.joint, columns, is_inertial=is_inertial, count=len(starts)
+        )
 
     def bins(
         self, effect: Effect, place: Place, equations: Equations
@@ -116,7 +132,7 @@ class Columns:
 
     def _kept(
         self, key: tuple[object, ...], equations: Equations, joint: int,
-        make: Callable[[], np.ndarray], *, is_inertial: bool = False,
+        make: Callable[[], np.ndarray], *, is_inertial: bool = False, count: int = 1,
     ) -> Seen:  # fmt: skip
         # what acts on one joint depends on whether that one is held, on no other
         keys = (*key, bool(equations.moving[:, max(joint, 0)].all())), (*key, equations)
@@ -124,7 +140,8 @@ class Columns:
             if known in self._known:
                 return self._known[known]
         raw = make()
-        found = Seen(equations, equations.compact(raw, joint, is_inertial=is_inertial), joint)
+        x = equations.compact(raw, joint, is_inertial=is_inertial)
+        found = Seen(equations, x, joint, count)
         if self._held > MOST_HELD:
             self._known.clear()
             self._held = 0
@@ -140,11 +157,13 @@ class Seen:
     Attributes:
         x: (N, m) of one joint, or (N, k, m).
         joint: whose rows they are, where they are of one.
+        count: of candidates whose columns lie side by side.
     """
 
     equations: Equations
     x: np.ndarray
     joint: int
+    count: int = 1
 
     @cached_property
     def rows(self) -> dict[int, np.ndarray]:
@@ -155,8 +174,9 @@ class Seen:
 
     @cached_property
     def squares(self) -> dict[int, np.ndarray]:
-        """Products of the columns with themselves by joint, (m, m) each."""
-        return {j: x.T @ x for j, x in self.rows.items()}
+        """Products of the columns of each candidate by joint, (count, m / count, m / count)."""
+        parts = {j: x.reshape(len(x), self.count, -1) for j, x in self.rows.items()}
+        return {j: np.einsum('nsa,nsb->sab', x, x) for j, x in parts.items()}
 
     @cached_property
     def explained(self) -> dict[int, np.ndarray]:

@@ -13,7 +13,7 @@ from sgp_ros.diagnosis.explain.products import Products, Rest
 from sgp_ros.diagnosis.explain.regression import Columns, Seen, dry_joints
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place, SmallEffect
+from sgp_ros.physics.parts import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 TRIALS = 2
@@ -106,19 +106,15 @@ class _Look:
     before: np.ndarray
     rows: int
 
-    def products(self, candidate: EffectAt, motion: ObservedMotion) -> Products | None:
-        """Return those of a candidate's columns; None where it has none."""
-        seen = self.columns.seen(candidate, self.rest.equations, motion)
-        return Products.of(self.rest, seen) if seen.x.shape[-1] else None
-
-    def gain(self, found: Products, c: np.ndarray, size: int) -> float:
-        """Return how much better columns with coefficients c (m,) leave it [nats]."""
+    def gains(self, found: Products, c: np.ndarray, size: int) -> np.ndarray:
+        """Return how much better candidates with coefficients c (S, m) leave it, (S,) [nats]."""
         rest = self.rest
         N, floor = self.rows, rest.floor
-        change = found.own @ c @ c - 2.0 * found.cross @ c
+        change = np.einsum('sjab,sa,sb->sj', found.own, c, c)
+        change -= 2.0 * np.einsum('sja,sa->sj', found.cross, c)
         after = np.maximum(rest.left + change / len(rest.r) * rest.frame.sigma**2, 0.0)
         ratio = (self.before + floor) / (after + floor)
-        return 0.5 * N * float(np.log(ratio).sum()) - 0.5 * size * float(np.log(N))
+        return np.asarray(0.5 * N * np.log(ratio).sum(axis=1) - 0.5 * size * np.log(N))
 
 
 def _trials(look: _Look, effect: Effect, place: Place, motion: ObservedMotion) -> Iterator[Trial]:
@@ -126,10 +122,9 @@ def _trials(look: _Look, effect: Effect, place: Place, motion: ObservedMotion) -
     if bins is not None:
         yield from _intervals(look, EffectAt(effect, place), *bins)
         return
-    for shape in _starts(look.rest, effect, place):
-        trial = _trial(look, EffectAt(effect, place, shape), motion)
-        if trial is not None:
-            yield trial
+    starts = [EffectAt(effect, place, shape) for shape in _starts(look.rest, effect, place)]
+    if starts:
+        yield from _shaped(look, starts, motion)
 
 
 def _starts(rest: Rest, effect: Effect, place: Place) -> np.ndarray:
@@ -141,35 +136,29 @@ def _starts(rest: Rest, effect: Effect, place: Place) -> np.ndarray:
     return wave.strongest(equations.filter.rows, rest.r, rest.frame.sigma)
 
 
-def _trial(look: _Look, candidate: EffectAt, motion: ObservedMotion) -> Trial | None:
-    effect = candidate.effect
-    if effect.small is not None:
-        return _small_trial(look, candidate, effect.small, motion)
-    found = look.products(candidate, motion)
-    if found is None:
-        return None
-    c = found.coefficients()
-    if effect.is_given:
-        # a start may have the wrong size, not the wrong sign
-        if c[0] <= 0.0:
-            return None
-    elif not replace(candidate, coefficients=c).is_possible(motion):
-        return None
-    return look.gain(found, c, len(c) + len(candidate.shape)), candidate
-
-
-def _small_trial(
-    look: _Look, start: EffectAt, small: SmallEffect, motion: ObservedMotion
-) -> Trial | None:
-    """Return the trial of an effect that is linear in its size while it is small."""
-    seen = look.columns.small(start, small, look.rest.equations, motion)
+def _shaped(look: _Look, starts: Sequence[EffectAt], motion: ObservedMotion) -> Iterator[Trial]:
+    """Yield the trials of the shapes of one law at one place."""
+    effect, small = starts[0].effect, starts[0].effect.small
+    seen = look.columns.bank(starts, look.rest.equations, motion)
+    if not seen.x.shape[-1]:
+        return
     found = Products.of(look.rest, seen)
     c = found.coefficients()
-    shape = small.shape(start.shape, c)
-    placed = start.with_shape(shape)
-    if not placed.is_possible(motion):
-        return None
-    return look.gain(found, c, len(shape)), placed
+    if small is not None:  # linear in its size
+        placed = [s.with_shape(small.shape(s.shape, x)) for s, x in zip(starts, c, strict=True)]
+        is_possible = [s.is_possible(motion) for s in placed]
+        gains = look.gains(found, c, len(placed[0].shape))
+    else:
+        placed = list(starts)
+        if effect.is_given:  # a start may have the wrong size, not the wrong sign
+            is_possible = (c[:, 0] > 0.0).tolist()
+        else:
+            sized = (replace(s, coefficients=x) for s, x in zip(starts, c, strict=True))
+            is_possible = [s.is_possible(motion) for s in sized]
+        gains = look.gains(found, c, c.shape[1] + len(starts[0].shape))
+    for s, gain, is_kept in zip(placed, gains, is_possible, strict=True):
+        if is_kept:
+            yield float(gain), s
 
 
 def _intervals(look: _Look, candidate: EffectAt, seen: Seen, edges: np.ndarray) -> Iterator[Trial]:
@@ -178,12 +167,12 @@ def _intervals(look: _Look, candidate: EffectAt, seen: Seen, edges: np.ndarray) 
     With the columns of narrow bins and their Gram matrix every interval costs a few sums.
     """
     found, count = Products.of(look.rest, seen), seen.x.shape[1]
-    G = np.where(np.isfinite(found.G), found.G, 0.0)
+    G, b = np.where(np.isfinite(found.G[0]), found.G[0], 0.0), found.b[0]
     i, j = np.triu_indices(len(edges), 1)
     area = np.zeros((len(edges), len(edges)))
     area[1:, 1:] = np.cumsum(np.cumsum(G, axis=0), axis=1)
     size = area[j, j] - area[i, j] - area[j, i] + area[i, i]
-    sums = np.concatenate([[0.0], np.cumsum(found.b)])
+    sums = np.concatenate([[0.0], np.cumsum(b)])
     push = sums[j] - sums[i]
     usable = (push > 0.0) & (j - i <= WIDEST * count) & (size > 1e-12 * area[-1, -1])
     gain = np.where(usable, push**2 / np.maximum(size, 1e-300), 0.0)
@@ -194,4 +183,4 @@ def _intervals(look: _Look, candidate: EffectAt, seen: Seen, edges: np.ndarray) 
             c = np.zeros(count)
             c[i[best] : j[best]] = push[best] / size[best]
             shape = np.array([edges[i[best]], edges[j[best]]])
-            yield look.gain(found, c, 3), candidate.with_shape(shape)
+            yield float(look.gains(found, c[None], 3)[0]), candidate.with_shape(shape)
