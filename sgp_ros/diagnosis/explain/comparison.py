@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +22,8 @@ from sgp_ros.physics.effect_at import EffectAt
 FIRST, SECOND, PARENTS = 12, 5, 6
 """Screened candidates that are fitted alone, as a second effect; effects that get a second."""
 
+MOST_SINGLES, MOST_PAIRS = 8, 3
+"""Of those the best that are fitted to all rows of a long recording, for each base and parent."""
 EXCHANGES = 2
 """Times that an effect of the best pair is exchanged for another."""
 
@@ -63,23 +65,44 @@ def compare_models(equations: Equations, progress: Callable[[float], None]) -> C
     singles: list[Model] = []
     for number, base in enumerate(bases):
         first = _distinct(screen(columns, base, effects), FIRST)
-        singles += [fit(columns, (s,), base.sigma, is_free=base.is_free, w=base.w) for s in first]
+        singles += _fitted(columns, base, [(s,) for s in first], MOST_SINGLES)
         progress(0.05 + 0.2 * (number + 1))
     singles = _ranked(singles)
     pairs: list[Model] = []
     parents = _varied(singles)
     for number, single in enumerate(parents):
         second = _distinct(screen(columns, single, effects), SECOND)
-        pairs += [
-            fit(columns, (*single.effects, s), single.sigma, is_free=single.is_free, w=single.w,
-                rounds=2, steps=8)
-            for s in second
-        ]  # fmt: skip
+        pairs += _fitted(columns, single, [(*single.effects, s) for s in second], MOST_PAIRS)
         progress(0.45 + 0.55 * (number + 1) / len(parents))
     ranked = _ranked([*pairs, *_exchanged(columns, _ranked(pairs))])
     ranked = _ranked([*ranked, *_plain(columns, (*singles[:1], *ranked[:1]))])
     found = Comparison(bases[0], bases[1], tuple(singles), tuple(ranked))
     return replace(found, more=tuple(_more(columns, found)))
+
+
+def _fitted(
+    columns: Columns, start: Model, candidates: Sequence[tuple[EffectAt, ...]], most: int
+) -> list[Model]:
+    """Fit candidates from the scale and the bodies of a model.
+
+    Of a long recording all are fitted to a few rows, see `sampled`, and only the best `most` of
+    these to all rows.
+    """
+    sigma, is_free, w = start.sigma, start.is_free, start.w
+
+    def first(rows: Columns) -> list[Model]:
+        rounds, steps = (3, 12) if not start.effects else (2, 8)
+        return [
+            fit(rows, s, sigma, is_free=is_free, w=w, rounds=rounds, steps=steps)
+            for s in candidates
+        ]
+
+    if columns.sample is columns:
+        return first(columns)
+    return [
+        fit(columns, m.effects, m.sigma, is_free=is_free, w=m.w, rounds=1)
+        for m in _ranked(first(columns.sample))[:most]
+    ]
 
 
 def _plain(columns: Columns, models: Iterable[Model]) -> Iterator[Model]:
@@ -141,11 +164,7 @@ def _exchanged(columns: Columns, ranked: list[Model]) -> list[Model]:
             parent = fit(columns, (kept,), best.sigma, is_free=best.is_free, w=best.w, rounds=2,
                          steps=4)  # fmt: skip
             second = _distinct(screen(columns, parent, effects), SECOND)
-            trials += [
-                fit(columns, (*parent.effects, s), best.sigma, is_free=best.is_free, w=best.w,
-                    rounds=2, steps=8)
-                for s in second
-            ]  # fmt: skip
+            trials += _fitted(columns, best, [(*parent.effects, s) for s in second], MOST_PAIRS)
         found += trials
         better = _ranked(trials)
         best = better[0] if better and better[0].score > best.score else None
