@@ -176,8 +176,8 @@ class ObservedMotion:
     def effort_slopes(self, joint: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the slopes of the nominal efforts, (n, k) each.
 
-        They are the derivatives by position, velocity and acceleration of one joint: by the last a
-        column of the mass matrix, by the others differences, exact for the velocity.
+        They are the derivatives by position, velocity and acceleration of one joint: all are
+        differences, exact for velocity and acceleration, by which it is a column of the mass matrix.
         """
         if joint not in self._slopes:
             found = []
@@ -189,8 +189,9 @@ class ObservedMotion:
                     states[which][:, joint] += sign * 1e-4
                     ends.append(self.effort_for(*states))
                 found.append((ends[0] - ends[1]) / 2e-4)
-            M = mass_matrix(self.tree, self.tree.parameters, self.position)
-            self._slopes[joint] = found[0], found[1], M[:, :, joint].copy()
+            pushed = self.acceleration + np.eye(self.tree.size)[joint]
+            by_a = self.effort_for(self.position, self.velocity, pushed) - self.nominal_effort
+            self._slopes[joint] = found[0], found[1], by_a
         return self._slopes[joint]
 
     @property

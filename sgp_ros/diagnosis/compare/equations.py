@@ -135,7 +135,7 @@ class Equations:
         if is_inertial:
             return self.filter(columns)
         moving = self.moving if columns.ndim == 3 else self.moving[:, joint]
-        return self.filter(columns * moving[..., None])
+        return self.filter(columns if moving.all() else columns * moving[..., None])
 
     def with_dry_friction(self, joints: frozenset[int]) -> Equations:
         """Return the equations under the hypothesis that dry friction may hold these joints.
