@@ -50,18 +50,14 @@ def asserted(
     depends: Sequence[Dependence],
 ) -> tuple[tuple[Finding, ...], tuple[np.ndarray, ...]]:
     """Return the findings of a verdict, most probable first, and the force of each (N, k)."""
-    findings: list[Finding] = []
     model = decision.model
     common = [i for i, s in enumerate(model.effects) if not isinstance(s.effect, InRecording)]
-    if decision.verdict != 'missing_physics':
-        common = []
     forces = [model.forces[i] for i in common]
-    if decision.verdict == 'missing_physics':
-        std = reported_std(model, Columns(equations))
-        findings = [
-            doubted_if_none(_finding(decision, model, i, std[i], chances), model.effects[i])
-            for i in common
-        ]
+    std = reported_std(model, Columns(equations)) if common else ()
+    findings = [
+        doubted_if_none(_finding(decision, model, i, std[i], chances), model.effects[i])
+        for i in common
+    ]
     findings += [
         _unknown(equations, decision, j, remainders, chances, depends) for j in decision.unknown
     ]
@@ -188,8 +184,6 @@ def stated_parameters(
 
 def bound_remarks(decision: Decision) -> tuple[str, ...]:
     """Say which numbers of asserted effects are where their search ends."""
-    if decision.verdict != 'missing_physics':
-        return ()
     motion = decision.model.frame.equations.motion
     remarks = []
     for s in decision.model.effects:

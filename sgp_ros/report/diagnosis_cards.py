@@ -23,7 +23,7 @@ def cards(found: Diagnosis) -> list[dict[str, str]]:
         shown.append({'value': f'{found.certainty:.2f}', 'label': label})
     if found.traces.forces or found.verdict in _WITHOUT_FORCES:
         by = {
-            'unexplained': 'the final model, without a law',
+            'unexplained': 'the final model',
             'parameters_only': 'corrected parameters of bodies',
         }.get(found.verdict, 'the finding')
         label = (

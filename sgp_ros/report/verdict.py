@@ -118,6 +118,11 @@ def _calm(found: Diagnosis) -> str:
 
 
 def _unexplained(found: Diagnosis) -> str:
+    beside = [f for f in found.findings if f.effect != UNKNOWN]
+    if beside:
+        each = [f'{place(f)}: {phrase(f)} (probability {f.probability:.2f})' for f in beside]
+        alone = replace(found, findings=tuple(f for f in found.findings if f not in beside))
+        return f'{_unexplained(alone)} Missing beside it {"; and ".join(each)}.'
     named = [f for f in found.findings if f.effect == UNKNOWN]
     joint = named[0].joint if named else found.joints[0]
     certainty = named[0].probability if named and found.certainty else found.certainty

@@ -176,8 +176,8 @@ class ObservedMotion:
     def effort_slopes(self, joint: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the slopes of the nominal efforts, (n, k) each.
 
-        They are the derivatives by position, velocity and acceleration of one joint: all are
-        differences, exact for velocity and acceleration, by which it is a column of the mass matrix.
+        They are the derivatives by position, velocity and acceleration of one joint: differences,
+        exact for the last two; that by the acceleration is a column of the mass matrix.
         """
         if joint not in self._slopes:
             found = []

@@ -71,8 +71,14 @@ def settled(
     while True:
         contrasts = Contrasts(equations, decision.model)
         chances = probabilities(equations, comparison, decision, contrasts)
-        if decision.verdict != 'missing_physics':
+        if not decision.model.effects:
             return decision, contrasts, chances
+        if decision.verdict == 'unexplained':  # what stands beside an unknown is settled alone
+            kept = _probable(equations, decision.model, chances)
+            if kept is decision.model:
+                return decision, contrasts, chances
+            decision = replace(decision, model=kept)
+            continue
         rivals = (decision.model, *decision.rivals)
         plainer = _plainer(equations, decision.model, chances.scale)
         if plainer is not None:
@@ -111,6 +117,12 @@ def settled_of(several: Several) -> tuple[Several, Contrasts, Probabilities]:
         return several, contrasts, probabilities(equations, comparison, decision, contrasts)
     decision, contrasts, chances = settled(equations, comparison, decision)
     return replace(several, decision=decision, model=decision.model), contrasts, chances
+
+
+def _probable(equations: Equations, model: Model, chances: Probabilities) -> Model:
+    """Return a model without the effects that are not probable enough to be asserted."""
+    weak = [s for i, s in enumerate(model.effects) if chances.of(model, i) < LEAST_ASSERTED]
+    return without(equations, model, lambda s: s in weak)
 
 
 def _is_probable(model: Model, chances: Probabilities) -> bool:
@@ -188,13 +200,20 @@ def probabilities(
 
 
 def certainty_of(
-    findings: Sequence[Finding | Difference], comparison: Comparison, trust: float = 1.0
+    findings: Sequence[Finding | Difference],
+    comparison: Comparison,
+    trust: float = 1.0,
+    *,
+    is_unexplained: bool = False,
 ) -> float:
     """Return the probability that the verdict is right: the least of those it rests on.
 
-    It rests on all findings that count as physics; on the most certain one where all are unknown;
-    without findings, on the probability `trust` of bodies against errors of the connection.
+    It rests on all findings that count as physics; on the most certain unknown one where it is
+    `unexplained`, or where all are unknown; without findings, on the probability `trust` of bodies
+    against errors of the connection.
     """
+    if is_unexplained:
+        findings = [f for f in findings if f.effect == UNKNOWN] or findings
     named = [f.probability for f in findings if f.effect != UNKNOWN and f.share > COUNTED_SHARE]
     if named:
         return min(named)

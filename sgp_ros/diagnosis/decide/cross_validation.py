@@ -22,6 +22,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import EVIDENCE, STRUCTURE_LEAST_SHARE
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
@@ -191,28 +192,35 @@ def without(equations: Equations, model: Model, is_dropped: Callable[[EffectAt],
     )
 
 
-def supported(
-    equations: Equations, rows: float, floor: np.ndarray, ranked: Sequence[Model]
-) -> Model | None:
-    """Return the first model whose effects all predict parts of the recording left out.
+def supported(equations: Equations, scale: Scale, ranked: Sequence[Model]) -> Model | None:
+    """Return the model of most worth whose effects all predict parts of the recording left out.
 
-    From models of more than two effects, those that do not are removed.
+    From models of more than two effects, those that do not are removed. What is left is compared
+    with the models that follow: another law may explain what that effect did, and be supported.
 
     Args:
         equations: of the recording.
-        rows: that count as independent.
-        floor: (k,) mean squares below which residuals do not count [N^2 m^2 or N^2].
-        ranked: models, best first.
+        scale: of mean squares.
+        ranked: models, those of most worth first.
     """
-    columns = Columns(equations)
+    columns, best = Columns(equations), None
     for model in ranked:
-        found = model
-        while found.effects and is_credible(found):
-            evidence = support(columns, found, floor, rows)
-            if evidence.min() > EVIDENCE:
-                return found
-            if len(found.effects) <= 2:
-                break
-            weakest = found.effects[int(np.argmin(evidence))]
-            found = without(equations, found, lambda s, out=weakest: s is out)  # type: ignore[misc]
+        if best is not None and scale.worth(best) >= scale.worth(model):
+            break
+        found = _pruned(columns, scale, model)
+        if found is not None and (best is None or scale.worth(found) > scale.worth(best)):
+            best = found
+    return best
+
+
+def _pruned(columns: Columns, scale: Scale, model: Model) -> Model | None:
+    """Return a model without the effects that do not predict parts left out; None of no model."""
+    while model.effects and is_credible(model):
+        evidence = support(columns, model, scale.floor * scale.power, scale.rows)
+        if evidence.min() > EVIDENCE:
+            return model
+        if len(model.effects) <= 2:
+            break
+        weakest = model.effects[int(np.argmin(evidence))]
+        model = without(columns.equations(frozenset()), model, lambda s, out=weakest: s is out)  # type: ignore[misc]
     return None

@@ -9,8 +9,8 @@ It is adequate, joint by joint, when what it leaves is small against what it exp
 as the motion predicts it (`repeatable`), for another law would explain that, and, less strictly,
 as far as earlier rows do. Where large forces cancel in an effort, their accuracy is what counts
 (`cancelling`). Effects of a joint that it does not describe are not asserted; those of
-the others stand, if together they explain more of the efforts than is left open: `missing_physics`
-with an unknown beside it, else `unexplained`.
+the others stand. If together they explain more of the efforts than is left open, the verdict is
+`missing_physics` with an unknown beside it, else `unexplained` with what is known beside it.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Decision:
 
     Attributes:
         verdict: as in the schema.
-        model: that is asserted; for `unexplained` the inertial parameters alone.
+        model: that is asserted; for `unexplained` that of the joints that are described.
         rivals: models that were not asserted, best first.
         excess: (k,) what the best model leaves, relative to what an adequate one may.
         worst: index of the joint where most is left.
@@ -100,7 +100,7 @@ def decide(equations: Equations, comparison: Comparison) -> Decision:
     likely = [m for m in ranked if scale.worth(m) > scale.worth(base)]
     if scale.base.max() < SLIGHT_REST and 0.5 * float(base.w @ base.w) < PER_EFFECT:
         likely = []
-    best = supported(equations, scale.rows, scale.floor * scale.power, likely)
+    best = supported(equations, scale, likely)
     rivals = tuple(m for m in ranked if m is not best)
     left = comparison.parameters.left
     if best is not None:
@@ -182,16 +182,29 @@ def _opened(
     named = scale.found(best)
     is_open = np.isin(np.arange(len(named)), open_)
     unsaid = named[is_open if is_accurate is None else is_open & ~is_accurate].sum()
-    if known.effects and is_credible(known) and named[~is_open].sum() > unsaid:
+    stands = bool(known.effects) and is_credible(known)
+    if stands and named[~is_open].sum() > unsaid:
         unknown = _ordered(np.where(is_open, excess, 0.0), int(np.argmax(excess)))
         return Decision('missing_physics', known, (best, *rivals), excess, unknown[0], unknown,
                         against=base.score)  # fmt: skip
     left, is_seen = comparison.parameters.left, max(best.filtered_shares) > COUNTED_SHARE
     if left.max() > COUNTED_SHARE or (is_seen and (best.left < NEARLY * left)[open_].any()):
         unknown = _ordered(np.where(is_open, excess, 0.0), worst)
-        return Decision('unexplained', base, (best, *rivals), excess, worst, unknown, best,
+        beside = _beside(equations, scale, base, known) if stands else base
+        return Decision('unexplained', beside, (best, *rivals), excess, worst, unknown, best,
                         base.score)  # fmt: skip
     return calm(base, rivals, scale)
+
+
+def _beside(equations: Equations, scale: Scale, base: Model, known: Model) -> Model:
+    """Return the model of the joints that are described beside one that is not, or else `base`.
+
+    What stands there predicts parts left out without the laws of the joint that is open, too.
+    """
+    found = supported(equations, scale, [known])
+    if found is None or scale.worth(found) <= scale.worth(base):
+        return base
+    return found
 
 
 def _ordered(size: np.ndarray, first: int) -> tuple[int, ...]:

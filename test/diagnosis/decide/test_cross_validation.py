@@ -147,9 +147,8 @@ def test_a_model_with_an_effect_without_support_gives_way(damped):
         for names in (('viscous_friction', 'cogging'), ('viscous_friction',))
     )
     scale = Scale.of(damped, Comparison(*bases, (right,), (rich,)))
-    floor = scale.floor * scale.power
-    assert supported(damped, scale.rows, floor, [rich, right]) is right
-    assert supported(damped, scale.rows, floor, [rich]) is None
+    assert supported(damped, scale, [rich, right]) is right
+    assert supported(damped, scale, [rich]) is None
 
 
 def test_an_effect_without_support_is_not_asserted(equations_for):
