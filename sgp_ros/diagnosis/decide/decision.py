@@ -79,15 +79,22 @@ def _ranked(comparison: Comparison, scale: Scale) -> list[Model]:
     """Return the models that could be asserted, best first.
 
     There are none where the best explanation of all is too small to be physics: a worse one that
-    is larger, because bodies undo most of it, is not to be preferred for that.
+    is larger, because bodies undo most of it, is not to be preferred for that. One that
+    couples joints is not small where it only says what laws of each joint say, which follow it.
     """
     models = (*comparison.singles, *comparison.pairs, *comparison.more)
     least = comparison.base.score + EVIDENCE
     sound = [m for m in models if m.score > least and is_sound(m)]
     ranked = sorted(sound, key=scale.worth, reverse=True)
-    if ranked and max(ranked[0].shares) < COUNTED_SHARE:
+    if ranked and _size(ranked[0]) < COUNTED_SHARE:
         return []
     return [m for m in ranked if scale.counts(m)]
+
+
+def _size(model: Model) -> float:
+    """Return the greatest share of an effect; a law that couples joints with its plain laws."""
+    shares = zip(model.effects, model.shares, model.filtered_shares, strict=True)
+    return max(filtered if s.place.source >= 0 else share for s, share, filtered in shares)
 
 
 def decide(equations: Equations, comparison: Comparison) -> Decision:

@@ -89,10 +89,12 @@ def is_slight(listed: Model, smooth: Model, joint: int) -> bool:
     """Return whether a smooth force differs from plain laws by less than counts as physics.
 
     Friction that creeps a little near rest is friction, a spring that hardens a little a spring.
-    A law with a shape of its own could be distorted to imitate another one, and so could several.
+    A law with a shape of its own could be distorted to imitate another one, and so could several,
+    if the smooth force takes their place.
     """
     own = own_effects(listed, joint)
-    rare = [s for s in own if not (s.effect.is_usual or s.effect in PLAIN or _is_plain_sum(s))]
+    rare = [s for s in _replaced(listed, smooth, joint)
+            if not (s.effect.is_usual or s.effect in PLAIN or _is_plain_sum(s))]  # fmt: skip
     if rare and (len(own) > 1 or len(rare[0].shape)):
         return False
     apart = listed.residual[:, joint] - smooth.residual[:, joint]
@@ -102,16 +104,21 @@ def is_slight(listed: Model, smooth: Model, joint: int) -> bool:
 def is_bent(listed: Model, smooth: Model, joint: int) -> bool:
     """Return whether a listed law was distorted to imitate a smooth force.
 
-    It has a shape of its own, and the smooth force explains more beyond the law than an adequate
-    model may leave of the part that this law adds.
+    It has a shape of its own, and the smooth force in its place explains more beyond the law than
+    an adequate model may leave of the part that this law adds.
     """
     apart = float(listed.mean_square[joint] - smooth.mean_square[joint])
-    own, power = own_effects(listed, joint), listed.frame.equations.power[joint]
+    own, power = _replaced(listed, smooth, joint), listed.frame.equations.power[joint]
     added = [
         share for s, share in zip(listed.effects, listed.filtered_shares, strict=True)
         if s in own and len(s.shape) and not s.effect.is_usual
     ]  # fmt: skip
     return any(apart > ADEQUATE_REST * share * power for share in added)
+
+
+def _replaced(listed: Model, smooth: Model, joint: int) -> tuple[EffectAt, ...]:
+    """Return the listed effects of a joint that a model with a smooth force does without."""
+    return tuple(s for s in own_effects(listed, joint) if s.key not in smooth.key)
 
 
 def _is_plain_sum(s: EffectAt) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.criteria import EVIDENCE, INDEPENDENT_ROWS
+from sgp_ros.diagnosis.decide import cross_validation
 from sgp_ros.diagnosis.decide.cross_validation import (
     LEAST_ROWS,
     left_out,
@@ -149,6 +150,20 @@ def test_a_model_with_an_effect_without_support_gives_way(damped):
     scale = Scale.of(damped, Comparison(*bases, (right,), (rich,)))
     assert supported(damped, scale, [rich, right]) is right
     assert supported(damped, scale, [rich]) is None
+
+
+def test_a_model_that_lost_an_effect_is_compared_again(damped, monkeypatch):
+    """The next one is worth more than what is left of the first, and is supported as it is."""
+    rich = fitted(damped, 'viscous_friction', 'cogging', 'armature')
+    next_one = fitted(damped, 'viscous_friction')
+    left = fitted(damped, 'quadratic_drag')
+    worth, pruned = {rich: 3.0, next_one: 2.0, left: 1.0}, {rich: left, next_one: next_one}
+    bases = (fitted(damped, is_free=f) for f in (False, True))
+    scale = Scale.of(damped, Comparison(*bases, (), ()))
+    monkeypatch.setattr(Scale, 'worth', lambda _self, model: worth[model])
+    monkeypatch.setattr(cross_validation, '_pruned', lambda _columns, _scale, model: pruned[model])
+    assert supported(damped, scale, [rich]) is left
+    assert supported(damped, scale, [rich, next_one]) is next_one
 
 
 def test_an_effect_without_support_is_not_asserted(equations_for):

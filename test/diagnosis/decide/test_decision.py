@@ -182,6 +182,38 @@ def test_no_larger_effect_takes_the_place_of_a_better_one_that_is_too_small(damp
     assert decide(damped, comparison).verdict != 'missing_physics'
 
 
+def test_a_law_that_couples_nothing_hides_no_law_of_a_joint(damped):
+    """Its size is that of all it says, though only what no plain law says counts of it."""
+    imitation, plain = fitted(damped, 'viscous_friction'), fitted(damped, 'quadratic_drag')
+    (s,) = imitation.effects
+    coupled = replace(imitation, effects=(replace(s, place=replace(s.place, source=0)),))
+    coupled.__dict__['shares'] = [0.0]
+    comparison = _comparison(damped, coupled, plain)
+    scale = Scale.of(damped, comparison)
+    assert scale.worth(coupled) > scale.worth(plain)
+    decision = decide(damped, comparison)
+    assert plain in (decision.model, decision.tentative)
+
+
+@pytest.fixture(scope='module')
+def half_known(equations_for):
+    """Two joints: friction on the second, and on the first a push that no law describes."""
+    world = simulate(
+        CHAINS[2], 7, 12.0,
+        force=lambda t, q, v: (6.0 * math.sin(9.0 * t + 1.0), -0.2 * v[1]),
+    )  # fmt: skip
+    return equations_for(world)[1]
+
+
+def test_what_is_known_of_a_joint_stands_beside_a_larger_unknown(half_known):
+    comparison = compare_models(half_known, lambda _share: None)
+    decision = decide(half_known, comparison)
+    assert decision.verdict == 'unexplained'
+    assert decision.unknown == (0,)
+    assert {(s.name, s.place.joint) for s in decision.model.effects} == {('viscous_friction', 1)}
+    assert decision.model.effects[0].coefficients[0] == pytest.approx(0.2, rel=0.01)
+
+
 def test_noise_of_the_acceleration_makes_no_rotor_large(equations_for):
     """Coarse encoders: above the cut-off a rotor would follow their noise."""
     world = simulate(CHAINS[1], 3, 10.0)
