@@ -78,9 +78,12 @@ def write_result(
 ) -> None:
     """Write a result with its schema and the machine; further packages have their version there.
 
+    The folder is made where there is none.
+
     Raises:
         ValueError: a number is not finite.
     """
     result = {'schema': schema, 'environment': machine(*packages), **content}
     text = json.dumps(result, indent=indent, allow_nan=False)
+    path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text + '\n', encoding='utf-8')
