@@ -154,8 +154,7 @@ def _diagnosed(
     findings, forces = asserted(whole, on_all, lags, learned, chances, depends)
     findings, differ = tuple(map(connected.against_rivals, findings)), differences(several, names)
     progress(1.0)
-    rests, is_open = (*findings, *differ), decision.verdict == 'unexplained'
-    certainty = certainty_of(rests, comparison, connected.trust, is_unexplained=is_open)
+    certainty = certainty_of((*findings, *differ), comparison, connected.trust, decision.verdict)
     vain = reasons_to_doubt({'train': proofs['train']}, recordings.still)
     findings = doubted(findings, vain, tree.moving_names)
     is_doubted = rests_on(doubts, findings, tree.moving_names)

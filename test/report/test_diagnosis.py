@@ -126,6 +126,16 @@ def test_the_unexplained_is_said_with_what_it_depends_on_and_the_nearest_effect(
     assert beside == text  # a formula is no listed effect
 
 
+def test_what_is_known_of_other_joints_is_said_after_the_unexplained():
+    """The first sentence is the same as without."""
+    alone = verdict_sentence(diagnosis('unexplained', [UNKNOWN], alternatives=[ASYMMETRIC]))
+    found = diagnosis('unexplained', [COULOMB, UNKNOWN], alternatives=[ASYMMETRIC])
+    before, after = verdict_sentence(found).split(' Missing beside it ')
+    assert before == alone
+    assert after.startswith('on elbow: Coulomb friction, level 0.3170')
+    assert after.endswith('(probability 0.99).')
+
+
 @pytest.mark.parametrize('name', [*EFFECTS, 'unknown'])
 def test_every_effect_has_a_plain_name(name):
     """Nothing of the schema's spelling reaches the reader."""

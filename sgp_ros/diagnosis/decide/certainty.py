@@ -203,8 +203,7 @@ def certainty_of(
     findings: Sequence[Finding | Difference],
     comparison: Comparison,
     trust: float = 1.0,
-    *,
-    is_unexplained: bool = False,
+    verdict: str = '',
 ) -> float:
     """Return the probability that the verdict is right: the least of those it rests on.
 
@@ -212,7 +211,7 @@ def certainty_of(
     `unexplained`, or where all are unknown; without findings, on the probability `trust` of bodies
     against errors of the connection.
     """
-    if is_unexplained:
+    if verdict == 'unexplained':
         findings = [f for f in findings if f.effect == UNKNOWN] or findings
     named = [f.probability for f in findings if f.effect != UNKNOWN and f.share > COUNTED_SHARE]
     if named:

@@ -138,6 +138,9 @@ def test_a_verdict_is_as_certain_as_the_least_that_it_rests_on(
         for p in chances
     ]
     assert certainty_of(findings, _comparison(equations)) == expected
+    if unknown:  # where most is unknown, the verdict does not rest on what stands beside it
+        likely = certainty_of(findings, _comparison(equations), verdict='unexplained')
+        assert likely == max(unknown)
 
 
 @pytest.mark.parametrize(('std', 'is_doubted'), [(0.002, False), (0.006, True), (None, False)])
