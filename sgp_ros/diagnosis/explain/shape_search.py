@@ -30,6 +30,8 @@ _EXPLAINED = 1e-13
 """Part of a column's square below which it counts as explained by the bodies."""
 _COLLINEAR = 1e-13
 """Part of the largest eigenvalue of scaled products below which columns are the same."""
+_ROUNDING = 1e-14
+"""Part of the target's square below which no residual is known."""
 _REMEMBERED = 100
 """Columns that a search holds before it forgets them."""
 _STEP = 2e-4
@@ -69,11 +71,11 @@ class Bench:
         self._known: dict[tuple[object, bytes], _Part] = {}
 
     def cost(self, candidates: Sequence[EffectAt]) -> float:
-        """Return the squares of the scaled residual."""
+        """Return the squares of the scaled residual; at least what rounding makes of them."""
         parts = self._parts(candidates)
         G = self._products(parts)
         weights = _weights(G, *_split(parts, _places(parts)))
-        return float(weights @ G @ weights)
+        return max(float(weights @ G @ weights), _ROUNDING * float(G[0, 0]))
 
     def slopes(
         self, candidates: Sequence[EffectAt], moved: Sequence[tuple[int, EffectAt, float]]

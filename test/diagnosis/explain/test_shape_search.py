@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from sgp_ros.diagnosis.explain.candidates import fit, split
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.regression import Columns, with_shapes
-from sgp_ros.diagnosis.explain.shape_search import Bench
+from sgp_ros.diagnosis.explain.shape_search import Bench, searched
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from test.diagnosis.worlds import CHAINS, simulate
@@ -94,3 +96,18 @@ def test_a_shape_is_found_from_afar(equations_for):
     sigma = np.sqrt((equations.d**2).mean(axis=0))
     found = fit(columns, (start,), sigma, is_free=False)
     assert found.effects[0].shape[0] == pytest.approx(7.0, abs=0.005)
+
+
+@pytest.mark.parametrize('size', [0.0, 1.0])
+def test_a_search_without_a_residual_ends(equations, size):
+    """All of the discrepancy is a law, whose shape the search begins with; or there is none."""
+    columns, law = Columns(equations), EFFECTS['cogging']
+    place = law.places(equations.motion)[0]
+    s = EffectAt(law, place, np.asarray(law.starts(equations.motion, place)[0]))
+    d = np.zeros_like(equations.d)
+    d[:, place.joint] = size * columns.local(s, equations, equations.motion)[:, 0]
+    exact = replace(equations, d=d)
+    frame = Frame.of(exact, np.array([0.3, 0.1]), is_free=False)
+    (found,) = searched(frame, Columns(exact), (s,), 4, None, 0)
+    np.testing.assert_allclose(found.shape, s.shape, rtol=1e-4)
+    assert 0.0 <= Bench(frame, Columns(exact), None).cost((s,)) < 1e-9
