@@ -24,7 +24,6 @@ from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
     RawTrajectory,
-    instant_error,
     measured_noise,
     observe,
     parallel_filter,
@@ -78,8 +77,7 @@ class Equations:
             unless the joint has, or is supposed to have, dry friction.
         rests: (n, k) whether a joint rests.
         model_error: (k,) mean square that a perfect model leaves: by how much d changes with the
-            smoothing of the states, for the motion is fast, and the noise and the unknown instants
-            of measured efforts.
+            smoothing of the states, for the motion is fast, and the noise of measured efforts.
         noise_part: (k,) part of d that the noise of measured efforts makes, in mean squares.
         free: the same equations where dry friction holds fewer joints; None where there are none.
     """
@@ -292,7 +290,6 @@ def make_equations(
     equations = Equations(
         motion, low, motion.time[low.rows], d, bases, directions, power, np.sqrt(variance),
         np.ones(motion.position.shape), resting(raw, motion, bandwidth),
-        _smoothing_error(raw, motion, low, bandwidth) + instant_error(raw, motion, low) + noise,
-        part_of_noise(noise, d),
+        _smoothing_error(raw, motion, low, bandwidth) + noise, part_of_noise(noise, d),
     )  # fmt: skip
     return replace(equations.with_dry_friction(motion.dry_joints), free=None)

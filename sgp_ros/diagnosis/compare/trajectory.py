@@ -66,7 +66,6 @@ class RawTrajectory:
         gains: of drives that hold position targets; None where commands are efforts.
         recording: (n,) index of the recording of each row, of several; None of one.
         approach: (n, k) direction from which each settled point was approached; None of motion.
-        period: of the states as they were recorded [s].
     """
 
     time: np.ndarray
@@ -84,7 +83,6 @@ class RawTrajectory:
     gains: Gains | None = None
     recording: np.ndarray | None = None
     approach: np.ndarray | None = None
-    period: float = 0.0
 
 
 def collect(
@@ -150,7 +148,7 @@ def collect(
             tuple((float(part.time[0]), len(part.time)) for part in parts), step,
         ),
         segments, dict(accepted.counts.refused), noise_density(position, segments, step),
-        start_ns, stated, remarks, gains=None if drive is None else gains, period=own_step,
+        start_ns, stated, remarks, gains=None if drive is None else gains,
     )  # fmt: skip
 
 
@@ -272,19 +270,6 @@ def measured_noise(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwi
     if motion.drive is not None or motion.is_static:
         return np.zeros(motion.tree.size)
     return effort_noise(motion.effort, raw.segments, raw.step, bandwidth.cutoff)
-
-
-def instant_error(raw: RawTrajectory, motion: ObservedMotion, low: ParallelFilter) -> np.ndarray:
-    """Return the mean square that the unknown instants of measured efforts make, (k,).
-
-    A driver reports an effort that acted somewhere within half a period of its stamp; where is not
-    known, and all of it is equally likely. Commands act from their stamps on.
-    """
-    if motion.drive is not None or motion.is_static:
-        return np.zeros(motion.tree.size)
-    change = np.concatenate([np.gradient(motion.effort[s], axis=0) for s in raw.segments])
-    periods = raw.period / raw.step
-    return np.asarray(periods**2 / 12.0 * (low(change) ** 2).mean(axis=0))
 
 
 def parallel_filter(raw: RawTrajectory, bandwidth: Bandwidth) -> ParallelFilter:

@@ -9,7 +9,7 @@ import pytest
 
 from sgp_ros.diagnosis.compare.bodies import body_directions
 from sgp_ros.diagnosis.compare.equations import make_equations
-from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect, instant_error
+from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.explain import regression
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
@@ -146,30 +146,3 @@ def test_columns_know_whom_they_were_made_for(equations_for, viscous, monkeypatc
     for i in range(450):
         columns.of(replace(tilt, shape=np.array([0.0, 0.001 * i])), equations, w)
     assert len(columns._known) <= 101
-
-
-@pytest.mark.parametrize('late', [0.25, -0.5])
-def test_an_effort_of_another_instant_leaves_what_is_expected_of_all_instants(
-    equations_for, perfect, late
-):
-    """Uniform within half a period of the stamp: a shift by s periods leaves 12 s^2 times that."""
-    world = perfect[2]
-    held = np.vstack([world.command[:1], world.command[:-1]])
-    acting = (0.5 + late) * held + (0.5 - late) * world.command
-    raw, equations = equations_for(world, effort=acting, commands=False)
-    low, motion = equations.filter, equations.motion
-    expected = 12.0 * late**2 * instant_error(raw, motion, low)
-    np.testing.assert_allclose((equations.d**2).mean(axis=0), expected, rtol=0.1)
-    assert (equations.model_error >= instant_error(raw, motion, low)).all()
-
-
-def test_the_instant_is_known_to_half_a_period_of_the_states_and_commands_are_exact(
-    equations_for, perfect
-):
-    raw, equations = equations_for(perfect[1], effort=perfect[1].command, commands=False)
-    low = equations.filter
-    whole = instant_error(raw, equations.motion, low)
-    often = instant_error(replace(raw, period=0.2 * raw.step), equations.motion, low)
-    np.testing.assert_allclose(often, 0.04 * whole)
-    raw, equations = equations_for(perfect[1])
-    assert not instant_error(raw, equations.motion, equations.filter).any()
