@@ -19,6 +19,9 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import INDEPENDENT_ROWS
 
+EXPLAINED = 1e-13
+"""Part of a column's square below which it counts as explained by others."""
+
 
 @dataclass(frozen=True, eq=False)
 class Frame:

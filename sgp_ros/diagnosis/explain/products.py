@@ -17,11 +17,8 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.candidates import split
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
-from sgp_ros.diagnosis.explain.frame import Frame
+from sgp_ros.diagnosis.explain.frame import EXPLAINED, Frame
 from sgp_ros.diagnosis.explain.regression import Columns, Seen
-
-_UNSEEN = 1e-13
-"""Part of a column's square below which it counts as explained."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +132,7 @@ class Products:
         whole = xx.sum(axis=1)
         G, at = whole - np.einsum('psa,psb->sab', u, u), np.arange(m)
         left = G[:, at, at]
-        G[:, at, at] = np.where(left > _UNSEEN * whole[:, at, at], left, np.inf)
+        G[:, at, at] = np.where(left > EXPLAINED * whole[:, at, at], left, np.inf)
         cross = xr - np.einsum('jp,psa->sja', rest.Br, u)
         return cls(own, cross, G, xr.sum(axis=1))
 
@@ -147,5 +144,5 @@ class Products:
         G = np.where(np.isfinite(self.G), self.G, 0.0) / (size[:, :, None] * size[:, None, :])
         at = np.arange(size.shape[1])
         G[:, at, at] = np.isfinite(size)
-        inverse = np.linalg.pinv(G, rcond=_UNSEEN, hermitian=True)
+        inverse = np.linalg.pinv(G, rcond=EXPLAINED, hermitian=True)
         return np.asarray((inverse @ (self.b / size)[:, :, None])[:, :, 0] / size)

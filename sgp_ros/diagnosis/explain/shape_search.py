@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from sgp_ros.diagnosis.explain.frame import Frame
+from sgp_ros.diagnosis.explain.frame import EXPLAINED, Frame
 from sgp_ros.diagnosis.explain.regression import (
     Columns,
     Seen,
@@ -26,10 +26,6 @@ from sgp_ros.physics.effect_at import EffectAt
 
 UNSEEN = 1e-12
 """A column that is this much smaller than the largest acts on nothing; its coefficient is zero."""
-_EXPLAINED = 1e-13
-"""Part of a column's square below which it counts as explained by the bodies."""
-_COLLINEAR = 1e-13
-"""Part of the largest eigenvalue of scaled products below which columns are the same."""
 _ROUNDING = 1e-14
 """Part of the target's square below which no residual is known."""
 _REMEMBERED = 100
@@ -122,19 +118,16 @@ class Bench:
         frame = self._frame
         u = np.concatenate([self._u, *(part.u for part in parts)], axis=1)
         G = np.zeros((u.shape[1], u.shape[1]))
-        ends = np.cumsum([1, *(part.u.shape[1] for part in parts)])
+        places = _places(parts)
         for j in range(self._target.shape[1]):
-            here = [i for i, part in enumerate(parts) if j in part.seen.rows]
-            at = [0, *(a for i in here for a in range(ends[i], ends[i + 1]))]
-            x = np.empty((len(at), len(self._target)))
-            x[0], first = self._target[:, j], 1
-            for i in here:
-                last = first + parts[i].u.shape[1]
-                np.divide(parts[i].seen.rows[j].T, frame.sigma[j], out=x[first:last])
-                first = last
-            G[np.ix_(at, at)] += x @ x.T
+            here = [(part.seen.rows[j], at) for part, at in zip(parts, places, strict=True)
+                    if j in part.seen.rows]  # fmt: skip
+            at = np.concatenate([[0], *(at for _, at in here)])
+            scaled = (rows / frame.sigma[j] for rows, _ in here)
+            x = np.concatenate([self._target[:, j : j + 1], *scaled], axis=1)
+            G[np.ix_(at, at)] += x.T @ x
         left = G - u.T @ u
-        explained = np.flatnonzero(np.diag(left) <= _EXPLAINED * np.diag(G))
+        explained = np.flatnonzero(np.diag(left) <= EXPLAINED * np.diag(G))
         left[explained, explained] = 0.0
         return left
 
@@ -155,7 +148,7 @@ def _weights(G: np.ndarray, free: np.ndarray, given: np.ndarray) -> np.ndarray:
         size[size <= UNSEEN * size.max()] = np.inf
         b = (G[free] @ weights) / size
         values, V = np.linalg.eigh(G[np.ix_(free, free)] / np.outer(size, size))
-        used = values > _COLLINEAR * max(values[-1], 1e-300)
+        used = values > EXPLAINED * max(values[-1], 1e-300)
         weights[free] = -(V[:, used] @ (V[:, used].T @ b / values[used])) / size
     return weights
 
