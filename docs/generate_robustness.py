@@ -68,7 +68,7 @@ def _still(rows):
 
 def _many(result):
     lines = [
-        '| rate [Hz] | processor per second of data [s] | of it for fits [s] | in the second half [s] | longest step, fit [s] | median nMSE |',
+        '| rate [Hz] | processor time per second of data [s] | of it for fits [s] | in the second half [s] | longest step, fit [s] | median nMSE |',
         '|---|---|---|---|---|---|',
     ]
     for name, x in result['runs'].items():
@@ -170,7 +170,7 @@ def text() -> str:
         KEPT='; '.join(f'{n} {kept}' for kept, n in kills['kept'].items()),
         LOST=f'{kills["most_lost_s"]:.2f}', DISK=_disk(disk),
         MACHINE=_machines({
-            'events': events, 'messages': messages, 'files': files, 'files made to harm': harm,
+            'events': events, 'messages': messages, 'files': files, 'malicious files': harm,
             'kills': kills, 'disks': disk, 'gates': gates, 'their cost': gate_time,
             'thirty joints': many,
         }),

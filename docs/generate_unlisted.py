@@ -166,7 +166,9 @@ def _failures(rows):
             lines.append(f'- `{r["kind"]}` ({r["case"]}): wrongly named {said}{beside}.')
     missed = sorted({r['kind'] for r in rows if not r['found'] and not r['wrong']})
     if missed:
-        lines.append(f'- Not found, and nothing wrong named: {", ".join(f"`{k}`" for k in missed)}.')
+        lines.append(
+            f'- Not found, and nothing wrong named: {", ".join(f"`{k}`" for k in missed)}.'
+        )
     return '\n'.join(lines) or '- It failed in none of these worlds.'
 
 
