@@ -161,8 +161,10 @@ def best_family(design):
 def judgement(machine):
     """Return how far a diagnosis meets what was expected, and why not wholly."""
     judged = machine['judged']
-    why = ''.join(f'\n* {reason}' for reason in judged['reasons'])
-    return f'Judged **{judged["grade"]}** (source of what was expected: {machine["source"]}).{why}'
+    why = '\n'.join(f'* {reason}' for reason in judged['reasons'])
+    return f'Judged **{judged["grade"]}** (source of what was expected: {machine["source"]}).' + (
+        f'\n\n{why}' if why else ''
+    )
 
 
 def tally(machines):
