@@ -89,7 +89,9 @@ def _section(law) -> str:
     if law.term is not None:
         sign = 'the same sign' if law.term.sign > 0.0 else 'the other sign'
         names = ', '.join(f'`{name}`' for name in law.term.names)
-        lines.append(f'- In a robot YAML: term `{law.term.name}` with coefficients {names}, {sign}.')
+        lines.append(
+            f'- In a robot YAML: term `{law.term.name}` with coefficients {names}, {sign}.'
+        )
     if not law.is_online:
         lines.append('- Not modelled online, because it depends on more than one instant.')
     return '\n'.join([*lines, ''])
