@@ -192,8 +192,8 @@ def bound_remarks(decision: Decision) -> tuple[str, ...]:
         if names:
             where = f'{s.effect.words} ({joint_name(motion, s.place.joint)})'
             remarks.append(
-                f'{", ".join(names)} of {where}: at the limit of what this recording '
-                'determines, so without an interval; the true value may lie beyond'
+                f'{", ".join(names)} of {where}: at the limit of what this recording can '
+                'determine, so no interval is given; the true value may lie beyond.'
             )
     return tuple(remarks)
 
@@ -213,7 +213,7 @@ def _unknown(
     if seen:
         on = f'it depends on {", ".join(seen[0].inputs)}'
     if seen and not any(own.is_significant(name) for name in own.scores):
-        on = f'Z follows {", ".join(seen[0].inputs)}, but no single variable significantly'
+        on = f'Z depends on {", ".join(seen[0].inputs)}, but on no single one significantly'
     share = float(decision.model.mean_square[joint] / equations.power[joint])
     where = region(equations, decision.model.residual[:, joint], joint)
     if where.variables:

@@ -63,7 +63,7 @@ from sgp_ros.robots.robot import Robot
 
 Progress = Callable[[float], None]
 _CALM = ('no_mismatch', 'parameters_only')
-_UNCLEAR = 'What machine and simulation have in common is unknown: one of them is unexplained.'
+_UNCLEAR = 'It is unknown what machine and simulation have in common: one of them is unexplained.'
 
 
 def diagnose(
@@ -133,7 +133,7 @@ def diagnose(
         raise NumericalError(
             f'the equations of the recording have no solution ({error})',
             'motion of every joint',
-            f'joints that do not move: {", ".join(recordings.still) or "none"}',
+            f'record a motion of all joints (not moving: {", ".join(recordings.still) or "none"})',
         ) from error
 
 

@@ -196,9 +196,9 @@ def disagreement(shares: Mapping[str, float]) -> str:
     if shares[worst] < LEAST_SHARE:
         return ''
     return (
-        f'The robot file does not describe the simulation: it leaves {100.0 * shares[worst]:.2g} '
-        f'% of the mean squared effort of {worst} there. The machine is compared with the '
-        'simulation as it was recorded.'
+        'The robot file does not describe the simulation: it leaves '
+        f'{100.0 * shares[worst]:.2g} % of the mean squared effort of {worst} there unexplained. '
+        'The machine is compared with the simulation as it was recorded.'
     )
 
 

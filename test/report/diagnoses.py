@@ -143,6 +143,6 @@ def search(why_not='the best formula follows the shape only approximately'):
     )  # fmt: skip
     return LawSearch(
         'elbow', 'q[elbow]', 'sign(dq[elbow])', 'rad', 'N m', x, shape, np.full(41, 0.01), 0.008,
-        0.03, (formula,), why_not, 'follows the position of elbow: 0.3 N m at -1 rad', x, shape,
+        0.03, (formula,), why_not, 'depends on the position of elbow: 0.3 N m at -1 rad', x, shape,
         beyond,
     )  # fmt: skip

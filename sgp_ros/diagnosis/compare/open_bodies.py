@@ -60,7 +60,7 @@ def open_bodies(robot: str, tree: Tree) -> tuple[int, ...]:
     if not len(found):
         raise ConfigError(
             f'the mass matrix of the nominal robot {robot} is singular',
-            'masses and inertias that load every joint',
+            'every joint to move some mass or inertia',
             'correct the inertias of the URDF, or give others with --bodies',
         )
     return tuple(int(i) for i in found)
@@ -126,7 +126,7 @@ def open_remark(tree: Tree, bodies: Sequence[int]) -> tuple[str, ...]:
     links = ', '.join(tree.link_names[i] for i in bodies)
     text = (
         f'The robot file has no usable inertia of {links}: it was estimated from this recording, '
-        'with friction and an offset of each joint. Give measured '
-        'values with --bodies.'
+        'together with friction and an offset of each joint. If you have measured values, give '
+        'them with --bodies.'
     )
     return (text,)

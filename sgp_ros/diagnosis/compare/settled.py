@@ -63,7 +63,7 @@ def collect_settled(
     rows = np.flatnonzero(accepted.is_measured)
     if len(rows) < LEAST_POSES:
         raise RecordingError(
-            f'{len(rows)} settled points with a measured effort', f'{LEAST_POSES}',
+            f'{len(rows)} poses with a measured effort', f'at least {LEAST_POSES}',
             'record more poses, with the effort that holds each',
         )  # fmt: skip
     position = accepted.position[rows]

@@ -17,8 +17,8 @@ from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.physics.motion import RecordedCommands
 
 _NO_COMMANDS = (
-    'Only some of the recordings have commands that act: the efforts are taken as measured, and '
-    'nothing can be said of delay, dead zone, saturation and lag of the drive.'
+    'Only some of the recordings have usable commands: the measured efforts are used instead, so '
+    'nothing can be said about delay, dead zone, saturation and lag of the drive.'
 )
 
 

@@ -93,8 +93,8 @@ def require_motion(events: Iterable[Event], robot: str, names: Sequence[str]) ->
     if len(still) == len(names):
         raise RecordingError(
             f'no joint of {robot} moves',
-            f'a range of positions of {LEAST_MOTION:g} times the noise of the encoder, of one of '
-            f'{", ".join(still)}',
+            f'a motion of {LEAST_MOTION:g} times the encoder noise on at least one joint '
+            f'({", ".join(still)})',
             'use a recording in which the robot moves',
         )
     return still
@@ -156,8 +156,8 @@ def require_rows(raw: RawTrajectory, bandwidth: Bandwidth) -> None:
     if rows < LEAST_ROWS:
         seconds = len(raw.time) * raw.step
         raise RecordingError(
-            f'{seconds:.3g} s give {rows} independent rows below {bandwidth.cutoff:.2g} Hz, where '
-            'motion and noise put the cut-off',
-            f'{LEAST_ROWS} rows',
+            f'{seconds:.3g} s give {rows} independent rows below {bandwidth.cutoff:.2g} Hz, the '
+            'cut-off chosen from motion and noise',
+            f'at least {LEAST_ROWS} rows',
             'use a longer recording',
         )

@@ -37,8 +37,8 @@ NOISE_SHARE = 3e-6
 """Share of the mean square of the effort that noise may take below the cut-off."""
 _COMMON_SHARE = 0.5
 _NO_EFFORTS = (
-    'The commands are not efforts: the measured effort does not follow them. It is taken as the '
-    'effort that acts: nothing can be said of delay, dead zone, saturation and lag of the drive.'
+    'The commands are not efforts: the measured effort does not follow them. It is used instead, '
+    'so nothing can be said about delay, dead zone, saturation and lag of the drive.'
 )
 VANISHING = 1e-9
 """Speed at which settled points are approached [rad/s or m/s]: only its direction counts."""
@@ -125,8 +125,9 @@ def collect(
     ]
     if not stretches:
         raise RecordingError(
-            f'{len(seconds)} states, no {SHORTEST_ROWS} without a pause of {config.max_gap:g} s',
-            'at least a few seconds of motion', 'use a longer recording',
+            f'{len(seconds)} states, nowhere {SHORTEST_ROWS} of them without a pause above '
+            f'{config.max_gap:g} s',
+            'at least a few seconds of motion', 'use a longer recording, or one without pauses',
         )  # fmt: skip
     own_step = float(np.median(np.concatenate([np.diff(seconds[rows]) for rows in stretches])))
     step = max(own_step, least_step)
@@ -166,7 +167,8 @@ def _drive(
         return None, ()
     if not measured and gains is None and are_positions(accepted, robot):
         raise RecordingError(
-            'commands that the positions follow', 'commanded efforts, or targets with their gains',
+            'the positions follow the commands, so these are position targets',
+            'effort commands, or targets with the gains of the drives',
             'give the gains of the drives with --gains gains.yaml',
         )  # fmt: skip
     if not measured or (gains is None and are_efforts(accepted, robot)):

@@ -83,7 +83,7 @@ def settled(
         plainer = _plainer(equations, decision.model, chances.scale)
         if plainer is not None:
             dropped |= decision.model.key - plainer.key
-            why = 'a plainer model is nearly as good'
+            why = 'a simpler model is nearly as good'
             decision = replace(decision.without(why), model=plainer, rivals=rivals)
             continue
         effects = decision.model.effects
@@ -92,7 +92,10 @@ def settled(
             return decision, contrasts, chances
         if len(p) < 2:
             if chances.scale.base.max() < LEAST_SHARE:
-                why = f'its probability is {p[0]:.2g}, and bodies alone leave too little'
+                why = (
+                    f'its probability is {p[0]:.2g}, and corrected bodies alone leave too little '
+                    'to count as physics'
+                )
                 left = calm(comparison.base, rivals, chances.scale)
                 decision = replace(left, refusals=decision.without(why).refusals)
                 contrasts = Contrasts(equations, decision.model)

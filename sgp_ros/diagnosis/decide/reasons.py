@@ -58,7 +58,8 @@ def why_not(model: Model, decision: Decision, scale: Scale) -> str:
     is_more = against.effects and against.key < model.key
     left = f'leaves {shown[0]} % of the mean squared effort of {joint}'
     is_alike = shown[0] == shown[1]
-    said = f'added to {name} it {left}, without it {"as much" if is_alike else f"{shown[1]} %"}'
+    without = 'as much as without it' if is_alike else f'without it {shown[1]} %'
+    said = f'added to {name} it {left}, {without}'
     if not is_more:
         said = f'{left}, as much as {name}' if is_alike else f'{left}, {name} {shown[1]} %'
     if refused:

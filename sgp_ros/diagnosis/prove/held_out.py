@@ -26,7 +26,7 @@ SHARE = 0.25
 MOST_BLOCKS = 4
 _POSES_SAID = (
     f'Without --test, one pose in {HELD_BACK} was held out: the model was chosen and '
-    'fitted on the others. Dry friction is taken to stand at its limit against the direction of '
+    'fitted on the others. Dry friction is assumed to be at its limit, against the direction of '
     'approach.'
 )
 LEAST_BLOCK_S = 2.4
@@ -45,7 +45,7 @@ def split_sentence(raw: RawTrajectory) -> str:
         least = LEAST_BLOCK_S / SHARE
         return (
             f'Nothing was held out: there is no --test, and {whole:.3g} s are too '
-            f'short (a quarter is held out from {least:.3g} s on).'
+            f'short (a quarter is held out of {least:.3g} s or more).'
         )
     where = 'the last quarter' if blocks == 1 else f'the last quarter of each of {blocks} parts'
     return (

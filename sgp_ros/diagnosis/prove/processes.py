@@ -55,7 +55,8 @@ def kept_processes(final: FinalModel) -> tuple[tuple[Remainder, ...], tuple[str,
             continue
         said = (
             f'Z of {names[remainder.joint]} was dropped: on parts that it was not learned from, '
-            f'roll-outs are worse than by the physics alone (error {max(ratio, 1.001):.4g} times).'
+            f'it makes the error of roll-outs {max(ratio, 1.001):.4g} times that of the physics '
+            'alone.'
         )
         remarks = (*remarks, said)
     return kept, remarks
@@ -138,7 +139,7 @@ def harm(
                 if beside.get(joint, 0.0) > without.get(joint, np.inf):
                     now, then = apart(beside[joint], without[joint])
                     found.append(
-                        f'Z of {joint} makes predictions worse in {stem}: nMSE of its {what} '
-                        f'{now}, {then} by physics alone.'
+                        f'Z of {joint} makes predictions worse in {stem}: the nMSE of its {what} '
+                        f'is {now}, with the physics alone {then}.'
                     )
     return tuple(found)

@@ -136,12 +136,12 @@ def reasons_to_doubt(
             if math.isfinite(error):
                 found.setdefault(joint, []).append(
                     f'The final model explains the effort of {joint} in {stem} no better than a '
-                    f'constant would (nMSE {error:.2g}): nothing is certain of this joint.'
+                    f'constant would (nMSE {error:.2g}): nothing is certain about this joint.'
                 )
             elif stem == 'train':
                 found.setdefault(joint, []).append(
                     f'The effort of {joint} in {stem} is constant, so no model explains more than '
-                    'a constant does: nothing is certain of this joint.'
+                    'a constant does: nothing is certain about this joint.'
                 )
     for joint, reason in not_carried_over(proofs, still).items():
         found.setdefault(joint, []).append(reason)

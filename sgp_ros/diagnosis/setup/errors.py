@@ -34,14 +34,16 @@ _TURNS = (-0.1, 0.1, 0.5 * math.pi, -0.5 * math.pi, math.pi)
 
 _REMEDIES = {
     'encoder_offset': 'Re-zero {joint}, or subtract {offset:.4g} from its positions.',
-    'position_scale': 'Divide the positions of {joint} by {scale:.5g}: unit or gear ratio.',
+    'position_scale': 'Divide the positions of {joint} by {scale:.5g}: check unit and gear ratio.',
     'joint_sign': 'Reverse the sign of {joint} ({channels}).',
     'swapped_joints': 'Exchange {joint} and {other_joint} ({channels}).',
-    'effort_scale': 'Divide the efforts of {joint} by {scale:.4g}: unit, gear or torque constant.',
+    'effort_scale': 'Divide the efforts of {joint} by {scale:.4g}: check unit, gear ratio and '
+    'torque constant.',
     'clock_offset': 'Stamp the efforts or commands {offset:.4g} s earlier.',
     'base_orientation': 'State how the base is mounted: roll {roll:.3g}, pitch {pitch:.3g} rad.',
     'joint_origin': 'Move the origin of {joint} by ({x:.4g}, {y:.4g}, {z:.4g}) m.',
-    'gain_scale': 'The drive of {joint} has {kp:.3g} times the stated kp, {kd:.3g} times kd.',
+    'gain_scale': 'Correct the gains of {joint}: its drive has {kp:.3g} times the stated kp and '
+    '{kd:.3g} times the stated kd.',
 }
 
 

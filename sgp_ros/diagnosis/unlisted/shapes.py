@@ -127,7 +127,7 @@ class Variable:
         """As it stands in a sentence."""
         what = 'position' if self.kind == 'q' else 'velocity'
         if self.memory:
-            return f'{what} of {self.joint} behind a {self.memory[0]}'
+            return f'{what} of {self.joint} after a {self.memory[0]}'
         if self.other is None:
             return f'{what} of {self.joint}'
         _, other, weight = self.other

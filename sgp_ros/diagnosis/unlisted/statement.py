@@ -203,7 +203,7 @@ def _why_not(found: Explained, joint: int, more: float) -> str:
         return ''
     listed = 'the listed effects explain the same with fewer parameters'
     if more < LEAST_SHARE:
-        listed = 'what the listed effects leave beyond it is too little to be missing physics'
+        listed = 'the listed effects leave too little more to count as missing physics'
     return found.why_not.get(joint, listed)
 
 
@@ -241,4 +241,4 @@ def _course(x: np.ndarray, f: np.ndarray, smooth: SmoothForce, unit: str, per: s
     clear = [i for i in inner if min(abs(f[i] - f[0]), abs(f[i] - f[-1])) > (1.0 - _CLEAR) * reach]
     points = ', '.join(f'{f[i]:.2g} {per} at {x[i]:.2g} {unit}' for i in sorted([*places, *clear]))
     times = f', times {smooth.factor}' if smooth.factor else ''
-    return f'follows the {smooth.variable.words}: {points}{times}'
+    return f'depends on the {smooth.variable.words}: {points}{times}'

@@ -96,5 +96,5 @@ def test_each_fourth_pose_is_held_out_with_its_direction(robots):
 
 
 def test_too_few_points_are_refused_in_one_line(robots):
-    with pytest.raises(RecordingError, match='40 settled points'):
+    with pytest.raises(RecordingError, match='40 poses with a measured effort'):
         collect_settled(_points(20), robots[1][0])

@@ -55,7 +55,7 @@ def test_what_is_improbable_is_not_asserted_beside_others(equations_for, viscous
     assert max(chances.by_key.values()) < LEAST_ASSERTED
     assert [s.key for s in kept.model.effects] == names[:1]
     assert kept.rivals[0] is pair
-    assert 'a plainer model is nearly as good' in why_not(pair, kept, scale)
+    assert 'a simpler model is nearly as good' in why_not(pair, kept, scale)
 
 
 def test_a_plain_law_takes_the_place_of_a_richer_one_that_is_not_probable(

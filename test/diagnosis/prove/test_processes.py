@@ -68,6 +68,6 @@ def test_harm_on_what_was_held_out_is_said(equations):
     assert harm(remainders, ('joint0',), before, {'far': proof(0.1, 0.1)}) == ()
     (said,) = harm(remainders, ('joint0',), before, {'far': proof(0.1, 0.4)})
     assert said.startswith(
-        'Z of joint0 makes predictions worse in far: nMSE of its roll-outs 0.4,'
+        'Z of joint0 makes predictions worse in far: the nMSE of its roll-outs is 0.4,'
     )
-    assert said.endswith('0.1 by physics alone.')
+    assert said.endswith('with the physics alone 0.1.')
