@@ -65,7 +65,7 @@ def run_commanded(
     for name, side in sides.items():
         if side.tree.moving_names != model.tree.moving_names:
             raise ConfigError(
-                f'{nominal} with the joints {list(side.tree.moving_names)}',
+                f'{nominal} has the joints {list(side.tree.moving_names)}',
                 f'those of {robot}, {list(model.tree.moving_names)}',
             )
         said: list[str] = []

@@ -49,7 +49,7 @@ def plan_joints(
         _check(urdf.place, what, list(names), free)
     both = sorted(set(chosen) & set(locked))
     if both:
-        raise ConfigError(f'{urdf.place}: {both} in joints and in locked', 'one of the two')
+        raise ConfigError(f'{urdf.place}: {both} in both joints and locked', 'one of the two')
     if not chosen:
         raise ConfigError(f'{urdf.place}: all joints are locked', 'a joint that moves')
     wrong = {name: x for name, x in locked.items() if not math.isfinite(x)}

@@ -47,8 +47,9 @@ def parse_urdf(path_or_text: str | Path) -> Urdf:
         raise ConfigError(f'{place} is not XML ({error})', 'a URDF') from error
     if root.tag != 'robot':
         raise ConfigError(
-            f'{place} holds <{root.tag}>', 'a URDF with <robot>', 'expand xacro files first'
-        )
+            f'{place} has the root element <{root.tag}>', 'a URDF with <robot>',
+            'expand xacro files first',
+        )  # fmt: skip
     reading = _Reading(place, mimic_parameters(root))
     links = [reading.name(link) for link in root.findall('link')]
     require_within(len(links), 'LINKS', f'links of {place}')
@@ -67,7 +68,7 @@ def _text(path_or_text: str | Path) -> tuple[str, str]:
         return 'URDF text', path_or_text.lstrip('\ufeff \t\r\n')
     path = Path(path_or_text)
     if not path.exists():
-        raise ConfigError(f'no file {path}', 'a URDF')
+        raise ConfigError(f'no file {path}', 'a URDF', 'check the path')
     try:
         text = read_text(path)
     except UnicodeDecodeError as error:
@@ -119,17 +120,19 @@ class _Reading:
         for kind, names in (('link', links), ('joint', [joint.name for joint in joints])):
             twice = sorted({name for name in names if names.count(name) > 1})
             if twice:
-                raise self._error(f'{kind} names {twice} stand twice', 'different names')
+                raise self._error(f'several {kind}s are named {twice}', 'different names')
         children = [joint.child for joint in joints]
         for joint in joints:
             unknown = [link for link in (joint.parent, joint.child) if link not in links]
             if unknown:
-                raise self._error(f'joint {joint.name} names the links {unknown}', str(links))
+                raise self._error(
+                    f'joint {joint.name} names the links {unknown}', f'some of {links}'
+                )
             if children.count(joint.child) > 1:
-                raise self._error(f'link {joint.child} hangs on several joints', 'a tree')
+                raise self._error(f'link {joint.child} is the child of several joints', 'a tree')
         roots = [link for link in links if link not in children]
         if len(roots) != 1:
-            raise self._error(f'{len(roots)} links without parent {roots}', 'one root link')
+            raise self._error(f'{len(roots)} links without a parent {roots}', 'one root link')
         reached = {roots[0]}
         for _ in joints:
             reached |= {joint.child for joint in joints if joint.parent in reached}

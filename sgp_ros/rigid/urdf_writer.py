@@ -54,7 +54,7 @@ def write_urdf(
         for fixed in layout.fixed_to(link):
             if fixed in parameters:
                 raise ConfigError(
-                    f'parameters of link {fixed}, which is fixed to link {link}',
+                    f'parameters are given for link {fixed}, which is fixed to link {link}',
                     'one set for each body that moves',
                     f'add them to those of {link}, in its frame',
                 )
@@ -110,9 +110,7 @@ class _Places:
         try:
             self._parser.Parse(self._source, True)  # noqa: FBT003  # takes no keywords
         except expat.ExpatError as error:
-            raise ConfigError(
-                f'a robot description that is not XML ({error})', 'a URDF'
-            ) from error
+            raise ConfigError(f'the robot description is not XML ({error})', 'a URDF') from error
         self._settle()
         return self._root.children[0]
 
@@ -150,7 +148,7 @@ class _Layout:
     def of(cls, source: bytes) -> _Layout:
         root = _Places(source).read()
         if root.tag != 'robot':
-            raise ConfigError(f'a document <{root.tag}>', 'a URDF, <robot>')
+            raise ConfigError(f'the root element is <{root.tag}>', 'a URDF with <robot>')
         named: dict[str, dict[str, _Element]] = {'link': {}, 'joint': {}}
         for child in root.children:
             if child.tag in named:
@@ -173,9 +171,7 @@ class _Layout:
 def _check_names(kind: str, given: Iterable[str], known: Iterable[str]) -> None:
     unknown = sorted(set(given) - set(known))
     if unknown:
-        raise ConfigError(
-            f'{kind} {unknown} that the URDF does not have', f'some of {sorted(known)}'
-        )
+        raise ConfigError(f'the URDF has no {kind} {unknown}', f'some of {sorted(known)}')
 
 
 def _inertial(link: str, parameters: np.ndarray) -> list[str]:

@@ -36,7 +36,7 @@ def simulated_model(file: str, robot: Nominal) -> tuple[Nominal, tuple[EffectAt,
     sim = nominal_model(load_robot(file))
     if set(sim.tree.moving_names) != set(names):
         raise ConfigError(
-            f'simulation {Path(file).name} with the joints {list(sim.tree.moving_names)}',
+            f'simulation {Path(file).name} has the joints {list(sim.tree.moving_names)}',
             f'those of the robot, {list(names)}', 'give a model of the same machine',
         )  # fmt: skip
     if sim.tree.moving_names != names:
@@ -45,7 +45,7 @@ def simulated_model(file: str, robot: Nominal) -> tuple[Nominal, tuple[EffectAt,
     other = [f'{j.name} is {j.kind}' for j in sim.robot.joints if j.kind != kinds[j.name]]
     if other:
         raise ConfigError(
-            f'simulation {Path(file).name} of another machine: {", ".join(other)} there',
+            f'simulation {Path(file).name} is of another machine: {", ".join(other)} there',
             'joints of the same kind as those of the robot', 'give a model of the same machine',
         )  # fmt: skip
     effects = tuple(e for e in sim.effects if e.is_complete and not e.effect.is_on_tree)
@@ -57,7 +57,10 @@ def _bare(sim: Nominal, robot: Robot) -> Robot:
     none = dict.fromkeys(sim.tree.joint_names, (0.0, 0.0))
     text = stated_urdf(sim.robot, sim.without_stated(sim.tree.parameters), none)
     if text is None:
-        raise ConfigError(f'simulation {sim.robot.name} with bodies that a URDF cannot express')
+        raise ConfigError(
+            f'simulation {sim.robot.name} has bodies that a URDF cannot express',
+            'physically possible bodies',
+        )
     passive = [j.name for j in robot.joints if not j.is_actuated]
     gain = {j.name: j.effort_gain for j in robot.joints if j.effort_gain != 1.0}
     kept = [e for e in _effects(sim.robot) if _is_on_tree(e, sim)]

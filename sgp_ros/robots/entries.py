@@ -80,7 +80,7 @@ class Entries:
             return None
         if formula.signals or not formula.parameters <= set(names):
             self.problems.append(
-                f'{self.prefix}{key} is {formula.text!r}; it may use {sorted(names)} alone'
+                f'{self.prefix}{key} is {formula.text!r}; it may use only {sorted(names)}'
             )
             return None
         return formula

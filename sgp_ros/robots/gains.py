@@ -142,7 +142,7 @@ def _column(
                           f'one number for each of {sorted(actuated)}, by name')  # fmt: skip
     table = found or {}
     if set(table) != set(actuated):
-        raise ConfigError(f'{place}: {key} of {sorted(map(str, table))}',
+        raise ConfigError(f'{place}: {key} is given for {sorted(map(str, table))}',
                           f'one number for each of {sorted(actuated)}')  # fmt: skip
     for joint, x in table.items():
         if not is_usable(x) or x < 0.0:
@@ -152,4 +152,6 @@ def _column(
 
 
 def _description(content: Any) -> str:
-    return f'the keys {sorted(map(str, content))}' if isinstance(content, dict) else 'no mapping'
+    return (
+        f'the keys {sorted(map(str, content))}' if isinstance(content, dict) else 'not a mapping'
+    )

@@ -44,7 +44,7 @@ def with_bodies(robot: Robot, path: str | Path) -> Robot:
     path = Path(path)
     known = nominal_tree(robot).link_names
     if not path.is_file():
-        raise ConfigError(f'no bodies at {path}', f'a YAML file, {_EXAMPLE}', 'check the path')
+        raise ConfigError(f'no file of bodies at {path}', f'YAML, {_EXAMPLE}', 'check the path')
     try:
         document = load_yaml(read_text(path))
     except (yaml.YAMLError, UnicodeDecodeError) as error:
@@ -68,7 +68,7 @@ def _parameters(
     """Return mass, first moment, and inertia about the origin of the link, (10,)."""
     before = len(problems)
     if link not in known:
-        problems.append(f'link {link!r} is not one of those that move, {list(known)}')
+        problems.append(f'link {link!r} is not one of the moving links {list(known)}')
     document: Mapping[Any, Any] = given if isinstance(given, dict) else {}
     entries = Entries(document, problems, f'{link}.')
     entries.refuse_others({'mass', 'com', 'inertia'})
@@ -79,5 +79,5 @@ def _parameters(
     shift = mass * np.array([y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y])
     found = np.concatenate([[mass], mass * c, about + shift])
     if len(problems) == before and not is_consistent(found):
-        problems.append(f'{link}: no body has the inertia {about.tolist()} about its centre')
+        problems.append(f'{link}: no body can have the inertia {about.tolist()} about its centre')
     return found

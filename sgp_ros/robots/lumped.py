@@ -91,14 +91,16 @@ def _joints(entry: object, problems: list[str]) -> tuple[Joint, ...]:
         inner.refuse_others({'name', 'kind', 'actuated', 'effort_unit'})
         kind, is_actuated = inner.text('kind', 'revolute'), inner.document.get('actuated', True)
         if kind not in {'revolute', 'prismatic'} or not isinstance(is_actuated, bool):
-            problems.append(f'joint {item!r}: kind revolute or prismatic, actuated true or false')
+            problems.append(
+                f'joint {item!r}: expected kind revolute or prismatic, actuated true or false'
+            )
         unit = inner.document.get('effort_unit', '')
         joints.append(
             Joint(inner.text('name', ''), kind, is_actuated=is_actuated, effort_unit=str(unit))
         )
     names = [joint.name for joint in joints]
     if not joints or not all(names) or len(set(names)) < len(names):
-        problems.append(f'joints is {entry!r}, not a list of {{name: text}}, different ones')
+        problems.append(f'joints is {entry!r}, not a list of {{name: text}} with different names')
         return ()
     return tuple(joints)
 
@@ -173,13 +175,13 @@ def _column(
     unknown = sorted({joint for _, joint in formula.signals} - set(joints))
     problem = ''
     if formula.parameters:
-        problem = f'has the names {sorted(formula.parameters)}; a column has numbers alone'
+        problem = f'has the names {sorted(formula.parameters)}; write numbers in their place'
     elif unknown:
-        problem = f'has the joints {unknown}, not some of {list(joints)}'
+        problem = f'has the joints {unknown}, which are not among {list(joints)}'
     elif not driven <= {given}:
         problem = f'for the target {target} may hold {given}[J], not {sorted(driven - {given})}'
     elif formula.driven_degree > 1.0:
-        problem = f'is not affine in {given}[J]: it may stand alone or times functions of q and dq'
+        problem = f'is not affine in {given}[J]: only functions of q and dq may multiply it'
     if problem:
         problems.append(f'{where}: {formula.text!r} {problem}')
         return None

@@ -58,11 +58,12 @@ class Nominal:
     def remarks(self) -> tuple[str, ...]:
         """Remarks for the user."""
         lumped = (
-            f'The bodies of {self.robot.name} are the simplest with its coefficients: '
-            'mass and centre of mass of a link are not measured.'
+            f'The bodies of {self.robot.name} are the simplest ones that have its coefficients: '
+            'mass and centre of mass of a single link are not known.'
         )
         unclear = tuple(
-            f'{e.name} of {e.joint} is not stated completely and so not part of the nominal robot.'
+            f'{e.name} of {e.joint} is not part of the nominal robot: not all of its parameters '
+            'are stated.'
             for e in self.effects
             if not e.is_complete
         )

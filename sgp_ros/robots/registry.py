@@ -125,7 +125,7 @@ def _from_document(text: str, path: Path) -> Robot:
     except yaml.YAMLError as error:
         raise ConfigError(f'robot file {path} is not YAML ({error})', 'a robot YAML') from error
     if not isinstance(document, dict):
-        raise ConfigError(f'robot file {path} holds {type(document).__name__}', 'a mapping')
+        raise ConfigError(f'robot file {path} contains {type(document).__name__}', 'a mapping')
     problems: list[str] = []
     if document.get('schema') != 1:
         problems.append(f'schema is {document.get("schema")!r}, not 1')
@@ -173,7 +173,7 @@ def _changed(document: Mapping[str, Any], problems: list[str]) -> Robot | None:
     if not isinstance(base, str) or base not in robot_names():
         problems.append(
             f'robot is {base!r}, not one of {list(robot_names())}, '
-            'and there are no urdf and no coefficients'
+            'and there is neither urdf nor coefficients'
         )
         return None
     try:
@@ -190,7 +190,7 @@ def _read_parameters(entries: Any, problems: list[str]) -> dict[str, tuple[float
     prior = {}
     for name, entry in entries.items():
         if not isinstance(entry, dict) or not {'value'} <= set(entry) <= {'value', 'std', 'unit'}:
-            problems.append(f'parameter {name}: {entry!r} is no {{value, std, unit}}')
+            problems.append(f'parameter {name} is {entry!r}, not {{value, std, unit}}')
             continue
         value, std = entry['value'], entry.get('std')
         std = math.inf if std is None else std

@@ -236,8 +236,8 @@ class Robot:
         names = self._input_names()
         if name not in names:
             raise ConfigError(
-                f'residual input {name!r}',
-                f'default, own, all, own:velocity and the like, or some of {list(names)}',
+                f'unknown residual input {name!r}',
+                f'default, own, all, own:CHANNEL such as own:velocity, or some of {list(names)}',
             )
         channel, joint = name.split(':', 1)
         return INPUT_CHANNELS.index(channel) * len(self.joints) + self.joint_names.index(joint)

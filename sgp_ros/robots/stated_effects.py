@@ -84,7 +84,7 @@ def _read(item: object, where: str, tree: Tree, problems: list[str]) -> EffectAt
     parameters: dict[str, Value] = {**values, **words}
     stated = EffectAt.stated(effect, joint, parameters, tree, std)
     if effect.is_force and not stated.is_possible(typical_motion(tree)):
-        problems.append(f'{where}: no such effect exists with the values {values}')
+        problems.append(f'{where}: the values {values} are physically impossible')
     return stated
 
 

@@ -89,7 +89,8 @@ def _formula(entries: Entries, joint: str, tree: Tree) -> Formula | None:
     others = sorted({j for _, j in formula.signals if j} - set(tree.moving_names))
     if others:
         entries.problems.append(
-            f'{entries.prefix}formula has the joints {others}, not some of {[*tree.moving_names]}'
+            f'{entries.prefix}formula has the joints {others}, which are not among '
+            f'{[*tree.moving_names]}'
         )
         return None
     return formula

@@ -32,7 +32,7 @@ from sgp_ros.robots.urdf_robot import nominal_tree, urdf_text
 Values = Mapping[str, float]
 ROUNDING = 1e-9
 """Share of a pseudo-inertia below which it may be negative."""
-NO_BODY = 'The stated parameters of {link} are physically impossible: those of the URDF are used.'
+NO_BODY = 'The stated parameters of {link} are physically impossible: the URDF is used instead.'
 
 
 def values_of(robot: Robot) -> dict[str, float]:
@@ -122,7 +122,10 @@ def term_effects(
             if effect.is_possible(typical_motion(tree)):
                 found.append(effect)
             else:
-                remarks.append(f'No {law.words} of {joint} has the value that is stated.')
+                remarks.append(
+                    f'The value stated for {law.words} of {joint} is physically impossible: it is '
+                    'ignored.'
+                )
     return tuple(found)
 
 

@@ -103,5 +103,5 @@ def test_robots_of_other_joints_are_refused(folder, tmp_path, capsys):
              '--nominal', tmp_path / 'other.xml', '--out', tmp_path / 'out']  # fmt: skip
     assert main([str(x) for x in words]) == 2
     said = capsys.readouterr().err
-    assert "with the joints ['knee']; expected those of" in said
+    assert "has the joints ['knee']; expected those of" in said
     assert said.count('\n') == 1

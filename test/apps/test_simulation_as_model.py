@@ -83,7 +83,7 @@ def test_another_machine_is_refused(machine, tmp_path, capsys):
              '--sim', str(tmp_path / 'sim.xml'), '--out', str(tmp_path / 'out')]  # fmt: skip
     assert main(words) == 2
     said = capsys.readouterr().err
-    assert "with the joints ['knee']; expected those of the robot, ['hinge']" in said
+    assert "has the joints ['knee']; expected those of the robot, ['hinge']" in said
     assert said.count('\n') == 1
 
 

@@ -115,7 +115,7 @@ def test_own_inputs_are_those_of_each_joint_itself():
     ]
     assert len(set(REACTION_WHEEL.residual_columns(('direction:pole',)))) == 1
     for name in ('own:speed', 'own:', 'own'):
-        with pytest.raises(ConfigError, match='own:velocity and the like'):
+        with pytest.raises(ConfigError, match='own:CHANNEL such as own:velocity'):
             REACTION_WHEEL.residual_columns(('own:velocity', name))
 
 

@@ -200,7 +200,7 @@ def test_arrays_of_a_tree_are_read_only():
         ('<robot name="r"/>', '0 links'),
         ('<robot name="r"><link name="a"/></robot>', 'no joint that moves'),
         (ARM % '<link name="loose"/>', "['base', 'loose']"),
-        (ARM % '<link name="base"/>', "['base'] stand twice"),
+        (ARM % '<link name="base"/>', "several links are named ['base']"),
         ((ARM % '').replace('0 2 0', '0 0 0'), 'joint elbow has the axis'),
         ((ARM % '').replace('0 2 0', '0 up 0'), "joint elbow: xyz is 'up'"),
         ((ARM % '').replace('"0 2 0"', '"0 2"'), 'three numbers'),
@@ -216,7 +216,7 @@ def test_arrays_of_a_tree_are_read_only():
         (ARM % FINGER.replace('joint="grip"', 'joint="other"'), "mimics 'other'"),
         (ARM % FINGER.replace('joint="grip"', 'joint="flange"'), "mimics 'flange'"),
         (ARM % FINGER.replace('child link="right"', 'child link="left"'),
-         'link left hangs on several joints'),
+         'link left is the child of several joints'),
     ],
 )  # fmt: skip
 def test_what_is_no_tree_is_refused_in_one_line(text, found):
@@ -248,7 +248,7 @@ def test_links_in_a_loop_are_refused():
         ({'joints': []}, 'all joints are locked'),
         ({'locked': {'knee': 0.0}}, "locked ['knee']"),
         ({'locked': {'elbow': np.nan}}, "{'elbow': nan}"),
-        ({'joints': ['elbow'], 'locked': {'elbow': 0.0}}, 'in joints and in locked'),
+        ({'joints': ['elbow'], 'locked': {'elbow': 0.0}}, 'in both joints and locked'),
         ({'passive': ['knee']}, "passive ['knee']"),
         ({'payload': Payload('hand', 1.0)}, "link 'hand'"),
         ({'payload': Payload('base', 1.0)}, "link 'base'"),

@@ -278,7 +278,7 @@ BAD = [
      'of knee: the joint is not one of'),
     ([{'effect': 'coulomb_friction', 'joint': 'elbow', 'parameters': {}}], 'level is None'),
     ([{'effect': 'coulomb_friction', 'joint': 'elbow', 'parameters': {'level': {'value': -1}}}],
-     'no such effect exists'),
+     'are physically impossible'),
     ([{'effect': 'dead_zone', 'joint': 'elbow', 'parameters': {'width': {'value': 0}}}],
      'not a positive number'),
     ([{'effect': 'coulomb_friction', 'joint': 'elbow',

@@ -29,14 +29,14 @@ def test_joints_without_a_drive_have_no_gain(tmp_path):
     ('text', 'said'),
     [
         ('kp: [1, 2, 3]\nkd: [1, 2]\n', 'kp is 3 numbers without names'),
-        ('kp: {a: 1}\nkd: {a: 1, b: 1}\n', "kp of \\['a'\\]"),
+        ('kp: {a: 1}\nkd: {a: 1, b: 1}\n', "kp is given for \\['a'\\]"),
         ('kp: {a: 1, b: x}\nkd: {a: 1, b: 1}\n', "kp of b is 'x'"),
         ('kp: {a: 1, b: -1}\nkd: {a: 1, b: 1}\n', 'kp of b is -1'),
         ('kp: {a: 1, b: .nan}\nkd: {a: 1, b: 1}\n', 'kp of b is nan'),
         ('kp: {a: 1, b: 1.0e+308}\nkd: {a: 1, b: 1}\n', 'from 0 to 1e\\+30'),
         ('kp: {a: 1, b: 1}\nkd: {a: 1, b: 1}\nki: 3\n', 'the keys'),
         ('kp: {a: 1, b: 1}\nkd: {a: 1, b: 1}\nfeedforward: magic\n', "feedforward 'magic'"),
-        ('- 1\n', 'no mapping'),
+        ('- 1\n', 'not a mapping'),
         ('kp: [1, 2\n', 'gains'),
     ],
 )

@@ -35,10 +35,13 @@ def test_a_stated_body_stands_in_the_tree_about_the_joint(robot, tmp_path):
 @pytest.mark.parametrize(
     ('text', 'said'),
     [
-        ('leg: {mass: 1.0, inertia: [1, 0, 1, 0, 0, 1]}', "link 'leg' is not one of those"),
+        (
+            'leg: {mass: 1.0, inertia: [1, 0, 1, 0, 0, 1]}',
+            "link 'leg' is not one of the moving links",
+        ),
         ('arm: {mas: 1.0}', "unknown key 'arm.mas'"),
-        ('arm: {mass: 1.0, inertia: [1, 0, 1, 0, 0, 5]}', 'no body has the inertia'),
-        ('arm: {mass: 1.0}', 'no body has the inertia'),
+        ('arm: {mass: 1.0, inertia: [1, 0, 1, 0, 0, 5]}', 'no body can have the inertia'),
+        ('arm: {mass: 1.0}', 'no body can have the inertia'),
         ('[]', 'name no link'),
     ],
 )

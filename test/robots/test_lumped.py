@@ -88,7 +88,7 @@ def _column(text, **more):
     ('change', 'problem'),
     [
         ({'joints': []}, 'joints is []'),
-        ({'joints': [{'name': 'a'}, {'name': 'a'}]}, 'different ones'),
+        ({'joints': [{'name': 'a'}, {'name': 'a'}]}, 'different names'),
         ({'joints': [{'name': 'drum-1', 'kind': 'ball'}]}, 'revolute or prismatic'),
         ({'target': 'speed'}, "target is 'speed'"),
         ({'colour': 'red'}, "unknown key 'colour'"),

@@ -34,10 +34,10 @@ LEFT = {
     'reduction': 'Reductions of <transmission> are ignored: efforts and positions are those at '
     'the joint.',
     'gazebo': 'Springs in <gazebo> are ignored: state them under `effects`.',
-    'xacro': 'xacro elements in a URDF are ignored: name the file .xacro.',
+    'xacro': 'xacro elements in a URDF are ignored: rename the file to .xacro to expand them.',
 }
 """Remarks on what has no place here."""
-REFUSED = ('floating and planar joints', 'loops of links', 'several links without parent')
+REFUSED = ('floating and planar joints', 'loops of links', 'several links without a parent')
 
 MODEL_ENDINGS = ('.urdf', '.xacro', '.xml', '.mjcf', '.sdf', '.world')
 """Of files that `read_model` reads."""
@@ -85,7 +85,7 @@ def find_file(name: str, folder: Path) -> Path:
     if scheme == 'file':
         return Path(rest)
     if scheme not in {'package', 'model'}:
-        raise ConfigError(f'address {name!r}', 'package://, model:// or file://')
+        raise ConfigError(f'unknown address {name!r}', 'package://, model:// or file://')
     package, _, inner = rest.partition('/')
     places = [*_installed(package), *(up / package for up in (folder, *folder.resolve().parents)),
               *(up for up in folder.resolve().parents if up.name == package)]  # fmt: skip
@@ -95,7 +95,7 @@ def find_file(name: str, folder: Path) -> Path:
         if (place / inner).exists():
             return place / inner
     raise ConfigError(
-        f'{name}: no package {package} with {inner}', 'an installed package or a folder above',
+        f'{name}: no package {package} with {inner}', 'an installed package or a parent folder',
         'source the workspace, or give the path of the file',
     )  # fmt: skip
 
@@ -120,7 +120,7 @@ def _kind_of(path: Path) -> str:
     except ET.ParseError as error:
         raise ConfigError(f'{path.name} is not XML ({error})', 'URDF, MJCF or SDF') from error
     if tag not in _ROOTS:
-        raise ConfigError(f'{path.name} holds <{tag}>', 'URDF, MJCF or SDF')
+        raise ConfigError(f'{path.name} has the root element <{tag}>', 'URDF, MJCF or SDF')
     return _ROOTS[tag]
 
 

@@ -59,8 +59,8 @@ LEFT = {
 REFUSED = (
     'free and ball joints',
     'connect and weld constraints',
-    'equality of joints on a curve',
-    'links that touch where the robot starts',
+    'nonlinear equality of joints',
+    'links that touch in the start pose',
 )
 _KINDS = {'mjJNT_HINGE': 'revolute', 'mjJNT_SLIDE': 'prismatic'}
 _NEAR = 1e-3
@@ -186,9 +186,9 @@ class _Reading:
             if contact.exclude == 0 and contact.dist < -_NEAR:
                 pair = [self.body(m.geom_bodyid[g]) for g in contact.geom]
                 raise self.error(
-                    f'bodies {pair[0]} and {pair[1]} touch where the robot starts',
+                    f'bodies {pair[0]} and {pair[1]} touch in the start pose',
                     'motion without contacts',
-                    'exclude the pair (<contact><exclude .../>), or start elsewhere',
+                    'exclude the pair (<contact><exclude .../>), or change the start pose',
                 )  # fmt: skip
 
     def _mimics(self) -> dict[int, tuple[str, float, float]]:

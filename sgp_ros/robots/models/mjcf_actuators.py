@@ -20,8 +20,8 @@ from sgp_ros.robots.models.model import ModelJoint, stated
 LEFT = {
     'mixed': 'Gains are ignored, as other joints are driven by efforts',
     'transmission': 'Actuators that do not act on a single joint are ignored',
-    'gain': 'The effort is the control times a gain (`effort_gain` of a robot YAML, where a '
-    'recording holds controls)',
+    'gain': 'The effort is the control times a gain (state it as `effort_gain` in a robot YAML if '
+    'a recording contains controls)',
     'gear': 'The target is the position times a gear',
     'law': 'Actuators of this type are ignored',
     'activation': 'The activation dynamics of these actuators are ignored',

@@ -72,7 +72,7 @@ def read_sdf(path: Path) -> Model:
     except (ET.ParseError, ValueError) as error:
         raise ConfigError(f'{path.name} is not XML ({error})', 'SDF') from error
     if root.tag != 'sdf':
-        raise ConfigError(f'{path.name} holds <{root.tag}>', 'SDF with <sdf>')
+        raise ConfigError(f'{path.name} has the root element <{root.tag}>', 'SDF with <sdf>')
     world = root.find('world')
     models = (root if world is None else world).findall('model')
     moving = [m for m in models if any(j.get('type') != 'fixed' for j in m.findall('joint'))]
@@ -147,7 +147,7 @@ class _Reading:
         ends = [(element.findtext(end) or '').strip() for end in ('parent', 'child')]
         unknown = [x for x in ends if x not in links and x != _WORLD]
         if unknown:
-            raise self.error(f'joint {name} names the links {unknown}', str(list(links)))
+            raise self.error(f'joint {name} names the links {unknown}', f'some of {list(links)}')
         joint = ModelJoint(name, kind, ends[0], ends[1])
         return joint if kind == 'fixed' else self._moving(joint, element)
 
