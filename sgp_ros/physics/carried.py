@@ -153,7 +153,7 @@ class TipForce(Effect):
     words = 'a constant force on the tool'
     formula = 'tau_x = J_tool(q)^T (fx, fy, fz)'
     source = _MECHANICS
-    appearance = 'the residual effort changes with the pose like the lever arms of one force'
+    appearance = 'the residual effort changes with the pose as the lever arms of one force do'
     quantities = (Quantity('fx', 'N'), Quantity('fy', 'N'), Quantity('fz', 'N'))
     linear = ('fx', 'fy', 'fz')
     site = TOOL

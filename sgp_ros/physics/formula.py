@@ -147,7 +147,7 @@ def read_formula(text: object, *, is_law: bool = False) -> Formula:
         raise ConfigError(f'formula {text!r}', 'a text or a number')
     written = text if isinstance(text, str) else repr(float(text))
     if len(written) > LONGEST:
-        raise ConfigError(f'a formula of {len(written)} characters', f'{LONGEST} at most')
+        raise ConfigError(f'a formula of {len(written)} characters', f'at most {LONGEST}')
     try:
         tree = ast.parse(written.strip(), mode='eval').body
         found = Contents(written, is_law)

@@ -78,7 +78,9 @@ class Contents:
         if is_number(node):
             return 0.0
         expected = f'{EXPECTED}, {TIME}, {", ".join(MEMORY)}' if self.is_law else EXPECTED
-        raise ConfigError(f'{ast.unparse(node)!r} in the formula {self.text!r}', expected)
+        raise ConfigError(
+            f'{ast.unparse(node)!r} is not allowed in the formula {self.text!r}', expected
+        )
 
     def _is_known(self, call: ast.Call) -> bool:
         """Whether it is a known function of as many arguments as it takes."""

@@ -38,7 +38,7 @@ class Spring(Effect):
     words = 'a spring'
     formula = 'tau_x = -stiffness (q - rest)'
     source = MECHANICS
-    appearance = 'the residual effort is a straight line over the position'
+    appearance = 'the residual effort is linear in the position'
     quantities = (
         Quantity('stiffness', 'N m/rad', low=0.0, joint_number='stiffness'),
         Quantity('rest', 'rad', joint_number='rest'),

@@ -34,7 +34,10 @@ class Hysteresis(Effect):
     words = 'hysteresis (presliding friction)'
     formula = 'tau_x = -level z, dz/dt = (v - |v| z) / presliding'
     source = 'Dahl 1968'
-    appearance = 'steps at reversals that build up over a short distance; loops over the position'
+    appearance = (
+        'steps at reversals that build up over a short distance; hysteresis loops over the '
+        'position'
+    )
     quantities = (
         Quantity('level', 'N m', low=0.0, joint_number='friction'),
         Quantity('presliding', 'rad', 1e-9, is_positive=True),

@@ -51,7 +51,7 @@ def read_unit(text: str) -> Unit:
     while plain[at:].strip():
         match = _TOKEN.match(plain, at)
         if match is None or (match['word'] and match['word'] not in _BASE):
-            raise ConfigError(f'{plain[at:].strip()!r} in the unit {text!r}', _EXAMPLE)
+            raise ConfigError(f'unknown {plain[at:].strip()!r} in the unit {text!r}', _EXAMPLE)
         tokens.append(match)
         at = match.end()
     steps = [{'(': 1, ')': -1}.get(t['sign'], 0) for t in tokens]
@@ -146,8 +146,8 @@ def _of_operation(node: ast.BinOp, left: Unit, right: Unit) -> Unit:
             return _NONE
         if power is None:
             raise ConfigError(
-                f'{ast.unparse(node)!r} is a power of what has the unit {unit_text(left)}',
-                'a number as its exponent, or a base without unit: divide it by a parameter',
+                f'the base of {ast.unparse(node)!r} has the unit {unit_text(left)}',
+                'a number as the exponent, or a base without unit: divide it by a parameter',
             )
         return left[0] * power, left[1] * power, left[2] * power
     sign = 1 if isinstance(node.op, ast.Mult) else -1
@@ -183,7 +183,7 @@ def _of_function(node: ast.Call, name: str, parts: list[Unit]) -> Unit:
         return _NONE
     if parts[0] != _NONE:
         raise ConfigError(
-            f'{name} of what has the unit {unit_text(parts[0])} in {ast.unparse(node)!r}',
+            f'the argument of {name} in {ast.unparse(node)!r} has the unit {unit_text(parts[0])}',
             'an argument without unit: divide it by a parameter of the same unit',
         )
     return _NONE
@@ -197,6 +197,6 @@ def _is_zero(node: ast.expr) -> bool:
 def _require_same(node: ast.expr, left: Unit, right: Unit) -> None:
     if left != right:
         raise ConfigError(
-            f'{ast.unparse(node)!r} joins the units {unit_text(left)} and {unit_text(right)}',
+            f'{ast.unparse(node)!r} combines the units {unit_text(left)} and {unit_text(right)}',
             'one unit',
         )

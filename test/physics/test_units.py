@@ -22,11 +22,11 @@ RIGHT = {
     '-a*(abs(dq[e])/v0)**n*sign(dq[e])': {'a': 'N m', 'v0': 'rad/s', 'n': '1'},
 }
 REFUSED = {
-    'tanh(dq[e]/0.05)': 'tanh of what has the unit 1/s',
-    'a*abs(dq[e])**n': 'is a power of what has the unit 1/s',
-    'q[e] + dq[e]': 'joins the units 1 and 1/s',
+    'tanh(dq[e]/0.05)': 'the argument of tanh in .* has the unit 1/s',
+    'a*abs(dq[e])**n': 'the base of .* has the unit 1/s',
+    'q[e] + dq[e]': 'combines the units 1 and 1/s',
     'lag(q[e], a)': 'has the unit kg m2/s2',
-    'max(q[e], t)': 'joins the units',
+    'max(q[e], t)': 'combines the units',
 }
 
 
