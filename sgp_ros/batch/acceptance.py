@@ -246,8 +246,8 @@ def require_joints(
         raise RecordingError(
             f'{recording} lacks {", ".join(missing)} of {robot.name}',
             'states of all of its joints',
-            'leave joints that do not move out with a robot YAML of three lines, to be given with '
-            f'--robot: "schema: 1", "urdf: FILE", "joints: [{", ".join(moving)}]"',
+            'if the others do not move, leave them out: give --robot a robot YAML of three lines, '
+            f'"schema: 1", "urdf: FILE", "joints: [{", ".join(moving)}]"',
         )  # fmt: skip
     near = {name: difflib.get_close_matches(name, shown, 1, 0.0) for name in missing}
     pairs = ', '.join(f'{name} is closest to {found[0]}' for name, found in near.items())

@@ -35,7 +35,7 @@ def holdout(
     if kind not in KINDS:
         raise ConfigError(f'hold-out {kind!r}', f'one of {list(KINDS)}')
     if not 0.0 < share < 1.0:
-        raise ConfigError(f'hold-out of share {share:g}', 'a share between 0 and 1')
+        raise ConfigError(f'hold-out share {share:g}', 'a share between 0 and 1')
     if not length_s > 0.0:
         raise ConfigError(f'hold-out in stretches of {length_s:g} s', 'a length above 0 s')
     n = len(data.time)
@@ -46,8 +46,8 @@ def holdout(
         is_held = np.floor((stretch + 1) * share) > np.floor(stretch * share)
     if is_held.all() or not is_held.any():
         raise ConfigError(
-            f'{n} rows of data, hold-out {kind} of {share:g}',
-            'rows on either side'
+            f'{n} rows of data cannot be divided, hold-out {kind} of {share:g}',
+            'rows in both parts'
             + (f', in stretches of {length_s:g} s' if kind == 'alternate' else ''),
             'use a longer recording, another share or shorter stretches',
         )

@@ -52,8 +52,8 @@ def require_gains_of_velocity(events: Iterable[Event], gains: Gains) -> None:
     kinds = {e.kind for e in events if isinstance(e, CommandSample) and e.names is not None}
     if VELOCITY in kinds and gains.kp.any():
         raise RecordingError(
-            'commands that are velocity targets', 'kp 0 and the velocity gain as kd',
-            'write both into the file of --gains',
+            'the commands are velocity targets, but kp is not 0',
+            'kp 0 and the velocity gain as kd', 'write both into the file given with --gains',
         )  # fmt: skip
 
 
@@ -80,9 +80,9 @@ def with_recorded_gains(
     names = {name for e in given for name in e.gains or ()}
     if not given or not driven <= names or any(set(e.gains or ()) != names for e in given):
         raise RecordingError(
-            f'gains of {sorted(names) or "no joint"} with the targets',
+            f'the targets come with gains of {sorted(names) or "no joint"}',
             f'kp and kd of each of {sorted(driven)} with each target',
-            'give those of the drives with --gains gains.yaml',
+            'give the gains of the drives with --gains gains.yaml',
         )  # fmt: skip
     given.sort(key=lambda e: e.stamp_ns)
     none = (0.0, 0.0)

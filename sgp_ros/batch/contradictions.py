@@ -61,8 +61,8 @@ def unit_contradictions(
     unit = _unit_of_positions(joint, *ends)
     if unit:
         sure.append(
-            f'the positions of {joint.name} go from {ends[0]:.3g} to {ends[1]:.3g}, its limits '
-            f'are {joint.lower:.3g} to {joint.upper:.3g} {joint.unit("position")}: '
+            f'the positions of {joint.name} go from {ends[0]:.3g} to {ends[1]:.3g}, but its '
+            f'limits are {joint.lower:.3g} to {joint.upper:.3g} {joint.unit("position")}: '
             f'they would fit in {unit}'
         )
     elif not (span := ends[1] - ends[0]) < _FARTHEST[joint.kind]:
@@ -80,7 +80,7 @@ def unit_contradictions(
     unit = _unit_of_efforts(joint, most_effort)
     if unit:
         open_ones.append(
-            f'the effort of {joint.name} reaches {most_effort:.3g}, its limit is '
+            f'the effort of {joint.name} reaches {most_effort:.3g}, but its limit is '
             f'{joint.effort_limit:.3g} {joint.unit("effort")}: it would fit in {unit}'
         )
     return sure, open_ones
@@ -289,11 +289,11 @@ def require_shared_motion(
     }
     if len(apart) == len(both):
         raise RecordingError(
-            'no joint passes through the same positions on machine and in simulation: '
+            'no joint reaches the same positions on the machine and in the simulation: '
             f'{", ".join(ranges.values())}', 'motions that overlap',
             'run the simulation with the commands of the machine',
         )  # fmt: skip
-    said = [f'Machine and simulation pass different positions: {x}.' for x in ranges.values()]
+    said = [f'Machine and simulation reach different positions: {x}.' for x in ranges.values()]
     alone = [n for n in (*ours, *simulation) if n not in both]
     if alone:
         said.append(f'Moving only on the machine or only in the simulation: {", ".join(alone)}.')

@@ -121,7 +121,7 @@ def choose_plan(signals: Signals, robot: Robot, cutoffs: Sequence[float] = CUTOF
         raise RecordingError(
             f'{len(signals.time) / signals.rate:.3g} s of recording at {signals.rate:.3g} Hz, '
             f'longest stretch without a gap {longest:.3g} s',
-            f'some {3 * len(robot.coefficients)} rows after a low-pass of {cutoffs[0]:g} Hz',
+            f'about {3 * len(robot.coefficients)} rows after a low-pass of {cutoffs[0]:g} Hz',
             'record longer, without gaps, or choose another cut-off',
         )
     regret = _total_regret(trials)

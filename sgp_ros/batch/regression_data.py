@@ -98,7 +98,7 @@ def filtered_data(signals: Signals, robot: Robot, plan: FilterPlan) -> FilteredD
         RecordingError: every segment is shorter than the transients of the filters.
     """
     if plan.velocity_source == 'measured' and signals.velocity is None:
-        raise ConfigError('velocity source measured, but the recording has none', 'position')
+        raise ConfigError('velocity source measured, but no velocity was recorded', 'position')
     light = ZeroPhase(signals.rate, plan.state_cutoff)
     lowpass = ZeroPhase(signals.rate, plan.cutoff)
     trim = light.trim + lowpass.trim

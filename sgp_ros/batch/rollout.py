@@ -127,7 +127,7 @@ def _check(time: np.ndarray, q: np.ndarray, v: np.ndarray, effort: np.ndarray) -
     if not (time.ndim == 1 and q.shape == v.shape == effort.shape and len(q) == len(time)):
         raise ValueError(f'time {time.shape}, q {q.shape}, v {v.shape}, effort {effort.shape}')
     if not all(np.isfinite(x).all() for x in (time, q, v, effort)):
-        raise RecordingError('values that are not finite', 'numbers', 'remove them')
+        raise RecordingError('values that are not finite', 'finite numbers', 'remove them')
     if len(time) < 2 or not np.all(np.diff(time) > 0.0):
         raise RecordingError('stamps that do not increase', 'two or more increasing stamps')
 

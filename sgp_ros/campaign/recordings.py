@@ -122,7 +122,7 @@ def read_covariates(
         remarks.append(f'{path}: {len(strangers)} rows match no recording, such as '
                        f'{strangers[0]}')  # fmt: skip
     if len(rows) < len(names):
-        remarks.append(f'{path}: nothing on {len(names) - len(rows)} of {len(names)} recordings')
+        remarks.append(f'{path}: no row for {len(names) - len(rows)} of {len(names)} recordings')
     numbers = _numbers(columns, path, remarks)
     for name, row in rows.items():
         found[name] = TableRow(

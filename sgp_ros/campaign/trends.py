@@ -195,7 +195,7 @@ def _add(columns: dict[str, np.ndarray], name: str, x: np.ndarray, remarks: list
     if is_new:
         columns[name] = x
     else:
-        remarks.append(f'{name} is constant, or follows from others: it has no coefficient')
+        remarks.append(f'{name} is constant or a combination of others: it has no coefficient')
     return is_new
 
 

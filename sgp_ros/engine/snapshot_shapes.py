@@ -65,7 +65,7 @@ def require_arrays(snapshot: Mapping[str, np.ndarray], k: int, p: int) -> None:
         }
         most = places.get(part.rpartition('_')[2])
         if most is not None and not ((array >= 0) & (array <= most)).all():
-            raise ConfigError(f'a snapshot whose {name} is no place in it', f'0 to {most}')
+            raise ConfigError(f'a snapshot whose {name} is out of range', f'0 to {most}')
 
 
 def _require_shape(

@@ -45,7 +45,7 @@ def formula_law(law: FormulaLaw) -> Law:
         raise ConfigError(
             f'the law {law.formula!r} of an acceleration or a delay cannot be simulated',
             'a law of q, dq, tau and t, with lag or play',
-            'an inertia is the effect armature, a delayed command command_delay',
+            'use the effect armature for an inertia, command_delay for a delayed command',
         )
     return Law(
         lambda joints, joint, values: (_Built(law, joints, joint, values).action(),),

@@ -63,7 +63,7 @@ def discrete_regulator(
     except (np.linalg.LinAlgError, ValueError) as error:
         raise NumericalError(
             f'no regulator balances the robot ({error})', 'a robot that its command can balance',
-            'take more usual physical parameters, or another controller',
+            'choose more usual physical parameters, or another controller',
         ) from error  # fmt: skip
     return gain
 

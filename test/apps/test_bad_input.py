@@ -58,7 +58,7 @@ def test_a_simulation_without_overlap_is_refused(tmp_path, robot, capsys):
         (
             'far',
             Q + 2.5,
-            'no joint passes through the same positions on machine and in simulation: hinge -1',
+            'no joint reaches the same positions on the machine and in the simulation: hinge -1',
         ),
     ):
         sim = _recording(tmp_path, stem, q)
@@ -76,7 +76,7 @@ def test_files_of_different_machines_are_refused(tmp_path, robot, capsys):
     assert line in _refused(capsys, tmp_path, *given, '--test', theirs)
     assert line in _refused(capsys, tmp_path, *given, '--sim', theirs)
     slides = _model(tmp_path, 'slides', kind='slide')
-    line = 'simulation slides.xml of another machine: hinge is prismatic there'
+    line = 'simulation slides.xml is of another machine: hinge is prismatic there'
     assert line in _refused(capsys, tmp_path, *given, '--sim', slides)
 
 
@@ -85,7 +85,7 @@ def test_a_unit_that_the_ranges_contradict_is_refused(tmp_path, robot, capsys):
     table = tmp_path / 'log.npz'
     np.savez(table, t=T, q_rad=np.degrees(Q)[:, None], tau=Q[:, None])
     said = _refused(capsys, tmp_path, 'import', str(table), '--robot', robot)
-    assert 'the positions of hinge go from -57.3 to 57.3, its limits are -3 to 3 rad' in said
+    assert 'the positions of hinge go from -57.3 to 57.3, but its limits are -3 to 3 rad' in said
     assert 'expected the units stated' in said
     np.savez(table, t=T, q=np.degrees(Q)[:, None], tau=Q[:, None])
     words = ['import', str(table), '--robot', robot, '--out', str(tmp_path / 'out')]

@@ -163,7 +163,7 @@ def test_gains_of_the_model_are_used_where_positions_are_commanded(tmp_path, cap
     out = str(tmp_path / 'out')
     assert main(['diagnose', str(tmp_path / 'log.mcap'), '--robot', robot, '--out', out]) == 2
     said = capsys.readouterr().err
-    assert 'commands that are velocity targets; expected kp 0' in said
+    assert 'the commands are velocity targets, but kp is not 0; expected kp 0' in said
     assert said.count('\n') == 1
 
 

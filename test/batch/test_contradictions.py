@@ -50,10 +50,11 @@ def test_units_that_limits_contradict_are_named():
     assert 'fits' not in plain
     assert 'slope' not in plain
     said = _remarks(q=Q * DEGREES)
-    assert 'positions of lift go from -57.3 to 57.3, its limits are -2 to 2 rad' in said
+    assert 'positions of lift go from -57.3 to 57.3, but its limits are -2 to 2 rad' in said
     assert 'they would fit in degrees' in said
-    assert 'effort of elbow reaches 143, its limit is 20 N m: it would fit in kgf cm' in _remarks(
-        q=Q, effort=204.0 * np.cos(T)[:, None] * [0.1, 0.7]
+    assert (
+        'effort of elbow reaches 143, but its limit is 20 N m: it would fit in kgf cm'
+        in _remarks(q=Q, effort=204.0 * np.cos(T)[:, None] * [0.1, 0.7])
     )
     assert 'it would fit in N mm' in _remarks(q=Q, effort=1e4 * Q)
     said = _remarks(q=Q, velocity=rate * DEGREES)
@@ -112,7 +113,7 @@ def test_machine_and_simulation_must_overlap():
     assert 'different positions: elbow 2 to 3, in the simulation 4 to 5' in said
     (said,) = require_shared_motion(ours, {'lift': (0.5, 2.0)})
     assert said == 'Moving only on the machine or only in the simulation: elbow.'
-    with pytest.raises(RecordingError, match='no joint passes through the same positions'):
+    with pytest.raises(RecordingError, match='no joint reaches the same positions'):
         require_shared_motion(ours[:1], {'lift': (1.5, 2.0)})
     with pytest.raises(RecordingError, match='machine moves lift, the simulation elbow'):
         require_shared_motion(ours[:1], {'elbow': (0.0, 1.0)})

@@ -86,7 +86,7 @@ def test_a_segment_shorter_than_the_transient_is_refused():
 
 def test_a_velocity_that_was_not_measured_is_refused(signals):
     """The simulated axis has an encoder alone."""
-    with pytest.raises(ConfigError, match='has none'):
+    with pytest.raises(ConfigError, match='no velocity was recorded'):
         filtered_data(signals, LINEAR_AXIS, FilterPlan(10.0, 50.0, 10, 'measured'))
 
 

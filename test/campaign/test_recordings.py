@@ -65,7 +65,7 @@ def test_a_table_tells_of_recordings_by_name_or_stem(tmp_path):
     assert rows['b/2.mcap'] == TableRow('right', '', noon, {'temperature': 20.0, 'payload': 1.5})
     assert rows['b/1.mcap'] == TableRow()
     assert any('gone.mcap' in said for said in remarks)
-    assert any('nothing on 1 of 3' in said for said in remarks)
+    assert any('no row for 1 of 3' in said for said in remarks)
     assert any('operator' in said for said in remarks)
 
 
