@@ -16,7 +16,7 @@ ARGUMENTS = {
     'robot': ('reaction_wheel_6', 'reaction_wheel, or reaction_wheel_6 without friction.'),
     'seed': ('0', 'Seed of noise and motion of the simulation.'),
     'controller': ('sinusoids', 'What drives the wheel: sinusoids, balance or zero.'),
-    'record': ('', 'Where to record what the node takes and gives; empty: nowhere.'),
+    'record': ('', 'File to record inputs and predictions in; empty: no recording.'),
 }
 
 

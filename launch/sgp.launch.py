@@ -22,12 +22,12 @@ ARGUMENTS = {
     'robot': 'Built-in robot, or path of a robot file; empty: that of params_file, or else topic '
     'robot_description.',
     'params_file': 'Parameter file (YAML); empty: the one shipped for a built-in robot, if any.',
-    'command_type': 'Message type of the commands, or none where joint states carry the effort.',
+    'command_type': 'Message type of the commands, or none if joint states contain the effort.',
     'joint_states': 'Topic of the joint states.',
     'command': 'Topic of the commands.',
-    'record': 'Where to record what the node takes and gives; may hold {time} and {node}.',
+    'record': 'File to record inputs and predictions in; may contain {time} and {node}.',
     'respawn': 'true: start the node again whenever it ends.',
-    'managed': 'true: a node with lifecycle, to be configured and activated.',
+    'managed': 'true: start a lifecycle node, to be configured and activated.',
     'prefix': 'Command that starts the node, such as nice -n -5 or taskset -c 3.',
     'log_level': 'debug, info, warn, error or fatal.',
 }

@@ -205,7 +205,7 @@ class Diagnosing:
             return False, 'no diagnosis is running'
         self.close()
         self._outcome = DiagnosisFailed(CANCELLED)
-        return True, 'the diagnosis is cancelled'
+        return True, 'the diagnosis was cancelled'
 
     def poll(self) -> DiagnosisDone | DiagnosisFailed | None:
         """Return the outcome of a diagnosis that has just ended."""

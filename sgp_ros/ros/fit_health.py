@@ -121,7 +121,7 @@ class FitHealth:
             values['process_weight'] = f'{weight.value:.4f}'
             if weight.value < 0.5:
                 message += (
-                    f'; Z errs more than the physics alone, its weight is {weight.value:.2f}'
+                    f'; Z predicts worse than the physics alone: its weight is {weight.value:.2f}'
                 )
         if not (drift.is_drifting and recent - target.nmse > LEAST_SHARE):
             return OK, message, values
@@ -162,7 +162,7 @@ def _excursion(joint: str, monitor: ExcursionMonitor) -> str:
     if not monitor.is_alarmed:
         return 'no alarm'
     return (
-        f'{joint}: error {monitor.ratio:.3g} times the half-width of its 95 % interval, outside '
-        'for '
-        f'{monitor.lasting_s:.1f} s; check the joint for a collision, a new load or a fault'
+        f'{joint}: the error is {monitor.ratio:.3g} times the half-width of its 95 % interval, '
+        f'and has been outside for {monitor.lasting_s:.1f} s; check the joint for a collision, a '
+        'new load or a fault'
     )

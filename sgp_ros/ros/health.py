@@ -94,7 +94,7 @@ class Health:
         self.last_fit = {
             '': f'log evidence rose by {gain:.3g} nat',
             'diverged': 'refused: the fit diverged, no usable covariance was found',
-            'no_better': 'refused: it predicts samples that are left out of it worse'
+            'no_better': 'refused: it predicts left-out samples worse'
             if fit.is_worse
             else f'refused: no improvement, log evidence {-gain:.3g} nat lower',
             'outdated': 'refused: outdated, its data have been forgotten',
@@ -145,8 +145,8 @@ class Health:
         if self.record_problem:
             values = {'unrecorded': str(self.unrecorded)}
             text = (
-                f'{self.record_problem}, {self.unrecorded} events are missing; free the disk, and '
-                'start the node again'
+                f'{self.record_problem}, {self.unrecorded} events are missing; free disk space '
+                'and restart the node'
             )
             parts.append(('record', ERROR, text, values))
         return [

@@ -262,7 +262,7 @@ class Identification:
             if status.level == level and (level == OK or now_ns - said_ns < _QUIET_NS):
                 continue
             if status.level == OK:  # rclpy wants a line of its own for each severity
-                calm = f'no warning any more: {status.name}: {status.message}'
+                calm = f'back to normal: {status.name}: {status.message}'
                 logger.info(calm)
             elif status.level == WARN:
                 logger.warning(status.message)

@@ -113,7 +113,7 @@ class RobotSource:
             level = WARN
             message = (
                 f'waiting for the robot on {self._topic} ({count} publishers); start '
-                'robot_state_publisher, or give parameter robot or robot_description'
+                'robot_state_publisher, or set parameter robot or robot_description'
             )
             self._node.get_logger().warning(message, throttle_duration_sec=_QUIET_S)
         name = self._node.get_fully_qualified_name().lstrip('/')
@@ -127,7 +127,7 @@ class RobotSource:
             return name
         if Path(name).suffix.lower() not in MODEL_ENDINGS:
             raise ConfigError(
-                f'parameter joints beside robot {name!r}', 'a model file such as a URDF',
+                f'parameter joints is set for robot {name!r}', 'a model file such as a URDF',
                 'a robot YAML states its joints itself, under the key joints',
             )  # fmt: skip
         document = read_model(find_file(name, Path.cwd()))

@@ -100,7 +100,7 @@ class Services:
         path = self._file.with_name(f'{name}.npz') if name else self._file
         try:
             if name and os.path.lexists(path) and not is_model(path):
-                raise FileExistsError(f'{path} exists and is no saved model')
+                raise FileExistsError(f'{path} exists and is not a saved model')
             self._session.save(path)
         except OSError as error:
             response.success, response.message = False, f'not saved: {error}'

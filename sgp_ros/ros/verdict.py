@@ -117,8 +117,8 @@ def _some_unreadable(arrivals: Arrivals) -> tuple[int, str] | None:
     if not arrivals.unreadable:
         return None
     return WARN, (
-        f'{arrivals.unreadable} messages on {arrivals.joint_states} or {arrivals.command} not '
-        f'readable: {arrivals.unreadable_reason}; mend what publishes them: '
+        f'{arrivals.unreadable} messages on {arrivals.joint_states} or {arrivals.command} could '
+        f'not be read: {arrivals.unreadable_reason}; correct the node that publishes them: '
         f'{", ".join(arrivals.publishers)}'
     )
 
@@ -145,7 +145,7 @@ def _no_equation(arrivals: Arrivals) -> tuple[int, str] | None:
         return None
     return WARN, (
         f'{arrivals.read} joint states of joints {list(arrivals.robot_joints)} gave no equation: '
-        'too few of them per filter.window; increase it'
+        'too few of them per filter.window; increase filter.window'
     )
 
 
@@ -153,7 +153,8 @@ def _nothing(arrivals: Arrivals) -> tuple[int, str]:
     if arrivals.unreadable:
         return ERROR, (
             f'none of {arrivals.unreadable} joint states could be read: '
-            f'{arrivals.unreadable_reason}; mend what publishes {arrivals.joint_states}: '
+            f'{arrivals.unreadable_reason}; correct the node that publishes '
+            f'{arrivals.joint_states}: '
             f'{", ".join(arrivals.publishers)}'
         )
     if arrivals.received:
@@ -205,7 +206,7 @@ def _state_remedy(reason: str, arrivals: Arrivals) -> str:
         'clock': 'their stamps are far from those of other states; check the clock of the source',
         'wrong_length': 'the numbers of positions, velocities or efforts and of names differ',
         'implausible': 'they are far beyond the limits of the robot file; check units and sensors',
-        'reset': 'they waited for their order when all was forgotten; nothing to do',
+        'reset': 'they still waited to be sorted when everything was reset; nothing to do',
         'error': 'an internal error; please report the first one in the log',
         'duplicate': 'stamps repeat; look for several publishers, or a source without stamps',
         'nonfinite': 'positions or velocities are not finite; check the sensors',
@@ -233,7 +234,7 @@ def _command_remedy(reason: str, arrivals: Arrivals) -> str:
         'late': 'older than reorder_window on arrival; check the clocks',
         'clock': 'their stamps are far from those of the states; check the clocks',
         'nonfinite': 'numbers are not finite; check the controller',
-        'reset': 'they waited for their order when all was forgotten; nothing to do',
+        'reset': 'they still waited to be sorted when everything was reset; nothing to do',
         'error': 'an internal error; please report the first one in the log',
     }.get(reason, 'see docs/bringup.md')
 

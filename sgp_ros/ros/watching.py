@@ -96,7 +96,9 @@ def run_watch(
         ):
             turn()
             if time.monotonic() > end:
-                others = f'heard of {sorted(picture.others)}' if picture.others else 'is it up?'
+                others = f'nodes there: {sorted(picture.others)}' if picture.others else (
+                    'is the node running?'
+                )  # fmt: skip
                 raise ConfigError(
                     f'nothing from {node} on /diagnostics within {wait:g} s', '',
                     f'{others}; check ROS_DOMAIN_ID and --node NAME',
@@ -173,12 +175,12 @@ def _head(picture: Picture) -> Any:
     samples, timing = picture.values('samples'), picture.values('timing')
     model = picture.statuses.get('model')
     robot = next((s.hardware_id for s in picture.statuses.values() if s.hardware_id), '?')
-    words = [f'{picture.node}', f'robot {robot}', 'waits' if model is None else model.message]
+    words = [f'{picture.node}', f'robot {robot}', 'waiting' if model is None else model.message]
     numbers = [
         f'{samples.get("rate_hz", "?")} Hz',
         f'{samples.get("used", "?")} states used, {samples.get("lost", "?")} lost',
         f'delay {timing.get("delay_s_p50", timing.get("delay_s_chosen", "?"))} s',
-        f'{timing.get("callback_ms_p99", "?")} ms p99 a message',
+        f'{timing.get("callback_ms_p99", "?")} ms p99 per message',
     ]
     return _text(f'{", ".join(words)}\n{", ".join(numbers)}', 'bold')
 

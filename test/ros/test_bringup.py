@@ -137,7 +137,7 @@ def test_a_file_of_the_robot_may_be_restricted_to_joints_too(graph: Graph) -> No
 def test_joints_beside_a_robot_that_states_its_own_are_refused(
     graph: Graph, robot: Path | str
 ) -> None:
-    with pytest.raises(ConfigError, match='parameter joints beside robot'):
+    with pytest.raises(ConfigError, match='parameter joints is set for robot'):
         _source(graph, robot, 'arm_2_joint')
 
 

@@ -292,7 +292,7 @@ def test_a_model_is_saved_by_name_in_the_folder_of_save_path(graph: Graph, tmp_p
     for _ in range(2):
         assert graph.call(Trigger, '/sgp_node/save').message == str(folder / 'arm-2.b.npz')
     assert rename('mine').successful
-    assert 'no saved model' in graph.call(Trigger, '/sgp_node/save').message
+    assert 'is not a saved model' in graph.call(Trigger, '/sgp_node/save').message
     assert (folder / 'mine.npz').read_text() == 'mine'
     assert rename('').successful
     assert graph.call(Trigger, '/sgp_node/save').message == str(folder / 'model.npz')

@@ -133,7 +133,7 @@ def test_lost_messages_are_counted(graph: Graph) -> None:
     _publish_until(
         graph,
         lambda i: states.publish(_state(sent + i * STEP_NS)),
-        lambda: 'no warning any more: sgp_node: samples: all joint states' in node.stderr,
+        lambda: 'back to normal: sgp_node: samples: all joint states' in node.stderr,
     )
 
 

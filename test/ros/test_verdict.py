@@ -97,7 +97,11 @@ def test_all_is_well_when_every_state_is_used() -> None:
         (
             {'read': 9, 'unreadable': 1, 'unreadable_reason': 'x', 'publishers': ('/a',)},
             WARN,
-            ['1 messages on /arm/joint_states or /arm/command not readable: x', 'mend', '/a'],
+            [
+                '1 messages on /arm/joint_states or /arm/command could not be read: x',
+                'correct the node',
+                '/a',
+            ],
         ),
         ({'read': 100, 'estimated': 0}, WARN, ['100 ', "['pole', 'wheel']", 'filter.window']),
     ],
