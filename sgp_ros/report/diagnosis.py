@@ -172,8 +172,8 @@ def _cancelled(found: Diagnosis, f: Finding) -> dict[str, str]:
     if not is_force or f.share <= _FAR_ABOVE * left:
         return {}
     return {
-        'share': f'it makes {percent(f.share)} of the mean squared effort, more than the nominal '
-        'robot leaves: other effects or bodies cancel part of it'
+        'share': f'it accounts for {percent(f.share)} of the mean squared effort, more than the '
+        'nominal robot leaves: other effects or bodies cancel part of it'
     }
 
 
@@ -187,7 +187,7 @@ def _finding(f: Finding, chart: str = '') -> dict[str, Any]:
         'place': place(f),
         'chart': chart,
         'probability': f'{f.probability:.2f}',
-        'share': f'it makes {percent(f.share)} of the {measured}',
+        'share': f'it accounts for {percent(f.share)} of the {measured}',
         'formula': f.formula,
         'why': f.why[:1].upper() + f.why[1:],
         'is_compared': bool(f.in_simulation),

@@ -24,7 +24,7 @@ def cards(found: Diagnosis) -> list[dict[str, str]]:
     if found.traces.forces or found.verdict in _WITHOUT_FORCES:
         by = {
             'unexplained': 'the final model',
-            'parameters_only': 'corrected parameters of bodies',
+            'parameters_only': 'corrected inertial parameters',
         }.get(found.verdict, 'the finding')
         label = (
             f'of the residual of the nominal robot, in the data learned from, is explained by {by}'

@@ -181,7 +181,7 @@ def _law(found: Diagnosis, i: int, finding: Finding, force: np.ndarray) -> Chart
     off = float(np.sqrt(np.nanmean((curve.measured - curve.law) ** 2)))
     return Chart(
         f'{effect_name(finding)} on {name}',
-        f'Measured and the law over {curve.label}: the law reaches '
+        f'Data and law over {curve.label}: the law reaches '
         f'{spoken(np.nanmax(np.abs(curve.law)))} {unit} and misses the data by {spoken(off)} '
         f'{unit} (root mean square).',
         curve.label, f'effort [{unit}]', curve.x[rows],

@@ -99,7 +99,7 @@ def _bars(
     y, low = np.arange(len(joints)), ends[0]
     for shift, when, colour, label in (
         (0.2, 'before', BEFORE, 'nominal robot'),
-        (-0.2, 'after', AFTER, 'final model'),
+        (-0.2, 'after', AFTER, 'diagnosed robot'),
     ):
         table = proof.errors()[f'{kind}_{when}']
         shown = [float(np.clip(np.nan_to_num(table.get(name, 0.0)), *ends)) for name in joints]
@@ -217,7 +217,7 @@ def _trace(axes: Axes, found: Diagnosis, j: int, shown: slice) -> dict[str, Arti
                   label=effect_name(finding))  # fmt: skip
     if not is_calm(found):
         left = broken(found, traces.after[:, j])[shown]
-        (alike['final model'],) = axes.plot(time, left, color='#D55E00', lw=0.9)
+        (alike['diagnosed robot'],) = axes.plot(time, left, color='#D55E00', lw=0.9)
     alike['noise (2 std)'] = axes.axhspan(-half, half, color=BAND, lw=0, zorder=0)
     axes.margins(x=0.01)
     return alike

@@ -45,7 +45,7 @@ def draw_location(found: Diagnosis) -> Figure:
     joints = important_joints(found)
     left = [('residual of the nominal robot', found.traces.before)]
     if not is_calm(found):
-        left.append(('residual of the final model', found.traces.after))
+        left.append(('residual of the diagnosed robot', found.traces.after))
     figure = Figure(figsize=(1.0 + 4.5 * len(left), 0.3 + 3.2 * len(joints)), layout='constrained')
     grid = figure.subplots(len(joints), len(left), squeeze=False, sharex='row', sharey='row')
     for row, j in zip(grid, joints, strict=True):

@@ -93,8 +93,8 @@ def near_and_far(found: Diagnosis) -> str:
         for stem, p in sorted(held.items(), key=lambda item: item[1].distance)
     ]
     return (
-        'Distance of the states from the nearest one learned from, in standard deviations per '
-        f'coordinate, median: {", ".join(parts)}.'
+        'Median distance of the states from the nearest state learned from, in standard '
+        f'deviations per coordinate: {", ".join(parts)}.'
     )
 
 
@@ -119,7 +119,7 @@ def rollouts_sentences(found: Diagnosis) -> str:
         f'Roll-outs start from measured states and last {HORIZON_S:g} s under the recorded '
         'commands; 1 is the error of staying at the start position, and a model that is '
         f'worse exceeds it. {on}, the rms error of {joint} is {misses[0]} its travel for the '
-        f'nominal robot and {misses[1]} it for the final model. '
+        f'nominal robot and {misses[1]} it for the diagnosed robot. '
         f'Number of roll-outs: {", ".join(parts)}.'
     )
 

@@ -25,7 +25,7 @@ UNKNOWN = 'unknown'
 """Name of what no effect of the catalogue describes."""
 _WORDS = {UNKNOWN: 'an unknown effect', 'gain_scale': 'a factor on the stated gains'}
 _PLACES = {'base': 'at the base', 'tool': 'at the tool', 'all': 'on all joints'}
-_ENTRIES = {f'com_{axis}': f'{axis} of the centre' for axis in 'xyz'}
+_ENTRIES = {f'com_{axis}': f'{axis} of the centre of mass' for axis in 'xyz'}
 _MEANINGLESS = 1e6
 """Error over variance that only a constant effort gives."""
 _MOST_ERRORS = 3
@@ -66,7 +66,7 @@ def gain_text(subject: str, found: Diagnosis) -> str:
     """Say which share of the nominal robot's residual is explained, or that nothing is."""
     share = explained(found)
     if share <= 0.0:
-        return 'the residual of the nominal robot does not become smaller by it'
+        return 'this does not make the residual of the nominal robot smaller'
     return f'{subject} {percent(share)} of the residual of the nominal robot'
 
 
@@ -143,7 +143,7 @@ def differences_text(found: Diagnosis) -> list[str]:
         text = f'{d.recording} has {place(d)} {phrase(d)}'
         if d.difference != d.parameters:
             own = replace(d, parameters=d.difference)
-            text += f', that is {", ".join(numbers(own))} beyond the others'
+            text += f', which differs from the others by {", ".join(numbers(own))}'
         lines.append(f'{text} (probability {d.probability:.2f})')
     return lines
 

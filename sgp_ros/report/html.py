@@ -29,7 +29,7 @@ MEANINGS = {
     'wrong_length': 'the numbers of positions, velocities or efforts and of names differ',
     'clock': 'a stamp far from those of the other states',
     'implausible': 'far beyond the limits of position, speed or effort in the model file',
-    'reset': 'waited for its order when all was forgotten on request',
+    'reset': 'still waiting to be sorted when everything was reset on request',
     'error': 'an internal error of this package; please report it',
 }
 
@@ -130,7 +130,7 @@ def _picture(engine: Engine, history: History, metrics: Mapping[str, Any]) -> st
     rows = [e.position for e in history.estimates]  # n of (k,)
     middle = np.median(rows, axis=0) if rows else np.zeros(len(robot.joints))
     posture = dict(zip(robot.joint_names, middle.tolist(), strict=True))
-    what = 'share of what the physics alone leaves by joint'
+    what = 'share of the residual of the physics alone by joint'
     return picture_of_robot(robot, posture, shares, what)
 
 

@@ -170,7 +170,9 @@ def picture_of(found: Identification, findings: Mapping[str, Any], tree: Tree) -
     total = sum(left.values())
     shares = {joint: x / total for joint, x in left.items()} if total else {}
     posture = np.median(found.data.U[:, : len(left)], axis=0)
-    return robot_picture(tree, posture, shares, 'share of what the physics alone leaves by joint')
+    return robot_picture(
+        tree, posture, shares, 'share of the residual of the physics alone by joint'
+    )
 
 
 def _cards(findings: Mapping[str, Any]) -> list[dict[str, str]]:

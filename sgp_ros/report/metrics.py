@@ -107,7 +107,7 @@ def model_remarks(engine: Engine, asked: EngineConfig) -> list[str]:
                 f'diagnosis: {", ".join(left_out)}'
             )
     remarks += [
-        f'Z of {joint} erred more than the physics alone: its weight in predictions was '
+        f'Z of {joint} predicted worse than the physics alone: its weight in predictions was '
         f'{weight.mean:.2f} on average and ended at {weight.value:.2f}'
         for joint, weight in engine.process_weights().items()
         if weight.n and weight.mean < 0.5

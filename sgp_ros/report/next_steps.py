@@ -114,7 +114,7 @@ def after_check(given: Given, *, is_fit: bool) -> Steps:
 
 def after_simulation(path: Path, robot: str) -> Steps:
     """Return what to do with a simulated recording of a robot."""
-    return [('Find the effects that were put in:',
+    return [('Find the effects that were added:',
              f'sgp diagnose {_path(path)} --robot {quote(robot)}')]  # fmt: skip
 
 
@@ -140,7 +140,7 @@ def after_export(path: Path) -> Steps:
 
 def after_campaign(out: Path) -> Steps:
     """Return what to do with the results of many recordings."""
-    return [('With more recordings, repeat it; what is finished is kept:',
+    return [('Repeat it with more recordings; finished ones are kept:',
              f'sgp campaign RECORDINGS --robot ROBOT.urdf --out {_path(out)}')]  # fmt: skip
 
 

@@ -143,8 +143,8 @@ def _unexplained(found: Diagnosis) -> str:
     top = listed[0]
     nearest = [f for f in listed if f.log_bayes_factor == top.log_bayes_factor]
     names = ' with '.join(dict.fromkeys(plain_name(f.effect) for f in nearest))
-    why = f' {top.why}' if top.why else ''
-    return f'{text}. No listed effect is asserted; the nearest is {names}:{why}.'
+    why = f': {top.why}' if top.why else ''
+    return f'{text}. No listed effect is asserted; the nearest is {names}{why}.'
 
 
 def _is_compared(found: Diagnosis) -> bool:
@@ -170,7 +170,7 @@ def _against_simulation(found: Diagnosis) -> str:
             f'({certainty_text(found.certainty)}).{both}'
         )
     return (
-        'No mismatch: machine and simulation differ by too little to be missing physics '
+        'No mismatch: machine and simulation differ by too little to count as missing physics '
         f'({certainty_text(found.certainty)}).{both}'
     )
 

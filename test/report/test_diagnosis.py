@@ -408,13 +408,13 @@ def test_the_proof_tells_near_from_far_with_intervals_and_roll_outs():
     """In plain words: by how much of the way each model misses, and what is in no mean."""
     found = diagnosis('missing_physics', [COULOMB])
     text = _text(render(found, {}))
-    assert 'median: real_test 1.5' in text
+    assert 'deviations per coordinate: real_test 1.5' in text
     assert '0.0004 0.0003 to 0.0005' in text
     assert (
         'On real_test, the rms error of shoulder is 30 % of its travel for the nominal robot'
         in text
     )
-    assert 'and 2 % of it for the final model' in text
+    assert 'and 2 % of it for the diagnosed robot' in text
     assert 'learned from 40, real_test 40 (3 left out' in text
     assert 'real_test 1 (0.9 to 1.1) and -2 nat' in text
 

@@ -188,7 +188,7 @@ def test_the_page_draws_the_robot_and_says_errors_in_units_first(found, findings
     """An axis has all of what the physics alone leaves."""
     picture = picture_of(found, findings, read_urdf(AXIS))
     assert 'axis 100 %' in picture
-    assert 'share of what the physics alone leaves' in picture
+    assert 'share of the residual of the physics alone' in picture
     page = render('', findings, {}, picture=picture)
     physics, both = (findings['scores'][m]['held out']['joints']['axis']['rmse']
                      for m in ('PR', 'SGP'))  # fmt: skip
