@@ -20,7 +20,7 @@ def add_commands(add: AddCommand) -> None:
                         help='few seeds, under two minutes')  # fmt: skip
     parser = add(
         'bench', 'sgp_proof.bench.command:run_bench',
-        'Measure speed and memory, beside other packages and the limit of the machine.',
+        'Measure speed and memory, compared with other packages and the limit of the machine.',
         'sgp bench step --out out/bench',
     )  # fmt: skip
     words = 'step, evidence, replay, diagnose or identify (default: all)'

@@ -260,7 +260,7 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
         found.add_argument('--json', dest='_json', action='store_true',
                            help='print the result as JSON; text goes to stderr')  # fmt: skip
         found.add_argument('--quiet', dest='_quiet', action='store_true',
-                           help='print no text and no progress, errors only')  # fmt: skip
+                           help='print errors only, no text and no progress')  # fmt: skip
         return found
 
     for add_one in COMMANDS:

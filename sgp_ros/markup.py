@@ -64,7 +64,7 @@ class _Keys:
         if self._is_next and isinstance(event, yaml.ScalarEvent) and event.value != '<<':
             if event.value in self._seen:
                 line = 0 if event.start_mark is None else event.start_mark.line + 1
-                raise YAMLError(f'the key {event.value[:80]!r} stands there again in line {line}')
+                raise YAMLError(f'the key {event.value[:80]!r} is repeated in line {line}')
             self._seen.add(event.value)
         self._is_next = not self._is_next
 
@@ -96,7 +96,7 @@ def _require_bounded(text: str) -> None:
             aliases += 1
             require_within(aliases, 'ALIASES', 'number of aliases in the YAML')
             if event.anchor not in sizes:
-                raise YAMLError(f'the alias {event.anchor} stands for nothing before it')
+                raise YAMLError(f'the alias {event.anchor} has no anchor before it')
             entries += sizes[event.anchor]
         entries += 1
         require_within(entries, 'ENTRIES', 'number of entries in the YAML')

@@ -23,6 +23,6 @@ def optional_package(name: str, purpose: str, extra: str) -> Any:
         return import_module(name)
     except ImportError as error:
         raise ConfigError(
-            f'the package {name} {purpose} is missing ({error})', name,
+            f'the package {name}, needed {purpose}, is missing ({error})', name,
             f"pip install 'sgp_ros[{extra}]'",
         ) from error  # fmt: skip

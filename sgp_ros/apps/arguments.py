@@ -262,7 +262,7 @@ def _add_without_arguments(add: AddCommand) -> None:
     add('robots', 'sgp_ros.apps.terminal:run_robots', 'List the built-in robots and their joints.',
         'sgp robots')  # fmt: skip
     add('compile', 'sgp_ros.apps.compiling:run_compile',
-        'Compile the numerical code now instead of in the first commands.', 'sgp compile'
+        'Compile the numerical code now, so that the first commands start faster.', 'sgp compile'
         )  # fmt: skip
 
 

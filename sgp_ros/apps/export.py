@@ -72,9 +72,7 @@ def _origin(handed: Handover, model: str | None) -> Path | None:
         return None
     path = Path(str(model or stated))
     if not path.is_file():
-        raise ConfigError(
-            f'no MJCF at {path}, from which the robot came', 'the file', 'name it with --model'
-        )
+        raise ConfigError(f'no MJCF at {path}', 'the MJCF of the robot', 'name it with --model')
     return path
 
 

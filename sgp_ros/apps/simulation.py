@@ -90,7 +90,8 @@ def run_simulation(
         truth, motion = write_truth(recording, out)
     n = len(recording.stamps_ns)
     print(simulator.description)
-    print(f'{n} samples of {", ".join(recording.joint_names)} in {path}, the truth in {truth}')
+    joints = ', '.join(recording.joint_names)
+    print(f'{n} samples of {joints} in {path}, the true parameters in {truth}')
     print(next_lines(after_simulation(path, robot)))
     return {
         'recording': str(path), 'truth': str(truth), 'motion': str(motion), 'samples': n,

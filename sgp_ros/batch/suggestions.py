@@ -170,5 +170,5 @@ def _in_words(
     if held:
         places = (f'{name} at {q:.3g} {units[name]}' for name, q in held.items())
         text += ', hold ' + ', '.join(places)
-    text += f': {gained} more direction' + ('s' if gained > 1 else '')
+    text += f': determines {gained} more combination' + ('s' if gained > 1 else '')
     return text + (f', shows {"; ".join(shows)}' if shows else '')

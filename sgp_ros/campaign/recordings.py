@@ -59,7 +59,7 @@ def find_recordings(places: Sequence[str]) -> dict[str, Path]:
             root = Path(*takewhile(lambda part: not glob.has_magic(part), Path(place).parts))
             matches = sorted(root.glob(str(Path(place).relative_to(root))))
         else:
-            raise RecordingError(f'nothing at {place}', _EXPECTED, 'check the path')
+            raise RecordingError(f'no file or folder at {place}', _EXPECTED, 'check the path')
         is_one = len(matches) == 1 and matches[0] == root and _is_recording(root)
         roots.append((root.parent if is_one else root).resolve())
         for match in matches:

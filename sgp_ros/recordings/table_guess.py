@@ -72,7 +72,7 @@ def guess_map(
         texts = sorted(name for name, column in columns.items() if as_numbers(column) is None)
         raise RecordingError(
             f'no column of positions among {sorted(set(columns) - set(texts))}'
-            + f' (no numbers, or not throughout: {texts})' * bool(texts),
+            + f' (not numeric throughout: {texts})' * bool(texts),
             'a name such as q, position, joint1_pos',
             'rename a column, or write a map (docs/import.md)',
         )  # fmt: skip

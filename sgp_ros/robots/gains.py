@@ -86,7 +86,7 @@ def read_gains(path: Path, joints: Sequence[str], actuated: Sequence[str]) -> Ga
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         reason = str(error).splitlines()[0]
         raise ConfigError(
-            f'{path.name}: {reason}', 'a YAML file with kp and kd by joint'
+            f'gains {path.name} cannot be read ({reason})', 'a YAML file with kp and kd by joint'
         ) from None
     return checked_gains(content, path.name, joints, actuated)
 

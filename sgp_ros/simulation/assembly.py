@@ -57,7 +57,7 @@ def make_simulation(
     name = next(iter(simulator.controllers)) if controller is None else controller
     if name not in simulator.controllers:
         raise ConfigError(
-            f'controller {name!r} of robot {simulator.name}',
+            f'robot {simulator.name} has no controller {name!r}',
             f'one of {list(simulator.controllers)}',
         )
     rate = simulator.rate_hz if rate_hz is None else rate_hz

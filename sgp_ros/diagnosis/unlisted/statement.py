@@ -230,7 +230,7 @@ def sentence(smooth: SmoothForce, shape: Shape, unit: str, per: str) -> str:
         how = f'falls from {ends[0]} to {ends[1]}'
     else:
         how = f'stays near {peak:.2g} {per}'
-    return f'{does} by a force that {how}'
+    return f'{does} with a force that {how}'
 
 
 def _course(x: np.ndarray, f: np.ndarray, smooth: SmoothForce, unit: str, per: str) -> str:

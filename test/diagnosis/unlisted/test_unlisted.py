@@ -84,7 +84,7 @@ def test_the_shape_is_described_in_words_and_numbers(braked):
     best = search.formulas[0].curve
     assert np.abs(best - shown)[np.isfinite(best)].max() < 0.1 * np.abs(true).max()
     assert (np.diff(search.seen_x) >= 0.0).all()
-    assert search.words.startswith('resists the motion by a force that rises to 0.6')
+    assert search.words.startswith('resists the motion with a force that rises to 0.6')
     far = np.array([_brake(0.0, (0.0,), (v,))[0] for v in search.beyond_x])
     far *= np.sign(search.beyond_x) if search.factor else 1.0
     assert search.beyond_x[-1] > 1.4 * search.x[-1]

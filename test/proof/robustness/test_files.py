@@ -127,7 +127,7 @@ def _robot(path):
         ('sixty.yaml', harm.SETTINGS['sixty.yaml'], load_parameters, 'SGP_MOST_LINE'),
         ('wide.jsonl', harm.TABLES['wide.jsonl'], _columns, 'SGP_MOST_UNPACKED_MB'),
         ('lists.json', harm.TABLES['lists.json'], _columns, 'SGP_MOST_'),
-        ('circle.yaml', harm.SETTINGS['circle.yaml'], load_parameters, 'stands for nothing'),
+        ('circle.yaml', harm.SETTINGS['circle.yaml'], load_parameters, 'has no anchor before it'),
         ('date.yaml', harm.SETTINGS['date.yaml'], load_parameters, 'month'),
         ('pipe.sdf', os.mkfifo, _robot, 'nor a file'),
         ('pipe.yaml', os.mkfifo, lambda p: read_gains(p, (), ()), 'not a regular file'),
