@@ -98,7 +98,7 @@ def run_campaign(
     table = read_covariates(chosen.covariates, tuple(found), remarks)
     jobs = _jobs(found, robot, chosen)
     if (out / RESULTS).is_symlink():
-        raise ConfigError(f'{out / RESULTS} is a link', 'no link there', 'remove it')
+        raise ConfigError(f'{out / RESULTS} is a link', 'a plain folder', 'remove the link')
     (out / RESULTS).mkdir(parents=True, exist_ok=True)
     mark_folder(out, 'campaign')  # an interrupted run has left its sign
     with replacing_results(out, 'campaign'):

@@ -198,7 +198,7 @@ def _read(
         stem = Path(bag).stem
         if stem in found or stem in taken:
             raise RecordingError(
-                f'two recordings with the name {stem!r}', 'different names', 'rename one'
+                f'two recordings are named {stem!r}', 'different names', 'rename one'
             )
         found[stem] = _events(bag, robot, options, remarks)
     return found

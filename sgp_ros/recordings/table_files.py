@@ -64,7 +64,7 @@ def _load_npz(path: Path, remarks: list[str]) -> Columns:
     except (ValueError, OSError, zipfile.BadZipFile, EOFError, AttributeError) as error:
         raise RecordingError(f'{path} cannot be read ({error})', 'a NumPy .npz file') from error
     if left:
-        remarks.append(f'{path.name}: {left} hold Python objects and are not read')
+        remarks.append(f'{path.name}: {left} contain Python objects and are not read')
     return columns
 
 

@@ -102,7 +102,7 @@ def _lock(path: Path) -> int | None:
     except OSError as error:
         if error.errno != errno.ELOOP:
             raise
-        raise ConfigError(f'{path} is a link', 'no link there', 'remove it') from error
+        raise ConfigError(f'{path} is a link', 'a plain file', 'remove the link') from error
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:

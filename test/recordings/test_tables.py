@@ -237,7 +237,7 @@ def test_an_array_that_is_damaged_is_not_left_out(tmp_path):
     remarks = []
     columns, _ = load_columns(path, remarks)
     assert set(columns) == {'t', 'q'}
-    assert remarks == ["x.npz: ['o'] hold Python objects and are not read"]
+    assert remarks == ["x.npz: ['o'] contain Python objects and are not read"]
     with zipfile.ZipFile(path) as file:
         parts = {name: file.read(name) for name in file.namelist()}
     with zipfile.ZipFile(path, 'w') as file:

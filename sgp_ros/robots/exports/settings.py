@@ -56,13 +56,13 @@ def write_isaaclab(handed: Handover) -> tuple[str, list[str]]:
     held = [*ISAACLAB_HELD, *(['gain'] if handed.has_targets else [])]
     left = handed.left_out(held)
     passive = [
-        f'{n}: a joint without motor keeps damping {j.damping:.4g}, friction {j.friction:.4g} and '
-        f'rotor inertia {j.armature:.4g} of the file of the robot'
+        f'{n}: the joint has no motor, so damping {j.damping:.4g}, friction {j.friction:.4g} and '
+        f'rotor inertia {j.armature:.4g} come from the robot file'
         for n, j in handed.joints.items() if not j.is_driven
     ]  # fmt: skip
     apart = {j.delay for j in driven.values()}
     if len(apart) > 1:
-        left.append(f'delays of several sizes {sorted(apart)}: the largest is written for all')
+        left.append(f'different delays {sorted(apart)}: the largest is written for all joints')
     return '\n'.join(lines), [*left, *passive]
 
 
