@@ -93,7 +93,7 @@ class DeadZone(_Drive):
     name = 'dead_zone'
     words = 'a dead zone of the drive'
     formula = 'motor torque = u - clip(u, -width, width)'
-    appearance = 'small commands have no effect; large ones act with a constant loss'
+    appearance = 'small commands have no effect; large ones lose a constant amount'
     quantities = (Quantity('width', 'N m', low=0.0, is_positive=True),)
     drawn_over = 'effort'
 
@@ -262,7 +262,7 @@ class CommandDelay(_Late):
     name = 'command_delay'
     words = 'a delay of the command'
     formula = 'motor torque(t) = command(t - delay)'
-    appearance = 'the motion responds to commands late, otherwise unchanged'
+    appearance = 'the motion responds to commands late, but is otherwise unchanged'
     quantities = (
         Quantity('delay', 's', low=0.0, is_positive=True, is_sought=True, joint_number='delay'),
     )
