@@ -132,4 +132,4 @@ def test_it_is_documented(registered):
     text = module.text()
     assert f'## `{NAME}`' in text
     assert '| `c` | N m s3/rad3 | at least 0 |' in text
-    assert f'The {len(EFFECTS)} effects' in text
+    assert f'This page lists the {len(EFFECTS)} effects' in text

@@ -79,7 +79,8 @@ class Hypothesis:
 
     def remedy(self, values: Mapping[str, float]) -> str:
         """Return what to do about the error of these numbers, a sentence."""
-        return _REMEDIES[self.effect].format(joint=self.joint, **values, **self.words)
+        joint = 'all joints' if self.joint == ALL else self.joint
+        return _REMEDIES[self.effect].format(joint=joint, **values, **self.words)
 
     @property
     def neutral(self) -> np.ndarray:
