@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
+from typing import NamedTuple
 
 from sgp_ros.physics.example import example_effect
 
@@ -17,8 +17,7 @@ _HANDED_BACK = {'.xml': 'mjcf', '.mjcf': 'mjcf', '.sdf': 'sdf'}
 """Ending of a robot's file to the format of `sgp export`; the URDF is among the results."""
 
 
-@dataclass(frozen=True, slots=True)
-class Given:
+class Given(NamedTuple):
     """Inputs of a command.
 
     Attributes:
