@@ -60,8 +60,15 @@ _POWER = re.compile(r'((?:(?<=kg )|(?<=m )|(?<=m\u00a0)|(?<=N )|(?<=/))(?:m|s|ra
 """A unit with a power, behind another unit; a joint may be called m2."""
 
 
+_EXPONENT = re.compile(r'\b(\d+(?:\.\d+)?)e([+-])0*(\d+)\b')
+_RAISED = str.maketrans('0123456789', '⁰¹²³⁴⁵⁶⁷⁸⁹')
+
+
 def typeset(text: str) -> str:
-    """Return text with the signs that a terminal may lack."""
+    """Return text with the signs that a terminal may lack; no number breaks at its exponent."""
+    text = _EXPONENT.sub(
+        lambda x: f'{x[1]}·10{"⁻" * (x[2] == "-")}{x[3].translate(_RAISED)}', text
+    )
     for plain, sign in _SIGNS.items():
         text = text.replace(plain, sign)
     return _POWER.sub(lambda found: found[1] + '²³'[int(found[2]) - 2], text)
