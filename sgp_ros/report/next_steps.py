@@ -13,8 +13,11 @@ Steps = Sequence[tuple[str, str]]
 PLUS_MINUS = '+- is half the width of a 95 % interval'
 _OTHER = 'OTHER.mcap'
 """Stands for a recording of the reader."""
-_HANDED_BACK = {'.xml': 'mjcf', '.mjcf': 'mjcf', '.sdf': 'sdf'}
-"""Ending of a robot's file to the format of `sgp export`; the URDF is among the results."""
+_HANDED_BACK = {
+    '.xml': 'mjcf', '.mjcf': 'mjcf', '.sdf': 'sdf', '.urdf': 'urdf', '.xacro': 'urdf',
+}  # fmt: skip
+"""Ending of a robot's file to the format of `sgp export`; the URDF beside the results holds
+bodies alone."""
 
 
 class Given(NamedTuple):
