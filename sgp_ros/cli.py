@@ -64,7 +64,7 @@ DEBUG = 'SGP_DEBUG'
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status: 0, 2 on bad input, 70 on a bug."""
-    given = list(sys.argv[1:] if argv is None else argv)
+    given = list(sys.argv[1:] if argv is None else argv) or ['--help']
     try:
         parser = _parser(given)
         _complete(parser)

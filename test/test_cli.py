@@ -284,10 +284,11 @@ def test_a_number_that_makes_no_sense_is_refused_as_it_was_given(arguments, said
     assert said in _refused(arguments.split(), capsys)
 
 
-def test_the_help_groups_the_commands_and_shows_an_example(capsys):
-    """Also those that other packages add; each stands there once."""
+@pytest.mark.parametrize('words', ['--help', ''])
+def test_the_help_groups_the_commands_and_shows_an_example(words, capsys):
+    """Also those that other packages add; each stands there once. It comes unasked too."""
     with pytest.raises(SystemExit):
-        main(['--help'])
+        main(words.split())
     text = capsys.readouterr().out
     parts = ('Explore', '  demo ', 'Analyse a', '  diagnose ', 'Work with', '  bench ')
     at = [text.index(part) for part in (*parts, 'example')]
