@@ -162,4 +162,5 @@ def test_units_are_written_with_their_signs_and_joints_keep_their_names():
 
 def test_a_number_is_not_broken_at_its_exponent():
     """A narrow table breaks lines at a hyphen; a name keeps its own."""
-    assert typeset('3.8e-06 to 4e+07, link2e-05') == '3.8·10⁻⁶ to 4·10⁷, link2e-05'
+    assert typeset('3.8e-06 to 4e+12, link2e-05') == '3.8·10⁻⁶ to 4·10¹², link2e-05'
+    assert typeset('4.8e+02 (3.6e+02 to 6e+02)') == '480 (360 to 600)'
