@@ -19,7 +19,7 @@ def _detection(found):
     looks = list(next(iter(found.values()))['found_after'])
     head = ' | '.join(f'within {look}' for look in looks)
     lines = [
-        f'| it grows | {head} | its place held | its size held | looks with a false change |',
+        f'| growth | {head} | interval contains the place | interval contains the size | looks with a false change |',
         '|---|' + '---|' * (len(looks) + 3),
     ]
     for name, x in found.items():
@@ -34,14 +34,14 @@ def _detection(found):
 
 def _waiting(found):
     lines = [
-        f'| workers | tasks of {found["task_s"]:g} s | seconds | without any cost | processor of scheduler and client | load of the computer |',
+        f'| workers | tasks of {found["task_s"]:g} s | seconds | without any overhead | processor time of scheduler and client | load of the computer |',
         '|---|---|---|---|---|---|',
     ]
     for n, x in found['workers'].items():
         tasks = int(n) * found['tasks_per_worker']
         lines.append(
             f'| {n} | {tasks} | {x["seconds"]:.1f} | {x["ideal"]:.1f} | '
-            f'{x["scheduler_ms_per_task"]:.1f} ms a task | {x["load_before"]:.1f} |'
+            f'{x["scheduler_ms_per_task"]:.1f} ms per task | {x["load_before"]:.1f} |'
         )
     return '\n'.join(lines)
 
@@ -49,22 +49,22 @@ def _waiting(found):
 def _speed(found):
     one, two = found['1'], found['2']
     return (
-        f'Recordings of a linear axis, `identify`: {one["recordings_per_s"]:.2f} a second on one worker, '
-        f'{two["recordings_per_s"]:.2f} on two, a ratio of {found["ratio"]:.2f} (target 1.8: '
+        f'**Speed.** With `identify` on recordings of a linear axis, one worker processes {one["recordings_per_s"]:.2f} recordings a '
+        f'second and two workers {two["recordings_per_s"]:.2f}, a ratio of {found["ratio"]:.2f} (target 1.8: '
         f'{"met" if found["ratio"] >= 1.8 else "**missed**"}). The computer has two cores, which scheduler and writer share '
-        'with the workers, and did nothing else.'
+        'with the workers; it was otherwise idle.'
     )
 
 
 def _kills(found):
     same = (
-        'is the same to the byte as that of an undisturbed run'
+        'is identical to the byte to that of an undisturbed run'
         if found['same_table']
         else 'differs'
     )
     return (
-        f'A campaign of {found["recordings"]} recordings on two workers, in which {found["killed_workers"]} workers and '
-        f'{found["killed_runs"]} whole runs were killed (SIGKILL) at random moments: its `results.parquet` {same}.'
+        f'In a campaign of {found["recordings"]} recordings on two workers, {found["killed_workers"]} workers and '
+        f'{found["killed_runs"]} whole runs were killed (SIGKILL) at random moments. Its `results.parquet` {same}.'
     )
 
 
@@ -74,12 +74,12 @@ def _workers(result):
         busy = 8e-1 * result['waiting']['workers']['8']['scheduler_ms_per_task']
         parts += [
             (
-                'Tasks that only wait show what the spreading itself costs, with any number of workers. All of it runs on the\n'
-                'two cores of a computer that did nothing else; the load is the mean of the minute before:'
+                'Tasks that only wait show the overhead of distributing them, with any number of workers. Everything runs on the\n'
+                'two cores of an otherwise idle computer; the load is the mean of the minute before:'
             ),
             _waiting(result['waiting']),
             (
-                'Recordings that take one second each would, with eight workers, keep scheduler and client busy for '
+                'With eight workers and recordings that take one second each, scheduler and client would be busy for '
                 f'{busy:.0f} % of\nthe time.'
             ),
         ]

@@ -1,4 +1,4 @@
-"""Write docs/connection.md: wrong connections, and simulations beside machines, as measured.
+"""Write docs/connection.md: wrong connections, and machines with their simulations, as measured.
 
 python docs/generate_connection.py
 """
@@ -13,9 +13,9 @@ ROOT = Path(__file__).parents[1]
 TARGET = ROOT / 'docs' / 'connection.md'
 _PAGE = """# Set-up errors and simulations, measured
 
-How often a diagnosis names an error of the connection, and how often it finds in what a machine and its simulation differ.
-Both tests draw robots, motions and errors from a seed, so anyone can repeat them or draw others. They are small: read the
-tables, not the shares. The names are those of [effects](effects.md) and of [set-up errors](check.md).
+This page shows how often a diagnosis names an error of the connection, and how often it finds the difference between a machine and
+its simulation. Both tests draw robots, motions and errors from a seed, so anyone can repeat them or draw others. The tests are
+small: look at the single worlds, not at the percentages. The names are those of [effects](effects.md) and of [set-up errors](check.md).
 
 ## Set-up errors
 
@@ -23,11 +23,16 @@ tables, not the shares. The names are those of [effects](effects.md) and of [set
 python -m sgp_proof.connection.run --seeds {setup_seeds}
 ```
 
-Simulated robots whose recording or robot file has an error: an encoder zero, a sign, a unit, two joints exchanged, efforts of
-another scale, a clock offset, a base that is not level, a joint origin. Some lack physics besides. *Right* means that the
-error, its joint and its channels are named, and each number to a tenth of the error. *Open* means that no wrong error is
-asserted: the error was missed, or its probability was 0.5 or less. *Wrong* means that an error was asserted that is not there.
-Physics that is asserted in place of an error is not scored here: it stands in the answer, each name with its probability.
+The recording or the robot file of a simulated robot has an error: an encoder zero, a sign, a unit, two swapped joints, efforts of
+another scale, a clock offset, a base that is not level, or a joint origin. In some worlds, physics is missing as well. The outcomes
+are:
+
+* *Right*: the error, its joint and its channels are named, and each number is right to a tenth of the error.
+* *Open*: no wrong error is asserted, but the error was missed or its probability was 0.5 or less.
+* *Wrong*: an error is asserted that is not there.
+
+Physics that is asserted in place of an error is not scored here. It is shown in the column *answer*, each name with its
+probability.
 
 | | worlds | right | open | wrong |
 |---|---|---|---|---|
@@ -45,16 +50,16 @@ Physics that is asserted in place of an error is not scored here: it stands in t
 |---|---|---|---|
 {setup_right}
 
-## A simulation beside the machine
+## A machine and its simulation
 
 ```bash
 python -m sgp_proof.connection.simulated --seeds {sim_seeds}
 ```
 
-`sgp diagnose real.mcap --robot arm.urdf --sim sim.mcap`: machine and simulation share one or two frictions that the
-robot file lacks, and differ in the size of one, in an effect that only one of them has, or in nothing. *Right* means that
-the difference is named with its joint and its size (to a tenth, or within three standard deviations), and nothing else is
-asserted; where nothing differs, that the verdict says so. Sizes are machine minus simulation, in SI units.
+This tests `sgp diagnose real.mcap --robot arm.urdf --sim sim.mcap`. Machine and simulation share one or two frictions that the
+robot file lacks. They differ in the size of one of them, in an effect that only one has, or in nothing. *Right* means that the
+difference is named with its joint and its size (to a tenth, or within three standard deviations), and that nothing else is
+asserted. If nothing differs, it means that the verdict says so. Sizes are machine minus simulation, in SI units.
 
 | what differs | worlds | right | missed | wrong |
 |---|---|---|---|---|
@@ -76,8 +81,8 @@ Of {shared} effects that machine and simulation share, {shared_named} are listed
 """
 _OUTCOMES = {'equivalent': 'open'}
 _KINDS = {
-    'size': 'the size of an effect', 'machine': 'an effect of the machine alone',
-    'simulation': 'an effect of the simulation alone', 'nothing': 'nothing',
+    'size': 'the size of an effect', 'machine': 'an effect that only the machine has',
+    'simulation': 'an effect that only the simulation has', 'nothing': 'nothing',
 }  # fmt: skip
 
 

@@ -52,15 +52,15 @@ def _tier(report):
     lines = [
         f'\n### Tier {report["tier"]}{pairs}: {s["worlds"]} worlds, seeds {report["seeds"]}\n',
         '| | |', '|---|---|',
-        f'| joint and effect right, one effect | {_percent(s["named_single"])} |',
-        f'| top answer right, pairs | {_percent(s["named_pair_top"])} |',
-        f'| components of pairs found | {_percent(s["components_of_pairs"])} |',
+        f'| one effect: joint and effect right | {_percent(s["named_single"])} |',
+        f'| pairs: top answer right | {_percent(s["named_pair_top"])} |',
+        f'| pairs: single effects found | {_percent(s["components_of_pairs"])} |',
         f'| false alarms without missing physics | {_percent(s["false_alarms"])} |',
-        (f'| unknown effects called unexplained, at the right joint | '
+        (f'| unknown effects reported as unexplained, at the right joint | '
         f'{_percent(s["unknown_called_unexplained"])} |'),
         f'| overlap of localised effects, median | {_number(s["overlap_median"])} |',
         f'| parameter error, median | {_number(s["parameter_error_median"], 100, " %")} |',
-        (f'| the same, true structure fitted | '
+        (f'| the same, for the fitted true structure | '
          f'{_number(s["oracle_parameter_error_median"], 100, " %")} |'),
         f'| truth within two standard deviations | {_percent(s["within_two_std"])} |',
     ]  # fmt: skip
@@ -74,7 +74,7 @@ def _tier(report):
         f'| {band["from"]:g} to {band["to"]:g} | {_percent(band)} |' for band in s['probability']
     ]
     if s['confused']:
-        lines += ['\n| truth -> said | worlds |', '|---|---|']
+        lines += ['\n| hidden -> reported | worlds |', '|---|---|']
         lines += [f'| {what} | {count} |' for what, count in sorted(s['confused'].items())]
     return '\n'.join(lines) + '\n'
 
@@ -138,12 +138,12 @@ def _machines(report):
     held_out = s['held_out_of_oracle']
     rows = {
         'worlds fully right': _percent(s['right']),
-        'the same, many effects concealed': _percent(s['right_hidden']),
+        'the same, many effects hidden': _percent(s['right_hidden']),
         'the same, an unlisted law on top': _percent(s['right_unlisted']),
-        'the same, no physics concealed': _percent(s['right_calm']),
-        'false alarms where no physics is concealed': _percent(s['false_alarms']),
+        'the same, no physics hidden': _percent(s['right_calm']),
+        'false alarms where no physics is hidden': _percent(s['false_alarms']),
         'worlds with a wrong law asserted': _percent(s['confidently_wrong']),
-        'worlds called unexplained though the list explains them': _percent(
+        'worlds reported as unexplained although the list explains them': _percent(
             s['called_unexplained']
         ),
         'effects asked for that are named (recall)': _percent(s['recall']),
@@ -164,7 +164,7 @@ def _machines(report):
 
 
 PAPER_COLUMNS = (
-    '| | worlds | top answer right | effects that count, found | found beside them | overlap | '
+    '| | worlds | top answer right | effects that count, found | others found | overlap | '
     'parameter error, median | truth within two standard deviations |'
 )
 PAPER_NAMES = {
@@ -223,8 +223,8 @@ def _nulls(worlds):
     alarms = rate(w['verdict'] in {'missing_physics', 'unexplained'} for w in calm)
     price = PER_EFFECT + PER_PARAMETER
     lines.append(
-        f'\nIn total, {_percent(alarms)} are false alarms. The cheapest effect costs '
-        f'{price:g} nats, the verdict `unexplained` requires {100 * LEAST_SHARE:g} % left.'
+        f'\nIn total, {_percent(alarms)} are false alarms. The smallest penalty of an effect is '
+        f'{price:g} nats. The verdict `unexplained` requires that {100 * LEAST_SHARE:g} % is left.'
     )
     return '\n'.join(lines)
 
@@ -261,11 +261,11 @@ def _effects(worlds):
     missing = len(of_list) - len(listed)
     lines.append(
         f'\nThe right model is adequate in {_percent(passed)}; the best model is rejected for an unlisted effect in '
-        f'{_percent(refused)}. Of the worlds with one listed effect, {missing} are not in the '
-        'table, because the right model was not among those fitted.\n\n'
-        f'Because of the errors of filters and signals, models are compared as if a right column left '
-        f'{100 * SHAPE_ERROR:g} % of the discrepancy; {_percent(nearly)} of the right models leave less structure. '
-        f'At most {INDEPENDENT_ROWS:g} rows count. Only the ratio of this number to the penalties matters, and the '
+        f'{_percent(refused)}. The table omits {missing} worlds with one listed effect, '
+        'because the right model was not among those fitted.\n\n'
+        f'Filters and signals have errors, so models are compared as if the right physics column left '
+        f'{100 * SHAPE_ERROR:g} % of the discrepancy. {_percent(nearly)} of the right models leave less structure. '
+        f'At most {INDEPENDENT_ROWS:g} rows count. Only the ratio of this number to the penalties matters; the '
         'table shows the gains under the null hypothesis.'
     )
     return lines
@@ -279,7 +279,7 @@ def _cancelling(report):
     """Return what is named where large forces cancel, by what was concealed, and wrong names."""
     count = report['summary']
     lines = [
-        '| concealed | worlds | named rightly, before | anything wrong, before |',
+        '| hidden | worlds | right names, before | any wrong name, before |',
         '|---|---|---|---|',
     ]
     kinds = dict.fromkeys(w['kind'] for w in report['worlds'])

@@ -34,14 +34,14 @@ TITLES = {
 CAPTIONS = {
     'location': 'The discrepancy from the nominal robot over the state, before and after.',
     'motion': 'Recorded motion, and that of the nominal and the diagnosed robot under the same efforts.',
-    'search': 'What a law would have to follow, with its band, and the formulas that were tried.',
+    'search': 'The shape of the force without a formula, with its band, and the formulas that were tried.',
     'others': 'The other joints on one scale, relative to their own effort.',
-    'time': 'The discrepancy over time (grey), what was found of it, and the residual (orange).',
-    'bands': 'The process Z over each variable, with its band of 95 %.',
+    'time': 'The discrepancy over time (grey), the part that was found, and the residual (orange).',
+    'bands': 'The Gaussian process Z over each variable, with its 95 % band.',
     'dependence': 'The share of the discrepancy that each variable predicts on held-out stretches.',
-    'law': 'The laws that were found, over their variables, beside the data.',
-    'shape': 'What other inertial parameters alone leave.',
-    'proof': 'Errors of efforts and roll-outs before and after.',
+    'law': 'The laws that were found, over their variables, with the data.',
+    'shape': 'What a model with other inertial parameters, but without effects, leaves.',
+    'proof': 'Errors of efforts and roll-outs before and after the correction.',
 }
 GRADES = ('right', 'partly', 'wrong')
 HALF_WIDTH = 1.96
@@ -58,14 +58,14 @@ def quantity(parameter):
 
 
 def parts(machine):
-    """Return the scores of what was learned from and of what was held out, by these names."""
+    """Return the scores of the training data and of what was held out, by these names."""
     fit = {stem: part for stem, part in machine['fit'].items() if isinstance(part, dict)}
-    return {'learned from' if k == 'train' else 'held out': part for k, part in fit.items()}
+    return {'training' if k == 'train' else 'held out': part for k, part in fit.items()}
 
 
 def worst(machine):
     """Return the joint of which the nominal robot leaves most, and each part's nMSE of it."""
-    before = parts(machine)['learned from']['nmse_before']
+    before = parts(machine)['training']['nmse_before']
     joint = max(before, key=before.get)
     errors = {name: f'{part["nmse_before"][joint]:.2g} → {part["nmse_after"][joint]:.2g}'
               for name, part in parts(machine).items()}  # fmt: skip
@@ -121,7 +121,7 @@ def scores(machine):
                for key, what in ERRORS.items() if part.get(f'{key}_before')]  # fmt: skip
     lines = [f'| nMSE | {" | ".join(title for title, *_ in columns)} |']
     lines.append('|---' * (len(columns) + 1) + '|')
-    for joint in parts(machine)['learned from']['nmse_before']:
+    for joint in parts(machine)['training']['nmse_before']:
         cells = ' | '.join(_error(part, key, joint) for _, part, key in columns)
         lines.append(f'| {joint} | {cells} |')
     return '\n'.join(lines)
@@ -161,8 +161,10 @@ def best_family(design):
 def judgement(machine):
     """Return how far a diagnosis meets what was expected, and why not wholly."""
     judged = machine['judged']
-    why = ''.join(f'\n* {reason}' for reason in judged['reasons'])
-    return f'Judged **{judged["grade"]}** (expected from: {machine["source"]}).{why}'
+    why = '\n'.join(f'* {reason}' for reason in judged['reasons'])
+    return f'Judged **{judged["grade"]}** (source of what was expected: {machine["source"]}).' + (
+        f'\n\n{why}' if why else ''
+    )
 
 
 def tally(machines):

@@ -65,10 +65,10 @@ def _rest(worlds):
     best = [min(x['effort_nmse'] for x in world['spans'].values()) for world in worlds]
     lines = [
         (
-            f'How much depends on that time was measured on {len(worlds)} simulated robots with stated dry friction '
-            '(`sgp_proof.concealed.draw`, tiers A and B), each replayed with the true parameters: nMSE of the effort of the '
-            'worst joint, relative to the best multiple for that robot. Every joint is scored on the equations in which no '
-            'multiple takes it to rest:'
+            f'The influence of that time was measured on {len(worlds)} simulated robots with stated dry friction '
+            '(`sgp_proof.concealed.draw`, tiers A and B), each replayed with the true parameters and with multiples of '
+            'the time. The table shows the nMSE of the effort of the worst joint, relative to the best multiple for that '
+            'robot. Every joint is scored on the equations in which no multiple takes it for resting:'
         ),
         '',
         '| multiple of the time | median | largest | equations held, mean |',
@@ -85,7 +85,7 @@ def _rest(worlds):
     lines += [
         '',
         (
-            '0 is two neighbouring intervals, the least. '
+            'A multiple of 0 means two neighbouring intervals, the minimum. '
             f'Effects: {", ".join(f"`{e}`" for e in effects)}. Command: `python -m sgp_proof.concealed.rest_span WORLDS`; '
             'result: [rest_span.json](../sgp_proof/results/rest_span.json).'
         ),

@@ -51,7 +51,7 @@ def _targets(result):
             if (row['joints'], row['seconds']) == (joints, seconds):
                 lines.append(
                     f'* `sgp {command}` of {seconds:g} s with {joints} joints in {most:g} s of '
-                    f'processor: {_word(row["processor_s"] <= most)} '
+                    f'processor time: {_word(row["processor_s"] <= most)} '
                     f'({_number(row["processor_s"])}).'
                 )
                 if (command, joints, seconds) == LONG:
@@ -110,7 +110,7 @@ def _rivals(result):
                 for name, words in RIVALS
             ]
             lines.append(
-                f'| `sgp diagnose`, told nothing: named {row["named"].replace("_", " ")} | '
+                f'| `sgp diagnose`, given no parameters: it named {row["named"].replace("_", " ")} | '
                 f'{_number(row["processor_s"])} | {_number(row["off_percent"], 2)} |'
             )
             return '\n'.join(lines)

@@ -21,28 +21,28 @@ NOTE = 'Generated from the code by `python docs/generate_reference.py`.'
 
 TOPICS = {
     '~/prediction': 'mean of accelerations and efforts, made before the measurement',
-    '~/prediction_variance': 'its variance, calibrated by earlier errors',
-    '~/prediction_raw_variance': 'its variance before calibration',
-    '~/predicted_joint_states': 'predicted effort by joint name, to plot over the measured one',
+    '~/prediction_variance': 'variance of the prediction, calibrated by earlier errors',
+    '~/prediction_raw_variance': 'variance of the prediction before calibration',
+    '~/predicted_joint_states': 'predicted effort by joint name, to plot together with the measured one',
     '~/residual': 'measured minus predicted effort',
-    '~/measured_effort': 'effort as predicted: commanded or measured, filtered, in the order of the robot',
+    '~/measured_effort': 'commanded or measured effort, filtered like the prediction, in the joint order of the robot',
     '~/band/lower': 'lower end of the 95 % interval of the effort',
-    '~/band/upper': 'upper end of it',
+    '~/band/upper': 'upper end of this interval',
     '~/parameters': 'value, standard deviation and unit of every parameter',
-    '~/parameter_values': 'the values alone, to plot',
+    '~/parameter_values': 'only the values, to plot',
     '~/monitor': 'distance of the robot from the learned model',
     '~/alarm': 'true while that distance is above its threshold',
-    '~/diagnosis': 'the last verdict, the content of diagnosis.json',
+    '~/diagnosis': 'the last verdict, as the content of diagnosis.json',
     '~/diagnosis_status': 'progress of a running diagnosis',
     '/diagnostics': 'rate, refused samples by reason, timing, quality of the fit, findings',
 }
 SERVICES = {
     'refit': 'fit the hyper-parameters to the buffer now',
-    'reset': 'forget what was learned, keep the settings',
+    'reset': 'discard what was learned, keep the settings',
     'save': 'write the model to `save.path`',
     'diagnose': 'look for missing physics in the last `diagnosis.window` seconds, in another process',
     'cancel_diagnosis': 'cancel a running diagnosis',
-    'learn': 'learn, or only predict',
+    'learn': 'switch between learning (true) and only predicting (false)',
 }
 
 
@@ -60,19 +60,19 @@ def commands():
     lines = [
         '# Commands',
         '',
-        NOTE,
+        'This page lists the commands of `sgp` with their arguments. ' + NOTE,
         '',
-        'Each command also takes `--out DIR` (folder of the results), `--json` (the result as JSON, alone on stdout), `--quiet`,',
-        '`--force` (write even if it contains other files) and `--help`. Exit status: 0; 2 for what a user can mend, with one',
-        'line on stderr; 130 if interrupted. Names complete with the Tab key after `pip install argcomplete` and',
-        '`eval "$(register-python-argcomplete sgp)"`.',
+        'Each command also takes `--out DIR` (folder of the results), `--json` (only the result on stdout, as JSON), `--quiet`,',
+        '`--force` (write even if the folder contains other files) and `--help`. The exit status is 0 on success, 2 for an error',
+        'that the user can fix (with one line on stderr), and 130 if interrupted. For completion with the Tab key, run',
+        '`pip install argcomplete` and `eval "$(register-python-argcomplete sgp)"`.',
         '',
     ]
     for name, (parser, summary, example) in parsers.items():
         lines += [f'## sgp {name}', '', summary, '', '```text', example, '```', '']
         rows = [_argument(action) for action in parser._actions]
         if rows:
-            lines += ['| argument | |', '|---|---|', *rows, '']
+            lines += ['| argument | meaning |', '|---|---|', *rows, '']
     return '\n'.join(lines)
 
 
@@ -90,26 +90,28 @@ def topics():
     lines = [
         '# Topics and services',
         '',
-        NOTE,
+        'This page lists what the node subscribes to, publishes and offers. ' + NOTE,
         '',
         '## Subscribed',
         '',
-        '| topic | type | |',
+        '| topic | type | content |',
         '|---|---|---|',
         '| `joint_states` | sensor_msgs/JointState | any order of joints; velocity and effort optional |',
-        '| `command` | as `command.type` | the commands, where efforts are not measured |',
-        '| `robot_description` | std_msgs/String | the robot, where `robot` names none |',
+        '| `command` | as `command.type` | the commands, if efforts are not measured |',
+        '| `robot_description` | std_msgs/String | the URDF, if `robot` names no robot |',
         '',
         '## Published',
         '',
-        '| topic | |',
+        '| topic | content |',
         '|---|---|',
     ]
     lines += [f'| `{name}` | {TOPICS[name]} |' for name in published]
     offered = _offered()
-    lines += ['', '## Services', '', '| service | type | |', '|---|---|---|']
+    lines += ['', '## Services', '', '| service | type | effect |', '|---|---|---|']
     lines += [f'| `~/{name}` | std_srvs/{kind} | {SERVICES[name]} |' for name, kind in offered]
-    return '\n'.join([*lines, '', 'Settings are ROS parameters: [settings](../settings.md).', ''])
+    return '\n'.join(
+        [*lines, '', 'Settings are ROS parameters, see [settings](../settings.md).', '']
+    )
 
 
 def _tree(name):
@@ -141,15 +143,15 @@ def robot_files():
     """Return the page of robot files."""
     return '\n'.join([
         '# Robot files', '', NOTE, '',
-        'A robot is given by a name (`sgp robots`), a model file ([URDF, MJCF, SDF](../model_files.md)) or a robot YAML, of which',
-        'there are three kinds. Editors complete and check all of them by [robot.schema.json](robot.schema.json); put this in the',
-        'first line: `# yaml-language-server: $schema=robot.schema.json`.', '',
-        '## A URDF and what is stated beside it', '', _code(urdf_robot), '',
-        '## Lumped coefficients by formulas', '', _code(lumped), '',
-        '## A known robot, changed', '',
+        'A robot is given by a name (`sgp robots`), a model file ([URDF, MJCF, SDF](../model_files.md)) or a robot YAML. This page',
+        'describes the three kinds of robot YAML. Editors complete and check all of them with [robot.schema.json](robot.schema.json)',
+        'if the first line is `# yaml-language-server: $schema=robot.schema.json`.', '',
+        '## A URDF with additional statements', '', _code(urdf_robot), '',
+        '## Lumped coefficients as formulas', '', _code(lumped), '',
+        '## A known robot with changes', '',
         '```yaml', 'schema: 1', 'robot: linear_axis', 'joints: [slide]', 'parameters:',
         '  M: {value: 95.1, std: 0.2, unit: kg}', '```', '',
-        'Effects and their parameters: [effects](../effects.md).', '',
+        'For effects and their parameters, see [effects](../effects.md).', '',
     ])  # fmt: skip
 
 
@@ -220,8 +222,8 @@ def python():
         'print(d)',
         '```',
         '',
-        'Nothing is printed by these functions. What a user can cause raises an `SgpError` in one line. A',
-        '[notebook](../notebook.ipynb) shows them.',
+        'These functions print nothing. An error that a user can cause raises an `SgpError` with a message of one line. A',
+        '[notebook](../notebook.ipynb) shows how to use them.',
         '',
     ]
     for name in ('diagnose', 'identify', 'simulate'):
@@ -232,7 +234,7 @@ def python():
             '',
             inspect.getdoc(kind).split('\n\n')[0],
             '',
-            '| | |',
+            '| member | meaning |',
             '|---|---|',
         ]
         for name, member in vars(kind).items():

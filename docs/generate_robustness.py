@@ -58,7 +58,11 @@ def _still(rows):
     for robot in dict.fromkeys(row['robot'] for row in rows):
         of = [row for row in rows if row['robot'] == robot]
         beyond, lost = (sum(row[name] > WITHIN for row in of) for name in ('ratio', 'ratio_lost'))
-        found.append(f'`{robot}`: {beyond} of {len(of)} with garbage, {lost} with losses')
+        median = np.median([row['nmse'] for row in of])
+        found.append(
+            f'`{robot}`: {beyond} of {len(of)} with garbage, {lost} with losses (median nMSE '
+            f'of the clean streams {median:.2g})'
+        )
     kept = sum(min(row['ratio'], row['ratio'] / row['ratio_lost']) <= WITHIN for row in rows)
     return (
         f'Beyond 10 %: {"; ".join(found)}. Within 10 % of the clean stream, or of the one that lost '
@@ -68,7 +72,7 @@ def _still(rows):
 
 def _many(result):
     lines = [
-        '| rate [Hz] | processor per second of data [s] | of it for fits [s] | in the second half [s] | longest step, fit [s] | median nMSE |',
+        '| rate [Hz] | processor time per second of data [s] | of it for fits [s] | in the second half [s] | longest step, fit [s] | median nMSE |',
         '|---|---|---|---|---|---|',
     ]
     for name, x in result['runs'].items():
@@ -170,7 +174,7 @@ def text() -> str:
         KEPT='; '.join(f'{n} {kept}' for kept, n in kills['kept'].items()),
         LOST=f'{kills["most_lost_s"]:.2f}', DISK=_disk(disk),
         MACHINE=_machines({
-            'events': events, 'messages': messages, 'files': files, 'files made to harm': harm,
+            'events': events, 'messages': messages, 'files': files, 'malicious files': harm,
             'kills': kills, 'disks': disk, 'gates': gates, 'their cost': gate_time,
             'thirty joints': many,
         }),

@@ -14,13 +14,14 @@ from sgp_ros.ros.settings import FIRST, node_settings
 TARGET = Path(__file__).parent / 'settings.md'
 HEAD = """# Settings
 
-Generated from the code by `python docs/generate_settings.py`. Every line is a ROS parameter of
-`sgp_node` and a key of the files in `config/`, which the commands read too. A read-only one is set
-at the start; any other takes effect before the next sample. A set that is invalid is refused and
-changes nothing.
+This page lists all settings, with defaults and ranges. It is generated from the code by
+`python docs/generate_settings.py`. Each setting is a ROS parameter of `sgp_node` and a key of the
+files in `config/`, which the commands read, too. A read-only setting can only be set at the start. Any
+other takes effect before the next sample. If one setting of a request is invalid, the whole request is
+refused and changes nothing.
 
-The hyper-parameters shown are those of the default kernel; `model.kernel` chooses another one (see
-below), whose hyper-parameters then take their place.
+The hyper-parameters shown are those of the default kernel. If `model.kernel` selects another kernel
+(see below), its hyper-parameters replace them.
 
 | setting | default | range | unit | what it does |
 |---|---|---|---|---|
@@ -28,7 +29,8 @@ below), whose hyper-parameters then take their place.
 NODE_HEAD = """
 ## Settings of the node only
 
-Source of the robot, recording, saving and rates of publication. Commands ignore these.
+These settings concern the source of the robot, recording, saving and the rates of publication. Commands
+ignore them.
 
 | setting | default | range | unit | what it does |
 |---|---|---|---|---|
@@ -36,8 +38,8 @@ Source of the robot, recording, saving and rates of publication. Commands ignore
 KERNEL_HEAD = """
 ## Kernels
 
-The choices of `model.kernel`. To add one, write one class (`sgp_ros/gp/kernel.py` shows one of ten
-lines) and add it to `KERNELS`: it can then be chosen, learnt, saved and restored.
+These are the choices of `model.kernel`. To add one, write one class (`sgp_ros/gp/kernel.py` shows an
+example of ten lines) and add it to `KERNELS`. It can then be chosen, learnt, saved and restored.
 
 | kernel | what it is | hyper-parameters of a joint |
 |---|---|---|

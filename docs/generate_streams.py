@@ -34,7 +34,7 @@ def _mean(values):
 
 
 def _long(result):
-    titles = ('way', 'µs a sample, first and last block', 'p99 of the last', 'MB, first and last block',
+    titles = ('method', 'µs a sample, first and last block', 'p99 of the last', 'MB, first and last block',
               'nMSE of the function', 'coverage', 'NLPD', 'intervals of W too narrow by')  # fmt: skip
     rows = []
     for name, way in result['ways'].items():
@@ -51,12 +51,12 @@ def _long_text(result):
     errors = sorted(result['random_subset_nmse'])
     basis = result['ways']['basis']
     return (
-        f'{result["samples"]} samples of one joint whose truth is a draw from the model, buffer of '
-        f'{result["budget"]}, {basis["features"][0]} features in use. A batch fit to a random subset '
+        f'The stream has {result["samples"]} samples of one joint whose truth is a draw from the model. The '
+        f'buffer holds {result["budget"]} samples, and {basis["features"][0]} features are in use. A batch fit to a random subset '
         f'of {result["budget"]} samples has an nMSE of {errors[len(errors) // 2]:.2g} '
         f'({errors[0]:.2g} to {errors[-1]:.2g} over {len(errors)} subsets). The last column is the '
-        'root mean square of the whitened error of W, 1 where intervals are right; with four '
-        'coefficients chance alone gives 0.5 to 1.5. Times are those of the processor.'
+        'root mean square of the whitened error of W. It is 1 where intervals are right; with four '
+        'coefficients, chance alone gives 0.5 to 1.5. Times are processor times.'
     )
 
 
@@ -86,7 +86,7 @@ def _best(result):
 
 
 def _worlds(found):
-    titles = ('way, hyper-parameters', 'coverage of predictions', 'NLPD', 'coverage of W',
+    titles = ('method, hyper-parameters', 'coverage of predictions', 'NLPD', 'coverage of W',
               'intervals of W too narrow by')  # fmt: skip
     rows = [
         (name, _percent(way['coverage95']), f'{way["nlpd"]:.3f}', _percent(way['w_coverage95']),
@@ -140,8 +140,8 @@ def _live(result):
 def _timed(result):
     """Say what the times of a result are of; the first results timed the engine alone."""
     if result.get('timed') == 'callback':
-        return 'The callback is the whole of a message: decoding, merging, the engine, record and topics.'
-    return 'What is called callback here is the part of the engine alone, `push_ms` on `/diagnostics`.'
+        return 'The callback is everything that is done for a message: decoding, merging, the engine, record and topics.'
+    return 'The callback here is only the part of the engine, `push_ms` on `/diagnostics`.'
 
 
 def _live_text(result):
@@ -153,9 +153,9 @@ def _live_text(result):
     return (
         f'Its median over runs is {statistics.median(plain):.2f} ms without refits and '
         f'{statistics.median(fitted):.2f} ms with them; runs of one kind differ by up to {spread:.2f} ms. '
-        f'Void, because this computer kept the publisher itself from sending for more than '
-        f'{result["pause_s"]:g} s, and repeated: {len(result["void"])} of '
-        f'{len(result["void"]) + sum(map(len, result["runs"].values()))} runs. {_timed(result)}'
+        f'{len(result["void"])} of {len(result["void"]) + sum(map(len, result["runs"].values()))} runs '
+        f'were void and repeated, because this computer kept the publisher itself from sending for more '
+        f'than {result["pause_s"]:g} s. {_timed(result)}'
     )
 
 
@@ -176,13 +176,13 @@ def _soak_text(result):
     memory = [block['resident_mb'] for block in result['blocks']]
     shipped = result.get('settings')
     return (
-        f"{result['joints']} joints at {result['rate_hz']:g} Hz, Panda's model, "
+        f"The run has {result['joints']} joints at {result['rate_hz']:g} Hz, Panda's model, "
         + (f'the settings of `{shipped}` with record and autosave, ' if shipped else '')
         + f'a buffer of '
         f'{result["budget"]}, refits, `qos.depth` {result["qos_depth"]}, {result["executor"]}; '
-        f'{result["minutes"]:.0f} minutes. Of {result["published"]} '
+        f'it lasted {result["minutes"]:.0f} minutes. Of {result["published"]} '
         f'messages {result["lost"]} did not arrive, and the node counted {result["counted_lost"]} '
-        f'as missing. {result["refits"]} refits; the node took '
+        f'as missing. There were {result["refits"]} refits, and the node took '
         f'{_percent(result["processor_share"], 0)} of a core. Resident memory went from '
         f'{memory[0]:.0f} to {memory[-1]:.0f} MB, between {min(memory):.0f} and {max(memory):.0f}. '
         f'The p99 of the callback was {statistics.median(minutes):.2f} ms in the median minute, '
@@ -229,8 +229,8 @@ def _diagnosis_text(result):
         else f'had no verdict after {result["took_s"]:.0f} s ({result["said"]})'
     )
     return (
-        f'A drawn arm of {result["joints"]} joints at {result["rate_hz"]:g} Hz with dry friction '
-        f'that its robot file lacks: `~/diagnose` on the last {result["window_s"]:g} s {came}; the '
+        f'A random simulated arm of {result["joints"]} joints at {result["rate_hz"]:g} Hz has dry friction '
+        f'that its robot file lacks. `~/diagnose` on the last {result["window_s"]:g} s {came}; the '
         f'target is {2.0 * result["window_s"]:g} s. Of {result["sent"]} messages '
         f'{result["lost"]} did not arrive, and the node counted {result["counted_lost"]} as '
         f'missing. The load of the computer was {result["load"]:.1f}. {_timed(result)}'
@@ -286,11 +286,15 @@ def _long_alarms_text(result):
         for asked, row in result['rates'].items()
         if _hourly(sum(row['false_alarms']), result['hours'])[0] > float(asked)
     ]
-    more = f' It alarms more often than allowed at {" and ".join(over)} per hour.' if over else ''
+    more = (
+        f' The monitor alarms more often than allowed at {" and ".join(over)} per hour.'
+        if over
+        else ''
+    )
     return (
-        f'In {result["hours"]:g} h of {result["axes"]} simulated linear axes, as long each, whose '
-        'motion and effort are written down, with cogging that the model lacks and Z has to learn, '
-        'noise and an encoder; windows of 0.2 s, one every 0.1 s. Intervals are those of a Poisson count.'
+        f'A longer test has {result["hours"]:g} h of {result["axes"]} simulated linear axes, all equally long. '
+        'Their motion and effort are given by formulas, with noise, an encoder, and cogging that the model '
+        'lacks and Z has to learn. Windows are 0.2 s long, one every 0.1 s. Intervals are those of a Poisson count.'
         + more
     )
 
@@ -308,11 +312,11 @@ def text():
         'LONG': _long(long), 'LONG_TEXT': _long_text(long), 'ACCURACY': _accuracy(accuracy),
         'BEST': _best(accuracy),
         'WORLDS': _worlds(worlds), 'WHEELS': _wheels(wheels),
-        'WORLDS_TEXT': f'{count} worlds drawn from the model itself, {calibration["length"]} samples '
-        f'each, a joint that returns, buffer of {calibration["budget"]}, at most '
-        f'{calibration["features"]} features; hyper-parameters known, or learned from the first samples:',
+        'WORLDS_TEXT': f'{count} worlds were drawn from the model itself, with {calibration["length"]} samples '
+        f'each, a joint that returns to earlier states, a buffer of {calibration["budget"]} and at most '
+        f'{calibration["features"]} features. Hyper-parameters are known, or learned from the first samples:',
         'WHEELS_TEXT': f'{wheels["exact"]["wheels"]} simulated reaction wheels with encoders, '
-        f'{calibration["wheel_s"]:g} s each, through the whole engine to a model that holds all of '
+        f'{calibration["wheel_s"]:g} s each, were run through the whole engine with a model that has all of '
         'their physics:',
         'SETTLED': '100', 'RECORDINGS': _recordings(calibration['recordings']),
         'WHEELS_COUNT': str(wheels['exact']['wheels']), 'FALSE_EXACT': drifting['exact'],

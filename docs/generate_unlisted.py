@@ -80,7 +80,7 @@ def _baselines(rows):
 
 def _no_law():
     result = json.loads(NO_LAW.read_text(encoding='utf-8'))
-    words = {'none': 'noise', 'parameters': 'wrong bodies', 'walk': 'a force that wanders',
+    words = {'none': 'noise', 'parameters': 'wrong bodies', 'walk': 'a force that drifts in time',
              'all': 'all'}  # fmt: skip
     lines = []
     for kind, found in result['summary'].items():
@@ -117,7 +117,7 @@ def _resonance(name, path):
     return {
         name: '\n'.join(lines), f'{name}_worlds': len(result['worlds']),
         f'{name}_seeds': result['seeds'],
-        f'{name}_missed': '\n'.join(['Missed, or with something else beside it:', '', *missed])
+        f'{name}_missed': '\n'.join(['Missed, or with something else asserted:', '', *missed])
         if missed else 'None was missed.',
     }  # fmt: skip
 
@@ -136,7 +136,7 @@ def _machines():
             best = s['formulas'][0]
             why = 'It is asserted.' if s['is_asserted'] else f'Not asserted: {s["why_not"]}.'
             lines.append(
-                f'The force on `{s["joint"]}` {s["words"]}. Without form it leaves '
+                f'The force on `{s["joint"]}` {s["words"]}. A force without a formula leaves '
                 f'{_small(s["left"])} of the mean squared effort, the effects that are still '
                 f'listed {_small(s["left_by_listed"])}, and the best formula, '
                 f'`{best["formula"]}`, {_small(best["left"])}. {why}'
@@ -161,13 +161,15 @@ def _failures(rows):
             )
             is_right = bool(r['law_error']) and max(x or 1.0 for x in r['law_error']) <= SAME
             beside = (
-                '; the law by itself is right, what stands beside it is not' if is_right else ''
+                '; the law itself is right, but what is named beside it is not' if is_right else ''
             )
             lines.append(f'- `{r["kind"]}` ({r["case"]}): wrongly named {said}{beside}.')
     missed = sorted({r['kind'] for r in rows if not r['found'] and not r['wrong']})
     if missed:
-        lines.append(f'- Not found, and not named: {", ".join(f"`{k}`" for k in missed)}.')
-    return '\n'.join(lines) or '- In none of these worlds.'
+        lines.append(
+            f'- Not found, and nothing wrong named: {", ".join(f"`{k}`" for k in missed)}.'
+        )
+    return '\n'.join(lines) or '- It failed in none of these worlds.'
 
 
 def _table(rows):

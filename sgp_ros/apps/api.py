@@ -1,4 +1,4 @@
-"""The commands as functions: they return the objects that the commands write down.
+"""The commands as functions. They return the results that the commands write to files.
 
     >>> import sgp_ros as sgp
     >>> d = sgp.diagnose('real.mcap', robot='arm.urdf', tests=['other.mcap'])  # doctest: +SKIP
@@ -8,8 +8,8 @@
     0.317
     >>> d.save('out')  # doctest: +SKIP
 
-Nothing is printed. What a user can cause raises an `SgpError`, which says in one line what was
-found, what was expected and what to do.
+Nothing is printed. An error that a user can cause raises an `SgpError`, which says in one line
+what was found, what was expected and what to do.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ _SIMULATED_S = 20.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Diagnosed:
-    """A diagnosis to look at, in a program or a notebook.
+    """A diagnosis, for use in a program or a notebook.
 
     Attributes:
         examined: what the command `sgp diagnose` has before it writes.
@@ -64,7 +64,7 @@ class Diagnosed:
 
     @property
     def result(self) -> Diagnosis:
-        """All that was found: proofs, rivals, traces, visibility."""
+        """Everything that was found: validation, rivals, traces, visibility."""
         return self.examined.found
 
     @property
@@ -120,7 +120,7 @@ class Diagnosed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Identified:
-    """An identified robot to look at.
+    """An identified robot, for use in a program or a notebook.
 
     Attributes:
         recording: what the command `sgp identify` has before it writes.

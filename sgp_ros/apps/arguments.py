@@ -234,7 +234,7 @@ def _add_check(add: AddCommand) -> None:
 def _add_effects(add: AddCommand) -> None:
     parser = add(
         'effects', 'sgp_ros.apps.listings:run_effects',
-        'List the effects that a robot can have beside rigid bodies: names, formulas, units.',
+        'List the effects that a robot can have besides rigid bodies: names, formulas, units.',
         'sgp effects --robot arm.yaml',
     )  # fmt: skip
     parser.add_argument('--robot', metavar='ROBOT',

@@ -78,11 +78,13 @@ class EngineConfig:
         choices=('auto', 'measured', 'position'),
     )  # fmt: skip
     model_method: str = _setting(
-        'model.method', 'str', 'SGP', 'SGP: physics and process; PR: physics; GP: process.',
+        'model.method', 'str', 'SGP',
+        'SGP: physics and Gaussian process; PR: physics only; GP: Gaussian process only.',
         choices=('SGP', 'PR', 'GP'), read_only=True,
     )  # fmt: skip
     model_kernel: str = _setting(
-        'model.kernel', 'str', SquaredExponential.name, 'Covariance function of the process Z.',
+        'model.kernel', 'str', SquaredExponential.name,
+        'Covariance function of the Gaussian process Z.',
         choices=KERNELS, read_only=True,
     )  # fmt: skip
     model_residual_inputs: tuple[str, ...] = _setting(
@@ -107,8 +109,8 @@ class EngineConfig:
     )  # fmt: skip
     process_weighting: str = _setting(
         'process.weighting', 'str', 'always',
-        'When Z is weighted by its errors beside those of the physics alone: always, only while '
-        'the model learns, or never (off): full weight.',
+        'When Z is weighted by its errors, compared with those of the physics alone: always, only '
+        'while the model learns, or never (off: full weight).',
         choices=('always', 'learning', 'off'),
     )  # fmt: skip
     learning_enabled: bool = _setting(
@@ -164,12 +166,13 @@ class EngineConfig:
         'refit.period',
         'int',
         200,
-        'Number of learned samples between two refits.',
+        'Number of learned samples between two refits; a robot that rests postpones them.',
         low=10,
         high=1_000_000,
     )
     refit_restarts: int = _setting(
-        'refit.restarts', 'int', 1, 'Random starts of the optimiser beside the present values.',
+        'refit.restarts', 'int', 1,
+        'Random starts of the optimiser in addition to the present values.',
         low=0, high=20,
     )  # fmt: skip
     seed: int = _setting(

@@ -174,7 +174,7 @@ def _bell(s: np.ndarray, t: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True)
 class Linear(Kernel):
-    """Kernel of a linear function through the origin, whose slopes are not known.
+    """Kernel of a linear function through the origin with unknown slopes.
 
     `kappa(u, u') = sum_i u_i u'_i / l_i^2`. What a squared exponential with very long length
     scales says too, but without a free constant, so the evidence prefers it where it is enough.

@@ -1,4 +1,4 @@
-"""Robots that a few lumped coefficients describe, as a robot YAML states them by formulas.
+"""Robots that are described by a few lumped coefficients, stated as formulas in a robot YAML.
 
     schema: 1
     name: pendulum
@@ -6,18 +6,18 @@
     source: where the equations come from
     target: effort              # or acceleration, what f(u) W predicts
     joints: [{name: hinge}]     # kind: prismatic, actuated: false, effort_unit: V
-    constants: {g: 9.81}        # numbers, or formulas of those before
+    constants: {g: 9.81}        # numbers, or formulas of earlier ones
     coefficients:               # one column of f(u) each: its formula in the equation of a joint
       J: {unit: kg m^2, columns: {hinge: 'ddq[hinge]'}, value: 0.15}
       G: {unit: N m, columns: {hinge: 'sin(q[hinge])'}, value: 0.3 * g, meaning: gravity}
     residual_inputs: own        # what Z sees
-    bodies:                     # the simplest that have these coefficients
+    bodies:                     # the simplest bodies with these coefficients
       derived: {mass: 4 * (G / g) ** 2 / (3 * J)}
       links: {hinge: {mass: mass, centre: -G / g / mass, inertia: J / 4}}
 
-Accelerations and efforts may enter a column only affinely: the filters rely on it. The values are
-what is known of the robot beforehand; an estimate does not start from them. The grammar of the
-formulas is that of `physics.formula`.
+Accelerations and efforts may enter a column only affinely, because the filters rely on it. The
+values are what is known of the robot beforehand; estimates do not start from them. The grammar of
+the formulas is that of `physics.formula`.
 """
 
 from __future__ import annotations

@@ -1,36 +1,36 @@
 """A robot from a URDF: inverse model of a tree of joints with friction and offsets.
 
-A robot YAML with the key `urdf` says which joints move and which physics is assumed:
+A robot YAML with the key `urdf` states which joints move and which physics is assumed:
 
     schema: 1
     urdf: panda.urdf            # relative to this file; or the XML itself
     name: panda
-    joints: [j1, j2]            # those that move, in this order; others are locked
-    locked: {torso: 0.15}       # where [rad or m]; 0 if not said
-    passive: [j3]               # without effort; else as `ros2_control` says
+    joints: [j1, j2]            # joints that move, in this order; all others are locked
+    locked: {torso: 0.15}       # position [rad or m]; default 0
+    passive: [j3]               # without effort; default: as `ros2_control` states
     effort_gain: {j1: 13.6}     # N m or N per unit of the recorded effort
     payload: {link: tool0, mass: 0.5, com: [0, 0, 0.05]}
     terms: {inertial: all, viscous: all, coulomb: [j1], offset: all}
     coulomb_width: 0.01         # rad/s or m/s, over which dry friction changes its sign
     stribeck_velocity: 0.1      # rad/s or m/s
-    prior: {inertial: {spread: 0.3}}   # about the values of the URDF; flat if not said
+    prior: {inertial: {spread: 0.3}}   # about the values of the URDF; default: flat
     residual_inputs: own        # or all, or a list such as [velocity:j1]
-    effects:                    # physics beside the terms, in the words of a diagnosis
+    effects:                    # physics in addition to the terms, as in a diagnosis
       - {effect: spring, joint: j1, parameters: {stiffness: {value: 2.9, std: 0.1},
                                                  rest: {value: 0.4, std: 0.01}}}
 
     gains: {kp: {j1: 300.0}, kd: {j1: 10.0}}   # of drives whose commands are positions
-    remarks: [...]              # what the model file said that has no place here
+    remarks: [...]              # what could not be represented from the model file
     model: arm.xml              # the MJCF that this came from, for `sgp export`
     parameters:                 # values of coefficients, as `sgp identify` writes them
       elbow.coulomb: {value: 0.4, std: 0.01, unit: N m}
 
-What `parameters` say of a body or of damping or friction of a joint takes the place of what the
-URDF says; `effects` come on top of both. Diagnosis, replay, simulation and the node read it so.
-`terms` are what is learned: what is not among them stays as the URDF has it, or is not modelled.
+Values in `parameters` for a body, or for damping or friction of a joint, replace those of the
+URDF; `effects` are added to both. Diagnosis, replay, simulation and the node follow this rule.
+`terms` are what is learned. Anything else stays as in the URDF, or is not modelled.
 
-Only `schema` and `urdf` must be there. The model predicts efforts; where accelerations are wanted,
-as on joints without effort, the engine solves the same equation of motion for them.
+Only `schema` and `urdf` are required. The model predicts efforts. Where accelerations are needed,
+as for joints without effort, the engine solves the same equation of motion for them.
 """
 
 from __future__ import annotations

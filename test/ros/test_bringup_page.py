@@ -123,7 +123,7 @@ def test_the_commands_of_a_page_write_the_file_and_start_the_node_with_it(
 def test_the_section_of_the_readme_names_what_is_installed_and_called() -> None:
     """Extras of setup.py, and services and topics that the page on bringup explains."""
     text = (ROOT / 'README.md').read_text()
-    section = text.split('## Beside a robot of ros2_control')[1].split('## ')[0]
+    section = text.split('## With a ros2_control robot')[1].split('## ')[0]
     (extras,) = re.findall(r"pip install '\.\[(.+?)\]'", section)
     setup = (ROOT / 'setup.py').read_text()
     assert all(f"'{extra}': [" in setup for extra in extras.split(','))

@@ -36,24 +36,24 @@ READ = (
     ('actuator dyntype filter', 'lag of the effort'),
     ('actuator delay', 'delay of the command'),
     ('gravcomp 1 on all bodies, with position drives', 'drives that hold gravity'),
-    ('equality joint, linear', 'joint that follows another, or stands'),
+    ('equality joint, linear', 'joint that follows another, or is locked'),
     ('fixed tendon under an actuator, on one joint and its followers', 'its transmission'),
-    ('option gravity', 'how the base stands'),
+    ('option gravity', 'orientation of the base'),
 )
 """Elements that are read, and their meaning here."""
 LEFT = {
-    'contact': 'Contacts are not modelled; none acts where the robot starts; solid bodies',
-    'off': 'Constraints that are not active in the file, ignored',
+    'contact': 'Contacts are not modelled, and none acts in the start pose; solid bodies',
+    'off': 'Constraints that are not active in the file are ignored',
     'constraint': 'Constraints of this kind are ignored',
     'motors': 'No actuator: all of these joints are assumed to be driven',
     'follower': 'Rotor inertia and springs of joints that follow others or are fixed are ignored',
     'gravcomp': 'Gravity compensation (gravcomp) is ignored',
     'damping': 'The nonlinear part of the damping is ignored',
     'stiffness': 'The nonlinear part of the stiffness is ignored',
-    'gravity': 'Gravity is 9.81 m/s2 here and not that of the file, in m/s2',
+    'gravity': 'Gravity is 9.81 m/s2 here, not that of the file, in m/s2',
     'fluid': 'Fluid forces are ignored',
     'tendon': 'Tendon forces are ignored',
-    'other': 'Not supported and ignored',
+    'other': 'Unsupported elements are ignored',
 }
 """Remarks on what has no place here."""
 REFUSED = (

@@ -42,7 +42,7 @@ LEFT = {
     'plugin': 'Plugins are ignored',
     'integral': 'The integral gain of the controller is ignored',
     'gains': 'Gains are ignored, as some joints have none',
-    'gravity': 'Gravity is 9.81 m/s2 along -z here and not that of the file',
+    'gravity': 'Gravity is 9.81 m/s2 along -z here, not that of the file',
 }
 """Remarks on what has no place here."""
 REFUSED = (
