@@ -10,7 +10,7 @@ import textwrap
 from pathlib import Path
 
 from sgp_ros.apps import api
-from sgp_ros.apps.arguments import COMMANDS, GROUPS
+from sgp_ros.apps.arguments import COMMANDS
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.robots import lumped, urdf_robot
 from sgp_ros.robots.registry import _KEYS, _URDF_KEYS
@@ -55,7 +55,7 @@ def commands():
         parsers[name] = parser, summary, example
         return parser
 
-    for add_one in COMMANDS:
+    for add_one in COMMANDS.values():
         add_one(add)
     lines = [
         '# Commands',
@@ -68,9 +68,7 @@ def commands():
         '`pip install argcomplete` and `eval "$(register-python-argcomplete sgp)"`.',
         '',
     ]
-    listed = [name for _, names in GROUPS for name in names if name in parsers]
-    for name in [*listed, *(n for n in parsers if n not in listed)]:
-        parser, summary, example = parsers[name]
+    for name, (parser, summary, example) in parsers.items():
         lines += [f'## sgp {name}', '', summary, '', '```text', example, '```', '']
         rows = [_argument(action) for action in parser._actions]
         if rows:

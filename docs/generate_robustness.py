@@ -58,7 +58,11 @@ def _still(rows):
     for robot in dict.fromkeys(row['robot'] for row in rows):
         of = [row for row in rows if row['robot'] == robot]
         beyond, lost = (sum(row[name] > WITHIN for row in of) for name in ('ratio', 'ratio_lost'))
-        found.append(f'`{robot}`: {beyond} of {len(of)} with garbage, {lost} with losses')
+        median = np.median([row['nmse'] for row in of])
+        found.append(
+            f'`{robot}`: {beyond} of {len(of)} with garbage, {lost} with losses (median nMSE '
+            f'of the clean streams {median:.2g})'
+        )
     kept = sum(min(row['ratio'], row['ratio'] / row['ratio_lost']) <= WITHIN for row in rows)
     return (
         f'Beyond 10 %: {"; ".join(found)}. Within 10 % of the clean stream, or of the one that lost '

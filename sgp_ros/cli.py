@@ -64,7 +64,7 @@ DEBUG = 'SGP_DEBUG'
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status: 0, 2 on bad input, 70 on a bug."""
-    given = list(sys.argv[1:] if argv is None else argv)
+    given = list(sys.argv[1:] if argv is None else argv) or ['--help']
     try:
         parser = _parser(given)
         _complete(parser)
@@ -226,13 +226,10 @@ class _Sgp(_Parser):
 
     def format_help(self) -> str:
         """Return the help: groups of commands, and an example that runs."""
-        listed = {name for _, names in GROUPS for name in names}
-        groups = [*GROUPS, ('More', tuple(name for name in self.summaries if name not in listed))]
+        others = [name for name in self.summaries if name not in COMMANDS]
         lines = [self.description or '', '', 'usage: sgp COMMAND ..., sgp COMMAND --help', '']
-        for title, names in groups:
-            known = [name for name in names if name in self.summaries]
-            lines += [strong(title)] * bool(known)
-            lines += [f'  {name:10s} {self.summaries[name]}' for name in known]
+        for title, names in [*GROUPS.items(), *[('More', others)] * bool(others)]:
+            lines += [strong(title), *(f'  {name:10s} {self.summaries[name]}' for name in names)]
         return '\n'.join([*lines, '', EXAMPLE, ''])
 
 
@@ -241,7 +238,7 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
     parser.summaries = {}
     parser.add_argument('--version', action='version', version=f'sgp {__version__}')
     commands = parser.add_subparsers(
-        dest='_name', required=True, metavar='COMMAND', parser_class=_Parser
+        dest='_name', required=True, metavar='COMMAND', parser_class=_Parser, prog='sgp'
     )
 
     def add(name: str, function: str, summary: str, example: str) -> argparse.ArgumentParser:
@@ -263,10 +260,13 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
                            help='print errors only, no text and no progress')  # fmt: skip
         return found
 
-    for add_one in COMMANDS:
-        add_one(add)
-    if not given or given[0] not in {*commands.choices, '--version'}:  # looking takes its time
-        _add_installed(add)
+    chosen = given[0] if given else ''
+    if chosen in COMMANDS:
+        COMMANDS[chosen](add)
+    elif chosen != '--version':
+        for add_one in COMMANDS.values():
+            add_one(add)
+        _add_installed(add)  # looking takes its time
     return parser
 
 

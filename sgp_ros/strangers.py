@@ -195,12 +195,13 @@ def read_text(path: Path, name: str = 'TEXT_MB') -> str:
     return path.read_text(encoding='utf-8-sig')
 
 
-def read_lines(path: Path, name: str) -> Iterator[str]:
+def read_lines(path: Path, name: str, encoding: str = 'utf-8-sig') -> Iterator[str]:
     """Yield the lines of a text without their ends.
 
     Args:
-        path: in UTF-8, with or without a mark of it.
+        path: of the file.
         name: of the bound of its size.
+        encoding: UTF-8, with or without a mark of it, or another one.
 
     Raises:
         TooMuchError: no plain file, a larger one, or a line beyond `LINE`.
@@ -208,7 +209,7 @@ def read_lines(path: Path, name: str) -> Iterator[str]:
     """
     require_file(path, name)
     most = bound('LINE')
-    with path.open(encoding='utf-8-sig') as stream:
+    with path.open(encoding=encoding) as stream:
         while line := stream.readline(most + 2):
             text = line.removesuffix('\n')
             if len(text) > most:

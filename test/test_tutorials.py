@@ -52,13 +52,15 @@ def test_a_pendulum_in_a_csv_file():
 
 
 def test_an_arm_with_urdf_and_bag():
-    """The fault of its elbow is found, and proved on the other recording."""
+    """The fault of its elbow is found, proved on the other recording, and handed back."""
     run('arm_bag')
     content, found = _found()
     assert found['elbow', 'coulomb_friction']['level']['value'] == pytest.approx(0.25, rel=0.1)
     proof = content['fit']['other']
     assert proof['nmse_after']['elbow'] < 0.05 * proof['nmse_before']['elbow']
-    assert Path('out/export/arm.xml').is_file()
+    text = Path('out/export/arm.urdf').read_text()
+    friction = [float(x) for x in re.findall(r'<dynamics[^>]*friction="([\d.]+)"', text)]
+    assert max(friction) == pytest.approx(0.25, rel=0.1)
 
 
 def test_a_mujoco_model_and_a_log_of_its_drives():

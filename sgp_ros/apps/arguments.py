@@ -233,7 +233,7 @@ def _add_check(add: AddCommand) -> None:
 
 def _add_effects(add: AddCommand) -> None:
     parser = add(
-        'effects', 'sgp_ros.apps.effects:run_effects',
+        'effects', 'sgp_ros.apps.listings:run_effects',
         'List the effects that a robot can have besides rigid bodies: names, formulas, units.',
         'sgp effects --robot arm.yaml',
     )  # fmt: skip
@@ -258,9 +258,12 @@ def _add_export(add: AddCommand) -> None:
                         help='also write value +- 2 std of each number')  # fmt: skip
 
 
-def _add_without_arguments(add: AddCommand) -> None:
-    add('robots', 'sgp_ros.apps.terminal:run_robots', 'List the built-in robots and their joints.',
+def _add_robots(add: AddCommand) -> None:
+    add('robots', 'sgp_ros.apps.listings:run_robots', 'List the built-in robots and their joints.',
         'sgp robots')  # fmt: skip
+
+
+def _add_compile(add: AddCommand) -> None:
     add('compile', 'sgp_ros.apps.compiling:run_compile',
         'Compile the numerical code now, so that the first commands start faster.', 'sgp compile'
         )  # fmt: skip
@@ -281,20 +284,17 @@ def _add_watch(add: AddCommand) -> None:
                         'Lichtblick and Foxglove into DIR')  # fmt: skip
 
 
-GROUPS = (
-    ('Explore', ('demo', 'robots', 'effects', 'compile')),
-    ('Analyse a recording', ('import', 'check', 'diagnose', 'identify', 'replay')),
-    ('Analyse many recordings', ('campaign',)),
-    ('Work with a model', ('simulate', 'export')),
-    ('Watch a running robot', ('watch',)),
-)
-"""Titles and commands of the help; others come after them."""
+GROUPS = {
+    'Explore': {'demo': _add_demo, 'robots': _add_robots, 'effects': _add_effects,
+                'compile': _add_compile},
+    'Analyse a recording': {'import': _add_import, 'check': _add_check, 'diagnose': _add_diagnose,
+                            'identify': _add_identify, 'replay': _add_replay},
+    'Analyse many recordings': {'campaign': _add_campaign},
+    'Work with a model': {'simulate': _add_simulate, 'export': _add_export},
+    'Watch a running robot': {'watch': _add_watch},
+}  # fmt: skip
+"""Title of the help to its commands, each with the function that adds it; others come after."""
+COMMANDS = {name: add_one for group in GROUPS.values() for name, add_one in group.items()}
 EXAMPLE = f"""example without data of your own:
   sgp simulate double_pendulum --effect {example_effect('elbow', 0.05)} --out out/real
   sgp diagnose out/real/double_pendulum.mcap --robot double_pendulum"""
-
-COMMANDS = (
-    _add_demo, _add_simulate, _add_replay, _add_identify, _add_diagnose, _add_effects,
-    _add_without_arguments, _add_import, _add_export, _add_watch, _add_check, _add_campaign,
-)  # fmt: skip
-"""Functions that add each command of the package, in the order of its help."""

@@ -9,14 +9,11 @@ import json
 import os
 import stat
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from sgp_ros.errors import ConfigError, SgpError
-from sgp_ros.report.next_steps import after_robots, next_lines
 
 _LISTING = '.sgp_'
 """Beginning of the names of the files that list the results of a command, see `report.files`."""
@@ -119,26 +116,6 @@ def mark_folder(out: Path, command: str) -> None:
         listing = out / f'{_LISTING}{command}.json'
         if not listing.exists():
             replace_file(listing, lambda stream: stream.write(b'{}\n'))
-
-
-def run_robots(out: Path | None, progress: Callable[[float], None]) -> dict[str, Any]:  # noqa: ARG001 - it writes nothing
-    """List the built-in robots: `sgp robots`.
-
-    Args:
-        out: of every command; not used.
-        progress: called with the share that is done.
-    """
-    from sgp_ros.robots.listing import listed_robots  # noqa: PLC0415 - it takes time
-
-    found = list(listed_robots())
-    width = max(len(robot.name) for robot in found)
-    for robot in found:
-        print(f'{robot.name:{width}s}  {robot.description}')
-        print(f'{"":{width}s}  joints: {", ".join(robot.joints)}')
-    print('Any URDF, MJCF, SDF or robot YAML can be given instead of a name.')
-    print(next_lines(after_robots(found[0].name)))
-    progress(1.0)
-    return {'robots': [asdict(robot) for robot in found]}
 
 
 def _coloured(text: str, code: str) -> str:

@@ -241,13 +241,15 @@ def require_joints(
         return
     shown = sorted({name for seen in names for name in seen})
     missing = [name for name in wanted if name not in shown]
-    if missing and set(shown) < set(wanted):
-        moving = [name for name in wanted if name in shown]
+    moving = [name for name in wanted if name in shown]
+    if missing and moving:
+        others = ', '.join(name for name in shown if name not in wanted)
+        renamed = f'; if one of {others} is meant, rename it in the robot file' if others else ''
         raise RecordingError(
             f'{recording} lacks {", ".join(missing)} of {robot.name}',
             'states of all of its joints',
             'if the others do not move, leave them out: give --robot a robot YAML of three lines, '
-            f'"schema: 1", "urdf: FILE", "joints: [{", ".join(moving)}]"',
+            f'"schema: 1", "urdf: FILE", "joints: [{", ".join(moving)}]"{renamed}',
         )  # fmt: skip
     near = {name: difflib.get_close_matches(name, shown, 1, 0.0) for name in missing}
     pairs = ', '.join(f'{name} is closest to {found[0]}' for name, found in near.items())

@@ -23,7 +23,7 @@ from sgp_ros.errors import RecordingError
 from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.robot import Robot
 
-_GAP = 5.0
+GAP = 5.0
 """Usual steps without a state that count as a gap."""
 _JITTER = 0.25
 """Of a step, as share of the usual one, from which on stamps are called uneven."""
@@ -139,7 +139,7 @@ def check_recording(
     steps = np.diff(stamps).astype(np.float64) * 1e-9
     forward = steps[steps > 0.0]
     usual = float(np.median(forward)) if len(forward) else 0.0
-    plain = forward[forward <= _GAP * usual]
+    plain = forward[forward <= GAP * usual]
     jitter = float(plain.std() / usual) if len(plain) and usual > 0.0 else 0.0
     seen = {name for s in states[:1000] for name in s.names}
     joints = {
@@ -153,7 +153,7 @@ def check_recording(
     found = RecordingCheck(
         len(states), len(commands),
         float(stamps.max() - stamps.min()) * 1e-9 if len(stamps) else 0.0,
-        1.0 / usual if usual > 0.0 else 0.0, jitter, int((forward > _GAP * usual).sum()),
+        1.0 / usual if usual > 0.0 else 0.0, jitter, int((forward > GAP * usual).sum()),
         int((steps < 0.0).sum()), int((steps == 0.0).sum()),
         1.0 / float(np.median(asked)) if len(asked) else 0.0,
         tuple(sorted({'unnamed' if c.names is None else c.kind for c in commands})),
@@ -202,7 +202,7 @@ def _joint(states: Sequence[JointSample], name: str, limits: tuple[float, float]
 def _clock(found: RecordingCheck) -> list[str]:
     said = []
     if found.gaps:
-        said.append(f'{found.gaps} gaps of more than {_GAP:g} periods: treated as pauses.')
+        said.append(f'{found.gaps} gaps of more than {GAP:g} periods: treated as pauses.')
     if found.backward or found.repeated:
         said.append(
             f'{found.backward} backward and {found.repeated} repeated stamps: such states are '

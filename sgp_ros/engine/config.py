@@ -166,7 +166,7 @@ class EngineConfig:
         'refit.period',
         'int',
         200,
-        'Number of learned samples between two refits.',
+        'Number of learned samples between two refits; a robot that rests postpones them.',
         low=10,
         high=1_000_000,
     )

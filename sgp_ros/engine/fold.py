@@ -12,6 +12,7 @@ from sgp_ros.engine.held_commands import MOST_COMMANDS
 from sgp_ros.engine.hyperparameters import settings_of
 from sgp_ros.engine.intake import Intake
 from sgp_ros.engine.ordering import ReorderBuffer
+from sgp_ros.engine.progress import Progress
 from sgp_ros.engine.results import NOTHING, Counts, Estimate, Step
 from sgp_ros.engine.samples import (
     CommandSample,
@@ -39,6 +40,7 @@ class Fold:
         fits: of hyper-parameters, handed out so far.
         stale_fits: how many of these were made for a model that is not in force any more.
         next_fit: learned count at which the next fit of hyper-parameters is due.
+        progress: of the motion since the last fit.
     """
 
     def __init__(self, robot: Robot, config: EngineConfig) -> None:
@@ -52,6 +54,7 @@ class Fold:
         self.filter = StateFilter(self.robot, self.config)
         self.estimator = Estimator(robot, config, self.counts)
         self.next_fit = 0
+        self.progress = Progress()
         self.began_ns = 0
         self._taking: Event | None = None
         self._is_fit_due = False
@@ -172,6 +175,8 @@ class Fold:
             self.delay_s = 0.5 * equation.span_s
             before = self.counts.reverted
             estimates.append(self.estimator.take(equation))
+            if estimates[-1].is_learned:
+                self.progress.take(equation)
             if self.counts.reverted > before:
                 changes.append(self._follow_model())
         return tuple(changes), tuple(estimates)
@@ -191,13 +196,16 @@ class Fold:
         self.filter = StateFilter(self.robot, self.config)
         self._is_fit_due = False
         self.next_fit = self.counts.learned
+        self.progress = Progress()
 
     def _schedule_fit(self) -> None:
         if not self.config.refit_enabled or not self._can_fit():
             return
-        if self.counts.learned >= self.next_fit:
+        period = self.config.refit_period
+        if self.counts.learned >= self.next_fit and self.progress.is_enough(period):
             self._is_fit_due = True
-            self.next_fit = self.counts.learned + self.config.refit_period
+            self.next_fit = self.counts.learned + period
+            self.progress.begin()
 
     def _can_fit(self) -> bool:
         regression = self.estimator.regression

@@ -29,7 +29,7 @@ from sgp_ros.gp.model import Model
 from sgp_ros.gp.regression import Regression
 from sgp_ros.robots.robot import Robot
 
-VERSION = 11
+VERSION = 12
 _TRIED = 40
 """Samples that a model must go on for before it is taken."""
 _WAITING = ('U', 'F', 'y', 'held')
@@ -67,6 +67,7 @@ def _plain(engine: Engine) -> dict[str, Any]:
         'fits': engine.fits,
         'stale_fits': engine.stale_fits,
         'next_fit': engine.next_fit,
+        'progress': engine.progress.state(),
         'delay_s': engine.delay_s,
         'released': None
         if order.released_ns is None
@@ -175,6 +176,7 @@ def _fill(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
         setattr(engine.counts, name, value)
     engine.fits, engine.next_fit = text['fits'], text['next_fit']
     engine.stale_fits = text['stale_fits']
+    engine.progress.restore(text['progress'])
     engine.delay_s = text['delay_s']
     intake = engine.intake
     for history, name in ((intake.commands, 'commands'), (intake.targets, 'targets')):

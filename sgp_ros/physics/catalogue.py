@@ -100,3 +100,13 @@ def words_of(name: str) -> str:
     if name == LAW:
         return 'a force law'
     return EFFECTS[name].words if name in EFFECTS else name.replace('_', ' ')
+
+
+def listed(law: Effect) -> dict[str, object]:
+    """Return what a list says of an effect, as JSON can hold it."""
+    return {
+        'effect': law.name, 'words': law.words, 'formula': law.formula, 'source': law.source,
+        'place': law.site.value, 'kinds': list(law.kinds), 'is_online': law.is_online,
+        'drawn_over': law.drawn_over,
+        'parameters': {q.name: q.unit for q in law.quantities},
+    }  # fmt: skip

@@ -106,7 +106,7 @@ def _stronger(before: str, found: str) -> str:
 
 def _words(name: str) -> list[str]:
     bare = re.sub(r'([a-z])([A-Z])', r'\1 \2', re.sub(r'mA\b', 'ma', name))
-    bare = re.sub(r'([A-Za-z])(\d)', r'\1 \2', bare)
+    bare = re.sub(r'([A-Za-z])(\d)', r'\1 \2', re.sub('°(?!C)', ' deg ', bare))
     return [word for word in re.split(r'[^A-Za-z0-9]+', bare) if word]
 
 

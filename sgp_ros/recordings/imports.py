@@ -139,6 +139,6 @@ def _gains(out_path: Path, stated: object) -> Path | None:
 
 def _written(out_path: Path, what: str, content: Mapping[str, Any]) -> Path:
     path = out_path.with_name(f'{out_path.stem}_{what}.yaml')
-    text = yaml.safe_dump(dict(content), sort_keys=False)
+    text = yaml.safe_dump(dict(content), sort_keys=False, allow_unicode=True)
     replace_file(path, lambda stream: stream.write(text.encode()))
     return path

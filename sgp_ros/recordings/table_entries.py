@@ -24,7 +24,7 @@ _NAMES = ('names', 'joint_names', 'joints', 'name')
 _DIGITS = '0123456789'
 _ROLES = {
     'rad': POSITION, 'deg': POSITION, 'rad/s': VELOCITY, 'deg/s': VELOCITY, 'rpm': VELOCITY,
-    'N m': EFFORT, 'mN m': EFFORT,
+    'N m': EFFORT, 'mN m': EFFORT, 'N mm': EFFORT, 'N cm': EFFORT, 'kgf cm': EFFORT,
 }  # fmt: skip
 """Units that only one quantity of a joint has."""
 

@@ -8,6 +8,7 @@ decision that another log could prove wrong is returned in words.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -21,6 +22,7 @@ from sgp_ros.recordings.column_names import (
     POSITION,
     TIME,
     VELOCITY,
+    Meaning,
     meaning,
 )
 from sgp_ros.recordings.table_entries import (
@@ -36,6 +38,7 @@ from sgp_ros.recordings.table_entries import (
 from sgp_ros.recordings.table_gains import add_gains
 from sgp_ros.recordings.table_map import UNITS
 from sgp_ros.recordings.table_units import (
+    PER_SECOND,
     as_numbers,
     follows,
     position_unit,
@@ -112,9 +115,9 @@ def _time(columns: Columns, rows: int, rate_hz: float | None, guess: Guess) -> n
     """Enter the time base and return the times [s], (n,)."""
     named = [
         name for name, x in columns.items()
-        if x.shape[:1] == (rows,) and x.size == rows and meaning(name).role == TIME
+        if x.shape[:1] == (rows,) and x.size == rows and _may_be_time(meaning(name))
     ]  # fmt: skip
-    named.sort(key=lambda name: ('des' in name.lower(), len(name)))
+    named.sort(key=lambda name: (not meaning(name).role, 'des' in name.lower(), len(name)))
     for name in named if rate_hz is None else ():
         stamps = as_numbers(columns[name])
         if stamps is None:  # texts, such as those of ISO 8601
@@ -128,8 +131,11 @@ def _time(columns: Columns, rows: int, rate_hz: float | None, guess: Guess) -> n
         if len(named) > 1:
             others = ', '.join(n for n in named if n != name)
             guess.unsure.append(f'The time is read from {name}, not from {others}.')
-        guess.content['time'] = {'column': name, 'unit': unit, **_episodes(columns, rows)}
-        return stamps * {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}[unit]
+        seconds = stamps / PER_SECOND[unit]
+        before = math.ceil(max(-np.nanmin(seconds), 0.0))  # such as those before a trigger
+        start = {'start': float(before)} if before else {}
+        guess.content['time'] = {'column': name, 'unit': unit, **start, **_episodes(columns, rows)}
+        return seconds
     rate_hz = rate_hz or _stated_rate(columns)
     if rate_hz is None:
         raise RecordingError(
@@ -138,6 +144,11 @@ def _time(columns: Columns, rows: int, rate_hz: float | None, guess: Guess) -> n
         )  # fmt: skip
     guess.content['time'] = {'rate': rate_hz}
     return np.arange(rows) / rate_hz
+
+
+def _may_be_time(said: Meaning) -> bool:
+    """Return whether a name says so, or says nothing but a unit of time."""
+    return said.role == TIME or (not said.role and said.unit in PER_SECOND)
 
 
 def _episodes(columns: Columns, rows: int) -> dict[str, str]:

@@ -11,6 +11,7 @@ import re
 from array import array
 from collections import deque
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 
@@ -24,6 +25,7 @@ Columns = dict[str, np.ndarray]
 Numbered = tuple[int, str]
 """A line and its number."""
 
+_OF_SPREADSHEETS = 'Windows-1252'
 _DELIMITERS = (';', '\t', ',', ' ')
 _COMMENTS = '#%'
 _COMMENTS_KEPT, _TITLES = 100, 20
@@ -51,19 +53,24 @@ def load_text(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]]:
         RecordingError: no table.
         TooMuchError: more of it than `TABLE_MB`, `LINE`, `ROWS`, `CELLS` or `UNPACKED_MB`.
     """
+    with suppress(UnicodeDecodeError):
+        return _load(path, remarks, 'utf-8-sig')
     try:
-        return _load(path, remarks)
+        found = _load(path, remarks, _OF_SPREADSHEETS)
     except UnicodeDecodeError as error:
         raise RecordingError(
             f'{path} is not a text file ({error})', 'a CSV file in UTF-8'
         ) from error
+    remarks.append(f'{path.name} is not in UTF-8; it is read as {_OF_SPREADSHEETS}')
+    return found
 
 
-def _load(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]]:
+def _load(path: Path, remarks: list[str], encoding: str) -> tuple[Columns, Sequence[int]]:
     with path.open('rb') as stream:
         n = sum(data.count(b'\n') for data in iter(lambda: stream.read(1 << 20), b''))
     require_within(n, 'ROWS', f'number of lines of {path}')
-    lines = ((i, x) for i, x in enumerate(read_lines(path, 'TABLE_MB'), start=1) if x.strip())
+    read = read_lines(path, 'TABLE_MB', encoding)
+    lines = ((i, x) for i, x in enumerate(read, start=1) if x.strip())
     header, mark, rest = _header(path, lines)
     names = _names(path, header, mark)
     require_within(n * len(names), 'CELLS', f'number of cells of {path}')
@@ -213,7 +220,8 @@ def _header(path: Path, lines: Iterator[Numbered]) -> tuple[str, str, Iterator[N
     rest = ((i, line) for i, line in lines if line.lstrip()[0] not in _COMMENTS)
     mark = _mark(first[1] or (comments[-1] if comments else ''))
     if not is_empty and not any(map(_is_value, _cells(first[1], mark))):
-        return first[1], mark, rest
+        header, below = _below_titles(first, rest)
+        return header, _mark(header), below
     titles = [line for line in comments if len(_cells(line, _mark(line))) > 1]
     width = len(_cells(first[1], mark))
     fitting = [line for line in titles if is_empty or len(_cells(line, _mark(line))) == width]
@@ -224,6 +232,23 @@ def _header(path: Path, lines: Iterator[Numbered]) -> tuple[str, str, Iterator[N
             'add that line',
         )
     return (fitting or comments or [''])[-1], mark, chain([] if is_empty else [first], rest)
+
+
+def _below_titles(first: Numbered, rest: Iterator[Numbered]) -> tuple[str, Iterator[Numbered]]:
+    """Return the line of the names of columns, below titles of the log, and the lines behind it.
+
+    It is the first one with as many cells as the numbers, all different; else the very first.
+    """
+    above = [first]
+    for numbered in rest:
+        above.append(numbered)
+        if len(above) > _TITLES or any(map(_is_value, _cells(numbered[1], _mark(numbered[1])))):
+            break
+    for i, (_, line) in enumerate(above[:-1]):
+        cells = _cells(line, mark := _mark(line))
+        if len(cells) == len(_cells(above[-1][1], mark)) == len(set(cells)):
+            return line, chain(above[i + 1 :], rest)
+    return first[1], chain(above[1:], rest)
 
 
 def _names(path: Path, header: str, mark: str) -> list[str]:

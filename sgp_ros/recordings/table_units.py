@@ -10,7 +10,8 @@ _EPOCHS = ((1e17, 'ns'), (1e14, 'us'), (1e11, 'ms'), (1e8, 's'))
 """Least number of a time since 1970, and its unit."""
 _RATES_HZ = (5.0, 20_000.0)
 """Of logs."""
-_PER_SECOND = {'s': 1.0, 'ms': 1e3, 'us': 1e6, 'ns': 1e9}
+PER_SECOND = {'s': 1.0, 'ms': 1e3, 'us': 1e6, 'ns': 1e9}
+"""Unit of time to its number in a second."""
 _TURN = 2.0 * np.pi
 _MARGIN = 0.3
 """Beyond a range that a position may read [rad]."""
@@ -49,13 +50,13 @@ def time_unit(stamps: np.ndarray, said: str) -> tuple[str, bool]:
     steps = steps[steps > 0.0]
     if len(steps) < 1 or len(steps) < 0.5 * (len(finite) - 1):
         return '', False
-    if said in _PER_SECOND:
+    if said in PER_SECOND:
         return said, True
     for least, unit in _EPOCHS:
         if finite[0] >= least:
             return unit, True
     step = float(np.median(steps))
-    fitting = [u for u, per in _PER_SECOND.items() if _RATES_HZ[0] <= per / step <= _RATES_HZ[1]]
+    fitting = [u for u, per in PER_SECOND.items() if _RATES_HZ[0] <= per / step <= _RATES_HZ[1]]
     if not fitting:
         return 's', False
     # rates of logs lie in one decade of a thousand, but between 5 and 20 Hz

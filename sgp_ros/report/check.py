@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from sgp_ros.batch.recording_check import GAP
 from sgp_ros.diagnosis.result import Finding
 from sgp_ros.engine.samples import Event, JointSample
 from sgp_ros.report.charts import Chart, Series, kept, spoken
@@ -116,12 +117,19 @@ def position_charts(events: Sequence[Event], robot: Robot) -> dict[str, Chart]:
         if len(own) < 2:
             continue
         stamps, q = (np.array(x) for x in zip(*own, strict=True))
-        time, unit = (stamps - stamps[0]) * 1e-9, joint.unit('position')
+        unit = joint.unit('position')
+        said = f'Between {spoken(q.min())} and {spoken(q.max())} {unit}.'
+        time, q = _broken((stamps - stamps[0]) * 1e-9, q)
         rows = kept([q])
         charts[f'position {joint.name}'] = Chart(
-            f'Position of {joint.name}',
-            f'Between {spoken(q.min())} and {spoken(q.max())} {unit}.',
-            'time [s]', f'position [{unit}]', time[rows],
+            f'Position of {joint.name}', said, 'time [s]', f'position [{unit}]', time[rows],
             [Series('measured', q[rows], 'final')], group='check',
         )  # fmt: skip
     return charts
+
+
+def _broken(time: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return a curve over time [s], both (n,), with a break in each gap, where none is known."""
+    step = np.diff(time)
+    at = np.flatnonzero(step > GAP * np.median(step[step > 0.0])) + 1
+    return np.insert(time, at, 0.5 * (time[at - 1] + time[at])), np.insert(q, at, np.nan)

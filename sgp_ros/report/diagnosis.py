@@ -97,7 +97,7 @@ def render(
     shown = {name: x for name, x in figures.items() if name != 'dependence'}  # bars of the page
     return render_page(
         'diagnosis.html', charts, shown,
-        title=f'{_VERDICTS[found.verdict]}: diagnosis of {found.robot}',
+        title=f'{_title(found)}: diagnosis of {found.robot}',
         verdict=verdict_sentence(found),
         held_out='' if len(found.proofs) > 1 else held_out_sentence(found),
         cards=cards(found),
@@ -154,6 +154,14 @@ def _dependences(found: Diagnosis, joints: Sequence[str]) -> list[dict[str, Any]
         ]}
         for d in found.dependences if d.joint in joints
     ]  # fmt: skip
+
+
+def _title(found: Diagnosis) -> str:
+    """Return the verdict in three words, behind an error of the set-up that is beside it."""
+    said = _VERDICTS[found.verdict]
+    if found.setup and found.verdict != 'setup_error':
+        return f'{_VERDICTS["setup_error"]}; {said[:1].lower()}{said[1:]}'
+    return said
 
 
 def _chart_of(found: Diagnosis, finding: Finding, charts: Mapping[str, Chart]) -> str:

@@ -30,6 +30,9 @@ _MEANINGLESS = 1e6
 """Error over variance that only a constant effort gives."""
 _MOST_ERRORS = 3
 _LEAST_CHANCE = 0.005
+_MIXED_UP = {math.pi / 180.0: 'radians were taken for degrees',
+             180.0 / math.pi: 'degrees were taken for radians'}  # fmt: skip
+"""Scale of positions or velocities to what makes it."""
 
 
 def is_calm(found: Diagnosis) -> bool:
@@ -72,7 +75,22 @@ def gain_text(subject: str, found: Diagnosis) -> str:
 
 def phrase(finding: Finding | Difference) -> str:
     """Return an effect in plain words, with its interval and parameters."""
-    return ', '.join([effect_name(finding), *numbers(finding)])
+    return ', '.join([effect_name(finding), *numbers(finding), *_mixed_up(finding)])
+
+
+def _mixed_up(finding: Finding | Difference) -> list[str]:
+    """Say which units a scale of positions or velocities mixes up, if it does."""
+    scale = finding.parameters.get('scale')
+    if finding.effect not in {'position_scale', 'velocity_scale'} or scale is None:
+        return []
+    value = float(scale.value)
+    return [said for ratio, said in _MIXED_UP.items() if math.isclose(value, ratio, rel_tol=0.02)]
+
+
+def sure_phrase(finding: Finding) -> str:
+    """Return an effect with its probability, and why that is low."""
+    why = f': {finding.why}' if finding.why else ''
+    return f'{phrase(finding)} (probability {finding.probability:.2f}{why})'
 
 
 def plain_name(effect: str) -> str:

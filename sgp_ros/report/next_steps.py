@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
+from typing import NamedTuple
 
 from sgp_ros.physics.example import example_effect
 
@@ -13,12 +13,14 @@ Steps = Sequence[tuple[str, str]]
 PLUS_MINUS = '+- is half the width of a 95 % interval'
 _OTHER = 'OTHER.mcap'
 """Stands for a recording of the reader."""
-_HANDED_BACK = {'.xml': 'mjcf', '.mjcf': 'mjcf', '.sdf': 'sdf'}
-"""Ending of a robot's file to the format of `sgp export`; the URDF is among the results."""
+_HANDED_BACK = {
+    '.xml': 'mjcf', '.mjcf': 'mjcf', '.sdf': 'sdf', '.urdf': 'urdf', '.xacro': 'urdf',
+}  # fmt: skip
+"""Ending of a robot's file to the format of `sgp export`; the URDF beside the results holds
+bodies alone."""
 
 
-@dataclass(frozen=True, slots=True)
-class Given:
+class Given(NamedTuple):
     """Inputs of a command.
 
     Attributes:

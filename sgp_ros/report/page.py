@@ -60,11 +60,22 @@ _POWER = re.compile(r'((?:(?<=kg )|(?<=m )|(?<=m\u00a0)|(?<=N )|(?<=/))(?:m|s|ra
 """A unit with a power, behind another unit; a joint may be called m2."""
 
 
+_EXPONENT = re.compile(r'\b(\d+(?:\.\d+)?)e([+-])0*(\d+)\b')
+_RAISED = str.maketrans('0123456789', '⁰¹²³⁴⁵⁶⁷⁸⁹')
+
+
 def typeset(text: str) -> str:
-    """Return text with the signs that a terminal may lack."""
+    """Return text with the signs that a terminal may lack; no number breaks at its exponent."""
+    text = _EXPONENT.sub(_power_of_ten, text)
     for plain, sign in _SIGNS.items():
         text = text.replace(plain, sign)
     return _POWER.sub(lambda found: found[1] + '²³'[int(found[2]) - 2], text)
+
+
+def _power_of_ten(number: re.Match[str]) -> str:
+    if number[2] == '+' and len(number[3]) == 1:
+        return f'{float(number[0]):.0f}'
+    return f'{number[1]}·10{"⁻" * (number[2] == "-")}{number[3].translate(_RAISED)}'
 
 
 def robot_styles() -> str:

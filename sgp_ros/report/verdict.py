@@ -24,6 +24,7 @@ from sgp_ros.report.diagnosis_text import (
     phrase,
     place,
     plain_name,
+    sure_phrase,
     worst_joint,
 )
 
@@ -33,7 +34,7 @@ _MOST_VARIABLES = 2
 def verdict_sentence(found: Diagnosis) -> str:
     """Return the finding in one sentence; `+-` is half of a 95 % interval."""
     if found.setup:
-        each = [f'{place(f)}: {phrase(f)} (probability {f.probability:.2f})' for f in found.setup]
+        each = [f'{place(f)}: {sure_phrase(f)}' for f in found.setup]
         head = f'The recording and the robot file contradict each other: {"; ".join(each)}.'
         rest = verdict_sentence(replace(found, setup=()))
         return head if found.verdict == 'setup_error' else f'{head} In addition: {rest}'
@@ -84,10 +85,10 @@ def _missing(found: Diagnosis) -> str:
             f'{"; ".join(differences_text(found))}.'
         )
     first = found.findings[0]
-    text = f'Missing {place(first)}: {phrase(first)} (probability {first.probability:.2f})'
+    text = f'Missing {place(first)}: {sure_phrase(first)}'
     for previous, f in pairwise(found.findings):
         where = '' if f.joint == previous.joint else f'{place(f)}: '
-        text += f'; and {where}{phrase(f)} (probability {f.probability:.2f})'
+        text += f'; and {where}{sure_phrase(f)}'
     if any(exerts_force(f.effect) for f in found.findings):
         subject = 'it explains' if len(found.findings) == 1 else 'together they explain'
         if found.parameter_errors:
@@ -120,7 +121,7 @@ def _calm(found: Diagnosis) -> str:
 def _unexplained(found: Diagnosis) -> str:
     beside = [f for f in found.findings if f.effect != UNKNOWN]
     if beside:
-        each = [f'{place(f)}: {phrase(f)} (probability {f.probability:.2f})' for f in beside]
+        each = [f'{place(f)}: {sure_phrase(f)}' for f in beside]
         alone = replace(found, findings=tuple(f for f in found.findings if f not in beside))
         return f'{_unexplained(alone)} Missing beside it {"; and ".join(each)}.'
     named = [f for f in found.findings if f.effect == UNKNOWN]

@@ -26,6 +26,7 @@ from sgp_ros.recordings.messages import JOINT_STATE
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.typestore import new_message
 from sgp_ros.recordings.writer import RecordingWriter
+from sgp_ros.report.check import position_charts
 from sgp_ros.robots.registry import load_robot
 from test.report.pages import content_of
 
@@ -203,3 +204,11 @@ def test_a_recording_without_a_finite_position_is_checked(value, tmp_path, capsy
     assert main([*words, '--out', str(tmp_path / 'out')]) == 0
     assert 'No motion above the noise, so not diagnosed: hinge' in capsys.readouterr().out
     assert '<td data-label="to">none' in (tmp_path / 'out' / 'report.html').read_text()
+
+
+def test_a_position_is_not_drawn_across_a_gap(tmp_path):
+    """Nobody knows how the joint moved there."""
+    t = T[:40] + np.where(np.arange(40) >= 20, 1.0, 0.0)
+    (chart,) = position_charts(_states(t, t), load_robot(_robot(tmp_path))).values()
+    assert np.flatnonzero(np.isnan(chart.series[0].y)).tolist() == [20]
+    assert t[19] < chart.x[20] + t[0] < t[20]

@@ -39,3 +39,12 @@ def test_joints_that_a_recording_lacks_are_left_out_as_the_message_says():
         require_joints([_state('shoulder')], ROBOT, 'a.mcap')
     assert 'a.mcap lacks elbow of double_pendulum' in str(caught.value)
     assert '"joints: [shoulder]"' in str(caught.value)
+
+
+def test_a_gripper_of_another_name_is_left_out_or_renamed():
+    """The nearest of all other names, such as that of a wheel, says nothing."""
+    with pytest.raises(RecordingError) as caught:
+        require_joints([_state('shoulder', 'gripper_width', 'wheel')], ROBOT, 'a.mcap')
+    assert 'a.mcap lacks elbow of double_pendulum' in str(caught.value)
+    assert '"joints: [shoulder]"' in str(caught.value)
+    assert 'if one of gripper_width, wheel is meant, rename it' in str(caught.value)

@@ -222,3 +222,19 @@ def test_what_cannot_be_guessed_is_refused(tmp_path):
         import_table(_npz(tmp_path, t=T, x=Q), None, tmp_path, HINTS)
     with pytest.raises(RecordingError, match='positions of 1 joints'):
         import_table(_npz(tmp_path, t=T, q=Q[:, 0]), None, tmp_path, HINTS)
+
+
+def test_a_log_in_another_language_is_read_by_its_units(tmp_path):
+    """As a spreadsheet exports it: titles, degree signs in Windows-1252, commas, a trigger."""
+    rows = [
+        f'{1e3 * t - 50.0:.1f};{np.degrees(q):.4f};{100.0 * u:.3f};21,5'.replace('.', ',')
+        for t, q, u in zip(T, Q[:, 0], TAU[:, 0], strict=True)
+    ]
+    head = ['Protokoll;Prüfstand;;', 'Zeit [ms];Winkel [°];Drehmoment [Ncm];Temperatur [°C]']
+    path = tmp_path / 'log.csv'
+    path.write_bytes('\n'.join([*head, *rows]).encode('cp1252'))
+    summary, states, _ = _read(path, tmp_path, (JointHint('arm'),))
+    assert 'log.csv is not in UTF-8; it is read as Windows-1252' in summary.remarks
+    np.testing.assert_allclose([s.position[0] for s in states], Q[:, 0], atol=1e-6)
+    np.testing.assert_allclose([s.effort[0] for s in states], TAU[:, 0], atol=1e-5)
+    assert np.diff([s.stamp_ns for s in states]).tolist() == [5_000_000] * 199

@@ -158,3 +158,9 @@ def test_units_are_written_with_their_signs_and_joints_keep_their_names():
     """`m2` behind another unit is a unit, alone it may be a joint."""
     said = typeset('m2: inertia 0.02 +- 0.01 kg m2, drag 1 N m s2/rad2')
     assert said == 'm2: inertia 0.02 ± 0.01 kg m², drag 1\u00a0N\u00a0m s²/rad²'
+
+
+def test_a_number_is_not_broken_at_its_exponent():
+    """A narrow table breaks lines at a hyphen; a name keeps its own."""
+    assert typeset('3.8e-06 to 4e+12, link2e-05') == '3.8·10⁻⁶ to 4·10¹², link2e-05'
+    assert typeset('4.8e+02 (3.6e+02 to 6e+02)') == '480 (360 to 600)'

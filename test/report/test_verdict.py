@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from sgp_ros.diagnosis.criteria import LEAST_SHARE
 from sgp_ros.diagnosis.result import VERDICTS, Parameter
 from sgp_ros.diagnosis.shown import Dependence
+from sgp_ros.report.diagnosis import render
 from sgp_ros.report.diagnosis_cards import cards
 from sgp_ros.report.diagnosis_text import explained
+from sgp_ros.report.next_steps import Given, after_diagnosis
 from sgp_ros.report.verdict import verdict_sentence
 from test.report.diagnoses import ASYMMETRIC, COULOMB, MASS, SPRING, UNKNOWN, diagnosis
 
@@ -89,3 +93,38 @@ def test_a_finding_that_a_simulation_was_not_asked_for_has_no_empty_number():
     text = verdict_sentence(found)
     assert 'in the simulation level 0.100 +- 0.020 N m (' in text
     assert 'in the simulation unknown (' in text
+
+
+def test_a_low_probability_has_its_reason_beside_it():
+    """Else a narrow interval contradicts it."""
+    small = replace(SPRING, probability=0.4, why='its share is too small to count')
+    text = verdict_sentence(diagnosis('missing_physics', [COULOMB, small]))
+    assert '(probability 0.40: its share is too small to count)' in text
+
+
+@pytest.mark.parametrize(
+    ('scale', 'said'), [(57.29, 'degrees were taken for radians'), (1.6, ''),
+                        (0.017453, 'radians were taken for degrees')],
+)  # fmt: skip
+def test_a_scale_that_mixes_up_units_says_so(scale, said):
+    error = replace(
+        SPRING, effect='position_scale', parameters={'scale': Parameter(scale, 1e-4, '')}
+    )
+    text = verdict_sentence(replace(diagnosis('setup_error', []), setup=(error,)))
+    assert (' were taken for ' in text) == bool(said)
+    assert said in text
+
+
+@pytest.mark.parametrize(('robot', 'to'), [('arm.urdf', 'urdf'), ('arm.xml', 'mjcf')])
+def test_the_next_step_hands_the_robot_back_in_its_format(robot, to):
+    """The URDF beside the results holds bodies alone."""
+    steps = after_diagnosis(
+        'missing_physics', Given('a.mcap', robot), Path('out'), has_setup_error=False
+    )
+    assert f'--to {to} --ranges' in steps[-1][1]
+
+
+def test_the_title_names_an_error_of_the_set_up_before_missing_physics():
+    """As the sentence below it does."""
+    found = replace(diagnosis('missing_physics', [COULOMB]), setup=(SPRING,))
+    assert '<title>Set-up error; physics is missing: diagnosis of' in render(found, {})
