@@ -239,9 +239,9 @@ def parameter_errors(
     tree = equations.motion.tree
     if not model.is_free:
         return ()
-    C = model.frame.covariance
+    C = model.frame.covariance[equations.instants :, equations.instants :]
     changed = equations.with_bodies(equations.motion, model.w).tree.parameters
-    D = equations.directions.reshape(len(model.w), -1, 10)
+    D = equations.directions.reshape(len(C), -1, 10)
     found = []
     for body, link in enumerate(tree.link_names):
         before, after = tree.parameters[body], changed[body]

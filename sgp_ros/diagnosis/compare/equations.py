@@ -3,7 +3,9 @@
 For every joint `d = tau_nominal(q, v, a) - tau_stated - tau_commanded = sum tau_x - Y dpi +
 noise`: what the motion takes beyond what was commanded, and beyond the effects that the nominal
 robot states, comes from effects tau_x, and from wrong inertial parameters. These have a prior: a
-body may have another mass, another centre, another inertia.
+body may have another mass, another centre, another inertia. An effort that was measured is read
+within half a sampling period of the position with its stamp, not at the same instant, which adds
+`t dtau/dt` with an unknown t for each joint.
 
 The nominal values of the robot are the reference, not a fit to its simulation: where the two agree
 a fit would add nothing but its own error, and where they do not, the wrong parameters and findings
@@ -19,8 +21,9 @@ from functools import cached_property
 import numpy as np
 
 from sgp_ros.diagnosis.compare.bodies import Factor, body_directions
-from sgp_ros.diagnosis.compare.grid import noisy_volume, part_of_noise
+from sgp_ros.diagnosis.compare.grid import effort_change, noisy_volume, part_of_noise
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
+from sgp_ros.diagnosis.compare.rest import resting
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
     RawTrajectory,
@@ -68,9 +71,9 @@ class Equations:
         filter: from n to N rows.
         time: (N,) [s].
         d: (N, k) discrepancy [N m or N].
-        bases: of each joint, (N, p) force per standard deviation of each inertial parameter's
-            change; those that a hypothesis does not change are shared.
-        directions: (p, 10 b) change of the inertial parameters per unit of the coefficients.
+        bases: of each joint, (N, p) force per standard deviation of each measured effort's
+            instant, then of each change of inertial parameters; unchanged ones are shared.
+        directions: (p - instants, 10 b) changes of inertial parameters.
         power: (k,) mean squared effort that shares refer to [N^2 m^2 or N^2].
         noise: (k,) standard deviation that the encoders' noise gives d [N m or N].
         moving: (n, k) 0 where a joint rests that dry friction may hold, 1 elsewhere; all 1
@@ -80,6 +83,7 @@ class Equations:
             smoothing of the states, for the motion is fast, and the noise of measured efforts.
         noise_part: (k,) part of d that the noise of measured efforts makes, in mean squares.
         free: the same equations where dry friction holds fewer joints; None where there are none.
+        instants: number of efforts whose instant is unknown: k where they are measured, else 0.
     """
 
     motion: ObservedMotion
@@ -95,6 +99,7 @@ class Equations:
     model_error: np.ndarray
     noise_part: np.ndarray
     free: Equations | None = None
+    instants: int = 0
 
     @cached_property
     def factors(self) -> tuple[Factor, ...]:
@@ -108,21 +113,27 @@ class Equations:
 
     @property
     def size(self) -> int:
-        """Number p of changes of the inertial parameters."""
-        return len(self.directions)
+        """Number p of instants and of changes of the inertial parameters."""
+        return self.instants + len(self.directions)
 
     @property
     def base(self) -> np.ndarray:
         """All bases in one new array, (N, k, p)."""
         return np.stack(self.bases, axis=1)
 
-    def force_of_bodies(self, w: np.ndarray) -> np.ndarray:
-        """Return the force of a change of the bodies, w (p,), in the rows, (N, k) [N m or N]."""
+    def force_of(self, w: np.ndarray) -> np.ndarray:
+        """Return the force of instants and changed bodies, w (p,), (N, k) [N m or N]."""
         return np.stack([base @ w for base in self.bases], axis=1)
 
+    def force_of_bodies(self, w: np.ndarray) -> np.ndarray:
+        """Return the force of the changed bodies of w alone, (N, k) [N m or N]."""
+        bodies = w[-len(self.directions) :]
+        return np.stack([base[:, self.instants :] @ bodies for base in self.bases], axis=1)
+
     def with_bodies(self, motion: ObservedMotion, w: np.ndarray) -> ObservedMotion:
-        """Return a motion of a robot with changed bodies, w (p,)."""
-        change = (w @ self.directions).reshape(motion.tree.parameters.shape)
+        """Return a motion of a robot with the changed bodies of w (p,)."""
+        bodies = w[-len(self.directions) :]
+        change = (bodies @ self.directions).reshape(motion.tree.parameters.shape)
         tree = replace(motion.tree, parameters=motion.tree.parameters + change)
         return replace(motion, tree=tree)
 
@@ -158,6 +169,7 @@ class Equations:
         if j not in self._held:
             motion, rests = self.motion, self.rests[:, j]
             change, base = np.empty(len(self.d)), self.bases[j].copy()
+            late = effort_change(motion.effort, motion.starts)[:, j]
             for rows, out in self.filter.blocks(_BLOCK):
                 at = rests[rows]
                 q = motion.position[rows][at]
@@ -166,8 +178,10 @@ class Equations:
                 needed = np.zeros((len(at), 1 + self.size))
                 acting = (motion.effort[rows, j] + motion.stated_force[rows, j])[at]
                 needed[at, 0] = motion.effort_for(q, v, a)[:, j] - acting
+                if self.instants:
+                    needed[at, 1 + j] = -late[rows][at]
                 Y = torque_regressor(motion.tree, q, v, a)[:, j]
-                needed[at, 1:] = Y @ self.directions.T
+                needed[at, 1 + self.instants :] = Y @ self.directions.T
                 found = self.filter.piece(needed, out)
                 change[out] = found[:, 0]
                 base[out] += found[:, 1:]
@@ -205,7 +219,7 @@ class Equations:
         matrix is not positive, infinity where the nominal robot has a joint without inertia.
 
         Args:
-            w: (p,) change of the bodies.
+            w: (p,) instants and change of the bodies.
             added: (k, k), or (`POSES`, k, k) for the poses [kg m^2 or kg].
         """
         if self.motion.is_static:  # efforts are measured there, no motion is predicted
@@ -221,22 +235,6 @@ class Equations:
         whole = (np.linalg.slogdet(M)[1] - np.linalg.slogdet(nominal)[1]).mean()
         own = np.log(np.diagonal(M, 0, 1, 2) / np.diagonal(nominal, 0, 1, 2)).mean(axis=0)
         return noisy_volume(own + (whole - own.sum()) / len(own), self.noise_part)
-
-
-def resting(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) -> np.ndarray:
-    """Return where joints rest: slower than the noise of the velocity for some time, (n, k)."""
-    noise = np.sqrt((2 * np.pi) ** 2 * raw.noise_density * bandwidth.state_cutoff**3 / 3.0)
-    speed = np.abs(motion.velocity)
-    threshold = np.maximum(4.0 * noise, 1e-3 * np.sqrt((speed**2).mean(axis=0)))
-    shortest = max(4, round(0.03 / raw.step))
-    rests = np.zeros(speed.shape, dtype=bool)
-    for j in range(speed.shape[1]):
-        wide = np.concatenate([[False], speed[:, j] < 3.0 * threshold[j], [False]])
-        edges = np.flatnonzero(np.diff(wide.astype(int)))
-        for start, stop in zip(edges[::2], edges[1::2], strict=True):
-            if np.sum(speed[start:stop, j] < threshold[j]) >= shortest:
-                rests[start:stop, j] = True
-    return rests
 
 
 def joint_name(motion: ObservedMotion, joint: int) -> str:
@@ -272,12 +270,17 @@ def make_equations(
     k = tree.size
     d = low(motion.nominal_effort - motion.effort - motion.stated_force) * motion.moves
     directions = body_directions(tree, unstated)
-    bases = tuple(np.empty((len(d), len(directions))) for _ in range(k))
+    m = k if motion.drive is None and not motion.is_static else 0
+    bases = tuple(np.zeros((len(d), m + len(directions))) for _ in range(k))
     for rows, out in low.blocks(_BLOCK):
         states = motion.position[rows], motion.velocity[rows], motion.acceleration[rows]
         Y = torque_regressor(tree, *states)
         for j in range(k):
-            bases[j][out] = -low.piece(Y[:, j] @ directions.T, out) * motion.moves[j]
+            bases[j][out, m:] = -low.piece(Y[:, j] @ directions.T, out) * motion.moves[j]
+    if m:
+        late = low(effort_change(motion.effort, motion.starts)) * motion.moves
+        for j in range(k):
+            bases[j][:, j] = late[:, j]
     power = np.where(
         tree.is_actuated[:k],
         (motion.effort**2).mean(axis=0),
@@ -291,5 +294,6 @@ def make_equations(
         motion, low, motion.time[low.rows], d, bases, directions, power, np.sqrt(variance),
         np.ones(motion.position.shape), resting(raw, motion, bandwidth),
         _smoothing_error(raw, motion, low, bandwidth) + noise, part_of_noise(noise, d),
+        instants=m,
     )  # fmt: skip
     return replace(equations.with_dry_friction(motion.dry_joints), free=None)

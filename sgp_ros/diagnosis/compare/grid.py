@@ -1,4 +1,4 @@
-"""A stretch of a recording on a uniform grid, and the noise of positions and efforts there."""
+"""A stretch of a recording on a uniform grid, with the noise and the instants of its signals."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ import scipy  # its parts load when they are used
 
 from sgp_ros.batch.acceptance import Accepted
 
+INSTANT_SPREAD = 12**-0.5
+"""Prior standard deviation of the instant of a measured effort, in periods: uniform over one."""
 _POSITIONS = 0.3, 0.48
 """Frequencies at which no robot moves, in parts of the rate."""
 _EFFORTS = 0.225, 0.32
@@ -126,3 +128,16 @@ def _levels(
     bands = [(frequency > a) & (frequency < b) for a, b in pairwise(edges)]
     # the median of an exponential variable is ln 2 of its mean
     return np.array([np.median(density[band], axis=0) for band in bands]) / math.log(2.0)
+
+
+def effort_change(effort: np.ndarray, starts: Sequence[int]) -> np.ndarray:
+    """Return by how much measured efforts change in one deviation of their instant, (n, k).
+
+    States and efforts of one stamp are read up to half a period apart, either one first.
+
+    Args:
+        effort: (n, k) [N m or N].
+        starts: rows at which the grid begins anew after a pause.
+    """
+    parts = [effort[start:stop] for start, stop in pairwise((*starts, len(effort)))]
+    return INSTANT_SPREAD * np.concatenate([np.gradient(part, axis=0) for part in parts])

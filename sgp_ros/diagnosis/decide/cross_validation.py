@@ -130,7 +130,7 @@ def left_out(
     """
     equations, sigma = model.frame.equations, model.sigma
     N, k = equations.d.shape
-    p = equations.size if model.is_free else 0
+    p = len(model.frame.R)
     y, X = equations.d / sigma, [equations.base[:, :, :p] / sigma[:, None]]
     for candidate in candidates:
         x = columns.of(candidate, equations, model.w) / sigma[:, None]

@@ -195,7 +195,7 @@ def _without_prior(equations: Equations, parameters: Model) -> Model:
     inertia = equations.inertia(w, np.zeros((k, k)))
     return replace(
         parameters, w=w, inertia=inertia,
-        residual=equations.d - equations.force_of_bodies(w),
+        residual=equations.d - equations.force_of(w),
     )  # fmt: skip
 
 

@@ -107,7 +107,7 @@ def _solved(
         forces.append(x @ own)
     left = equations.d - sum(forces, np.zeros_like(equations.d))
     w = frame.parameters(left)
-    residual = left - equations.force_of_bodies(w)
+    residual = left - equations.force_of(w)
     mean = (residual**2).mean(axis=0)
     inertia = equations.inertia(w, added_inertia(placed, equations))
     # what is measured is the motion: the floor is one of accelerations

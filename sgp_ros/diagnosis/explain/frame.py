@@ -1,11 +1,11 @@
 """Least squares with the inertial parameters projected out.
 
-Rows are scaled by the standard deviation of their joint. The change w of the inertial parameters
-has the prior N(0, I). N rows tell no more than `INDEPENDENT_ROWS` independent ones, for what is
-wrong with the columns repeats in every row: beside them the prior weighs N over that number. With
-the prior as p more rows, `Q` spans what it can explain, and columns are compared by what is left
-of them. Source: Golub and Pereyra 1973 for the projection of linear coefficients while the shapes
-are searched.
+Rows are scaled by the standard deviation of their joint. The instants of measured efforts and the
+change of the inertial parameters, together w, have the prior N(0, I). N rows tell no more than
+`INDEPENDENT_ROWS` independent ones, for what is wrong with the columns repeats in every row:
+beside them the prior weighs N over that number. With the prior as p more rows, `Q` spans what it
+can explain, and columns are compared by what is left of them. Source: Golub and Pereyra 1973 for
+the projection of linear coefficients while the shapes are searched.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Frame:
         S: orthonormal coefficients of the bases of the joints, (r_j, p) each, and of the prior,
             (p, p): `Q = diag(Q_1, ..., Q_k, I) S`, see `Factor`.
         R: (p, p) upper triangular, `Q R = [B / sigma; sqrt(weight) I]`.
-        is_free: whether inertial parameters may differ; else p is 0 here.
+        is_free: whether inertial parameters may differ; else p here counts the instants alone.
         weight: of the prior, in rows.
     """
 
@@ -49,7 +49,7 @@ class Frame:
     ) -> Frame:
         """Return the frame for rows of these standard deviations; N rows give the usual weight."""
         factors = equations.factors
-        p = equations.size if is_free else 0
+        p = equations.size if is_free else equations.instants
         parts = [f.R[:, :p] / s for f, s in zip(factors, sigma, strict=True)]
         weight = weight or max(1.0, len(equations.d) / INDEPENDENT_ROWS)
         S, R = np.linalg.qr(np.concatenate([*parts, math.sqrt(weight) * np.eye(p)]))
@@ -75,7 +75,7 @@ class Frame:
         N, k, m = columns.shape
         x = np.zeros((N * k + len(self.S[-1]), m))
         scaled = np.divide(columns, self.sigma[:, None], out=x[: N * k].reshape(N, k, m))
-        if self.is_free:
+        if self.R.size:
             u = self.explained(scaled)
             for j, factor in enumerate(self.equations.factors):
                 scaled[:, j] -= factor.Q @ (self.S[j] @ u)
@@ -97,10 +97,10 @@ class Frame:
 
     def parameters(self, unexplained: np.ndarray) -> np.ndarray:
         """Return w (p,) that explains best what effects (N, k) leave of the target."""
-        if not self.is_free:
-            return np.zeros(self.equations.size)
         u = self.explained((unexplained / self.sigma)[:, :, None])
-        return np.linalg.solve(self.R, u[:, 0])
+        w = np.zeros(self.equations.size)
+        w[: len(self.R)] = np.linalg.solve(self.R, u[:, 0])
+        return w
 
     @property
     def occam(self) -> float:

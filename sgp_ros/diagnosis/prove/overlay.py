@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sgp_ros.batch.zero_phase import ZeroPhase
-from sgp_ros.diagnosis.compare.equations import resting
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
+from sgp_ros.diagnosis.compare.rest import resting
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
     RawTrajectory,

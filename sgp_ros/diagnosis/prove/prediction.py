@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.equations import Equations, resting
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.compare.rest import resting
 from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, observe
 from sgp_ros.diagnosis.explain.fitted_model import Model, extra_force, held_joints, imbalance
 from sgp_ros.diagnosis.locate.remainder import Remainder
@@ -144,11 +145,11 @@ def diagnosed_bodies(
     nominal = equations.motion.tree.parameters
     if not model.is_free:
         return nominal if unstated else None
-    D = equations.directions  # (p, 10 b), parameters change by w @ D
-    changed = (nominal.ravel() + model.w @ D).reshape(nominal.shape)
+    D, at = equations.directions, equations.instants  # parameters change by w[at:] @ D
+    changed = (nominal.ravel() + model.w[at:] @ D).reshape(nominal.shape)
     if np.all(is_consistent(changed)):
         return changed
-    root = np.linalg.solve(D, model.frame.R.T).T  # R w = root @ change
+    root = np.linalg.solve(D, model.frame.R[at:, at:].T).T  # R w = root @ change, any instants
     blocks = [range(10 * i, 10 * i + 10) for i in range(len(nominal))]
     try:
         found = project_information(changed.ravel(), root, blocks, reference=nominal.ravel())

@@ -9,6 +9,7 @@ import pytest
 
 from sgp_ros.diagnosis.compare.bodies import body_directions
 from sgp_ros.diagnosis.compare.equations import make_equations
+from sgp_ros.diagnosis.compare.grid import INSTANT_SPREAD
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.explain import regression
 from sgp_ros.diagnosis.explain.candidates import fit
@@ -85,6 +86,41 @@ def test_rows_in_which_dry_friction_holds_ask_nothing(equations_for, dry):
     column = np.ones((len(equations.motion.time), 1))
     assert np.abs(held.compact(column, 0, is_inertial=False)[inside]).max() < 1e-12
     assert np.abs(held.compact(column, 0, is_inertial=True)[inside]).min() > 0.99
+
+
+@pytest.mark.parametrize('periods', [-0.3, -1.0])
+def test_efforts_of_another_instant_are_no_mismatch(equations_for, perfect, periods):
+    """Their instant is estimated, with its sign, where bodies are those of the file.
+
+    A command that is held from its stamp on acts half a period later on average.
+    """
+    world = perfect[2]
+    step = float(np.median(np.diff(world.time)))
+    read = [np.interp(world.time + periods * step, world.time, tau) for tau in world.command.T]
+    _, now = equations_for(world, effort=world.command, commands=False)
+    _, then = equations_for(world, effort=np.column_stack(read), commands=False)
+    fitted = [fit(Columns(e), (), start(e), is_free=False) for e in (now, then)]
+    assert then.instants == 2
+    assert all(np.all(m.mean_square < 2e-5 * now.power) for m in fitted)
+    apart = fitted[1].w[:2] - fitted[0].w[:2]
+    np.testing.assert_allclose(apart * INSTANT_SPREAD, -periods, rtol=0.05)
+    assert not fitted[1].w[2:].any()
+    np.testing.assert_array_equal(then.force_of_bodies(fitted[1].w), 0.0)
+
+
+def test_the_instants_of_commands_are_known(equations_for, perfect):
+    """They have a stamp of their own, and a delay is an effect."""
+    assert equations_for(perfect[2])[1].instants == 0
+
+
+def test_an_effort_that_friction_takes_up_has_no_instant(equations_for, dry):
+    """In rows where a joint is held, its measured effort may be any."""
+    _, equations = equations_for(dry, effort=dry.command, commands=False)
+    held = equations.with_dry_friction(frozenset([0]))
+    half, rests = len(held.filter.taps) // 2, equations.rests[:, 0]
+    inside = np.array([rests[i - half : i + half + 1].all() for i in held.filter.rows])
+    assert np.abs(equations.bases[0][inside, 0]).max() > 1e-6
+    assert np.abs(held.bases[0][inside, 0]).max() < 1e-12
 
 
 def test_a_robot_that_never_rests_has_no_held_rows(equations_for, perfect):

@@ -226,7 +226,7 @@ def test_a_rotor_is_found_where_bodies_could_stand_for_it(equations_for):
     frame = Frame.of(equations, base.sigma * 1e-3, is_free=True, weight=1.0)
     unexplained = equations.d - sum(bodies.forces)
     imitation = frame.parameters(unexplained)
-    rest = ((unexplained - equations.force_of_bodies(imitation)) ** 2).mean(axis=0)
+    rest = ((unexplained - equations.force_of(imitation)) ** 2).mean(axis=0)
     left = bodies.mean_square / equations.power
     assert (rest / equations.power).max() < COUNTED_SHARE < left.max()
     found = by_joint(columns, bodies)[0]
