@@ -76,13 +76,13 @@ class Equations:
         directions: (p - instants, 10 b) changes of inertial parameters.
         power: (k,) mean squared effort that shares refer to [N^2 m^2 or N^2].
         noise: (k,) standard deviation that the encoders' noise gives d [N m or N].
-        moving: (n, k) 0 where a joint rests that dry friction may hold, 1 elsewhere; all 1
-            unless the joint has, or is supposed to have, dry friction.
-        rests: (n, k) whether a joint rests.
-        model_error: (k,) mean square that a perfect model leaves: by how much d changes with the
-            smoothing of the states, for the motion is fast, and the noise of measured efforts.
-        noise_part: (k,) part of d that the noise of measured efforts makes, in mean squares.
-        free: the same equations where dry friction holds fewer joints; None where there are none.
+        moving: (n, k) 0 where a joint rests that has, or may have, dry friction, 1 elsewhere.
+        rests: (n, k) where joints rest.
+        model_error: (k,) mean square that a perfect model leaves: the change of d with the
+            smoothing of the states, and the noise of measured efforts.
+        noise_part: (k,) part of d that this noise makes, in mean squares.
+        effort_noise: (k,) its mean square, the part of `model_error` that no inertia changes.
+        free: the same equations where dry friction holds fewer joints, or None.
         instants: number of efforts whose instant is unknown: k where they are measured, else 0.
     """
 
@@ -98,6 +98,7 @@ class Equations:
     rests: np.ndarray
     model_error: np.ndarray
     noise_part: np.ndarray
+    effort_noise: np.ndarray
     free: Equations | None = None
     instants: int = 0
 
@@ -294,6 +295,6 @@ def make_equations(
         motion, low, motion.time[low.rows], d, bases, directions, power, np.sqrt(variance),
         np.ones(motion.position.shape), resting(raw, motion, bandwidth),
         _smoothing_error(raw, motion, low, bandwidth) + noise, part_of_noise(noise, d),
-        instants=m,
+        noise, instants=m,
     )  # fmt: skip
     return replace(equations.with_dry_friction(motion.dry_joints), free=None)

@@ -30,7 +30,8 @@ class Scale:
 
     Attributes:
         power: (k,) mean squared efforts.
-        error: (k,) what filters and smoothing leave of a perfect model, as mean squares.
+        error: (k,) what filters, smoothing and noise leave of a perfect model, as mean squares.
+        noise: (k,) the part of that which is noise of measured efforts.
         base: rest of the best model without effects, (k,) shares.
         nominal: discrepancy of the nominal robot, (k,) shares.
         rows: that count as independent.
@@ -39,6 +40,7 @@ class Scale:
 
     power: np.ndarray
     error: np.ndarray
+    noise: np.ndarray
     base: np.ndarray
     nominal: np.ndarray
     rows: float
@@ -49,7 +51,8 @@ class Scale:
         """Return the scale of a recording."""
         power, error = equations.power, equations.model_error
         base, nominal = comparison.base.left, comparison.nominal.mean_square / power
-        return cls(power, error, base, nominal, min(INDEPENDENT_ROWS, len(equations.d)))
+        noise = equations.effort_noise
+        return cls(power, error, noise, base, nominal, min(INDEPENDENT_ROWS, len(equations.d)))
 
     @property
     def floor(self) -> np.ndarray:
@@ -113,14 +116,15 @@ class Scale:
         """Return the tempered log likelihood, with the prior of the bodies' change [nats].
 
         It is one of the motion, which is what was measured: a residual of effort, and what a
-        perfect model would leave of it, grows with the inertia of a model.
+        perfect model would leave of it beside noise of efforts, grows with the inertia of a model.
         """
         return self.likelihood(model) - 0.5 * float(model.w @ model.w)
 
     def likelihood(self, model: Model) -> float:
         """Return the fit without that prior [nats]."""
-        floor = self.floor * np.exp(2.0 * np.maximum(model.inertia, -50.0))
-        share = model.mean_square / self.power + floor
+        noise = self.noise / self.power
+        floor = (self.floor - noise) * np.exp(2.0 * np.maximum(model.inertia, -50.0))
+        share = model.mean_square / self.power + floor + noise
         return self.rows * (model.log_inertia - 0.5 * float(np.log(share).sum()))
 
     def worth(self, model: Model) -> float:

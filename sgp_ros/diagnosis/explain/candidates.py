@@ -110,8 +110,7 @@ def _solved(
     residual = left - equations.force_of(w)
     mean = (residual**2).mean(axis=0)
     inertia = equations.inertia(w, added_inertia(placed, equations))
-    # what is measured is the motion: the floor is one of accelerations
-    variance = mean + floors(equations) * np.exp(2.0 * np.maximum(inertia, -50.0))
+    variance = mean + floors(equations, inertia)
     N = len(residual)
     size = sum(len(s.shape) for s in candidates) + len(c)
     score = (

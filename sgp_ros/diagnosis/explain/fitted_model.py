@@ -174,9 +174,15 @@ def beyond_plain(s: EffectAt, force: np.ndarray, equations: Equations) -> np.nda
     return left
 
 
-def floors(equations: Equations) -> np.ndarray:
-    """Return the least variance of a residual, (k,)."""
-    return FLOOR_SHARE * equations.power + equations.model_error + 1e-300
+def floors(equations: Equations, inertia: np.ndarray | float = 0.0) -> np.ndarray:
+    """Return the least variance of a residual, (k,).
+
+    Errors of the motion become larger ones of the effort with the log of a model's inertia (k,),
+    the noise of measured efforts does not.
+    """
+    noise = equations.effort_noise
+    motion = FLOOR_SHARE * equations.power + equations.model_error - noise
+    return np.asarray(motion * np.exp(2.0 * np.maximum(inertia, -50.0)) + noise + 1e-300)
 
 
 def price_of(frame: Frame, size: int) -> float:
