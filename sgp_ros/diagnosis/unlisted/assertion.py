@@ -10,18 +10,19 @@ unexplained, and listed effects that explain it less well than the smooth force 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import LACKING, LEAST_LAW, SIGNIFICANT
+from sgp_ros.diagnosis.criteria import ALIKE, LACKING, LEAST_LAW, NEARLY, SIGNIFICANT
 from sgp_ros.diagnosis.decide.certainty import probabilities
 from sgp_ros.diagnosis.decide.decision import Decision, decide, refused
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, moved
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
-from sgp_ros.diagnosis.explain.fitted_model import Model, floors
+from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.unlisted.beside import PLAIN, law_of, own_effects, says_less
 from sgp_ros.diagnosis.unlisted.search import Searched, search
@@ -85,9 +86,9 @@ def _joints(equations: Equations, comparison: Comparison, decision: Decision) ->
 
 def _decided(equations: Equations, found: Explained, searched: Searched) -> Explained:
     """Return what is decided with the laws of one more joint."""
-    if searched.laws and says_less(equations, searched.laws[0], searched.joint):
-        plain = _with_plain_laws(equations, searched)
-        comparison = replace(found.comparison, more=(*found.comparison.more, *plain))
+    plain = _in_plain_laws(equations, found.comparison, searched)
+    if plain is not None:
+        comparison = replace(found.comparison, more=(*found.comparison.more, plain))
         return replace(found, comparison=comparison, decision=decide(equations, comparison))
     why = _objection(equations, found.comparison, searched)
     if not why:
@@ -110,20 +111,38 @@ def _decided(equations: Equations, found: Explained, searched: Searched) -> Expl
     return replace(found, decision=decision, why_not=found.why_not | {searched.joint: why})
 
 
-def _with_plain_laws(equations: Equations, searched: Searched) -> tuple[Model, ...]:
-    """Return the model of the best formula with one plain law of friction or load in its place."""
-    best, columns = searched.laws[0], Columns(equations)
-    law = law_of(best, searched.joint)
+def _in_plain_laws(
+    equations: Equations, comparison: Comparison, searched: Searched
+) -> Model | None:
+    """Return the best model with plain laws of friction and load in place of the best formula.
+
+    None where the formula needs all its coefficients, and is worth more than any sum of them and
+    leaves clearly less: three laws that every joint may have are likelier than a formula of five
+    numbers, whatever their number costs.
+    """
+    if not searched.laws:
+        return None
+    best, joint, columns = searched.laws[0], searched.joint, Columns(equations)
+    scale = Scale.of(equations, comparison).of_forms()
+    law = law_of(best, joint)
     others = tuple(s for s in best.effects if s is not law)
-    start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
-    return tuple(
+    missing = [e for e in PLAIN if all(s.effect is not e for s in own_effects(best, joint))]
+    sums = (c for n in range(len(missing)) for c in combinations(missing, n + 1))
+    tried = [
         fit(
-            columns, (*others, EffectAt(effect, Place(searched.joint))), start,
-            is_free=is_free, steps=_STEPS,
+            columns, (*others, *(EffectAt(e, Place(joint)) for e in added)), best.sigma,
+            is_free=is_free, still=len(others),
         )
-        for effect in PLAIN
+        for added in sums
         for is_free in dict.fromkeys((False, best.is_free))
-    )  # fmt: skip
+    ]  # fmt: skip
+    if not tried:
+        return None
+    most = max(tried, key=scale.worth)
+    plain = fit(columns, most.effects, most.sigma, is_free=most.is_free, w=most.w, steps=_STEPS)
+    is_near = best.mean_square[joint] > NEARLY * plain.mean_square[joint]
+    is_as_good = is_near or scale.worth(best) < scale.worth(plain) + ALIKE
+    return plain if is_as_good or says_less(equations, best, joint) else None
 
 
 def _objection(equations: Equations, comparison: Comparison, searched: Searched) -> str:

@@ -17,11 +17,11 @@ from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
-from sgp_ros.diagnosis.unlisted.assertion import with_laws
+from sgp_ros.diagnosis.unlisted.assertion import _in_plain_laws, with_laws
 from sgp_ros.diagnosis.unlisted.beside import earned, is_bent, law_of
 from sgp_ros.diagnosis.unlisted.formulas import Range, texts
 from sgp_ros.diagnosis.unlisted.formulas import law as a_law
-from sgp_ros.diagnosis.unlisted.search import search
+from sgp_ros.diagnosis.unlisted.search import Searched, search
 from sgp_ros.diagnosis.unlisted.sentences import COEFFICIENTS
 from sgp_ros.diagnosis.unlisted.shapes import (
     FINE,
@@ -140,6 +140,34 @@ def test_a_listed_effect_beside_a_formula_earns_its_price_again(equations_for, f
     names = [s.name for s in left.effects]
     assert names == ['law', 'coulomb_friction'][: 1 + (friction > 0.0)]
     assert scale.worth(left) > scale.worth(model)
+
+
+@pytest.mark.parametrize('name', ['plain', 'brake'])
+def test_a_sum_of_plain_laws_stands_in_place_of_a_formula(equations_for, name):
+    """A formula in which a shifted step imitates a constant load; that of a brake remains."""
+
+    def force(t, q, v):
+        return (0.4 - 0.5 * v[0],) if name == 'plain' else _brake(t, q, v)
+
+    _, equations = equations_for(simulate(CHAINS[1], 11, 10.0, force=force))
+    motion = equations.motion
+    smooth = next(s for s in smooth_forces(motion, 0) if (s.variable.kind, s.gate) == ('dq', ''))
+    text, start = {
+        'plain': ('a*X + b*tanh((X - x0)/w0)', {'x0': -12.0, 'w0': 2.0}),
+        'brake': ('a*X/(1 + (X/v0)**2)', {'v0': 1.5}),
+    }[name]
+    law = a_law(smooth, motion, Range.of_variable(smooth.variable, motion), text, start)
+    listed = compare_models(equations, lambda _share: None)
+    scale = np.sqrt((equations.d**2).mean(axis=0))
+    shape = np.array(list(start.values()))
+    model = fit(Columns(equations), (EffectAt(law, Place(0), shape),), scale, is_free=False)
+    found = Searched(0, listed.base, model, (model,), (np.zeros(0), 0), 0.0)
+    plain = _in_plain_laws(equations, listed, found)
+    if name == 'brake':
+        assert plain is None
+        return
+    assert {s.name for s in plain.effects} == {'constant_load', 'viscous_friction'}
+    assert not plain.is_free
 
 
 def test_a_listed_effect_keeps_its_name(equations_for, viscous):
