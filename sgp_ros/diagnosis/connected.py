@@ -19,6 +19,7 @@ from sgp_ros.diagnosis.compare.sufficiency import require_rows
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth
 from sgp_ros.diagnosis.criteria import (
     ALIKE,
+    NEARLY,
     PER_EFFECT,
     TEMPER,
 )
@@ -115,17 +116,20 @@ class Connected:
         """Return the worth of what is decided, as the density of the recorded motion [nats].
 
         Errors are relative to the recorded efforts, in whatever unit these are, so that what a
-        perfect model leaves is the same motion with a correction and without.
+        perfect model leaves is the same motion with a correction and without. Where nothing is
+        asserted the best model counts if it explains most of the discrepancy: a correction has
+        to explain more than it does.
 
         Args:
             nominal: (k,) shares of the discrepancy whose shape is only nearly right; the same
                 for all that are compared.
             recorded: (k,) mean squared efforts of the recording [N^2 m^2 or N^2].
         """
-        model, scale = (
-            self.several.decision.model,
-            Scale.of(self.equations, self.several.comparison),
-        )
+        decision, base = self.several.decision, self.several.comparison.base
+        model = decision.tentative or decision.model
+        if decision.tentative and model.left.sum() > NEARLY * base.left.sum():
+            model = base
+        scale = Scale.of(self.equations, self.several.comparison)
         if self.correction is not None:
             recorded = recorded[list(self.correction.effort_order)]
             units = model.inertia - np.log(np.abs(self.correction.scale))

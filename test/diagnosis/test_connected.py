@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from sgp_ros.diagnosis import connected
@@ -78,6 +79,35 @@ def test_gains_are_asserted_only_where_bodies_do_not_explain_as_much(
     assert bool(one.findings) == asserted
     assert one.trust == (1.0 if asserted else 0.5)
     assert bool(one.equivalents) != asserted
+
+
+@dataclass(frozen=True)
+class _AsGiven:
+    """A scale on which models are worth what they say."""
+
+    nominal: float = 0.0
+    power: float = 0.0
+
+    def worth(self, model):
+        return model.worth
+
+
+def test_an_error_has_to_explain_more_than_the_best_model_that_is_not_asserted(monkeypatch):
+    """An absurd mount of the base leaves less than nothing does; rotor and friction do so too.
+
+    The nearest model counts only if it explains most: a payload that stops the robot does not.
+    """
+    monkeypatch.setattr(connected, 'Scale', SimpleNamespace(of=lambda *_: _AsGiven()))
+
+    def worth(nearest):
+        base = SimpleNamespace(worth=70.0, left=np.array([0.9, 0.01]))
+        decision = SimpleNamespace(model=nearest or base, tentative=nearest)
+        several = SimpleNamespace(decision=decision, comparison=SimpleNamespace(base=base))
+        return Connected(None, None, several).worth(0.0, 0.0)
+
+    assert worth(None) == 70.0
+    assert worth(SimpleNamespace(worth=217.0, left=np.array([0.1, 0.1]))) == 217.0
+    assert worth(SimpleNamespace(worth=217.0, left=np.array([0.5, 0.1]))) == 70.0
 
 
 def test_what_is_found_with_an_error_of_the_connection_too_is_as_certain():
