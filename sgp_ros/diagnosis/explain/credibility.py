@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import MOST_OPPOSED, SLIGHT_REST
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, MOST_OPPOSED, SLIGHT_REST
 from sgp_ros.diagnosis.explain.fitted_model import Model, beyond_plain
 from sgp_ros.diagnosis.explain.screening import WIDEST, are_apart
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import MOTOR
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 
@@ -17,6 +18,7 @@ def is_credible(model: Model) -> bool:
     motion = model.frame.equations.motion
     is_finite = model.is_possible() and bool(np.isfinite(model.score))
     is_finite = is_finite and are_apart(model.effects, motion) and is_sound(model)
+    is_finite = is_finite and _delivers(model)
     equations = model.frame.equations
     return is_finite and all(
         s.effect.is_inside(s, motion) and _is_confined(s, motion) and _is_needed(s, equations)
@@ -30,6 +32,23 @@ def is_sound(model: Model) -> bool:
     nominal = float(((equations.d**2).mean(axis=0) / equations.power).sum())
     there = max(min(model.net_share, nominal), 1e-12)
     return sum(model.filtered_shares) < MOST_OPPOSED * there
+
+
+def _delivers(model: Model) -> bool:
+    """Return whether motors deliver more of each command than counts as physics at all.
+
+    A law that takes nearly all of a command away leaves the motion as unexplained as it was: the
+    command is in another unit.
+    """
+    equations = model.frame.equations
+    laws = [s.place.joint for s in model.effects if s.effect.site == MOTOR and s.place.joint >= 0]
+    if not laws:
+        return True
+    acting = equations.filter(equations.motion.effort)
+    for s, force in zip(model.effects, model.forces, strict=True):
+        if s.effect.site == MOTOR:
+            acting = acting + force
+    return bool(((acting**2).mean(axis=0) > COUNTED_SHARE * equations.power)[laws].all())
 
 
 def _is_needed(s: EffectAt, equations: Equations) -> bool:
