@@ -63,6 +63,7 @@ class Hypothesis:
         is_possible: whether it can have these numbers (m,).
         canonical: returns the one of several equal sets of numbers (m,) that is reported.
         is_physics: whether it is physics, which hides errors of the connection while present.
+        exact: numbers of one parameter that come from a mistaken unit, not from a measurement.
     """
 
     effect: str
@@ -76,6 +77,7 @@ class Hypothesis:
     is_possible: Callable[[np.ndarray], bool] = lambda _: True
     canonical: Callable[[np.ndarray], np.ndarray] = lambda x: x
     is_physics: bool = False
+    exact: tuple[float, ...] = ()
 
     def remedy(self, values: Mapping[str, float]) -> str:
         """Return what to do about the error of these numbers, a sentence."""
@@ -166,6 +168,7 @@ def _position_scale(joints: Sequence[int], name: str, starts: Sequence[float]) -
     return Hypothesis(
         'position_scale', name, ('scale',), ('1',), _column(np.array(starts)), np.array([0.02]),
         lambda c, x: replace(c, scale=_times(c.scale, joints, x[0])), is_possible=_is_positive,
+        exact=(1e-3, 1e3, DEGREES, 1.0 / DEGREES),
     )  # fmt: skip
 
 
@@ -174,7 +177,7 @@ def _effort_scale(joints: Sequence[int], name: str) -> Hypothesis:
         'effort_scale', name, ('scale',), ('1',), _column(np.array([*_SCALES, *_UNITS])),
         np.array([0.02]),
         lambda c, x: replace(c, effort_scale=_times(c.effort_scale, joints, x[0])),
-        is_possible=_is_positive,
+        is_possible=_is_positive, exact=_UNITS,
     )  # fmt: skip
 
 

@@ -20,6 +20,8 @@ _REFINED = 6
 _MOST = 4
 _FLAT = 1e-3
 """Evidence below which a number changes nothing [nats]."""
+_WIDER = (1.0, 3.0, 9.0, 27.0)
+"""Steps, relative to the first, at which a scale is asked whether it changes anything."""
 _FAR = 300.0
 """Evidence that a start may lack and still be looked at [nats]."""
 
@@ -265,9 +267,19 @@ def _refined(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> Tr
         )  # fmt: skip
         x = h.canonical(found.x)
         std = _spread(probe, base, h, x)
-        x = np.where(np.isfinite(std), x, h.neutral)
+        is_known = np.isfinite(std)
+        x = np.where(is_known, x, h.neutral)
+        x = _of_a_unit(probe, base, h, x) if is_known.all() else x
     correction = h.applied(base, x)
     return Tried(h, x, std, correction, probe.agreement(correction))
+
+
+def _of_a_unit(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> np.ndarray:
+    """Return the number of a unit that fits as well as x, less the price of a number, or x."""
+    units = [np.array([unit]) for unit in h.exact]
+    best = max(units, key=lambda unit: _value(probe, base, h, unit), default=x)
+    is_as_good = _value(probe, base, h, best) > _value(probe, base, h, x) - PER_PARAMETER
+    return best if is_as_good else x
 
 
 def _spread(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> np.ndarray:
@@ -275,9 +287,11 @@ def _spread(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> np.
     std = np.full(len(x), np.inf)
     centre = _value(probe, base, h, x)
     for i, step in enumerate(h.steps_at(x)):
-        e = np.zeros(len(x))
-        e[i] = 0.3 * step
-        bend = 2.0 * centre - _value(probe, base, h, x - e) - _value(probe, base, h, x + e)
-        if bend > _FLAT:
-            std[i] = e[i] / np.sqrt(bend)
+        for wider in _WIDER if h.exact else (1.0,):  # bodies may make up for most of a scale
+            e = np.zeros(len(x))
+            e[i] = 0.3 * wider * step
+            bend = 2.0 * centre - _value(probe, base, h, x - e) - _value(probe, base, h, x + e)
+            if bend > _FLAT:
+                std[i] = e[i] / np.sqrt(bend)
+                break
     return std

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.errors import hypotheses
 from sgp_ros.diagnosis.setup.evidence import Probe
 from sgp_ros.diagnosis.setup.joint import Together
-from sgp_ros.diagnosis.setup.search import search
+from sgp_ros.diagnosis.setup.search import _refined, search
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.gains import read_gains
 from sgp_ros.robots.nominal import nominal_model
@@ -138,3 +139,30 @@ def test_a_corrected_motion_is_scaled_with_its_derivatives():
     assert right.acceleration[:, 2] == pytest.approx(seen.acceleration[:, 2] / 2.0)
     assert right.effort[:, 1] == pytest.approx(seen.effort[:, 1] / 4.0)
     assert right.effort[:, 0] == pytest.approx(seen.effort[:, 0])
+
+
+@pytest.mark.parametrize(
+    ('evidence', 'number', 'is_known'),
+    [
+        (
+            lambda x: 900.0 - np.log(x / 900.0) ** 2,
+            1000.0,
+            True,
+        ),  # bodies make up for it
+        (lambda x: -((x - 1030.0) ** 2), 1030.0, True),  # measured, and of no unit
+        (lambda _: 900.0, 1.0, False),
+    ],
+)
+def test_a_number_of_which_bodies_make_up_is_that_of_a_unit(evidence, number, is_known):
+    """A torque in mN m: the evidence hardly falls over half a decade, and no number is better."""
+    probe = SimpleNamespace(
+        agreement=lambda x: SimpleNamespace(evidence=float(evidence(x)), left=np.zeros(1))
+    )
+    scale = SimpleNamespace(
+        steps_at=lambda x: 0.02 * np.abs(x), is_possible=lambda x: x[0] > 0.0, exact=(1e-3, 1e3),
+        applied=lambda _base, x: x[0], canonical=lambda x: x, neutral=np.ones(1),
+    )  # fmt: skip
+    start = np.array([1000.0])
+    found = _refined(probe, None, scale, start)
+    assert np.isfinite(found.std[0]) == is_known
+    assert found.numbers[0] == pytest.approx(number, rel=1e-4)
