@@ -38,7 +38,7 @@ def _percent(rate):
         return 'none drawn'
     return (
         f'{100 * rate["share"]:.0f} % of {rate["n"]} '
-        f'({100 * max(rate["low"], 0.0):.0f} to {100 * rate["high"]:.0f} %)'
+        f'({100 * max(rate["low"], 0.0) + 0.0:.0f} to {100 * rate["high"]:.0f} %)'
     )
 
 
