@@ -94,7 +94,9 @@ def test_a_recording_without_gains_beside_one_with_is_refused(bag, robot):
         CommandSample(e.stamp_ns, e.effort, e.names, e.kind) if isinstance(e, CommandSample) else e
         for e in events
     ]
-    with pytest.raises(RecordingError, match='gains of no joint with the targets; expected kp'):
+    with pytest.raises(
+        RecordingError, match='the targets come with gains of no joint; expected kp'
+    ):
         collect(bare, nominal.robot, gains=gains)
 
 
