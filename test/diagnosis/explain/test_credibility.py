@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from sgp_ros.diagnosis.explain.credibility import is_credible
+from sgp_ros.diagnosis.explain.credibility import _delivers, is_credible
 from test.diagnosis.fitted_models import fitted
 
 
@@ -18,4 +18,5 @@ def test_a_motor_delivers_what_it_was_commanded(equations_for, perfect, times, c
     model = fitted(equations, 'torque_gain')
     (gain,) = model.effects[0].report(equations.motion).values()
     assert gain == pytest.approx(1.0 / times, rel=0.02)
+    assert _delivers(model) == credible
     assert is_credible(model) == credible
