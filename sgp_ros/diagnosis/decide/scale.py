@@ -20,7 +20,7 @@ from sgp_ros.diagnosis.criteria import (
 )
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.credibility import is_credible
-from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.fitted_model import Model, least_variance
 from sgp_ros.physics.parts import JOINT, MOTOR
 
 
@@ -122,9 +122,8 @@ class Scale:
 
     def likelihood(self, model: Model) -> float:
         """Return the fit without that prior [nats]."""
-        noise = self.noise / self.power
-        floor = (self.floor - noise) * np.exp(2.0 * np.maximum(model.inertia, -50.0))
-        share = model.mean_square / self.power + floor + noise
+        floor = least_variance(self.floor, self.noise / self.power, model.inertia)
+        share = model.mean_square / self.power + floor
         return self.rows * (model.log_inertia - 0.5 * float(np.log(share).sum()))
 
     def worth(self, model: Model) -> float:

@@ -175,14 +175,20 @@ def beyond_plain(s: EffectAt, force: np.ndarray, equations: Equations) -> np.nda
 
 
 def floors(equations: Equations, inertia: np.ndarray | float = 0.0) -> np.ndarray:
-    """Return the least variance of a residual, (k,).
-
-    Errors of the motion become larger ones of the effort with the log of a model's inertia (k,),
-    the noise of measured efforts does not.
-    """
+    """Return the least variance of a residual, (k,), of a model with this log of inertia (k,)."""
     noise = equations.effort_noise
-    motion = FLOOR_SHARE * equations.power + equations.model_error - noise
-    return np.asarray(motion * np.exp(2.0 * np.maximum(inertia, -50.0)) + noise + 1e-300)
+    whole = FLOOR_SHARE * equations.power + equations.model_error
+    return least_variance(whole, noise, inertia) + 1e-300
+
+
+def least_variance(
+    whole: np.ndarray, noise: np.ndarray, inertia: np.ndarray | float
+) -> np.ndarray:
+    """Return what a perfect model leaves, (k,), of which the noise of measured efforts is a part.
+
+    Errors of the motion become larger ones of the effort with the inertia, that noise does not.
+    """
+    return np.asarray((whole - noise) * np.exp(2.0 * np.maximum(inertia, -50.0)) + noise)
 
 
 def price_of(frame: Frame, size: int) -> float:
