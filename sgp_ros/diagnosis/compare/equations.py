@@ -30,6 +30,7 @@ from sgp_ros.diagnosis.compare.trajectory import (
     measured_noise,
     observe,
     parallel_filter,
+    smoothing_error,
 )
 from sgp_ros.physics.parts import PLACES
 from sgp_ros.rigid.rigid_body import mass_matrix, torque_regressor
@@ -117,6 +118,11 @@ class Equations:
         """Number p of instants and of changes of the inertial parameters."""
         return self.instants + len(self.directions)
 
+    @cached_property
+    def effort(self) -> np.ndarray:
+        """Efforts behind the filter, (N, k) [N m or N]."""
+        return self.filter(self.motion.effort)
+
     @property
     def base(self) -> np.ndarray:
         """All bases in one new array, (N, k, p)."""
@@ -170,7 +176,7 @@ class Equations:
         if j not in self._held:
             motion, rests = self.motion, self.rests[:, j]
             change, base = np.empty(len(self.d)), self.bases[j].copy()
-            late = effort_change(motion.effort, motion.starts)[:, j]
+            late = effort_change(motion.effort[:, [j]], motion.starts) if self.instants else None
             for rows, out in self.filter.blocks(_BLOCK):
                 at = rests[rows]
                 q = motion.position[rows][at]
@@ -179,8 +185,8 @@ class Equations:
                 needed = np.zeros((len(at), 1 + self.size))
                 acting = (motion.effort[rows, j] + motion.stated_force[rows, j])[at]
                 needed[at, 0] = motion.effort_for(q, v, a)[:, j] - acting
-                if self.instants:
-                    needed[at, 1 + j] = -late[rows][at]
+                if late is not None:
+                    needed[at, 1 + j] = -late[rows, 0][at]
                 Y = torque_regressor(motion.tree, q, v, a)[:, j]
                 needed[at, 1 + self.instants :] = Y @ self.directions.T
                 found = self.filter.piece(needed, out)
@@ -243,18 +249,6 @@ def joint_name(motion: ObservedMotion, joint: int) -> str:
     return _OTHER_PLACES.get(joint) or motion.tree.joint_names[joint]
 
 
-def _smoothing_error(
-    raw: RawTrajectory, motion: ObservedMotion, low: ParallelFilter, bandwidth: Bandwidth
-) -> np.ndarray:
-    """Return the mean square by which the nominal efforts depend on the light smoothing, (k,)."""
-    less = replace(bandwidth, state_cutoff=0.7 * bandwidth.state_cutoff)
-    other = observe(raw, motion.tree, less)
-    change = low(
-        (motion.nominal_effort - motion.stated_force) - (other.nominal_effort - other.stated_force)
-    )
-    return np.asarray((change**2).mean(axis=0))
-
-
 def make_equations(
     raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth, unstated: Collection[int] = ()
 ) -> Equations:
@@ -294,7 +288,7 @@ def make_equations(
     equations = Equations(
         motion, low, motion.time[low.rows], d, bases, directions, power, np.sqrt(variance),
         np.ones(motion.position.shape), resting(raw, motion, bandwidth),
-        _smoothing_error(raw, motion, low, bandwidth) + noise, part_of_noise(noise, d),
+        smoothing_error(raw, motion, low, bandwidth) + noise, part_of_noise(noise, d),
         noise, instants=m,
     )  # fmt: skip
     return replace(equations.with_dry_friction(motion.dry_joints), free=None)

@@ -274,6 +274,18 @@ def measured_noise(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwi
     return effort_noise(motion.effort, raw.segments, raw.step, bandwidth.cutoff)
 
 
+def smoothing_error(
+    raw: RawTrajectory, motion: ObservedMotion, low: ParallelFilter, bandwidth: Bandwidth
+) -> np.ndarray:
+    """Return the mean square by which the nominal efforts depend on the light smoothing, (k,)."""
+    less = replace(bandwidth, state_cutoff=0.7 * bandwidth.state_cutoff)
+    other = observe(raw, motion.tree, less)
+    change = low(
+        (motion.nominal_effort - motion.stated_force) - (other.nominal_effort - other.stated_force)
+    )
+    return np.asarray((change**2).mean(axis=0))
+
+
 def parallel_filter(raw: RawTrajectory, bandwidth: Bandwidth) -> ParallelFilter:
     """Return the filter for target and columns."""
     return ParallelFilter(1.0 / raw.step, bandwidth.cutoff, raw.segments)

@@ -44,7 +44,7 @@ def _delivers(model: Model) -> bool:
     laws = [s.place.joint for s in model.effects if s.effect.site == MOTOR and s.place.joint >= 0]
     if not laws:
         return True
-    acting = equations.filter(equations.motion.effort)
+    acting = equations.effort
     for s, force in zip(model.effects, model.forces, strict=True):
         if s.effect.site == MOTOR:
             acting = acting + force
