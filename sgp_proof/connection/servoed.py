@@ -105,7 +105,7 @@ def _counts(names, targets, rate, kp, kd, motion, hidden):
 
 
 def _model(path):
-    text, _ = write_mjcf(hand_over(nominal_model(load_robot(str(path)))), None)
+    text, _ = write_mjcf(hand_over(nominal_model(load_robot(str(path)))), None, path.parent)
     model = mujoco.MjModel.from_xml_string(text)
     model.opt.timestep, model.opt.integrator = _STEP_S, mujoco.mjtIntegrator.mjINT_RK4
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)

@@ -180,11 +180,11 @@ def joint_names(
         plain = [x for x in labels if not x.strip(_DIGITS)]
         first = min((int(x) for x in plain if x), default=0)
         return {x: f'joint_{int(x or first) - first + 1}' if x in plain else x for x in labels}
-    matched = {x: [h.name for h in hints if _same(x, h.name)] for x in labels}
-    if all(len(m) == 1 for m in matched.values()) and len({m[0] for m in matched.values()}) == len(
-        labels
-    ):
-        return {x: m[0] for x, m in matched.items()}
+    for fits in (_same, _ends):
+        matched = {x: [h.name for h in hints if fits(x, h.name)] for x in labels}
+        unique = {x: m[0] for x, m in matched.items() if len(m) == 1}
+        if len(set(unique.values())) == len(labels):
+            return unique
     if len(labels) == len(hints):
         order = sorted(labels, key=int) if all(x.isdigit() for x in labels) else labels
         said = ', '.join(
@@ -207,3 +207,8 @@ def _same(label: str, name: str) -> bool:
     a, b = (''.join(c for c in x.lower() if c.isalnum()) for x in (label, name))
     bare = b.replace('joint', '')
     return bool(a) and (a in {b, bare} or a.replace('joint', '') == bare)
+
+
+def _ends(label: str, name: str) -> bool:
+    """Return whether a label is the end of a joint's name, whose beginning all columns share."""
+    return bool(label) and name.lower().endswith(f'_{label.lower()}')

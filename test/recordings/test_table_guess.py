@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -100,6 +101,19 @@ def test_columns_of_each_joint_are_gathered(tmp_path):
     assert commands == []
     assert summary.end_ns - summary.start_ns == 995_000_000
     assert 'ms' in ' '.join(summary.unsure) or summary.quality['rate_hz'] == pytest.approx(200.0)
+
+
+def test_columns_named_after_joints_with_one_beginning_are_theirs_in_any_order(tmp_path):
+    header = 'time,arm_elbow.position,arm_shoulder.position'
+    np.savetxt(
+        tmp_path / 'log.csv', np.column_stack([T, Q[:, ::-1]]), delimiter=',', header=header,
+        comments='',
+    )  # fmt: skip
+    hints = tuple(replace(hint, name=f'arm_{hint.name}') for hint in HINTS)
+    summary, states, _ = _read(tmp_path / 'log.csv', tmp_path, hints)
+    order = [states[0].names.index(f'arm_{j}') for j in ('shoulder', 'elbow')]
+    np.testing.assert_allclose([s.position[order] for s in states], Q, atol=1e-12)
+    assert not any('order of the robot' in said for said in summary.unsure)
 
 
 @pytest.mark.parametrize(
