@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -180,8 +181,9 @@ def joint_names(
         plain = [x for x in labels if not x.strip(_DIGITS)]
         first = min((int(x) for x in plain if x), default=0)
         return {x: f'joint_{int(x or first) - first + 1}' if x in plain else x for x in labels}
-    for fits in (_same, _ends):
-        matched = {x: [h.name for h in hints if fits(x, h.name)] for x in labels}
+    whole = {x: _within(positions[x].column, hints) for x in labels}
+    same = {x: [h.name for h in hints if _same(x, h.name)] for x in labels}
+    for matched in (whole, same):
         unique = {x: m[0] for x, m in matched.items() if len(m) == 1}
         if len(set(unique.values())) == len(labels):
             return unique
@@ -209,6 +211,10 @@ def _same(label: str, name: str) -> bool:
     return bool(a) and (a in {b, bare} or a.replace('joint', '') == bare)
 
 
-def _ends(label: str, name: str) -> bool:
-    """Return whether a label is the end of a joint's name, whose beginning all columns share."""
-    return bool(label) and name.lower().endswith(f'_{label.lower()}')
+def _within(column: str, hints: Sequence[JointHint]) -> list[str]:
+    """Return the longest of the joints' names that stand in a column's name as words."""
+    found = [
+        h.name for h in hints
+        if re.search(rf'(?<![^\W_]){re.escape(h.name)}(?![^\W_])', column, re.IGNORECASE)
+    ]  # fmt: skip
+    return [max(found, key=len)] if found else []

@@ -183,9 +183,9 @@ def _position_units(
         (positions[x].numbers, _hint(joints[x], hinted).lower, _hint(joints[x], hinted).upper)
         for x in turning if said[x] not in {'rad', 'deg', 'rev', 'counts', 'm', 'mm'}
     ]  # fmt: skip
-    angle, is_sure = position_unit(ranges)
+    angle, is_sure = position_unit(ranges, are_joints_known=bool(hinted))
     if ranges and not is_sure:
-        guess.unsure.append(f'Positions are assumed to be in {angle}, judging by their range.')
+        guess.unsure.append(f'Positions go beyond one turn and are assumed to be in {angle}.')
     for x in positions:
         known = said[x] in {'rad', 'deg', 'rev', 'm', 'mm'}
         units[x] = said[x] if known else (angle if x in turning else 'm')

@@ -63,17 +63,22 @@ def time_unit(stamps: np.ndarray, said: str) -> tuple[str, bool]:
     return fitting[0], len(fitting) == 1
 
 
-def position_unit(columns: Sequence[tuple[np.ndarray, float, float]]) -> tuple[str, bool]:
+def position_unit(
+    columns: Sequence[tuple[np.ndarray, float, float]], *, are_joints_known: bool = False
+) -> tuple[str, bool]:
     """Return `rad` or `deg` of turning joints and whether it is sure.
 
     Args:
         columns: of each joint its numbers (n,) and its range [rad], infinite for none.
+        are_joints_known: from the file of a robot; then a joint without a range turns endlessly,
+            and how far it went does not tell the unit.
     """
     votes = {'rad': 0, 'deg': 0}
     largest = 0.0
     for numbers, lower, upper in columns:
         low, high = np.nanmin(numbers), np.nanmax(numbers)
-        largest = max(largest, abs(low), abs(high))
+        if not are_joints_known or np.isfinite(lower) or np.isfinite(upper):
+            largest = max(largest, abs(low), abs(high))
         for unit, factor in (('rad', 1.0), ('deg', np.pi / 180.0)):
             if np.isfinite(lower) and np.isfinite(upper):
                 fits = low * factor >= lower - _MARGIN and high * factor <= upper + _MARGIN
@@ -81,7 +86,7 @@ def position_unit(columns: Sequence[tuple[np.ndarray, float, float]]) -> tuple[s
     if votes['rad'] != votes['deg']:
         return ('rad', True) if votes['rad'] > votes['deg'] else ('deg', True)
     if largest <= _TURN + _MARGIN:
-        return 'rad', True
+        return 'rad', all(np.nanmax(np.abs(x)) <= _TURN + _MARGIN for x, _, _ in columns)
     return ('deg' if largest > 6.0 * np.pi else 'rad'), False
 
 

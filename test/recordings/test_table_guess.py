@@ -103,15 +103,19 @@ def test_columns_of_each_joint_are_gathered(tmp_path):
     assert 'ms' in ' '.join(summary.unsure) or summary.quality['rate_hz'] == pytest.approx(200.0)
 
 
-def test_columns_named_after_joints_with_one_beginning_are_theirs_in_any_order(tmp_path):
-    header = 'time,arm_elbow.position,arm_shoulder.position'
+@pytest.mark.parametrize(
+    'names', [('arm_shoulder', 'arm_elbow'), ('j1_lift', 'J2'), ('arm', 'arm_2')]
+)
+def test_columns_that_hold_the_names_of_joints_are_theirs_in_any_order(tmp_path, names):
+    """Also where all names begin alike, where a filler is part of one, or one of another."""
+    header = f'time,{names[1]}.position,{names[0]}.position'
     np.savetxt(
         tmp_path / 'log.csv', np.column_stack([T, Q[:, ::-1]]), delimiter=',', header=header,
         comments='',
     )  # fmt: skip
-    hints = tuple(replace(hint, name=f'arm_{hint.name}') for hint in HINTS)
+    hints = tuple(replace(hint, name=name) for hint, name in zip(HINTS, names, strict=True))
     summary, states, _ = _read(tmp_path / 'log.csv', tmp_path, hints)
-    order = [states[0].names.index(f'arm_{j}') for j in ('shoulder', 'elbow')]
+    order = [states[0].names.index(name) for name in names]
     np.testing.assert_allclose([s.position[order] for s in states], Q, atol=1e-12)
     assert not any('order of the robot' in said for said in summary.unsure)
 
@@ -252,3 +256,14 @@ def test_a_log_in_another_language_is_read_by_its_units(tmp_path):
     np.testing.assert_allclose([s.position[0] for s in states], Q[:, 0], atol=1e-6)
     np.testing.assert_allclose([s.effort[0] for s in states], TAU[:, 0], atol=1e-5)
     assert np.diff([s.stamp_ns for s in states]).tolist() == [5_000_000] * 199
+
+
+def test_how_far_an_endless_joint_went_does_not_tell_its_unit(tmp_path):
+    """A pole that goes over the top in radians; without a robot, 30 are more likely degrees."""
+    far = np.column_stack([T, 30.0 * np.sin(T)])
+    np.savetxt(tmp_path / 'log.csv', far, delimiter=',', header='time,pole_pos', comments='')
+    summary, states, _ = _read(tmp_path / 'log.csv', tmp_path, (JointHint('pole'),))
+    np.testing.assert_allclose([s.position[0] for s in states], far[:, 1], atol=1e-12)
+    assert any('assumed to be in rad' in said for said in summary.unsure)
+    summary, states, _ = _read(tmp_path / 'log.csv', tmp_path, ())
+    np.testing.assert_allclose([s.position[0] for s in states], np.radians(far[:, 1]), atol=1e-12)
