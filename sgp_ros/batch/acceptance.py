@@ -172,7 +172,7 @@ def accept(
             state = intake.take_state(event)
             states += [] if state is None else [state]
     if not states:
-        raise _none_accepted(robot, config, counts, commands_are)
+        raise _none_accepted(robot, config, counts, commands_are, admitted)
     known = admitted if counts.clock_jumps else events
     start_ns = min(event.stamp_ns for event in known if isinstance(event, JointSample))
     return _table(states, intake, counts, start_ns)
@@ -198,8 +198,9 @@ def _table(states: list[State], intake: Intake, counts: Counts, start_ns: int) -
 
 
 def _none_accepted(
-    robot: Robot, config: EngineConfig, counts: Counts, commands_are: str
-) -> RecordingError:
+    robot: Robot, config: EngineConfig, counts: Counts, commands_are: str,
+    events: Iterable[object],
+) -> RecordingError:  # fmt: skip
     if counts.commands_refused['wrong_kind']:
         kind = 'efforts' if commands_are == EFFORT else 'positions'
         return RecordingError(
@@ -208,11 +209,16 @@ def _none_accepted(
             else 'omit --gains',
         )  # fmt: skip
     if counts.refused['unpaired']:
+        silent = _without_effort(robot, events)
+        some = 'has an effort' if len(silent) == len(robot.joint_names) else (
+            f'has an effort of {", ".join(silent)}'
+        )  # fmt: skip
         return RecordingError(
-            f'none of {counts.read} states has an effort, effort source {config.effort_source!r}',
-            'an effort in the states, or commands before them',
-            'name the command topic with --command, or choose another --effort; list joints '
-            'without a motor under `passive` in a robot YAML',
+            f'none of {counts.read} states {some}, effort source {config.effort_source!r}',
+            'an effort of each motor in the states, or commands before them',
+            'name the command topic with --command, or choose another --effort; for joints '
+            'without a motor give a robot YAML in place of the URDF: '
+            f'{{schema: 1, urdf: robot.urdf, passive: [{", ".join(silent)}]}}',
         )
     reasons = [f'{count} {reason}' for reason, count in counts.refused.items() if count]
     return RecordingError(
@@ -220,6 +226,18 @@ def _none_accepted(
         f'states of the joints {list(robot.joint_names)}',
         'check the refused states, or use another recording',
     )
+
+
+def _without_effort(robot: Robot, events: Iterable[object]) -> list[str]:
+    """Return the joints with a motor of which no state has a finite effort."""
+    known = {
+        name
+        for event in events
+        if isinstance(event, JointSample) and event.effort is not None
+        for name, effort in zip(event.names, event.effort, strict=False)
+        if np.isfinite(effort)
+    }
+    return [j.name for j in robot.joints if j.is_actuated and j.name not in known]
 
 
 def require_joints(

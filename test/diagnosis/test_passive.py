@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.pipeline import diagnose
+from sgp_ros.engine.samples import frozen_array
 from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.imports import import_table
 from sgp_ros.recordings.reader import open_recording
@@ -45,8 +47,18 @@ def test_a_free_swing_without_efforts_is_diagnosed(passive):
 
 def test_a_driven_link_without_efforts_is_refused(robots):
     events = events_of(_swing(), commands=False)
-    with pytest.raises(RecordingError, match='has an effort'):
+    with pytest.raises(RecordingError, match=r'has an effort, .* passive: \[joint0\]'):
         diagnose(events, *robots[1], {})
+
+
+def test_of_two_joints_the_one_without_efforts_is_named(robots):
+    """As of a cart with a pole: only one of them has a motor."""
+    events = [
+        replace(event, effort=frozen_array([0.1, np.nan]))
+        for event in events_of(simulate(CHAINS[2], 1, 3.0), commands=False)
+    ]
+    with pytest.raises(RecordingError, match=r'has an effort of joint1, .* passive: \[joint1\]'):
+        diagnose(events, *robots[2], {})
 
 
 def test_friction_of_a_free_swing_is_found_in_an_imported_table(passive, tmp_path):
