@@ -12,6 +12,7 @@ from sgp_ros.diagnosis.decide import cross_validation
 from sgp_ros.diagnosis.decide.cross_validation import (
     LEAST_ROWS,
     left_out,
+    repeatable,
     structure,
     support,
     supported,
@@ -63,6 +64,18 @@ def test_what_its_own_past_predicts_is_structure(equations):
     for period in (31.0, 4.1):  # a quarter of a period on, a sine has no correlation
         rest = np.sin(2.0 * np.pi * rows / period) * np.sqrt(equations.power)
         assert np.all(structure(equations, rest) > 0.9)
+
+
+def test_what_follows_the_motion_later_is_structure(equations, monkeypatch):
+    """As states that nobody measures do, though the motion at the time says nothing of it."""
+    monkeypatch.setattr(cross_validation, '_by_motion', lambda *_: 0.0)
+    monkeypatch.setattr(cross_validation, '_by_past', lambda *_: 0.0)
+    rest = np.roll(equations.filter(equations.motion.acceleration), 5, axis=0)
+    every = np.ones(2, dtype=bool)
+    assert np.all(repeatable(equations, rest, every)[0] > 0.9)
+    assert np.all(repeatable(equations, _white(equations), every)[0] < 0.1)
+    few = replace(equations, d=equations.d[:LEAST_ROWS])  # too few for any response
+    assert cross_validation._by_response(few, few.d[:5, 0]) == 0.0
 
 
 def test_filtered_white_noise_predicts_nothing_of_itself(equations):
