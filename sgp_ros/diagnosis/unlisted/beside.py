@@ -17,7 +17,7 @@ from sgp_ros.diagnosis.unlisted.shapes import SmoothForce
 from sgp_ros.physics.catalogue import CONSTANT_LOAD, COULOMB_FRICTION, VISCOUS_FRICTION
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.law import FormulaLaw
-from sgp_ros.physics.parts import JOINT, MOTOR
+from sgp_ros.physics.parts import JOINT, MOTOR, Place
 
 PLAIN = (COULOMB_FRICTION, VISCOUS_FRICTION, CONSTANT_LOAD)
 _NONE = 2.0
@@ -126,11 +126,31 @@ def _is_plain_sum(s: EffectAt) -> bool:
     return bool(s.effect.plain) and not len(s.shape)
 
 
-def subsets(effects: tuple[EffectAt, ...]) -> Iterable[tuple[EffectAt, ...]]:
-    """Return none of some effects, all, all but one, and all but those of one variable."""
+def beside(listed: Model, joint: int, *, is_open: bool) -> Iterable[tuple[EffectAt, ...]]:
+    """Return sets of listed effects of a joint that a law may stand beside.
+
+    None, all, all but one, and all but those of one variable; where they leave the joint
+    unexplained, also those of plain friction: the list was asked without the law, and friction
+    beside it may have been left out, or given another name.
+
+    Args:
+        listed: model of listed effects.
+        joint: index.
+        is_open: whether it leaves the joint unexplained.
+    """
+    friction = tuple(EffectAt(e, Place(joint)) for e in (COULOMB_FRICTION, VISCOUS_FRICTION))
+    found = _subsets(own_effects(listed, joint))
+    found += _subsets(friction) if is_open else []
+    unique: dict[object, tuple[EffectAt, ...]] = {}
+    for kept in found:
+        unique.setdefault(frozenset(s.key for s in kept), kept)
+    return unique.values()
+
+
+def _subsets(effects: tuple[EffectAt, ...]) -> list[tuple[EffectAt, ...]]:
     found = [(), effects, *(tuple(s for s in effects if s is not out) for out in effects)]
     found += [
         tuple(s for s in effects if s.effect.drawn_over != over)
         for over in dict.fromkeys(s.effect.drawn_over for s in effects)
     ]
-    return dict.fromkeys(found)
+    return found

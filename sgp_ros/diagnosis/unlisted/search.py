@@ -23,13 +23,13 @@ from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.diagnosis.unlisted.beside import (
+    beside,
     earned,
     is_bent,
     is_slight,
     law_of,
     own_effects,
     says_less,
-    subsets,
 )
 from sgp_ros.diagnosis.unlisted.formulas import FoundLaw, curve_of, formulas
 from sgp_ros.diagnosis.unlisted.shapes import (
@@ -283,11 +283,10 @@ class _Look:
     def _bases(self) -> Iterator[Model]:
         """Yield models of all other joints with some of the effects of this one.
 
-        None, all, all but one, all but those of one variable; with bodies as in the robot's
-        file, and free.
+        With bodies as in the robot's file, and free.
         """
         for is_free in (False, True):
-            for kept in subsets(own_effects(self.listed, self.joint)):
+            for kept in beside(self.listed, self.joint, is_open=self.is_open):
                 yield self._without((*self._others(), *kept), is_free=is_free)
 
     def _others(self) -> tuple[EffectAt, ...]:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.criteria import LACKING, SIGNIFICANT
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, LACKING, SIGNIFICANT
 from sgp_ros.diagnosis.decide.decision import decide
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
@@ -38,6 +38,7 @@ from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.formula import read_formula
 from sgp_ros.physics.parts import Place
 from sgp_ros.physics.units import read_unit, unit_of
+from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, events_of, simulate
 
 
@@ -235,6 +236,22 @@ def test_a_formula_is_held_against_any_form(equations_for):
     ratio, chance = found.lack_of_fit
     assert ratio > LACKING
     assert chance < SIGNIFICANT
+
+
+def test_a_law_is_found_beside_friction_that_was_not_named(equations_for):
+    """A cable that stiffens, on a bearing: where nothing was asserted, friction may be there."""
+    world = simulate(
+        CHAINS[1], 11, 10.0, force=lambda _t, q, v: (-0.5 * q[0] ** 3 - 0.2 * v[0],),
+        dry=lambda _t, _q, _s: 0.4,
+    )  # fmt: skip
+    _, equations = equations_for(world)
+    comparison = compare_models(equations, lambda _share: None)
+    found = search(equations, Scale.of(equations, comparison), fitted(equations), 0, is_open=True)
+    assert found is not None
+    assert found.laws
+    names = {s.effect.name for s in found.laws[0].effects}
+    assert {'coulomb_friction', 'viscous_friction'} < names
+    assert found.laws[0].left[0] < 0.1 * COUNTED_SHARE
 
 
 def test_a_finer_spline_has_columns_of_its_own(equations_for):
