@@ -60,6 +60,9 @@ class TorqueGain(Effect):
     appearance = 'the residual effort is proportional to the effort'
     quantities = (Quantity('gain', '1', is_positive=True, neutral=1.0, joint_number='gain'),)
     linear = ('gain',)
+    alike = (
+        'armature',
+    )  # where no gravity acts: a motor of half the torque, or twice the inertia
     site = MOTOR
     drawn_over = 'effort'
 

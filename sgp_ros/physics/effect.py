@@ -66,11 +66,11 @@ class Effect:
         linear: names of those that are coefficients, by column; without any the coefficient is 1.
         kinds: the variants it comes in; `kind_word` is the parameter that says which.
         has_source: whether it comes from another joint.
-        plain: laws of one joint that it becomes without coupling, drift or way (least shape).
+        plain, alike: laws it becomes without coupling, drift or way (least shape); usual ones
+            that leave as little where only bodies tell them apart.
         site: what it sits on.
         edge: quantity that says where it begins, of an effect at one end of the range.
-        needs_limits: whether the joint must have limits.
-        takes_all: whether it may act on every motor at once.
+        needs_limits, takes_all: whether joints must have limits; whether it may act on all motors.
         size: stated number in which an effect without linear ones is linear nevertheless.
         term: how it enters a robot YAML under `terms`; None where it does not.
         small: to first order in its size; None where starts are shapes.
@@ -79,13 +79,12 @@ class Effect:
         is_online: a model that sees one time of the motion at once can hold it.
         is_late: it answers to commands of the past; the stated number is a time [s].
         is_dry: it holds a joint at rest; where there are kinds, only `coulomb` does.
-        is_inertial: proportional to the acceleration.
+        is_inertial, sees_acceleration: proportional to the acceleration; dependent on it.
         uses_bodies: its columns depend on the inertial parameters of the robot.
-        sees_acceleration: its force depends on the acceleration.
         is_body: it changes a body; where bodies may differ, it adds nothing.
         is_on_tree: it changes gravity or bodies, see `gravity` and `added_body`.
         is_of_command: it lies before the motor's current: a measured effort is behind it.
-        has_memory: its force at a time depends on other times too, of the motion or the commands.
+        has_memory: its force depends on other times too, of the motion or the commands.
         is_open: a robot may have it or not, and its numbers are not known.
         is_usual, has_chosen_form: nearly every joint with a motor has it; the data chose its form.
     """
@@ -101,6 +100,7 @@ class Effect:
     kind_word: str = 'kind'
     has_source: bool = False
     plain: tuple[str, ...] = ()
+    alike: tuple[str, ...] = ()
     site: Site = JOINT
     edge: str = ''
     needs_limits: bool = False

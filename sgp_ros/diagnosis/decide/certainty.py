@@ -8,7 +8,7 @@ the number of rows. `sgp_proof/concealed` measures how the probabilities keep wh
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,7 +38,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.result import Difference, Finding
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import JOINT, MOTOR
+from sgp_ros.physics.parts import JOINT, MOTOR, Place
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,15 +137,25 @@ def _is_probable(model: Model, chances: Probabilities) -> bool:
 def _plainer(equations: Equations, model: Model, scale: Scale) -> Model | None:
     """Return a model without a law that few joints have and that is hardly worth more.
 
-    With its plain law in its place, where there is one.
+    With its plain law in its place, where there is one, or a usual one that looks alike.
     """
     for s in model.effects:
         if not s.effect.is_usual:
-            plainer = _without(equations, model, s)
-            is_alike = scale.worth(plainer) > scale.worth(model) - ALIKE
-            if plainer.effects and is_credible(plainer) and is_alike:
-                return plainer
+            for plainer in (_without(equations, model, s), *_exchanged(equations, model, s)):
+                is_alike = scale.worth(plainer) > scale.worth(model) - ALIKE
+                if plainer.effects and is_credible(plainer) and is_alike:
+                    return plainer
     return None
+
+
+def _exchanged(equations: Equations, model: Model, effect: EffectAt) -> Iterator[Model]:
+    """Yield models with a usual law in the place of an effect that looks like it."""
+    others = tuple(s for s in model.effects if s is not effect)
+    for name in effect.effect.alike:
+        other = EffectAt(EFFECTS[name], Place(effect.place.joint))
+        if other.key not in model.key:
+            yield fit(Columns(equations), (*others, other), model.sigma, is_free=model.is_free,
+                      w=model.w, still=len(others))  # fmt: skip
 
 
 def _without(equations: Equations, model: Model, effect: EffectAt) -> Model:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -56,6 +57,22 @@ def test_what_is_improbable_is_not_asserted_beside_others(equations_for, viscous
     assert [s.key for s in kept.model.effects] == names[:1]
     assert kept.rivals[0] is pair
     assert 'a simpler model is nearly as good' in why_not(pair, kept, scale)
+
+
+def test_a_rotor_takes_the_place_of_a_gain_that_is_worth_as_much(equations_for):
+    """A motor of half the torque is a motor of twice the inertia, where no gravity tells them."""
+    chain = (replace(CHAINS[1][0], inertia=CHAINS[1][0].inertia + 0.05),)
+    _, equations = equations_for(simulate(chain, 4, 10.0))
+    model = fitted(equations, 'torque_gain')
+    alike, better = SimpleNamespace(worth=lambda _: 0.0), SimpleNamespace(worth=_worth_of_gains)
+    plainer = certainty._plainer(equations, model, alike)
+    assert [s.effect.name for s in plainer.effects] == ['armature']
+    assert plainer.effects[0].coefficients[0] == pytest.approx(0.05, rel=0.05)
+    assert certainty._plainer(equations, model, better) is None
+
+
+def _worth_of_gains(model):
+    return 2.0 * ALIKE * any(s.effect.name == 'torque_gain' for s in model.effects)
 
 
 def test_a_plain_law_takes_the_place_of_a_richer_one_that_is_not_probable(
