@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis.compare.equations import make_equations
+from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.engine.samples import frozen_array
 from sgp_ros.errors import RecordingError
@@ -15,6 +17,7 @@ from sgp_ros.recordings.imports import import_table
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import nominal_tree
+from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, events_of, shown, simulate, urdf
 
 LEVEL = 0.08
@@ -59,6 +62,18 @@ def test_of_two_joints_the_one_without_efforts_is_named(robots):
     ]
     with pytest.raises(RecordingError, match=r'has an effort of joint1, .* passive: \[joint1\]'):
         diagnose(events, *robots[2], {})
+
+
+def test_bodies_without_a_motor_do_not_vanish(passive):
+    """A body of no size would leave nothing of a push that nobody knows."""
+    robot, tree = passive
+    world = _swing(force=lambda t, _q, _v: (0.4 * np.sin(37.0 * t) * np.sin(0.9 * t * t),))
+    raw = collect(events_of(world, commands=False), robot)
+    equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
+    nominal = fitted(equations, is_free=False)
+    model = fitted(equations, 'viscous_friction', is_free=True)
+    assert abs(model.inertia[0]) < 0.1
+    assert model.mean_square[0] > 0.5 * nominal.mean_square[0]
 
 
 def test_friction_of_a_free_swing_is_found_in_an_imported_table(passive, tmp_path):

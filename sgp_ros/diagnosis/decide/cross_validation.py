@@ -177,10 +177,12 @@ def left_out(
     grams = [np.tensordot(A[part == i], A[part == i], ((0, 1), (0, 1))) for i in range(PARTS)]
     sides = [np.tensordot(A[part == i], y[part == i], ((0, 1), (0, 1))) for i in range(PARTS)]
     prior = model.frame.weight * np.diag(np.repeat([1.0, 0.0], [p, A.shape[2] - p]))
+    pull = np.zeros(len(prior))
+    pull[:p] = model.frame.wanted * np.sqrt(model.frame.weight)
     found, unlikely = np.empty((PARTS, k)), 0.0
     for i in range(PARTS):
         G = sum(grams[:i] + grams[i + 1 :], prior)
-        c = np.linalg.lstsq(G, sum(sides[:i] + sides[i + 1 :], np.zeros(len(G))), rcond=1e-12)[0]
+        c = np.linalg.lstsq(G, sum(sides[:i] + sides[i + 1 :], pull), rcond=1e-12)[0]
         r = (y[part == i] - A[part == i] @ c) * sigma
         found[i] = (r**2).mean(axis=0)
         unlikely += 0.5 * float(c[:p] @ c[:p]) / PARTS

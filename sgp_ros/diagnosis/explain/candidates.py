@@ -10,6 +10,7 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors, price_of
 from sgp_ros.diagnosis.explain.frame import Frame
+from sgp_ros.diagnosis.explain.inertia_slope import InertiaSlope
 from sgp_ros.diagnosis.explain.regression import Columns, dry_joints
 from sgp_ros.diagnosis.explain.shape_search import UNSEEN, searched
 from sgp_ros.physics.effect_at import EffectAt
@@ -40,15 +41,29 @@ def fit(
     """
     equations = columns.equations(dry_joints(candidates))
     frame = Frame.of(equations, sigma, is_free=is_free)
+    slope = columns.inertia_slope if is_free else None
+    if slope is not None:
+        free = _solved(frame, columns, candidates, w)
+        frame = _held(frame, slope, free, np.zeros(equations.size) if w is None else w, sigma)
     model = None
     for _ in range(rounds):
         candidates = searched(frame, columns, candidates, steps, w, still)
         model = _solved(frame, columns, candidates, w)
         w = model.w if is_free else None
         frame = Frame.of(equations, model.sigma, is_free=is_free)
+        if slope is not None:
+            frame = _held(frame, slope, model, model.w, model.sigma)
         steps = max(steps // 2, 4)
     assert model is not None
     return _solved(frame, columns, candidates, w)
+
+
+def _held(
+    frame: Frame, slope: InertiaSlope, model: Model, w: np.ndarray, sigma: np.ndarray
+) -> Frame:
+    """Return a frame that holds the inertia of joints without a motor at bodies w (p,)."""
+    pull = slope.pull(w, model.w, model.mean_square, sigma, len(model.residual))
+    return replace(frame, pull=pull)
 
 
 def split(

@@ -34,6 +34,8 @@ class Frame:
         R: (p, p) upper triangular, `Q R = [B / sigma; sqrt(weight) I]`.
         is_free: whether inertial parameters may differ; else p here counts the instants alone.
         weight: of the prior, in rows.
+        pull: (p,) slope in w of what the likelihood gains with the inertia of joints without a
+            motor, see `explain/inertia_slope.py`; None for none.
     """
 
     equations: Equations
@@ -42,11 +44,13 @@ class Frame:
     R: np.ndarray
     is_free: bool
     weight: float
+    pull: np.ndarray | None = None
 
     @classmethod
     def of(
-        cls, equations: Equations, sigma: np.ndarray, *, is_free: bool, weight: float | None = None
-    ) -> Frame:
+        cls, equations: Equations, sigma: np.ndarray, *, is_free: bool,
+        weight: float | None = None, pull: np.ndarray | None = None,
+    ) -> Frame:  # fmt: skip
         """Return the frame for rows of these standard deviations; N rows give the usual weight."""
         factors = equations.factors
         p = equations.size if is_free else equations.instants
@@ -54,7 +58,7 @@ class Frame:
         weight = weight or max(1.0, len(equations.d) / INDEPENDENT_ROWS)
         S, R = np.linalg.qr(np.concatenate([*parts, math.sqrt(weight) * np.eye(p)]))
         ends = np.cumsum([len(part) for part in parts])
-        return cls(equations, sigma, tuple(np.split(S, ends)), R, is_free, weight)
+        return cls(equations, sigma, tuple(np.split(S, ends)), R, is_free, weight, pull)
 
     @property
     def Q(self) -> np.ndarray:  # noqa: N802  # as in the equations
@@ -65,10 +69,24 @@ class Frame:
             rows[:, j] = factor.Q @ self.S[j]
         return np.concatenate([rows.reshape(N * k, -1), self.S[-1]])
 
+    @property
+    def wanted(self) -> np.ndarray:
+        """Target of the rows of the prior, (p,): `weight |w|^2 / 2 - pull w` is least there."""
+        p = len(self.R)
+        return np.zeros(p) if self.pull is None else self.pull / math.sqrt(self.weight)
+
     @cached_property
     def y(self) -> np.ndarray:
         """Rest of the target, (N k + p,)."""
-        return self.projected(self.equations.d[:, :, None])[:, 0]
+        y = self.projected(self.equations.d[:, :, None])[:, 0]
+        if self.pull is not None:
+            N, k = self.equations.d.shape
+            u = self.S[-1].T @ self.wanted
+            y[: N * k] -= np.stack(
+                [f.Q @ (self.S[j] @ u) for j, f in enumerate(self.equations.factors)], axis=1
+            ).ravel()
+            y[N * k :] += self.wanted - self.S[-1] @ u
+        return y
 
     def projected(self, columns: np.ndarray) -> np.ndarray:
         """Return what inertial parameters leave of filtered columns (N, k, m), (N k + p, m)."""
@@ -97,9 +115,11 @@ class Frame:
 
     def parameters(self, unexplained: np.ndarray) -> np.ndarray:
         """Return w (p,) that explains best what effects (N, k) leave of the target."""
-        u = self.explained((unexplained / self.sigma)[:, :, None])
+        u = self.explained((unexplained / self.sigma)[:, :, None])[:, 0]
+        if self.pull is not None:
+            u += self.S[-1].T @ self.wanted
         w = np.zeros(self.equations.size)
-        w[: len(self.R)] = np.linalg.solve(self.R, u[:, 0])
+        w[: len(self.R)] = np.linalg.solve(self.R, u)
         return w
 
     @property

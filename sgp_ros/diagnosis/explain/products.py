@@ -44,7 +44,9 @@ class Rest:
     @classmethod
     def of(cls, columns: Columns, model: Model, dry: frozenset[int]) -> Rest:
         """Return what a model leaves where dry friction may hold some joints."""
-        frame = Frame.of(columns.equations(dry), model.sigma, is_free=model.is_free)
+        frame = Frame.of(
+            columns.equations(dry), model.sigma, is_free=model.is_free, pull=model.frame.pull
+        )
         y, A, _ = split(frame, columns, model.effects, model.w)
         own = np.zeros((len(y), 0))
         if A.shape[1]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.compare.sample import sampled
+from sgp_ros.diagnosis.explain.inertia_slope import InertiaSlope
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
@@ -48,6 +49,12 @@ class Columns:
         equations = self._equations[frozenset()]
         few = sampled(equations)
         return self if few is equations else Columns(few)
+
+    @cached_property
+    def inertia_slope(self) -> InertiaSlope | None:
+        """Gain of the likelihood with the inertia of joints without a motor; None for none."""
+        found = InertiaSlope(self._equations[frozenset()])
+        return found if found.joints.size else None
 
     def corrected(self, w: np.ndarray | None) -> ObservedMotion:
         """Return the motion of a robot with changed bodies."""

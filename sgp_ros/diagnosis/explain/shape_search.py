@@ -64,6 +64,8 @@ class Bench:
         self._frame, self._columns, self._w = frame, columns, w
         self._target = frame.equations.d / frame.sigma
         self._u = frame.explained(self._target[:, :, None])
+        self._wanted = frame.wanted
+        self._u[:, 0] += frame.S[-1].T @ self._wanted
         self._known: dict[tuple[object, bytes], _Part] = {}
 
     def cost(self, candidates: Sequence[EffectAt]) -> float:
@@ -126,6 +128,7 @@ class Bench:
             scaled = (rows / frame.sigma[j] for rows, _ in here)
             x = np.concatenate([self._target[:, j : j + 1], *scaled], axis=1)
             G[np.ix_(at, at)] += x.T @ x
+        G[0, 0] += float(self._wanted @ self._wanted)
         left = G - u.T @ u
         explained = np.flatnonzero(np.diag(left) <= EXPLAINED * np.diag(G))
         left[explained, explained] = 0.0
