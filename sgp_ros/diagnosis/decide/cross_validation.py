@@ -112,9 +112,11 @@ def _by_response(equations: Equations, r: np.ndarray) -> float:
     """Return the share of r (N,) that a linear response to the motion explains on parts left out.
 
     A response of finite length to accelerations and velocities of all joints, `ORDER` rows before
-    and after, fewer where rows are few.
+    and after, fewer where rows are few. Settled points respond to nothing before them.
     """
     motion = equations.motion
+    if motion.is_static:
+        return 0.0
     moves = equations.filter(np.column_stack([motion.acceleration, motion.velocity]))
     moves = moves / (moves.std(axis=0) + 1e-12)
     order = min(ORDER, (len(r) // (PER_COLUMN * moves.shape[1]) - 1) // 2)
