@@ -15,6 +15,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.rigid.rigid_body import torque_regressor
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 _LEAST = 1e-6
 """Of the nominal inertia, the least that bodies are taken for."""
@@ -31,17 +32,11 @@ class InertiaSlope:
     """
 
     def __init__(self, equations: Equations) -> None:
-        motion, tree = equations.motion, equations.motion.tree
-        is_passive = ~tree.is_actuated[: tree.size] & motion.moves
-        still = equations.poses[0]
-        zero = np.zeros_like(still.position)
-        rest = torque_regressor(tree, still.position, zero, zero)
-        self.joints = np.flatnonzero(is_passive)
+        tree, (still, *pushed) = equations.motion.tree, equations.poses
+        self.joints = np.flatnonzero(~tree.is_actuated[: tree.size] & equations.motion.moves)
         self._nominal, self._change = [], []
         for j in self.joints.tolist():
-            unit = zero.copy()
-            unit[:, j] = 1.0
-            Y = (torque_regressor(tree, still.position, zero, unit) - rest)[:, j]
+            Y = (_regressor(pushed[j]) - _regressor(still))[:, j]
             change = np.zeros((len(Y), equations.size))
             change[:, equations.instants :] = Y @ equations.directions.T
             self._nominal.append(Y @ tree.parameters.ravel())
@@ -77,3 +72,7 @@ class InertiaSlope:
             slope /= self._nominal[i][:, None]
             total += N * min(rest / sigma[j] ** 2, 1.0) * slope.mean(axis=0)
         return total
+
+
+def _regressor(motion: ObservedMotion) -> np.ndarray:
+    return torque_regressor(motion.tree, motion.position, motion.velocity, motion.acceleration)
