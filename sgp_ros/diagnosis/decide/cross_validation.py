@@ -83,9 +83,10 @@ def repeatable(equations: Equations, residual: np.ndarray, asked: np.ndarray) ->
     found = np.ones((2, k))
     if N < LEAST_ROWS:
         return found
+    response = _by_response(equations, residual) if asked.any() else np.zeros(k)
     for j in np.flatnonzero(asked):
         r = residual[:, j]
-        motion = max(_by_motion(equations, r, int(j)), _by_response(equations, r))
+        motion = max(_by_motion(equations, r, int(j)), response[j])
         explained = np.array([motion, _by_past(equations, r)])
         found[:, j] = np.minimum(1.0, np.maximum(explained, 0.0) + 1.0 / np.sqrt(N))
     return found
@@ -108,30 +109,32 @@ def _by_past(equations: Equations, r: np.ndarray) -> float:
     return 1.0 - error / float(now @ now) / max(least, 1e-6)
 
 
-def _by_response(equations: Equations, r: np.ndarray) -> float:
-    """Return the share of r (N,) that a linear response to the motion explains on parts left out.
+def _by_response(equations: Equations, residual: np.ndarray) -> np.ndarray:
+    """Return the shares that a linear response to the motion explains on parts left out, (k,).
 
     A response of finite length to accelerations and velocities of all joints, `ORDER` rows before
     and after, fewer where rows are few. Settled points respond to nothing before them.
+
+    Args:
+        equations: of the recording.
+        residual: of a model, (N, k) [N m or N].
     """
-    motion = equations.motion
-    if motion.is_static:
-        return 0.0
+    motion, (N, k) = equations.motion, residual.shape
+    order = min(ORDER, (N // (PER_COLUMN * 2 * motion.position.shape[1]) - 1) // 2)
+    if motion.is_static or order < 1:
+        return np.zeros(k)
     moves = equations.filter(np.column_stack([motion.acceleration, motion.velocity]))
-    moves = moves / (moves.std(axis=0) + 1e-12)
-    order = min(ORDER, (len(r) // (PER_COLUMN * moves.shape[1]) - 1) // 2)
-    if order < 1:
-        return 0.0
+    moves /= moves.std(axis=0) + 1e-12
     windows = np.lib.stride_tricks.sliding_window_view(moves, 2 * order + 1, axis=0)
     X = np.column_stack([windows.reshape(len(windows), -1), np.ones(len(windows))])
-    y = r[order : len(r) - order]
-    part, error = parts_of(len(y)), 0.0
+    y = residual[order : N - order]
+    part, error = parts_of(len(y)), np.zeros(k)
     for i in range(PARTS):
         out = part == i
         A = X[~out]
         gram = A.T @ A + RIDGE * len(A) * np.eye(A.shape[1])
-        error += float(((y[out] - X[out] @ np.linalg.solve(gram, A.T @ y[~out])) ** 2).sum())
-    return 1.0 - error / float(y @ y)
+        error += ((y[out] - X[out] @ np.linalg.solve(gram, A.T @ y[~out])) ** 2).sum(axis=0)
+    return np.asarray(1.0 - error / np.maximum((y**2).sum(axis=0), 1e-300))
 
 
 def _by_motion(equations: Equations, r: np.ndarray, joint: int) -> float:
