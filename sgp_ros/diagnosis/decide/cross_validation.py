@@ -183,7 +183,7 @@ def left_out(
     sides = [np.tensordot(A[part == i], y[part == i], ((0, 1), (0, 1))) for i in range(PARTS)]
     prior = model.frame.weight * np.diag(np.repeat([1.0, 0.0], [p, A.shape[2] - p]))
     pull = np.zeros(len(prior))
-    pull[:p] = model.frame.wanted * np.sqrt(model.frame.weight)
+    pull[:p] = model.frame.pull
     found, unlikely = np.empty((PARTS, k)), 0.0
     for i in range(PARTS):
         G = sum(grams[:i] + grams[i + 1 :], prior)

@@ -35,7 +35,7 @@ class Frame:
         is_free: whether inertial parameters may differ; else p here counts the instants alone.
         weight: of the prior, in rows.
         pull: (p,) slope in w of what the likelihood gains with the inertia of joints without a
-            motor, see `explain/inertia_slope.py`; None for none.
+            motor, see `explain/inertia_slope.py`; zeros for none.
     """
 
     equations: Equations
@@ -44,7 +44,7 @@ class Frame:
     R: np.ndarray
     is_free: bool
     weight: float
-    pull: np.ndarray | None = None
+    pull: np.ndarray
 
     @classmethod
     def of(
@@ -58,7 +58,8 @@ class Frame:
         weight = weight or max(1.0, len(equations.d) / INDEPENDENT_ROWS)
         S, R = np.linalg.qr(np.concatenate([*parts, math.sqrt(weight) * np.eye(p)]))
         ends = np.cumsum([len(part) for part in parts])
-        return cls(equations, sigma, tuple(np.split(S, ends)), R, is_free, weight, pull)
+        return cls(equations, sigma, tuple(np.split(S, ends)), R, is_free, weight,
+                   np.zeros(p) if pull is None else pull)  # fmt: skip
 
     @property
     def Q(self) -> np.ndarray:  # noqa: N802  # as in the equations
@@ -72,14 +73,13 @@ class Frame:
     @property
     def wanted(self) -> np.ndarray:
         """Target of the rows of the prior, (p,): `weight |w|^2 / 2 - pull w` is least there."""
-        p = len(self.R)
-        return np.zeros(p) if self.pull is None else self.pull / math.sqrt(self.weight)
+        return self.pull / math.sqrt(self.weight)
 
     @cached_property
     def y(self) -> np.ndarray:
         """Rest of the target, (N k + p,)."""
         y = self.projected(self.equations.d[:, :, None])[:, 0]
-        if self.pull is not None:
+        if self.pull.any():
             N, k = self.equations.d.shape
             u = self.S[-1].T @ self.wanted
             y[: N * k] -= np.stack(
@@ -116,8 +116,7 @@ class Frame:
     def parameters(self, unexplained: np.ndarray) -> np.ndarray:
         """Return w (p,) that explains best what effects (N, k) leave of the target."""
         u = self.explained((unexplained / self.sigma)[:, :, None])[:, 0]
-        if self.pull is not None:
-            u += self.S[-1].T @ self.wanted
+        u += self.S[-1].T @ self.wanted
         w = np.zeros(self.equations.size)
         w[: len(self.R)] = np.linalg.solve(self.R, u)
         return w
