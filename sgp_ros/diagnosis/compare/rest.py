@@ -7,18 +7,36 @@ import numpy as np
 from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory
 from sgp_ros.robots.observed_motion import ObservedMotion
 
+_SLOW, _CREEP = 1e-3, 1e-2
+"""Speeds, of the mean square one, below which a joint rests, and below which it may."""
+_NARROW = 1e-2
+"""Part of its range within which a joint stays that rests, as dry friction gives way a little."""
+
 
 def resting(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) -> np.ndarray:
-    """Return where joints rest: slower than the noise of the velocity for some time, (n, k)."""
+    """Return where joints rest, (n, k).
+
+    They are slower there than the noise of the velocity for some time; or they creep, and stay
+    within a small part of their range: friction is elastic before it slides.
+    """
     noise = np.sqrt((2 * np.pi) ** 2 * raw.noise_density * bandwidth.state_cutoff**3 / 3.0)
-    speed = np.abs(motion.velocity)
-    threshold = np.maximum(4.0 * noise, 1e-3 * np.sqrt((speed**2).mean(axis=0)))
+    typical = np.sqrt((motion.velocity**2).mean(axis=0))
     shortest = max(4, round(0.03 / raw.step))
-    rests = np.zeros(speed.shape, dtype=bool)
-    for j in range(speed.shape[1]):
-        wide = np.concatenate([[False], speed[:, j] < 3.0 * threshold[j], [False]])
-        edges = np.flatnonzero(np.diff(wide.astype(int)))
-        for start, stop in zip(edges[::2], edges[1::2], strict=True):
-            if np.sum(speed[start:stop, j] < threshold[j]) >= shortest:
-                rests[start:stop, j] = True
+    rests = np.zeros(motion.velocity.shape, dtype=bool)
+    for j in range(motion.velocity.shape[1]):
+        q, speed = motion.position[:, j], np.abs(motion.velocity[:, j])
+        least = 4.0 * float(noise[j])
+        surely, perhaps = max(least, _SLOW * typical[j]), max(least, _CREEP * typical[j])
+        for part in _slow(speed, surely, shortest):
+            rests[part, j] = True
+        for part in _slow(speed, perhaps, shortest):
+            rests[part, j] |= np.ptp(q[part]) < _NARROW * np.ptp(q)
     return rests
+
+
+def _slow(speed: np.ndarray, limit: float, shortest: int) -> list[slice]:
+    """Return the stretches below three times a speed that have enough rows below it."""
+    wide = np.concatenate([[False], speed < 3.0 * limit, [False]])
+    edges = np.flatnonzero(np.diff(wide.astype(int)))
+    parts = (slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True))
+    return [part for part in parts if np.sum(speed[part] < limit) >= shortest]
