@@ -1,16 +1,45 @@
-"""Credibility of a fitted model: whether its laws are those that their names state."""
+"""Credibility of a fitted model: its gain over another, and whether its laws are what they say."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from sgp_ros.batch.least_squares import correlation_factor
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import COUNTED_SHARE, MOST_OPPOSED, SLIGHT_REST
+from sgp_ros.diagnosis.criteria import (
+    COUNTED_SHARE,
+    INDEPENDENT_ROWS,
+    MOST_OPPOSED,
+    PER_PARAMETER,
+    SLIGHT_REST,
+)
 from sgp_ros.diagnosis.explain.fitted_model import Model, beyond_plain
 from sgp_ros.diagnosis.explain.screening import WIDEST, are_apart
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import MOTOR
 from sgp_ros.robots.observed_motion import ObservedMotion
+
+
+def gain(trial: Model, model: Model, *, is_whole: bool = True) -> float:
+    """Return what a trial is worth more than a model of the same recording [nats].
+
+    The log likelihood, less the prices of effects and parameters. Rows that are correlated in
+    time count as fewer, joint by joint, and never as more than `INDEPENDENT_ROWS`. Missing physics
+    is correlated too; only the model with the smaller residual shows how much, and only once it is
+    complete.
+
+    Args:
+        trial: to compare.
+        model: with it.
+        is_whole: whether all that there is may be in one of them; else no row counts as fewer.
+    """
+    of = trial if np.log(trial.sigma).sum() < np.log(model.sigma).sum() else model
+    factors = np.array([correlation_factor(r) if is_whole else 1.0 for r in of.residual.T])  # (k,)
+    rows = np.minimum(len(of.residual) / factors, INDEPENDENT_ROWS)
+    prior = 0.5 * float(model.w @ model.w - trial.w @ trial.w)
+    inertia = float(rows.mean()) * (trial.log_inertia - model.log_inertia)
+    price = trial.law_price - model.law_price + PER_PARAMETER * (trial.size - model.size)
+    return float(rows @ np.log(model.sigma / trial.sigma)) + inertia + prior - price
 
 
 def is_credible(model: Model) -> bool:

@@ -15,17 +15,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sgp_ros.batch.least_squares import correlation_factor
 from sgp_ros.diagnosis.compare.settled import shows
 from sgp_ros.diagnosis.criteria import (
     COUNTED_SHARE,
-    INDEPENDENT_ROWS,
     PER_EFFECT,
-    PER_PARAMETER,
     SLIGHT_REST,
 )
 from sgp_ros.diagnosis.explain.candidates import fit
-from sgp_ros.diagnosis.explain.credibility import is_credible
+from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model, adds_to_usual
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import Trial, screen
@@ -38,28 +35,6 @@ SWEEPS = 4
 """Most sweeps over the joints."""
 TRIALS = 3
 """Screened candidates that are fitted."""
-
-
-def gain(trial: Model, model: Model, *, is_whole: bool = True) -> float:
-    """Return what a trial is worth more than a model of the same recording [nats].
-
-    The log likelihood, less the prices of effects and parameters. Rows that are correlated in
-    time count as fewer, joint by joint, and never as more than `INDEPENDENT_ROWS`. Missing physics
-    is correlated too; only the model with the smaller residual shows how much, and only once it is
-    complete.
-
-    Args:
-        trial: to compare.
-        model: with it.
-        is_whole: whether all that there is may be in one of them; else no row counts as fewer.
-    """
-    of = trial if np.log(trial.sigma).sum() < np.log(model.sigma).sum() else model
-    factors = np.array([correlation_factor(r) if is_whole else 1.0 for r in of.residual.T])  # (k,)
-    rows = np.minimum(len(of.residual) / factors, INDEPENDENT_ROWS)
-    prior = 0.5 * float(model.w @ model.w - trial.w @ trial.w)
-    inertia = float(rows.mean()) * (trial.log_inertia - model.log_inertia)
-    price = trial.law_price - model.law_price + PER_PARAMETER * (trial.size - model.size)
-    return float(rows @ np.log(model.sigma / trial.sigma)) + inertia + prior - price
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +81,18 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
     model = fit(columns, model.effects, model.sigma, is_free=model.is_free, w=model.w, rounds=2,
                 steps=6)  # fmt: skip
     rivals = [t for block in _blocks(model) for t in _changes(columns, model, block)]
-    return [m for m in (model, *rivals) if m.effects and is_credible(m)]
+    return [m for m in (model, _large(columns, model), *rivals) if m.effects and is_credible(m)]
+
+
+def _large(columns: Columns, model: Model) -> Model:
+    """Return a model without its rare laws that turned out too small beside the others."""
+    while True:
+        seen = zip(model.effects, model.shares, model.filtered_shares, strict=True)
+        small = [s for s, share, filtered in seen if not s.effect.is_usual
+                 and (share <= COUNTED_SHARE or filtered <= SLIGHT_REST)]  # fmt: skip
+        if not small:
+            return model
+        model = _fitted(columns, model, _arranged(model, _Block((), None), small[-1]))
 
 
 def usual(columns: Columns, base: Model, first: tuple[EffectAt, ...] = ()) -> Model:

@@ -16,10 +16,16 @@ from sgp_ros.diagnosis.criteria import (
 )
 from sgp_ros.diagnosis.decide.cross_validation import support
 from sgp_ros.diagnosis.explain.candidates import fit, split
-from sgp_ros.diagnosis.explain.credibility import is_credible
+from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import beyond_plain, floors
 from sgp_ros.diagnosis.explain.frame import Frame
-from sgp_ros.diagnosis.explain.joint_search import by_joint, coupled, gain, uncoupled, usual
+from sgp_ros.diagnosis.explain.joint_search import (
+    _large,
+    by_joint,
+    coupled,
+    uncoupled,
+    usual,
+)
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
@@ -71,6 +77,16 @@ def test_what_is_not_worth_its_price_is_taken_out(equations):
     rich = fit(columns, (*pair.effects, wave), pair.sigma, is_free=True)
     found, *_ = by_joint(columns, rich)
     assert _keys(found) == TRUTH
+
+
+def test_a_rare_law_that_is_too_small_goes_and_takes_nothing_with_it(equations):
+    columns, pair = _pair(equations)
+    wave = next(c for _, c in screen(columns, pair, [EFFECTS['cogging']], (0,)))
+    rich = fit(columns, (*pair.effects, wave), pair.sigma, is_free=True)
+    assert rich.shares[-1] < COUNTED_SHARE
+    found = _large(columns, rich)
+    assert found.key == pair.key
+    assert _large(columns, found) is found
 
 
 def test_a_gain_is_what_the_other_way_loses(equations):
