@@ -74,7 +74,7 @@ def equations_of(recording):
     return Equations(
         motion, low, t[low.rows], d, (np.zeros((len(d), 0)),) * 2, np.zeros((0, 20)),
         (effort**2).mean(axis=0), np.full(2, 1e-9), np.ones((n, 2)), np.zeros((n, 2), dtype=bool),
-        np.zeros(2), np.zeros(2), np.zeros(2),
+        *[np.zeros(2)] * 4,
     )  # fmt: skip
 
 

@@ -21,7 +21,12 @@ from functools import cached_property
 import numpy as np
 
 from sgp_ros.diagnosis.compare.bodies import Factor, body_directions
-from sgp_ros.diagnosis.compare.grid import effort_change, noisy_volume, part_of_noise
+from sgp_ros.diagnosis.compare.grid import (
+    carried_inertia,
+    effort_change,
+    noisy_volume,
+    part_of_noise,
+)
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.rest import resting
 from sgp_ros.diagnosis.compare.trajectory import (
@@ -83,6 +88,7 @@ class Equations:
             smoothing of the states, and the noise of measured efforts.
         noise_part: (k,) part of d that this noise makes, in mean squares.
         effort_noise: (k,) its mean square, the part of `model_error` that no inertia changes.
+        carried: (k,) log of the inertia that efforts show, see `carried_inertia`.
         free: the same equations where dry friction holds fewer joints, or None.
         instants: number of efforts whose instant is unknown: k where they are measured, else 0.
     """
@@ -100,6 +106,7 @@ class Equations:
     model_error: np.ndarray
     noise_part: np.ndarray
     effort_noise: np.ndarray
+    carried: np.ndarray
     free: Equations | None = None
     instants: int = 0
 
@@ -276,19 +283,17 @@ def make_equations(
         late = low(effort_change(motion.effort, motion.starts)) * motion.moves
         for j in range(k):
             bases[j][:, j] = late[:, j]
-    power = np.where(
-        tree.is_actuated[:k],
-        (motion.effort**2).mean(axis=0),
-        (low(motion.mass_diagonal * motion.acceleration) ** 2).mean(axis=0),
-    )
+    inertial = low(motion.mass_diagonal * motion.acceleration)
+    squares = (motion.effort**2).mean(axis=0), (inertial**2).mean(axis=0)
+    power = np.where(tree.is_actuated[:k], *squares)
     power = np.where(motion.moves & (power > 0.0), power, 1.0)
     inertia = motion.mass_diagonal.mean(axis=0)
     variance = inertia**2 * (2 * np.pi) ** 4 * raw.noise_density * bandwidth.cutoff**5 / 5.0
-    noise = measured_noise(raw, motion, bandwidth)
+    noise, carried = measured_noise(raw, motion, bandwidth), carried_inertia(motion, low, d)
+    error = np.exp(2.0 * carried) * smoothing_error(raw, motion, low, bandwidth)
     equations = Equations(
         motion, low, motion.time[low.rows], d, bases, directions, power, np.sqrt(variance),
         np.ones(motion.position.shape), resting(raw, motion, bandwidth),
-        smoothing_error(raw, motion, low, bandwidth) + noise, part_of_noise(noise, d),
-        noise, instants=m,
+        error + noise, part_of_noise(noise, d), noise, carried, instants=m,
     )  # fmt: skip
     return replace(equations.with_dry_friction(motion.dry_joints), free=None)

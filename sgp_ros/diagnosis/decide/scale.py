@@ -36,6 +36,7 @@ class Scale:
         nominal: discrepancy of the nominal robot, (k,) shares.
         rows: that count as independent.
         shape_error: part of `nominal` that the right column may leave.
+        carried: log of the inertia that efforts show, relative to the nominal one, (k,).
     """
 
     power: np.ndarray
@@ -45,6 +46,7 @@ class Scale:
     nominal: np.ndarray
     rows: float
     shape_error: float = SHAPE_ERROR
+    carried: np.ndarray | float = 0.0
 
     @classmethod
     def of(cls, equations: Equations, comparison: Comparison) -> Scale:
@@ -52,7 +54,8 @@ class Scale:
         power, error = equations.power, equations.model_error
         base, nominal = comparison.base.left, comparison.nominal.mean_square / power
         noise = equations.effort_noise
-        return cls(power, error, noise, base, nominal, min(INDEPENDENT_ROWS, len(equations.d)))
+        rows, carried = min(INDEPENDENT_ROWS, len(equations.d)), equations.carried
+        return cls(power, error, noise, base, nominal, rows, carried=carried)
 
     @property
     def floor(self) -> np.ndarray:
@@ -122,7 +125,7 @@ class Scale:
 
     def likelihood(self, model: Model) -> float:
         """Return the fit without that prior [nats]."""
-        floor = least_variance(self.floor, self.noise / self.power, model.inertia)
+        floor = least_variance(self.floor, self.noise / self.power, model.inertia - self.carried)
         share = model.mean_square / self.power + floor
         return self.rows * (model.log_inertia - 0.5 * float(np.log(share).sum()))
 

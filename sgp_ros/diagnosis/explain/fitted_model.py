@@ -11,7 +11,7 @@ from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import FLOOR_SHARE, PER_EFFECT, PER_UNUSUAL
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.regression import dry_joints
-from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.catalogue import EFFECTS, TORQUE_GAIN
 from sgp_ros.physics.effect import EMPTY, Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
@@ -55,6 +55,15 @@ class Model:
     def is_free(self) -> bool:
         """Whether inertial parameters may differ from the nominal ones."""
         return self.frame.is_free
+
+    @property
+    def delivered(self) -> np.ndarray:
+        """Logs of what motors deliver of recorded efforts, (k,): of half of one, half can err."""
+        found = np.zeros(len(self.inertia))
+        for s in self.effects:
+            if s.effect is TORQUE_GAIN:
+                found[s.place.joint] += np.log(1.0 + float(s.coefficients[0]))
+        return found
 
     @property
     def mean_square(self) -> np.ndarray:
@@ -174,21 +183,28 @@ def beyond_plain(s: EffectAt, force: np.ndarray, equations: Equations) -> np.nda
     return left
 
 
-def floors(equations: Equations, inertia: np.ndarray | float = 0.0) -> np.ndarray:
-    """Return the least variance of a residual, (k,), of a model with this log of inertia (k,)."""
+def floors(equations: Equations, inertia: np.ndarray | None = None) -> np.ndarray:
+    """Return the least variance of a residual, (k,), of a model with this log of inertia (k,).
+
+    Without one, of a model with the inertia that the efforts show.
+    """
     noise = equations.effort_noise
     whole = FLOOR_SHARE * equations.power + equations.model_error
-    return least_variance(whole, noise, inertia) + 1e-300
+    beyond = 0.0 if inertia is None else inertia - equations.carried
+    return least_variance(whole, noise, beyond) + 1e-300
 
 
-def least_variance(
-    whole: np.ndarray, noise: np.ndarray, inertia: np.ndarray | float
-) -> np.ndarray:
+def least_variance(whole: np.ndarray, noise: np.ndarray, beyond: np.ndarray | float) -> np.ndarray:
     """Return what a perfect model leaves, (k,), of which the noise of measured efforts is a part.
 
     Errors of the motion become larger ones of the effort with the inertia, that noise does not.
+
+    Args:
+        whole: (k,) what it leaves where it has the inertia that the efforts show.
+        noise: (k,) part of it.
+        beyond: (k,) log of the inertia of a model relative to that.
     """
-    return np.asarray((whole - noise) * np.exp(2.0 * np.maximum(inertia, -50.0)) + noise)
+    return np.asarray((whole - noise) * np.exp(2.0 * np.maximum(beyond, -50.0)) + noise)
 
 
 def price_of(frame: Frame, size: int) -> float:

@@ -18,7 +18,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
-from test.diagnosis.worlds import CHAINS, World, events_of
+from test.diagnosis.worlds import CHAINS, World, events_of, robot_of
 
 
 def start(equations):
@@ -140,6 +140,20 @@ def test_more_inertia_costs_what_its_determinant_says(equations_for, perfect):
     assert equations.inertia(w, np.full((1, 1), -2.0 * inertia)) == -np.inf
     w[0] = 1.0
     assert equations.inertia(w, np.zeros((1, 1))) == pytest.approx(np.log(1.25))
+
+
+def test_floors_are_those_of_the_inertia_that_the_efforts_show(equations_for, perfect, tmp_path):
+    """A rotor of fifty times the link: what a perfect model leaves is relative to both."""
+    (link,) = CHAINS[1]
+    light = replace(link, mass=link.mass / 50.0, inertia=link.inertia / 50.0)
+    robot, tree = robot_of(tmp_path, (light,))
+    raw = collect(events_of(perfect[1]), robot)
+    geared = make_equations(raw, tree, choose_bandwidth(raw, tree))
+    assert geared.carried == pytest.approx(np.log(50.0), abs=0.1)
+    np.testing.assert_allclose(floors(geared, geared.carried), floors(geared))
+    assert floors(geared, geared.carried)[0] < 1e-4 * geared.power[0]
+    _, plain = equations_for(perfect[1])
+    assert plain.carried == pytest.approx(0.0, abs=0.02)
 
 
 def _beside_a_still_joint(world):

@@ -73,7 +73,7 @@ def equations_of(truth):
     empty = (np.zeros((len(d), 0)),) * d.shape[1]
     return Equations(
         seen, low, seen.time[rows], d, empty, np.zeros((0, 20)), power, np.full(2, 1e-9),
-        np.ones(seen.position.shape), still, np.zeros(2), np.zeros(2), np.zeros(2),
+        np.ones(seen.position.shape), still, *[np.zeros(2)] * 4,
     )  # fmt: skip
 
 
