@@ -64,6 +64,7 @@ class Hypothesis:
         canonical: returns the one of several equal sets of numbers (m,) that is reported.
         is_physics: whether it is physics, which hides errors of the connection while present.
         exact: numbers of one parameter that come from a mistaken unit, not from a measurement.
+        least: size of one number below which it is how signals are sampled, and no error.
     """
 
     effect: str
@@ -78,6 +79,7 @@ class Hypothesis:
     canonical: Callable[[np.ndarray], np.ndarray] = lambda x: x
     is_physics: bool = False
     exact: tuple[float, ...] = ()
+    least: float = 0.0
 
     def remedy(self, values: Mapping[str, float]) -> str:
         """Return what to do about the error of these numbers, a sentence."""
@@ -117,7 +119,7 @@ def hypotheses(motion: ObservedMotion) -> list[Hypothesis]:
     if len(driven) > 1 and not isinstance(motion.drive, Servo):
         found.append(_effort_scale(driven, ALL))
     if driven:
-        found.append(_clock(has_commands=motion.drive is not None))
+        found.append(_clock(motion.step, has_commands=motion.drive is not None))
     if isinstance(motion.drive, Servo):
         found.append(_late_targets())
     turning = [j for j in joints if not tree.is_prismatic[j]]
@@ -217,13 +219,14 @@ def _swaps(motion: ObservedMotion, i: int, j: int) -> Iterator[Hypothesis]:
             yield _discrete('swapped_joints', tree.joint_names[i], _swap(i, j, moves, acts), words)
 
 
-def _clock(*, has_commands: bool) -> Hypothesis:
+def _clock(period: float, *, has_commands: bool) -> Hypothesis:
     """Return the offset of the clock; commands that act late have a delay, which is physics."""
     starts = np.array([x for x in _CLOCKS if x > 0.0 or not has_commands])
     return Hypothesis(
         'clock_offset', ALL, ('offset',), ('s',), _column(starts), np.array([0.004]),
         lambda c, x: replace(c, clock=c.clock + float(x[0])),
         is_possible=lambda x: bool(x[0] > 0.0) or not has_commands,
+        least=0.0 if has_commands else period,
     )  # fmt: skip
 
 

@@ -53,6 +53,11 @@ class Tried:
         return self.hypothesis.remedy(values)
 
     @property
+    def is_beyond(self) -> bool:
+        """Whether its numbers are more than how signals are sampled."""
+        return not self.numbers.size or float(np.abs(self.numbers).max()) >= self.hypothesis.least
+
+    @property
     def worth(self) -> float:
         """Evidence less the price of the hypothesis [nats]."""
         return self.agreement.evidence - _price(self.hypothesis)
@@ -183,16 +188,13 @@ def _price(h: Hypothesis) -> float:
 
 
 def _joint(probe: Probe, errors: Sequence[Tried]) -> Together:
-    return Together(
-        probe, tuple(e.hypothesis for e in errors), tuple(e.numbers for e in errors)
-    )  # fmt: skip
+    return Together(probe, *zip(*((e.hypothesis, e.numbers) for e in errors), strict=True))
 
 
 def _without(found: Together, i: int) -> Together:
     """Return all but one of some errors, with their numbers searched anew."""
-    hypotheses, numbers = list(found.hypotheses), list(found.numbers)
-    del hypotheses[i], numbers[i]
-    return Together(found.probe, tuple(hypotheses), tuple(numbers)).best()
+    fewer = (x[:i] + x[i + 1 :] for x in (found.hypotheses, found.numbers))
+    return Together(found.probe, *fewer).best()  # type: ignore[arg-type]
 
 
 def _chain(found: Together) -> list[Tried]:
@@ -211,7 +213,7 @@ def _ranked(
 ) -> list[Tried]:  # fmt: skip
     """Return the hypotheses that are worth most on top of a correction, best first.
 
-    Those that change the residual by less than the share that counts as physics are left out.
+    Left out are those that change less than what counts as physics, and those of sampling.
     """
     known = [e.hypothesis.key for e in errors]
     screened = []
@@ -230,7 +232,7 @@ def _ranked(
         drives = [s for s in screened[_REFINED:] if s[1].is_of_gains]
         return [_refined(probe, base, h, x) for _, h, x in screened[:_REFINED] + drives]
     found = [_refined(probe, base, h, x) for _, h, x in screened[:_REFINED]]
-    found = [t for t in found if t.agreement.distance(now) > COUNTED_SHARE]
+    found = [t for t in found if t.agreement.distance(now) > COUNTED_SHARE and t.is_beyond]
     return sorted(found, key=lambda t: -t.worth)
 
 
