@@ -17,12 +17,7 @@ from sgp_ros.diagnosis.compare.equations import Equations, joint_name, make_equa
 from sgp_ros.diagnosis.compare.grid import noisy_volume
 from sgp_ros.diagnosis.compare.sufficiency import require_rows
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth
-from sgp_ros.diagnosis.criteria import (
-    ALIKE,
-    NEARLY,
-    PER_EFFECT,
-    TEMPER,
-)
+from sgp_ros.diagnosis.criteria import ALIKE, NEARLY, PER_EFFECT, TEMPER
 from sgp_ros.diagnosis.decide.differences import Several, decide_several
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.gathered import Recordings
@@ -113,11 +108,12 @@ class Connected:
         return np.maximum(nominal.left, moving), gained
 
     def worth(self, nominal: np.ndarray, recorded: np.ndarray) -> float:
-        """Return the worth of what is decided, as the density of the recorded motion [nats].
+        """Return the worth of what is decided, as the density of what was recorded [nats].
 
-        Errors are relative to the recorded efforts, in whatever unit these are, so that what a
-        perfect model leaves is the same motion with a correction and without. Where nothing is
-        asserted the best model counts if it explains most of the discrepancy: a correction has
+        That is of the efforts, given the motion, where all joints have some, as in `Probe`; else
+        of the motion. Errors are relative to the recorded efforts, in whatever unit these are, so
+        that what a perfect model leaves is the same with a correction and without. Where nothing
+        is asserted the best model counts if it explains most of the discrepancy: a correction has
         to explain more than it does.
 
         Args:
@@ -129,11 +125,16 @@ class Connected:
         model = decision.tentative or decision.model
         if decision.tentative and model.left.sum() > NEARLY * base.left.sum():
             model = base
-        scale = Scale.of(self.equations, self.several.comparison)
-        if self.correction is not None:
-            recorded = recorded[list(self.correction.effort_order)]
-            units = model.inertia - np.log(np.abs(self.correction.scale))
+        scale, done = Scale.of(self.equations, self.several.comparison), self.correction
+        has_efforts = self.equations.motion.has_all_efforts
+        if has_efforts:
+            model, scale = replace(model, inertia=model.delivered), replace(scale, carried=0.0)
+        if done is not None and has_efforts:
+            recorded = recorded[done.effort_order] / done.effort_scale**2
+        elif done is not None:
+            units = model.inertia - np.log(np.abs(done.scale))
             model = replace(model, inertia=noisy_volume(units, self.equations.noise_part))
+            recorded = recorded[done.effort_order]
         return replace(scale, nominal=nominal, power=recorded).worth(model)
 
     def recorded(self, found: Predictions) -> Predictions:

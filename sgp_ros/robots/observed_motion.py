@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.drive import Servo
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.motion import Commands, RecordedCommands
@@ -102,6 +103,12 @@ class ObservedMotion:
         A measured effort is what models have to predict; nothing may be explained by it.
         """
         return self.tree.is_actuated[: self.tree.size] & (self.drive is not None)
+
+    @property
+    def has_all_efforts(self) -> bool:
+        """Whether every joint has a recorded effort that no drive makes of the motion."""
+        is_driven = self.tree.is_actuated[: self.tree.size].all()
+        return bool(is_driven) and not isinstance(self.drive, Servo)
 
     @property
     def is_continuous(self) -> np.ndarray:

@@ -11,6 +11,7 @@ import pytest
 from sgp_ros.diagnosis import connected
 from sgp_ros.diagnosis.connected import Connected
 from sgp_ros.diagnosis.result import Finding, Location
+from sgp_ros.diagnosis.setup.correction import Correction
 
 
 def _of(cutoff):
@@ -87,6 +88,7 @@ class _AsGiven:
 
     nominal: float = 0.0
     power: float = 0.0
+    carried: float = 1.0
 
     def worth(self, model):
         return model.worth
@@ -103,11 +105,50 @@ def test_an_error_has_to_explain_more_than_the_best_model_that_is_not_asserted(m
         base = SimpleNamespace(worth=70.0, left=np.array([0.9, 0.01]))
         decision = SimpleNamespace(model=nearest or base, tentative=nearest)
         several = SimpleNamespace(decision=decision, comparison=SimpleNamespace(base=base))
-        return Connected(None, None, several).worth(0.0, 0.0)
+        equations = SimpleNamespace(motion=SimpleNamespace(has_all_efforts=False))
+        return Connected(None, equations, several).worth(0.0, 0.0)
 
     assert worth(None) == 70.0
     assert worth(SimpleNamespace(worth=217.0, left=np.array([0.1, 0.1]))) == 217.0
     assert worth(SimpleNamespace(worth=217.0, left=np.array([0.5, 0.1]))) == 70.0
+
+
+@dataclass(frozen=True)
+class _OfEfforts(_AsGiven):
+    """A scale that is worth minus the errors in units of efforts as they were recorded."""
+
+    def worth(self, model):
+        assert self.carried == 0.0
+        return float((model.inertia - 0.5 * np.log(model.mean_square / self.power)).sum())
+
+
+@dataclass(frozen=True)
+class _Residual:
+    """What is left of a recording, and what its motors deliver."""
+
+    mean_square: np.ndarray
+    delivered: np.ndarray
+    inertia: np.ndarray
+    worth: float = 0.0
+
+
+def test_recorded_efforts_in_any_unit_are_explained_alike(monkeypatch):
+    """Ten times the unit, ten times the error; a heavier model gains nothing by its inertia."""
+    monkeypatch.setattr(connected, 'Scale', SimpleNamespace(of=lambda *_: _OfEfforts()))
+    equations = SimpleNamespace(motion=SimpleNamespace(has_all_efforts=True))
+    square, recorded = np.array([4.0, 1.0]), np.array([100.0, 100.0])
+
+    def worth(square, factor, delivered=1.0, inertia=0.0):
+        model = _Residual(square, np.log(np.full(2, delivered)), np.full(2, inertia))
+        decision = SimpleNamespace(model=model, tentative=None)
+        several = SimpleNamespace(decision=decision, comparison=SimpleNamespace(base=model))
+        done = replace(Correction.none(2), effort_scale=np.full(2, factor))
+        return Connected(None, equations, several, done).worth(0.0, recorded)
+
+    plain = worth(square, 1.0)
+    assert worth(square / 100.0, 10.0) == pytest.approx(plain)
+    assert worth(square, 1.0, inertia=3.0) == plain
+    assert worth(square / 4.0, 1.0, delivered=0.5) == pytest.approx(plain)
 
 
 def test_what_is_found_with_an_error_of_the_connection_too_is_as_certain():

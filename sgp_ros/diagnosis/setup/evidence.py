@@ -2,9 +2,14 @@
 
 `d = low(tau_nominal(q, v, a) - tau) = low(X) b + noise` with everyday unknowns b: inertial
 parameters and, per joint, viscous and dry friction and an offset, each with a wide normal prior.
-The evidence is that of the recorded motion and efforts, with b integrated out (Laplace), for the
-nominal robot alone, with bodies, and with friction too; the best of the three counts, so that an
-error of the connection must explain what all three leave.
+The evidence has b integrated out (Laplace), for the nominal robot alone, with bodies, and with
+friction too; the best of the three counts, so that an error of the connection must explain what
+all three leave. Beside friction, rows where it may hold a joint say nothing of that joint.
+
+Where every joint has a recorded effort it is the evidence of the efforts, given the motion. A
+joint without a motor has none that tells the size of its bodies, and a drive makes its effort of
+the motion: there it is the evidence of the motion, which is in units of effort by inertia. With
+recorded efforts that would prize inertia wherever gravity and friction prevail.
 
 Beside open bodies the size of all efforts is open too, and so are the gains of drives, where no
 effort is measured: these are looked for with known bodies, beside rotors and dry friction in the
@@ -20,13 +25,14 @@ import numpy as np
 from sgp_ros.diagnosis.compare.bodies import body_directions
 from sgp_ros.diagnosis.compare.grid import noisy_volume, part_of_noise
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
+from sgp_ros.diagnosis.compare.rest import resting
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
     RawTrajectory,
     measured_noise,
     observe,
 )
-from sgp_ros.diagnosis.criteria import INDEPENDENT_ROWS, SHAPE_ERROR
+from sgp_ros.diagnosis.criteria import FORCE_ACCURACY, INDEPENDENT_ROWS, SHAPE_ERROR
 from sgp_ros.diagnosis.setup.correction import Acting, Correction, delayed
 from sgp_ros.diagnosis.setup.unknowns import Unknowns
 from sgp_ros.physics.drive import Servo
@@ -44,6 +50,10 @@ _KEPT = 50
 """Clock offsets of which the efforts are remembered."""
 _MOTIONS = 8
 """Corrected motions of which the columns are remembered."""
+_FRICTION = 2
+"""Number of the set of unknowns with friction."""
+_MOST_INACCURATE = 0.05
+"""Share of an effort that is small beside the forces in it which these may leave."""
 FRICTION = 0.3
 """Prior standard deviation of friction and offset, relative to the rms of the joint's effort."""
 
@@ -115,6 +125,9 @@ class Probe:
         inertial = (self.motion.mass_diagonal * self.motion.acceleration).var(axis=0)
         self.power = np.where(self.driven, effort, inertial)
         self.power = np.where(self.power > 0.0, self.power, 1.0)
+        # where large forces cancel their accuracy counts; in a wrong unit efforts only seem small
+        cancelled = np.maximum(inertial / self.power - 1.0, 0.0)
+        self._inaccuracy = np.minimum(FORCE_ACCURACY**2 * cancelled, _MOST_INACCURATE)
         d = self.motion.nominal_effort - self.motion.effort - self.motion.stated_force
         # rows that are left out alias the noise
         noise = every * measured_noise(raw, motion, bandwidth)
@@ -125,7 +138,8 @@ class Probe:
         inertia = self.motion.mass_diagonal.mean(axis=0)
         self._rotors = np.diag(inertia) if knows_bodies else None
         self._known: dict[float, Acting] = {}
-        self._columns: dict[tuple[object, ...], Unknowns] = {}
+        self._columns: dict[tuple[object, ...], tuple[Unknowns, Unknowns]] = {}
+        self._moving = ~resting(raw, motion, bandwidth)[pick]
         self._Y: np.ndarray | None = None  # fresh memory costs more than the computation
 
     def acting(self, clock: float) -> Acting:
@@ -159,18 +173,24 @@ class Probe:
             unknowns: number of the set of unknowns; None for the best.
         """
         motion = correction.motion(self.motion, self.acting(correction.clock))
-        columns = self._unknowns_of(correction.moves, motion)
-        d = columns.nominal - self.filter(motion.effort + motion.stated_force)
+        moving = self._moving[:, correction.order]
+        columns = self._unknowns_of(correction.moves, motion, moving)
+        acting = motion.effort + motion.stated_force
+        both = [c.nominal - self.filter(acting * m)
+                for c, m in zip(columns, (1.0, moving), strict=True)]  # fmt: skip
         power = self._delivered(motion, correction)
         rms = np.sqrt(power)
         # by how much the density of recorded accelerations exceeds that of relative errors
         units = -0.5 * self.driven * np.log(power / self.power) - np.log(np.abs(correction.scale))
         volume = float(noisy_volume(units, self._noise_part).sum())
-        rows = min(INDEPENDENT_ROWS, len(d))
+        rows = min(INDEPENDENT_ROWS, len(both[0]))
         found = []
         for number in range(3) if unknowns is None else (unknowns,):
-            value, rest, share, w = self._with(number, d, columns, power)
-            shift = self._log_inertia(motion.tree, w, motion.position[self._pose]) + volume
+            d = both[number == _FRICTION]
+            value, rest, share, w = self._with(number, d, columns[number == _FRICTION], power)
+            shift = self._log_inertia(motion.tree, w, motion.position[self._pose])
+            if np.isfinite(shift):  # else bodies that cannot be
+                shift = 0.0 if self.full.has_all_efforts else shift + volume
             left = (rest**2).mean(axis=0) / power
             found.append(
                 Agreement(value + rows * shift, number, left, d / rms, rest / rms, share, rows)
@@ -195,18 +215,29 @@ class Probe:
             power = power[correction.effort_order] / correction.effort_scale**2
         return np.where(self.driven & (power > 0.0), power, self.power)
 
-    def _unknowns_of(self, key: tuple[object, ...], motion: ObservedMotion) -> Unknowns:
-        """Return the columns of a motion; corrections of efforts alone leave them as they are."""
+    def _unknowns_of(
+        self, key: tuple[object, ...], motion: ObservedMotion, moving: np.ndarray
+    ) -> tuple[Unknowns, Unknowns]:
+        """Return the columns of a motion, of all rows and of those where joints are `moving`.
+
+        Corrections of efforts alone leave them as they are.
+        """
         if key not in self._columns:
             if len(self._columns) >= _MOTIONS:
                 self._columns.clear()
             q, v, a = motion.position, motion.velocity, motion.acceleration
             self._Y = torque_regressor(motion.tree, q, v, a, self._Y)
-            found = Unknowns.of(motion, self._Y, self.filter, self.directions)
-            if self._rotors is not None:
-                found = found.of_known_bodies(self.filter(a), self._rotors)
-            self._columns[key] = found
+            whole = self._of_rows(motion, np.ones_like(moving))
+            held = whole if moving.all() else self._of_rows(motion, moving)
+            self._columns[key] = whole, held
         return self._columns[key]
+
+    def _of_rows(self, motion: ObservedMotion, moving: np.ndarray) -> Unknowns:
+        assert self._Y is not None
+        found = Unknowns.of(motion, self._Y, self.filter, self.directions, moving)
+        if self._rotors is None:
+            return found
+        return found.of_known_bodies(self.filter(motion.acceleration * moving), self._rotors)
 
     def _log_inertia(self, tree: Tree, w: np.ndarray, poses: np.ndarray) -> float:
         """Return the mean of log det M of changed bodies or rotors less the nominal one."""
@@ -230,6 +261,8 @@ class Probe:
         rows = min(INDEPENDENT_ROWS, N)
         square = (d**2).mean(axis=0)
         floor = (1e-5 + SHAPE_ERROR * np.minimum(square / power, 1.0)) * power
+        if self.full.has_all_efforts:
+            floor += self._inaccuracy * power
         p = unknowns.bodies.shape[2]
         size = FRICTION * np.sqrt(power)
         count = (0, p, p + 3 * k)[number]

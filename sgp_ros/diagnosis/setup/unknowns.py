@@ -53,16 +53,19 @@ class Unknowns:
     @classmethod
     def of(
         cls, motion: ObservedMotion, regressor: np.ndarray, low: ParallelFilter,
-        directions: np.ndarray,
+        directions: np.ndarray, moving: np.ndarray,
     ) -> Unknowns:  # fmt: skip
-        """Return those of a motion with its regressor (n, k, 10 b), behind a filter."""
-        tree, v = motion.tree, motion.velocity
+        """Return those of a motion with its regressor (n, k, 10 b), behind a filter.
+
+        Rows in which a joint is not `moving` (n, k) are left out of its equation.
+        """
+        tree, v = motion.tree, motion.velocity * moving
         k = tree.size
-        Y = low(regressor)
+        Y = low(regressor if moving.all() else regressor * moving[:, :, None])
         nominal = Y @ tree.parameters.ravel() + low(tree.damping[:k] * v)
         bodies = -(Y.reshape(len(Y) * k, -1) @ directions.T).reshape(len(Y), k, -1)
         size = np.maximum(np.sqrt((v * v).mean(axis=0)), 1e-12)
-        friction = np.stack([v / size, motion.direction, np.ones_like(v)], axis=2)
+        friction = np.stack([v / size, motion.direction * moving, 1.0 * moving], axis=2)
         return cls(nominal, bodies, low(friction))
 
     def of_known_bodies(self, acceleration: np.ndarray, rotors: np.ndarray) -> Unknowns:

@@ -1,0 +1,73 @@
+"""Evidence of recordings whose connection is corrected."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.setup.correction import Correction
+from sgp_ros.diagnosis.setup.evidence import Probe
+from sgp_ros.diagnosis.setup.search import search
+from test.diagnosis.worlds import CHAINS, PERIOD, events_of, robot_of, simulate
+
+KGF_CM = 100.0 / 9.80665
+
+
+@pytest.fixture(scope='module')
+def slow(tmp_path_factory):
+    """A robot that moves so slowly that gravity and friction are nearly all of its efforts.
+
+    It stops between motions, and dry friction holds it there.
+    """
+    world = simulate(CHAINS[1], 3, 16.0, dry=lambda t, q, s: 0.8, reach=0.5)
+    robot, tree = robot_of(tmp_path_factory.mktemp('robot'), CHAINS[1])
+    return world, robot, tree
+
+
+def probe_of(world, robot, tree):
+    raw = collect(events_of(world), robot)
+    return Probe(raw, tree, choose_bandwidth(raw, tree))
+
+
+def test_efforts_in_another_unit_are_found_beside_friction(slow):
+    """And not a scale of the positions that makes all accelerations large."""
+    world, robot, tree = slow
+    (error,) = search(probe_of(replace(world, command=KGF_CM * world.command), robot, tree)).errors
+    assert error.hypothesis.effect == 'effort_scale'
+    assert error.numbers[0] > 5.0
+
+
+def test_efforts_that_are_recorded_prize_no_inertia(slow):
+    """Ten times the positions, which no body explains, are worth less than none."""
+    probe = probe_of(*slow)
+    none = Correction.none(1)
+    large = replace(none, scale=np.full(1, 0.1))
+    assert probe.agreement(large).evidence < probe.agreement(none).evidence
+
+
+def test_beside_friction_rows_of_a_held_joint_say_nothing_of_it(slow):
+    """The friction that takes up the command there is no rest of any model."""
+    probe = probe_of(*slow)
+    moving = probe._moving
+    assert 0.02 < np.mean(~moving[:, 0]) < 0.9
+    found = probe.agreement(Correction.none(1), unknowns=2)
+    probe._moving = np.ones_like(moving)
+    probe._columns.clear()
+    assert found.left[0] < 0.2 * probe.agreement(Correction.none(1), unknowns=2).left[0]
+
+
+@pytest.mark.parametrize(('periods', 'expected'), [(0.7, []), (2.0, ['clock_offset'])])
+def test_efforts_read_within_a_period_of_the_positions_have_no_other_clock(
+    tmp_path, periods, expected
+):
+    """States and efforts of one stamp are read one after the other."""
+    world = simulate(CHAINS[2], 5, 12.0)
+    robot, tree = robot_of(tmp_path, CHAINS[2])
+    late = world.time - 4.0 * periods * PERIOD
+    read = np.column_stack([np.interp(late, world.time, x) for x in world.command.T])
+    raw = collect(events_of(world, effort=read, commands=False)[::4], robot)
+    errors = search(Probe(raw, tree, choose_bandwidth(raw, tree))).errors
+    assert [e.hypothesis.effect for e in errors] == expected
