@@ -26,13 +26,7 @@ from sgp_ros.diagnosis.explain.in_recording import InRecording
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.locate.remainder import Remainder, region
-from sgp_ros.diagnosis.result import (
-    Difference,
-    Finding,
-    Location,
-    Parameter,
-    ParameterError,
-)
+from sgp_ros.diagnosis.result import Difference, Finding, Location, Parameter, ParameterError
 from sgp_ros.diagnosis.shown import Dependence
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
 from sgp_ros.physics.effect_at import EffectAt
@@ -112,7 +106,8 @@ def doubted_if_none(finding: Finding, effect: EffectAt) -> Finding:
     """Return a finding, doubted if its size may be zero, or is too small to count as physics.
 
     One 95 % interval of its sizes must exclude zero; in a form that the data chose, each must. A
-    finding with all sizes at bounds, which have no interval, is kept.
+    finding with all sizes at bounds, which have no interval, is kept. Where a plain law is the
+    same with sizes that are equal, they must differ.
     """
     chance = min(finding.probability, DOUBTED)
     if finding.share <= COUNTED_SHARE:
@@ -120,9 +115,20 @@ def doubted_if_none(finding: Finding, effect: EffectAt) -> Finding:
     known = [(finding.parameters[q.name], q.neutral) for q in effect.sizes]
     away = [abs(float(p.value) - neutral) > INTERVAL * p.std
             for p, neutral in known if p.std is not None]  # fmt: skip
-    if all(away) if effect.effect.has_chosen_form else any(away) or not away:
-        return finding
-    return replace(finding, probability=chance, why='the 95 % interval of its size includes zero')
+    why = ''
+    if effect.effect.plain and not _differ([p for p, _ in known]):
+        why = 'the 95 % interval of what sets it apart from a plainer law includes zero'
+    if not (all(away) if effect.effect.has_chosen_form else any(away) or not away):
+        why = 'the 95 % interval of its size includes zero'
+    return replace(finding, probability=chance, why=why) if why else finding
+
+
+def _differ(sizes: Sequence[Parameter]) -> bool:
+    """Return whether sizes of one unit differ by more than their 95 % interval; True of others."""
+    known = [(float(p.value), p.std) for p in sizes if p.std is not None]
+    if len(known) < 2 or len({p.unit for p in sizes}) > 1:
+        return True
+    return bool(np.ptp([x for x, _ in known]) > INTERVAL * np.linalg.norm([s for _, s in known]))
 
 
 def alternatives(decision: Decision, chances: Probabilities) -> tuple[Finding, ...]:

@@ -140,6 +140,17 @@ def test_a_finding_too_small_to_count_is_doubted(equations_for, viscous):
     assert certainty_of([doubted, sure], _comparison(equations)) == 0.97
 
 
+@pytest.mark.parametrize(('std', 'is_doubted'), [(0.3, True), (0.05, False)])
+def test_a_drift_without_a_known_change_is_doubted(std, is_doubted):
+    """Friction is there for certain; that it drifts is what sets the law apart from it."""
+    known = {'start': Parameter(0.8, 0.05, 'N m'), 'end': Parameter(0.4, std, 'N m')}
+    finding = Finding('joint0', 'friction_drift', known, Location(), 1.0, 0.97, 0.1)
+    place = Place(0, kind='coulomb')
+    doubted = doubted_if_none(finding, EffectAt(EFFECTS['friction_drift'], place))
+    assert (doubted.probability <= DOUBTED) is is_doubted
+    assert ('sets it apart' in doubted.why) is is_doubted
+
+
 @pytest.mark.parametrize(
     ('named', 'unknown', 'expected'),
     [((0.99, 0.96), (), 0.96), ((0.99,), (0.9,), 0.99), ((), (0.7, 0.9), 0.9)],
