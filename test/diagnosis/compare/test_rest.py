@@ -29,15 +29,15 @@ def swings(middle):
 
 
 def test_a_joint_that_creeps_within_its_friction_rests():
-    """Half a hundredth of its speed, while an elastic friction takes up what is needed."""
-    speed, creeping = swings(np.full(60, 0.005))
+    """Half a hundredth of its usual speed, while an elastic friction takes up what is needed."""
+    speed, creeping = swings(np.full(60, 0.002))
     found = rests(speed)
     assert found[creeping].all()
     assert not found[:780].any()
 
 
 def test_a_slow_motion_over_part_of_the_range_is_no_rest():
-    speed, slow = swings(np.full(2000, 0.005))
+    speed, slow = swings(np.full(2000, 0.002))
     assert not rests(speed)[slow].any()
 
 

@@ -41,11 +41,25 @@ def test_efforts_in_another_unit_are_found_beside_friction(slow):
 
 
 def test_efforts_that_are_recorded_prize_no_inertia(slow):
-    """Ten times the positions, which no body explains, are worth less than none."""
-    probe = probe_of(*slow)
+    """A hundred times the positions, which leave more than all of the efforts."""
+    world, *robot = slow
+    probe = probe_of(replace(world, command=KGF_CM * world.command), *robot)
     none = Correction.none(1)
-    large = replace(none, scale=np.full(1, 0.1))
-    assert probe.agreement(large).evidence < probe.agreement(none).evidence
+    wrong = probe.agreement(replace(none, scale=np.full(1, 0.01)))
+    assert wrong.left[0] > 1.0
+    assert wrong.evidence < probe.agreement(none).evidence
+
+
+def test_where_forces_cancel_their_accuracy_counts(slow, tmp_path):
+    """Inertial forces are larger than a fast robot's effort, and nothing in a slow one's."""
+    world = simulate(CHAINS[1], 5, 12.0)
+    robot, tree = robot_of(tmp_path, CHAINS[1])
+    swinging, none = probe_of(world, robot, tree), Correction.none(1)
+    force = (swinging.motion.mass_diagonal * swinging.motion.acceleration)[:, 0]
+    cancelled = force.var() / swinging.power[0] - 1.0
+    assert cancelled > 0.0
+    assert swinging.agreement(none).share[0] >= 0.01 * cancelled
+    assert probe_of(*slow).agreement(none, unknowns=2).share[0] < 0.005
 
 
 def test_beside_friction_rows_of_a_held_joint_say_nothing_of_it(slow):
