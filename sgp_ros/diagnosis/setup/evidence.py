@@ -26,12 +26,7 @@ from sgp_ros.diagnosis.compare.bodies import body_directions
 from sgp_ros.diagnosis.compare.grid import noisy_volume, part_of_noise
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.rest import resting
-from sgp_ros.diagnosis.compare.trajectory import (
-    Bandwidth,
-    RawTrajectory,
-    measured_noise,
-    observe,
-)
+from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, measured_noise, observe
 from sgp_ros.diagnosis.criteria import FORCE_ACCURACY, INDEPENDENT_ROWS, SHAPE_ERROR
 from sgp_ros.diagnosis.setup.correction import Acting, Correction, delayed
 from sgp_ros.diagnosis.setup.unknowns import Unknowns
@@ -79,6 +74,10 @@ class Agreement:
     rest: np.ndarray
     share: np.ndarray
     rows: float
+
+    def leaves_less(self, other: Agreement) -> bool:
+        """Return whether less of the efforts is left; stiffer drives move with less error."""
+        return float(np.log(self.share / other.share).sum()) < 0.0
 
     def distance(self, other: Agreement) -> float:
         """Return the greatest share of a joint's effort by which two discrepancies differ."""

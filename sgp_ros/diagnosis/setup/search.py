@@ -232,7 +232,8 @@ def _ranked(
         drives = [s for s in screened[_REFINED:] if s[1].is_of_gains]
         return [_refined(probe, base, h, x) for _, h, x in screened[:_REFINED] + drives]
     found = [_refined(probe, base, h, x) for _, h, x in screened[:_REFINED]]
-    found = [t for t in found if t.agreement.distance(now) > COUNTED_SHARE and t.is_beyond]
+    found = [t for t in found if t.agreement.distance(now) > COUNTED_SHARE and t.is_beyond
+             and t.agreement.leaves_less(now)]  # fmt: skip
     return sorted(found, key=lambda t: -t.worth)
 
 
