@@ -107,7 +107,7 @@ def doubted_if_none(finding: Finding, effect: EffectAt) -> Finding:
 
     One 95 % interval of its sizes must exclude zero; in a form that the data chose, each must. A
     finding with all sizes at bounds, which have no interval, is kept. Where a plain law is the
-    same with sizes that are equal, they must differ.
+    same with sizes that are equal, these must differ, or all exclude zero.
     """
     chance = min(finding.probability, DOUBTED)
     if finding.share <= COUNTED_SHARE:
@@ -116,7 +116,7 @@ def doubted_if_none(finding: Finding, effect: EffectAt) -> Finding:
     away = [abs(float(p.value) - neutral) > INTERVAL * p.std
             for p, neutral in known if p.std is not None]  # fmt: skip
     why = ''
-    if effect.effect.plain and not _differ([p for p, _ in known]):
+    if effect.effect.plain and not all(away) and not _differ([p for p, _ in known]):
         why = 'the 95 % interval of what sets it apart from a plainer law includes zero'
     if not (all(away) if effect.effect.has_chosen_form else any(away) or not away):
         why = 'the 95 % interval of its size includes zero'

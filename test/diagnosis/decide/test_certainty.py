@@ -140,9 +140,9 @@ def test_a_finding_too_small_to_count_is_doubted(equations_for, viscous):
     assert certainty_of([doubted, sure], _comparison(equations)) == 0.97
 
 
-@pytest.mark.parametrize(('std', 'is_doubted'), [(0.3, True), (0.05, False)])
+@pytest.mark.parametrize(('std', 'is_doubted'), [(0.3, True), (0.2, False), (0.05, False)])
 def test_a_drift_without_a_known_change_is_doubted(std, is_doubted):
-    """Friction is there for certain; that it drifts is what sets the law apart from it."""
+    """Its end may be the start, or none; where both are there for certain friction is, too."""
     known = {'start': Parameter(0.8, 0.05, 'N m'), 'end': Parameter(0.4, std, 'N m')}
     finding = Finding('joint0', 'friction_drift', known, Location(), 1.0, 0.97, 0.1)
     place = Place(0, kind='coulomb')
