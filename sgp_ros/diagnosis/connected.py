@@ -107,7 +107,9 @@ class Connected:
         moving = gained * power / np.where(variance > 0.0, variance, power)
         return np.maximum(nominal.left, moving), gained
 
-    def worth(self, nominal: np.ndarray, recorded: np.ndarray) -> float:
+    def worth(
+        self, nominal: np.ndarray, recorded: np.ndarray, *, is_of_motion: bool = False
+    ) -> float:
         """Return the worth of what is decided, as the density of what was recorded [nats].
 
         That is of the efforts, given the motion, where all joints have some, as in `Probe`; else
@@ -120,13 +122,14 @@ class Connected:
             nominal: (k,) shares of the discrepancy whose shape is only nearly right; the same
                 for all that are compared.
             recorded: (k,) mean squared efforts of the recording [N^2 m^2 or N^2].
+            is_of_motion: whether that of the motion is asked for in any case.
         """
         decision, base = self.several.decision, self.several.comparison.base
         model = decision.tentative or decision.model
         if decision.tentative and model.left.sum() > NEARLY * base.left.sum():
             model = base
         scale, done = Scale.of(self.equations, self.several.comparison), self.correction
-        has_efforts = self.equations.motion.has_all_efforts
+        has_efforts = self.equations.motion.has_all_efforts and not is_of_motion
         if has_efforts:
             model, scale = replace(model, inertia=model.delivered), replace(scale, carried=0.0)
         if done is not None and has_efforts:
@@ -188,7 +191,7 @@ def with_laws(connected: Connected) -> Connected:
     if not found.laws or connected.uncorrected is None:
         return found
     alone = _extended(connected.uncorrected)
-    return found if _gain(alone, found) - found.price >= PER_EFFECT else alone
+    return found if _gain(alone, found, found.price) >= PER_EFFECT else alone
 
 
 def _extended(connected: Connected) -> Connected:
@@ -223,25 +226,22 @@ def _connected(
         said = () if is_explained else (setup_advice(found),)
         return replace(plain, remarks=(*said, *plain.remarks))
     price, rare = price_of(found)
-    gain = _gain(plain, corrected) - price
+    gain = _gain(plain, corrected, price)
     if gain >= PER_EFFECT and plain.several.decision.verdict != 'unexplained':
         # on the same band: what is slower has less noise
         cutoff = corrected.equations.filter.cutoff
         if plain.equations.filter.cutoff > cutoff:
             on_band = compared(recordings, tree, next(each), cutoff)
-            gain = _gain(on_band, corrected) - price
+            gain = _gain(on_band, corrected, price)
     least = -ALIKE if _stands_for_gains(plain, found) else PER_EFFECT
     if gain < least:
         return plain if gain + rare < -ALIKE else _beside(plain, found, gain, _named(corrected))
     return replace(
         corrected,
         findings=tuple(error_finding(found, i, gain) for i in range(len(found.errors))),
-        equivalents=equal_errors(found),
-        delay_std=found.delay_std,
-        uncorrected=plain,
-        price=price,
+        equivalents=equal_errors(found), delay_std=found.delay_std, uncorrected=plain, price=price,
         remarks=(*(f'{e.remedy} {_CORRECTED}' for e in found.errors), *recordings.remarks),
-    )
+    )  # fmt: skip
 
 
 def _stands_for_gains(plain: Connected, found: Connection) -> bool:
@@ -254,10 +254,16 @@ def _stands_for_gains(plain: Connected, found: Connection) -> bool:
     return plain.recordings.learned.gains is not None and bool(named & scaled)
 
 
-def _gain(plain: Connected, corrected: Connected) -> float:
-    """Return by how much the corrected recording is better explained [nats]."""
+def _gain(plain: Connected, corrected: Connected, price: float) -> float:
+    """Return by how much the corrected recording is better explained, less a price [nats].
+
+    Efforts, given the motion, and the motion must both be; 0 where only one of them clearly is.
+    """
     nominal, recorded = np.minimum(plain.nominal, corrected.nominal), plain.equations.power
-    return corrected.worth(nominal, recorded) - plain.worth(nominal, recorded)
+    worth = [[c.worth(nominal, recorded, is_of_motion=m) for m in (False, True)]
+             for c in (corrected, plain)]  # fmt: skip
+    gains = [a - b - price for a, b in zip(*worth, strict=True)]
+    return max(min(gains), 0.0) if max(gains) >= PER_EFFECT else min(gains)
 
 
 def _named(connected: Connected) -> frozenset[tuple[str, str]]:
@@ -267,11 +273,9 @@ def _named(connected: Connected) -> frozenset[tuple[str, str]]:
 
 
 def _beside(
-    plain: Connected,
-    found: Connection,
-    gain: float,
+    plain: Connected, found: Connection, gain: float,
     common: frozenset[tuple[str, str]] = frozenset(),
-) -> Connected:
+) -> Connected:  # fmt: skip
     """Return the recording as it is, with errors of the connection that explain as much."""
     named = tuple((e.hypothesis.joint, e.hypothesis.effect) for e in found.errors)
     return replace(
@@ -288,10 +292,8 @@ def compared(
     """Return the models that are compared on recordings as they are, up to a cut-off [Hz]."""
     bandwidth = choose_bandwidth(recordings.learned, tree)
     if bandwidth.cutoff > most_hz:
-        bandwidth = replace(
-            bandwidth, cutoff=most_hz,
-            state_cutoff=bandwidth.state_cutoff * most_hz / bandwidth.cutoff,
-        )  # fmt: skip
+        state_cutoff = bandwidth.state_cutoff * most_hz / bandwidth.cutoff
+        bandwidth = replace(bandwidth, cutoff=most_hz, state_cutoff=state_cutoff)
     require_rows(recordings.learned, bandwidth)
     equations = make_equations(recordings.learned, tree, bandwidth, recordings.unstated)
     several = decide_several(equations, len(recordings.names), progress)

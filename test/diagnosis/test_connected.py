@@ -12,6 +12,7 @@ from sgp_ros.diagnosis import connected
 from sgp_ros.diagnosis.connected import Connected
 from sgp_ros.diagnosis.result import Finding, Location
 from sgp_ros.diagnosis.setup.correction import Correction
+from sgp_ros.diagnosis.setup.evidence import Agreement
 
 
 def _of(cutoff):
@@ -124,7 +125,7 @@ class _OfEfforts(_AsGiven):
 
 @dataclass(frozen=True)
 class _Residual:
-    """What is left of a recording, and what its motors deliver."""
+    """A residual, and how much of the efforts the motors deliver."""
 
     mean_square: np.ndarray
     delivered: np.ndarray
@@ -149,6 +150,29 @@ def test_recorded_efforts_in_any_unit_are_explained_alike(monkeypatch):
     assert worth(square / 100.0, 10.0) == pytest.approx(plain)
     assert worth(square, 1.0, inertia=3.0) == plain
     assert worth(square / 4.0, 1.0, delivered=0.5) == pytest.approx(plain)
+
+
+@pytest.mark.parametrize(
+    ('of_efforts', 'of_motion', 'gain'),
+    [(60.0, 40.0, 30.0), (60.0, -50.0, 0.0), (-50.0, 60.0, 0.0), (12.0, -50.0, -60.0)],
+)
+def test_efforts_and_motion_must_both_be_better_explained(of_efforts, of_motion, gain):
+    """Where one clearly is and the other is not, neither side is believed."""
+
+    def side(*worth):
+        return SimpleNamespace(
+            nominal=np.zeros(1), equations=SimpleNamespace(power=np.ones(1)),
+            worth=lambda _n, _r, is_of_motion: worth[is_of_motion],
+        )  # fmt: skip
+
+    assert connected._gain(side(0.0, 0.0), side(of_efforts, of_motion), 10.0) == gain
+
+
+@pytest.mark.parametrize('share', [0.5, 2.0])
+def test_an_agreement_leaves_less_by_what_is_left_of_all_efforts(share):
+    shares = np.array([[0.1, 0.2], [0.1, 0.2 * share]])
+    one, two = (Agreement(0.0, 2, *[np.zeros(2)] * 3, x, 100.0) for x in shares)
+    assert two.leaves_less(one) is (share < 1.0)
 
 
 def test_what_is_found_with_an_error_of_the_connection_too_is_as_certain():

@@ -1,7 +1,8 @@
 """Agreement of a recording with its robot once its connections are corrected.
 
 `d = low(tau_nominal(q, v, a) - tau) = low(X) b + noise` with everyday unknowns b: inertial
-parameters and, per joint, viscous and dry friction and an offset, each with a wide normal prior.
+parameters and, per joint, viscous and dry friction, an offset and a rotor, each with a wide normal
+prior.
 The evidence has b integrated out (Laplace), for the nominal robot alone, with bodies, and with
 friction too; the best of the three counts, so that an error of the connection must explain what
 all three leave. Beside friction, rows where it may hold a joint say nothing of that joint.
@@ -29,7 +30,7 @@ from sgp_ros.diagnosis.compare.rest import resting
 from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, measured_noise, observe
 from sgp_ros.diagnosis.criteria import FORCE_ACCURACY, INDEPENDENT_ROWS, SHAPE_ERROR
 from sgp_ros.diagnosis.setup.correction import Acting, Correction, delayed
-from sgp_ros.diagnosis.setup.unknowns import Unknowns
+from sgp_ros.diagnosis.setup.unknowns import EVERYDAY, Unknowns
 from sgp_ros.physics.drive import Servo
 from sgp_ros.rigid.rigid_body import mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
@@ -233,7 +234,10 @@ class Probe:
 
     def _of_rows(self, motion: ObservedMotion, moving: np.ndarray) -> Unknowns:
         assert self._Y is not None
-        found = Unknowns.of(motion, self._Y, self.filter, self.directions, moving)
+        found = Unknowns.of(
+            motion, self._Y, self.filter, self.directions, moving,
+            has_rotors=self.full.has_all_efforts,
+        )  # fmt: skip
         if self._rotors is None:
             return found
         return found.of_known_bodies(self.filter(motion.acceleration * moving), self._rotors)
@@ -264,7 +268,7 @@ class Probe:
             floor += self._inaccuracy * power
         p = unknowns.bodies.shape[2]
         size = FRICTION * np.sqrt(power)
-        count = (0, p, p + 3 * k)[number]
+        count = (0, p, p + EVERYDAY * k)[number]
         variance, left = square + floor, d
         occam, b = 0.0, np.zeros(count)
         products = unknowns.products(d, size) if count else None

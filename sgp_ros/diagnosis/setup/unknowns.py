@@ -10,27 +10,30 @@ import numpy as np
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.robots.observed_motion import ObservedMotion
 
+EVERYDAY = 4
+"""Everyday forces of a joint: viscous and dry friction, an offset, a rotor."""
+
 
 @dataclass(frozen=True, eq=False)
 class Products:
-    """Products of the columns of p bodies and three everyday forces, joint by joint.
+    """Products of the columns of p bodies and four everyday forces, joint by joint.
 
     Attributes:
-        G: (k, p + 3, p + 3) with themselves.
-        g: (k, p + 3) with the discrepancy.
+        G: (k, p + 4, p + 4) with themselves.
+        g: (k, p + 4) with the discrepancy.
     """
 
     G: np.ndarray
     g: np.ndarray
 
     def weighted(self, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the sums over joints with weights (k,), (P, P) and (P,) for P = p + 3 k."""
-        k, p = len(weight), self.G.shape[1] - 3
+        """Return the sums over joints with weights (k,), (P, P) and (P,) for P = p + 4 k."""
+        k, p = len(weight), self.G.shape[1] - EVERYDAY
         G, g = self.G * weight[:, None, None], self.g * weight[:, None]
-        A, b = np.zeros((p + 3 * k, p + 3 * k)), np.zeros(p + 3 * k)
+        A, b = np.zeros((p + EVERYDAY * k,) * 2), np.zeros(p + EVERYDAY * k)
         A[:p, :p], b[:p] = G[:, :p, :p].sum(axis=0), g[:, :p].sum(axis=0)
         for j in range(k):
-            own = slice(p + 3 * j, p + 3 * j + 3)
+            own = slice(p + EVERYDAY * j, p + EVERYDAY * (j + 1))
             A[:p, own], A[own, :p], A[own, own] = G[j, :p, p:], G[j, p:, :p], G[j, p:, p:]
             b[own] = g[j, p:]
         return A, b
@@ -43,7 +46,8 @@ class Unknowns:
     Attributes:
         nominal: (N, k) of the nominal robot [N m or N].
         bodies: (N, k, p) per standard deviation of each inertial parameter's change.
-        friction: (N, k, 3) of a unit of viscous and dry friction and of an offset at each joint.
+        friction: (N, k, 4) of a unit of viscous and dry friction, of an offset, and of a rotor at
+            each joint; of none where the size of its inertia would be open.
     """
 
     nominal: np.ndarray
@@ -53,11 +57,12 @@ class Unknowns:
     @classmethod
     def of(
         cls, motion: ObservedMotion, regressor: np.ndarray, low: ParallelFilter,
-        directions: np.ndarray, moving: np.ndarray,
+        directions: np.ndarray, moving: np.ndarray, *, has_rotors: bool,
     ) -> Unknowns:  # fmt: skip
         """Return those of a motion with its regressor (n, k, 10 b), behind a filter.
 
-        Rows in which a joint is not `moving` (n, k) are left out of its equation.
+        Rows in which a joint is not `moving` (n, k) are left out of its equation. Rotors are there
+        where efforts are explained: of a motion they leave the size of all inertia open.
         """
         tree, v = motion.tree, motion.velocity * moving
         k = tree.size
@@ -65,18 +70,20 @@ class Unknowns:
         nominal = Y @ tree.parameters.ravel() + low(tree.damping[:k] * v)
         bodies = -(Y.reshape(len(Y) * k, -1) @ directions.T).reshape(len(Y), k, -1)
         size = np.maximum(np.sqrt((v * v).mean(axis=0)), 1e-12)
-        friction = np.stack([v / size, motion.direction * moving, 1.0 * moving], axis=2)
+        a = motion.acceleration * (moving * has_rotors)
+        a = a / np.maximum(np.sqrt((a * a).mean(axis=0)), 1e-12)
+        friction = np.stack([v / size, motion.direction * moving, 1.0 * moving, a], axis=2)
         return cls(nominal, bodies, low(friction))
 
     def of_known_bodies(self, acceleration: np.ndarray, rotors: np.ndarray) -> Unknowns:
-        """Return those with rotors for bodies, and without viscous friction.
+        """Return those with rotors for bodies, and without viscous friction and other rotors.
 
         Args:
             acceleration: filtered (N, k).
             rotors: typical inertias of the joints, (k, k) diagonal.
         """
         friction = self.friction.copy()
-        friction[:, :, 0] = 0.0
+        friction[:, :, [0, 3]] = 0.0
         return replace(self, bodies=-acceleration[:, :, None] * rotors, friction=friction)
 
     @cached_property
@@ -87,17 +94,17 @@ class Unknowns:
     def products(self, d: np.ndarray, size: np.ndarray) -> Products:
         """Return the products for a discrepancy (N, k) and forces of these sizes (k,)."""
         k, p = d.shape[1], self.bodies.shape[2]
-        scale = np.ones((k, p + 3))
+        scale = np.ones((k, p + EVERYDAY))
         scale[:, p:] = size[:, None]
-        g = np.empty((k, p + 3))
+        g = np.empty((k, p + EVERYDAY))
         for j in range(k):
             g[j, :p], g[j, p:] = self.bodies[:, j].T @ d[:, j], self.friction[:, j].T @ d[:, j]
         return Products(self._squares * scale[:, :, None] * scale[:, None, :], g * scale)
 
     def force(self, b: np.ndarray, size: np.ndarray) -> np.ndarray:
-        """Return the efforts of unknowns b (p,) or (p + 3 k,), (N, k) [N m or N]."""
+        """Return the efforts of unknowns b (p,) or (p + 4 k,), (N, k) [N m or N]."""
         k, p = self.bodies.shape[1:]
         found = self.bodies @ b[:p]
         if len(b) > p:
-            found += (self.friction * (b[p:].reshape(k, 3) * size[:, None])).sum(axis=2)
+            found += (self.friction * (b[p:].reshape(k, EVERYDAY) * size[:, None])).sum(axis=2)
         return found

@@ -13,7 +13,7 @@ from sgp_ros.diagnosis.connected import Connected, with_laws
 class _Worth(Connected):
     """Comparison with a given worth."""
 
-    def worth(self, nominal, recorded):
+    def worth(self, nominal, recorded, *, is_of_motion=False):
         return float(self.remarks[0])
 
     @property
