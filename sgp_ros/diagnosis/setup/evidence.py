@@ -174,10 +174,10 @@ class Probe:
         """
         motion = correction.motion(self.motion, self.acting(correction.clock))
         moving = self._moving[:, correction.order]
-        columns = self._unknowns_of(correction.moves, motion, moving)
+        columns = whole, held = self._unknowns_of(correction.moves, motion, moving)
         acting = motion.effort + motion.stated_force
-        both = [c.nominal - self.filter(acting * m)
-                for c, m in zip(columns, (1.0, moving), strict=True)]  # fmt: skip
+        d = whole.nominal - self.filter(acting)
+        both = d, d if held is whole else held.nominal - self.filter(acting * moving)
         power = self._delivered(motion, correction)
         rms = np.sqrt(power)
         # by how much the density of recorded accelerations exceeds that of relative errors
