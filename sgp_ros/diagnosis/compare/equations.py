@@ -289,7 +289,8 @@ def make_equations(
     power = np.where(motion.moves & (power > 0.0), power, 1.0)
     inertia = motion.mass_diagonal.mean(axis=0)
     variance = inertia**2 * (2 * np.pi) ** 4 * raw.noise_density * bandwidth.cutoff**5 / 5.0
-    noise, carried = measured_noise(raw, motion, bandwidth), carried_inertia(motion, low, d)
+    noise = measured_noise(raw, motion, bandwidth)
+    carried = carried_inertia(motion, low, inertial, d)
     error = np.exp(2.0 * carried) * smoothing_error(raw, motion, low, bandwidth)
     equations = Equations(
         motion, low, motion.time[low.rows], d, bases, directions, power, np.sqrt(variance),

@@ -114,7 +114,9 @@ def noisy_volume(volume: np.ndarray, part: np.ndarray) -> np.ndarray:
     return np.asarray(0.5 * np.log(part + (1.0 - part) * np.exp(2.0 * volume)))
 
 
-def carried_inertia(motion: ObservedMotion, low: ParallelFilter, d: np.ndarray) -> np.ndarray:
+def carried_inertia(
+    motion: ObservedMotion, low: ParallelFilter, inertial: np.ndarray, d: np.ndarray
+) -> np.ndarray:
     """Return the log of the inertia that efforts show, relative to the nominal one, (k,).
 
     A rotor behind a gear can be hundreds of times the link that it turns, and what a perfect model
@@ -124,12 +126,12 @@ def carried_inertia(motion: ObservedMotion, low: ParallelFilter, d: np.ndarray) 
     Args:
         motion: n rows.
         low: from n to N rows.
+        inertial: (N, k) forces of each joint's own acceleration, nominal [N m or N].
         d: (N, k) discrepancy [N m or N].
     """
     found = np.zeros(d.shape[1])
     if motion.is_static:
         return found
-    inertial = low(motion.mass_diagonal * motion.acceleration)
     q, v = motion.position, motion.velocity
     states = [low(x) for x in (np.ones_like(q), q, np.sin(q), np.cos(q), v, np.sign(v))]
     for j in np.flatnonzero(motion.tree.is_actuated[: len(found)] & motion.moves):
