@@ -62,6 +62,8 @@ from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.robot import Robot
 
 Progress = Callable[[float], None]
+_MOVING = 0.9
+"""Share of a filtered row in which no dry friction holds the joint, from which its laws show."""
 _CALM = ('no_mismatch', 'parameters_only')
 _UNCLEAR = 'It is unknown what machine and simulation have in common: one of them is unexplained.'
 
@@ -283,4 +285,5 @@ def _traces(
     return Traces(
         time, low(motion.position), low(motion.velocity), low(motion.effort),
         equations.d, comparison.parameters.residual, after, equations.noise, forces,
+        low(model.frame.equations.moving) > _MOVING,
     )  # fmt: skip

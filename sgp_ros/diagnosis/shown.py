@@ -67,6 +67,7 @@ class Traces:
         after: (N, k) what the final model leaves.
         noise: (k,) expected from the encoders.
         forces: by finding, (N, k) force on each joint.
+        moving: (N, k) where no dry friction holds the joint, and laws show.
     """
 
     time: np.ndarray
@@ -78,6 +79,7 @@ class Traces:
     after: np.ndarray
     noise: np.ndarray
     forces: tuple[np.ndarray, ...]
+    moving: np.ndarray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

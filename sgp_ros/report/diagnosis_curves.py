@@ -37,10 +37,15 @@ class LawCurve:
 
 
 def law_curve(found: Diagnosis, finding: Finding, force: np.ndarray) -> LawCurve:
-    """Return the law of a finding with force (N, k), and the data beside it."""
+    """Return the law of a finding with force (N, k), and the data beside it.
+
+    What friction takes up while it holds the joint is not there to be drawn: NaN.
+    """
     j = _strongest(found, finding, force)
     x, label = abscissa(found, finding, j)
-    law, measured = force[:, j], found.traces.after[:, j] + force[:, j]
+    moving = found.traces.moving[:, j]
+    law = np.where(moving | ~moving.any(), force[:, j], np.nan)
+    measured = found.traces.after[:, j] + law
     over = drawn_over(finding.effect, finding.formula)
     if over == 'seconds':
         shown = zoomed(found, j)

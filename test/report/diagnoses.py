@@ -91,7 +91,8 @@ def diagnosis(
         tuple(errors), {'train': proof} | ({'real_test': far} if held else {}), {},
         tuple(Dependence(name, 0.1, scores, chances) for name in joints),
         Traces(time, position, velocity, np.ones((N, k)), before, before, after,
-               np.full(k, NOISE), tuple(force for f in findings if f is not UNKNOWN)),
+               np.full(k, NOISE), tuple(force for f in findings if f is not UNKNOWN),
+               np.ones((N, k), bool)),
         10.0, 40.0, N, {'duplicate': 3}, bands=tuple(_bands(joints)),
         overlays={
             stem: _overlay(time, position, before, after)

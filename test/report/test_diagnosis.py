@@ -326,6 +326,17 @@ def test_a_force_is_drawn_beside_its_own_finding():
     assert (laws[0] == laws[1]).all()
 
 
+def test_a_law_is_not_drawn_where_friction_holds_the_joint():
+    """Friction takes up there what the law gives: neither is zero."""
+    found = diagnosis('missing_physics', [COULOMB])
+    moving = np.arange(len(found.traces.time)) % 4 > 0
+    traces = replace(found.traces, moving=moving[:, None] & np.ones(len(found.joints), bool))
+    law, measured = (line.get_ydata() for line in draw_laws(replace(found, traces=traces)).axes[0]
+                     .lines[1::-1])  # fmt: skip
+    assert (np.isfinite(law) == moving).all()
+    assert (np.isfinite(measured) == moving).all()
+
+
 def test_each_row_over_time_names_the_forces_it_shows():
     """In the colours of their laws, also where joints differ in what acts on them."""
     found = diagnosis('missing_physics', [COULOMB, SPRING])
