@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pinocchio  # type: ignore[import-untyped]  # comes without types
@@ -23,6 +24,9 @@ from sgp_ros.rigid.urdf_text import parse_urdf
 GRAVITY = (0.0, 0.0, -9.81)
 """Acceleration of free fall in the frame of the root link [m/s^2]; its z axis points up (REP 103).
 """
+
+_JOINT = 'joint of the file '
+"""Before the names of joints, while links have their own."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -177,24 +181,32 @@ def read_urdf(
     urdf = parse_urdf(path_or_text)
     plan = plan_joints(urdf, joints, locked or {}, passive)
     try:
-        model = _reduced(pinocchio.buildModelFromXML(urdf.plain), plan)
+        model = _reduced(pinocchio.buildModelFromXML(_apart(urdf.plain)), plan)
     except (ValueError, RuntimeError) as error:
         raise ConfigError(f'{urdf.place}: {error}', 'a URDF that Pinocchio reads') from error
     return _tree(urdf, plan, model, payload)
+
+
+def _apart(plain: str) -> str:
+    """Return a plain URDF in which no joint has the name of a link, as MJCF and URDF allow."""
+    root = ET.fromstring(plain)  # noqa: S314  # written by `rigid`
+    for joint in root.findall('joint'):
+        joint.set('name', _JOINT + joint.get('name', ''))
+    return ET.tostring(root, encoding='unicode')
 
 
 def _reduced(model: Any, plan: Plan) -> Any:
     """Return the model with locked joints made fixed and their bodies merged."""
     start = pinocchio.neutral(model)
     for name, position in plan.locked.items():
-        start[model.joints[model.getJointId(name)].idx_q] = position
-    indices = [model.getJointId(name) for name in plan.locked]
+        start[model.joints[model.getJointId(_JOINT + name)].idx_q] = position
+    indices = [model.getJointId(_JOINT + name) for name in plan.locked]
     return pinocchio.buildReducedModel(model, indices, start)
 
 
 def _tree(urdf: Urdf, plan: Plan, model: Any, payload: Payload | None) -> Tree:
     names = plan.names
-    ids = [model.getJointId(name) for name in names]
+    ids = [model.getJointId(_JOINT + name) for name in names]
     body = {0: -1} | {joint: i for i, joint in enumerate(ids)}
     found = [urdf.joints[name] for name in names]
     frames = tuple(_frames(model, body))

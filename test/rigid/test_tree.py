@@ -77,6 +77,17 @@ def test_a_file_reads_like_its_text(tmp_path):
         assert read_urdf(source).name == 'arm'
 
 
+def test_joints_may_have_the_names_of_links():
+    """Those of a MuJoCo model often have; what is locked, and what hangs on it, is the same."""
+    text = random_urdf(3, 4)
+    tree = read_urdf(text, locked={'j1': 0.3})
+    same = read_urdf(text.replace('link_j', 'j'), locked={'j1': 0.3})
+    assert same.joint_names == tree.joint_names
+    assert set(same.joint_names) <= set(same.link_names)
+    np.testing.assert_array_equal(same.parameters, tree.parameters)
+    np.testing.assert_array_equal(same.translations, tree.translations)
+
+
 def test_joints_come_in_the_order_asked_for():
     """Torques are permuted, not changed."""
     text = random_urdf(4, 6)
