@@ -16,7 +16,7 @@ _QUANTITIES = {
     TIME: 't time times timestamp timestamps stamp stamps sec secs seconds clock',
     POSITION: 'q qs pos position positions qpos angle angles theta jointpos encoder enc state',
     VELOCITY: 'dq qd qdot vel velocity velocities qvel dtheta omega speed thetadot jointvel',
-    EFFORT: 'tau taus torque torques effort efforts force forces qfrc load moment trq',
+    EFFORT: 'tau taus torque torques effort efforts eff effs force forces qfrc load moment trq',
     CURRENT: 'i current currents amps curr',
     KP: 'kp stiffness pgain',
     KD: 'kd dgain',
@@ -34,11 +34,12 @@ _UNITS = {
     'rad': 'rad', 'radians': 'rad', 'deg': 'deg', 'degs': 'deg', 'degree': 'deg',
     'degrees': 'deg', 'rev': 'rev', 'turns': 'rev', 'm': 'm', 'mm': 'mm', 'rpm': 'rpm',
     'nm': 'N m', 'mnm': 'mN m', 'n': 'N', 'kn': 'kN', 'a': 'A', 'ma': 'mA', 'ticks': 'counts',
+    'pct': '%', 'percent': '%',
     'counts': 'counts', 'nmm': 'N mm', 'ncm': 'N cm', 'kgfcm': 'kgf cm', 'kgcm': 'kgf cm',
 }  # fmt: skip
 _LONG_UNITS = frozenset({
     'rad', 'deg', 'degrees', 'rpm', 'counts', 'ticks', 'mm', 'nm', 'nmm', 'ncm', 'kgfcm', 'kgcm',
-    'ms', 'ns', 'us',
+    'ms', 'ns', 'us', 'pct', 'percent',
 })  # fmt: skip
 """Units that nothing else means, wherever they stand."""
 _FILLER = frozenset({
@@ -106,7 +107,9 @@ def _stronger(before: str, found: str) -> str:
 
 def _words(name: str) -> list[str]:
     bare = re.sub(r'([a-z])([A-Z])', r'\1 \2', re.sub(r'mA\b', 'ma', name))
-    bare = re.sub(r'([A-Za-z])(\d)', r'\1 \2', re.sub('°(?!C)', ' deg ', bare))
+    bare = re.sub(
+        r'([A-Za-z])(\d)', r'\1 \2', re.sub('°(?!C)', ' deg ', bare.replace('%', ' pct '))
+    )
     return [word for word in re.split(r'[^A-Za-z0-9]+', bare) if word]
 
 

@@ -219,21 +219,21 @@ def _add_efforts(
 ) -> None:  # fmt: skip
     efforts = chosen(entries, EFFORT, guess)
     currents = {} if efforts else chosen(entries, CURRENT, guess)
+    open_unit = ''
     for label, e in (efforts or currents).items():
         if label not in joints:
             guess.unsure.append(f'The effort {e.column} belongs to no position column: ignored.')
             continue
-        if currents:
-            more = {'scale': 1e-3} if e.said.unit == 'mA' else {'scale': 1.0}
-            found[joints[label]]['effort'] = e.place('A', **more)
-        else:
-            usual = 'N' if _hint(joints[label], hinted).slides else 'N m'
-            unit = e.said.unit if e.said.unit in _EFFORTS else usual
-            found[joints[label]]['effort'] = e.place(unit)
-    if currents:
+        unit, more = 'A' if currents else e.said.unit, {}
+        if unit in {'A', '%'}:
+            open_unit, more = unit, {'scale': 1e-3 if e.said.unit == 'mA' else 1.0}
+        elif unit not in _EFFORTS:
+            unit = 'N' if _hint(joints[label], hinted).slides else 'N m'
+        found[joints[label]]['effort'] = e.place(unit, **more)
+    if open_unit:
         guess.unsure.append(
-            'The efforts are currents in A: enter the torque constant in N m/A as `scale` in the '
-            'map.'
+            f'The efforts are in {open_unit}: enter the torque of 1 {open_unit} in N m as `scale` '
+            'in the map.'
         )
 
 

@@ -24,7 +24,7 @@ Keys of a quantity: `column`, `unit`, `index` (which column of a matrix in NPZ o
 
     value in SI = scale * (column in unit) + offset
 
-Units are those of `UNITS`. counts, A and V need a `scale` that leads to SI, or to the unit of
+Units are those of `UNITS`. counts, A, V and % need a `scale` that leads to SI, or to the unit of
 effort that the robot states. A member of a MAT structure is written `data.q`.
 """
 
@@ -60,7 +60,7 @@ UNITS: dict[str, dict[str, float | None]] = {
     'effort': {
         'N': 1.0, 'kN': 1e3, 'N m': 1.0, 'Nm': 1.0, 'mN m': 1e-3, 'mNm': 1e-3,
         'N mm': 1e-3, 'N cm': 1e-2, 'kgf cm': _KGF * 1e-2, 'kgf': _KGF,
-        'A': None, 'V': None, 'counts': None,
+        'A': None, 'V': None, '%': None, 'counts': None,
     },
 }  # fmt: skip
 """Unit to its factor to SI, per quantity; None where only a `scale` can tell."""

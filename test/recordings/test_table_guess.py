@@ -58,7 +58,10 @@ def _read(path, folder, hints=HINTS, rate=None):
         ('action', 'command', True, '', ''),
         ('target_velocity', 'velocity', True, '', ''),
         ('p_gain', 'kp', False, '', ''),
+        ('knee.eff', 'effort', False, 'knee', ''),
         ('ddq', 'other', False, '', ''),
+        ('base_pan_load_pct', 'effort', False, 'base_pan', '%'),
+        ('Load [%]', 'effort', False, '', '%'),
     ],
 )
 def test_names_tell_quantity_joint_and_unit(name, role, is_target, joint, unit):
@@ -136,6 +139,14 @@ def test_the_torque_of_a_single_joint_is_its_own_whatever_it_is_called(tmp_path,
     np.testing.assert_allclose([c.effort[0] for c in commands], TAU[:, 0])
     assert ('is taken as' in ' '.join(summary.unsure)) == bool(said)
     assert said in ' '.join(summary.unsure)
+
+
+def test_a_load_in_per_cent_asks_for_the_torque_of_one(tmp_path):
+    """As servos report it; the number goes into the map."""
+    path = _npz(tmp_path, t=T, q=Q, load_pct=100.0 * TAU)
+    summary, states, _ = _read(path, tmp_path)
+    assert any('torque of 1 %' in said for said in summary.unsure)
+    np.testing.assert_allclose([s.effort for s in states], 100.0 * TAU)
 
 
 def test_a_table_in_which_no_torque_is_seen_says_so(tmp_path):
