@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from sgp_ros.batch.forward import forward
-from sgp_ros.batch.rollout import roll_out
+from sgp_ros.batch.rollout import advance, roll_out
 from sgp_ros.physics.term import Motion
 from sgp_ros.robots.registry import load_robot
 
@@ -123,6 +123,31 @@ def test_a_sliding_body_stops_when_and_where_friction_has_eaten_its_energy():
         np.testing.assert_allclose(q[0, -1, 0], speed**2 * M / (2.0 * Fc), rtol=1e-12)
         assert v[0, -1, 0] == 0.0
         assert np.ptp(q[0, -5:, 0]) == 0.0
+
+
+@dataclass
+class _Sliding:
+    """Two bodies on a plane with dry friction, which count how often they are asked."""
+
+    asked: int = 0
+
+    def level_of_dry_friction(self, q, effort):
+        return np.ones_like(q)
+
+    def equations(self, q, v, effort):
+        self.asked += 1
+        return np.tile(np.eye(2), (len(q), 1, 1)), effort - np.sign(v)
+
+
+@pytest.mark.parametrize(('h', 'is_short'), [(1e-3, True), (2e-3, False)])
+def test_in_a_short_step_joints_stop_at_its_end(h, is_short):
+    """No step is cut for each of many joints; they lie still behind it either way."""
+    bodies = _Sliding()
+    speed = h * np.array([[0.3, 0.6]])
+    q, v = advance(bodies, np.zeros((1, 2)), speed, np.zeros((1, 2)), h)
+    assert (v == 0.0).all()
+    assert np.abs(q - 0.5 * speed**2).max() < h**2
+    assert (bodies.asked == 4) == is_short
 
 
 def test_a_body_at_rest_stays_until_the_effort_exceeds_the_friction():
