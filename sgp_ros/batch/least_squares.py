@@ -160,14 +160,16 @@ def _at_lag(residual: np.ndarray, block: np.ndarray, lag: int) -> float:
     return found * pairs / len(residual)
 
 
-def correlation_factor(residual: np.ndarray) -> float:
+def correlation_factor(residual: np.ndarray, along: np.ndarray | None = None) -> float:
     """Return `1 + 2 sum of rho(lag)` of one joint's residual (N,), at least 1.
 
     The variance of a mean of correlated samples is this much larger than that of independent ones
-    (Bartlett 1946).
+    (Bartlett 1946). A regressor (N,) that changes faster than the residual averages it: with
+    `along`, rho is the product of both autocorrelations.
     """
     r = residual - residual.mean()
-    power = float(r @ r)
+    x = np.ones(len(r)) if along is None or not along.any() else along
+    power, size = float(r @ r), float(x @ x)
     if power <= 0.0:
         return 1.0
     total = 1.0
@@ -175,5 +177,5 @@ def correlation_factor(residual: np.ndarray) -> float:
         rho = float(r[lag:] @ r[:-lag]) / power
         if rho < _LEAST_CORRELATION:
             break
-        total += 2.0 * rho
-    return total
+        total += 2.0 * rho * (float(x[lag:] @ x[:-lag]) / size if along is not None else 1.0)
+    return max(total, 1.0)

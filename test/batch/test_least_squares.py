@@ -84,3 +84,15 @@ def test_white_and_alternating_residuals_count_row_by_row():
     noise = np.random.default_rng(2).standard_normal(5000)
     for r in (noise, np.resize([1.0, -1.0], 100), np.zeros(50)):
         assert correlation_factor(r) == 1.0
+
+
+@pytest.mark.parametrize(('turns', 'factor'), [(0, 9.0), (2000, 1.0)])
+def test_a_fast_regressor_averages_a_slow_residual(turns, factor):
+    """The variance of `sum x r` by that of independent rows, over drawn residuals."""
+    x = np.cos(2.0 * np.pi * turns * np.arange(8000) / 8000.0)
+    noise = np.random.default_rng(3).standard_normal((400, 8000))
+    r = signal.lfilter([1.0], [1.0, -0.8], noise, axis=1)
+    drawn = (r @ x).var() / ((x @ x) * (r**2).mean())
+    found = np.mean([correlation_factor(row, x) for row in r[:50]])
+    assert found == pytest.approx(factor, rel=0.2)
+    assert max(drawn, 1.0) == pytest.approx(factor, rel=0.2)

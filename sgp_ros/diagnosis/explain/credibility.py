@@ -24,9 +24,9 @@ def gain(trial: Model, model: Model, *, is_whole: bool = True) -> float:
     """Return what a trial is worth more than a model of the same recording [nats].
 
     The log likelihood, less the prices of effects and parameters. Rows that are correlated in
-    time count as fewer, joint by joint, and never as more than `INDEPENDENT_ROWS`. Missing physics
-    is correlated too; only the model with the smaller residual shows how much, and only once it is
-    complete.
+    time count as fewer, joint by joint, and never as more than `INDEPENDENT_ROWS`; by how much
+    depends on how fast that changes by which the models differ. Missing physics is correlated too;
+    only the model with the smaller residual shows how much, and only once it is complete.
 
     Args:
         trial: to compare.
@@ -34,7 +34,9 @@ def gain(trial: Model, model: Model, *, is_whole: bool = True) -> float:
         is_whole: whether all that there is may be in one of them; else no row counts as fewer.
     """
     of = trial if np.log(trial.sigma).sum() < np.log(model.sigma).sum() else model
-    factors = np.array([correlation_factor(r) if is_whole else 1.0 for r in of.residual.T])  # (k,)
+    apart = (trial.residual - model.residual).T
+    factors = np.array([correlation_factor(r, x) if is_whole else 1.0
+                        for r, x in zip(of.residual.T, apart, strict=True)])  # (k,)  # fmt: skip
     rows = np.minimum(len(of.residual) / factors, INDEPENDENT_ROWS)
     prior = 0.5 * float(model.w @ model.w - trial.w @ trial.w)
     inertia = float(rows.mean()) * (trial.log_inertia - model.log_inertia)
