@@ -15,6 +15,8 @@ from sgp_ros.physics.waves import Wave, most_periods, peak_width, per_turn
 
 _NEWTON = 6
 """Steps to the true position."""
+_IMITATED = 0.025
+"""Part of the force of an error that an encoder's zero and scale leave if they are as adequate."""
 _STEEPEST = 0.9
 """Greatest slope of an encoder's error: one that turned back would be no encoder."""
 
@@ -85,6 +87,16 @@ class EncoderEccentricity(Effect):
         """Return whether the encoder never turns back."""
         slope = np.hypot(*at.shape[1:]) * at.shape[0] * per_turn(motion, at.place.joint)
         return bool(slope < _STEEPEST)
+
+    def is_inside(self, at: Placed, motion: SeenMotion) -> bool:
+        """Return whether the motion shows so much of a wave that it is no zero and scale."""
+        j = at.place.joint
+        q, v, a = (x[:, [j]] for x in (motion.position, motion.velocity, motion.acceleration))
+        by_q, by_v, by_a = motion.effort_slopes(j)
+        force = self.columns(motion, at.place, at.shape).ravel()
+        plain = np.stack([by_q, by_q * q + by_v * v + by_a * a], axis=2).reshape(-1, 2)
+        left = force - plain @ np.linalg.lstsq(plain, force, rcond=1e-9)[0]
+        return bool(left @ left > _IMITATED * (force @ force))
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         j = place.joint

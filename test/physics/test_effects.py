@@ -686,6 +686,17 @@ def test_an_eccentric_encoder_is_right_to_first_order_of_its_size():
         assert left[0] < linear[0]
 
 
+@pytest.mark.parametrize(('turns', 'is_one'), [(0.15, False), (2.0, True)])
+def test_a_small_part_of_a_wave_is_a_zero_and_a_scale_of_the_encoder(turns, is_one):
+    """Whatever its amplitude and phase."""
+    law, j = EFFECTS['encoder_eccentricity'], 0
+    periods = turns * 2.0 * math.pi / np.ptp(MOTION.position[:, j])
+    for phase in (0.0, 1.5, 3.0):
+        shape = np.array([periods, *_sine_cosine(0.02, phase)])
+        at = EffectAt(law, Place(j), shape, np.ones(1))
+        assert law.is_inside(at, MOTION) == is_one
+
+
 def test_the_motion_behind_an_eccentric_encoder_is_exact():
     """Where the efforts are linear in position, velocity and acceleration nothing is left.
 
