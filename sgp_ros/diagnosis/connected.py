@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations, joint_name, make_equations
-from sgp_ros.diagnosis.compare.grid import noisy_volume
 from sgp_ros.diagnosis.compare.sufficiency import require_rows
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth
+from sgp_ros.diagnosis.compare.volume import noisy_volume
 from sgp_ros.diagnosis.criteria import ALIKE, NEARLY, PER_EFFECT, TEMPER
 from sgp_ros.diagnosis.decide.differences import Several, decide_several
 from sgp_ros.diagnosis.decide.scale import Scale
@@ -119,8 +119,7 @@ class Connected:
         to explain more than it does.
 
         Args:
-            nominal: (k,) shares of the discrepancy whose shape is only nearly right; the same
-                for all that are compared.
+            nominal: (k,) shares whose shape is only nearly right; the same of all compared.
             recorded: (k,) mean squared efforts of the recording [N^2 m^2 or N^2].
             is_of_motion: whether that of the motion is asked for in any case.
         """
@@ -135,7 +134,8 @@ class Connected:
         if done is not None and has_efforts:
             recorded = recorded[done.effort_order] / done.effort_scale**2
         elif done is not None:
-            units = model.inertia - np.log(np.abs(done.scale))
+            stated = self.equations.loop.volume(0.0 * recorded, 1.0 / done.kp, 1.0 / done.kd)
+            units = model.inertia - stated - np.log(np.abs(done.scale))
             model = replace(model, inertia=noisy_volume(units, self.equations.noise_part))
             recorded = recorded[done.effort_order]
         return replace(scale, nominal=nominal, power=recorded).worth(model)

@@ -12,7 +12,7 @@ from sgp_ros.diagnosis import connected
 from sgp_ros.diagnosis.connected import Connected
 from sgp_ros.diagnosis.result import Finding, Location
 from sgp_ros.diagnosis.setup.correction import Correction
-from sgp_ros.diagnosis.setup.evidence import Agreement
+from sgp_ros.diagnosis.setup.unknowns import Agreement
 
 
 def _of(cutoff):
@@ -171,7 +171,7 @@ def test_efforts_and_motion_must_both_be_better_explained(of_efforts, of_motion,
 @pytest.mark.parametrize('share', [0.5, 2.0])
 def test_an_agreement_leaves_less_by_what_is_left_of_all_efforts(share):
     shares = np.array([[0.1, 0.2], [0.1, 0.2 * share]])
-    one, two = (Agreement(0.0, 2, *[np.zeros(2)] * 3, x, 100.0) for x in shares)
+    one, two = (Agreement(0.0, 2, *[np.zeros(2)] * 3, x, 100.0, np.zeros(2)) for x in shares)
     assert two.leaves_less(one) is (share < 1.0)
 
 

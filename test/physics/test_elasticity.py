@@ -11,6 +11,7 @@ from scipy import signal
 from sgp_ros.batch.zero_phase import ZeroPhase
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
+from sgp_ros.diagnosis.compare.volume import Loop
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
@@ -74,7 +75,7 @@ def equations_of(recording):
     return Equations(
         motion, low, t[low.rows], d, (np.zeros((len(d), 0)),) * 2, np.zeros((0, 20)),
         (effort**2).mean(axis=0), np.full(2, 1e-9), np.ones((n, 2)), np.zeros((n, 2), dtype=bool),
-        *[np.zeros(2)] * 4,
+        *[np.zeros(2)] * 4, Loop.of(motion, CUTOFF),
     )  # fmt: skip
 
 

@@ -18,6 +18,11 @@ SPREAD = 0.25
 OPEN_SPREAD = 1.0
 """The same of bodies that the robot file leaves open."""
 
+LOAD = 0.25
+"""Prior standard deviation of the mass of a load at a tip, relative to all that moves."""
+_TOOL = 0.15
+"""Distance of a load beyond the last link, relative to the length of the robot."""
+
 
 @dataclass(frozen=True, eq=False)
 class Factor:
@@ -77,6 +82,30 @@ def body_directions(tree: Tree, unstated: Collection[int] = ()) -> np.ndarray:
         full[:, 10 * body : 10 * body + 10] = changes
         rows.append(full)
     return np.concatenate(rows)
+
+
+def load_precision(directions: np.ndarray, tree: Tree) -> np.ndarray:
+    """Return the inverse covariance of changes w (p,) with loads on the last links, (p, p).
+
+    Without a load it is one. A load has a mass, a first moment and an inertia of their own, which
+    are unknown; a link without any inertia carries none.
+
+    Args:
+        directions: (p, 10 b) of `body_directions`.
+        tree: nominal robot.
+    """
+    precision = np.eye(len(directions))
+    mass = LOAD * float(tree.parameters[:, 0].sum())
+    tool = _TOOL * float(np.linalg.norm(tree.translations, axis=1).sum())
+    for tip in set(range(len(tree.parameters))) - set(tree.parents.tolist()):
+        values, own = tree.parameters[tip], slice(10 * tip, 10 * tip + 10)
+        if values[0] > 0.0:
+            about = 0.5 * (values[4] + values[6] + values[9])
+            far = float(np.sqrt(max(about / float(values[0]), 1e-6))) + tool
+            load = mass * np.array([1.0, far, far, far, *[far * far] * 6])
+            X = np.linalg.solve(directions[own, own].T, np.diag(load))  # w of each load
+            precision[own, own] = np.linalg.inv(np.eye(10) + X @ X.T)
+    return precision
 
 
 def _point(c: np.ndarray) -> np.ndarray:

@@ -21,12 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from sgp_ros.diagnosis.compare.bodies import Factor, body_directions
-from sgp_ros.diagnosis.compare.grid import (
-    carried_inertia,
-    effort_change,
-    noisy_volume,
-    part_of_noise,
-)
+from sgp_ros.diagnosis.compare.grid import effort_change
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.rest import resting
 from sgp_ros.diagnosis.compare.trajectory import (
@@ -36,6 +31,13 @@ from sgp_ros.diagnosis.compare.trajectory import (
     observe,
     parallel_filter,
     smoothing_error,
+)
+from sgp_ros.diagnosis.compare.volume import (
+    Loop,
+    carried_inertia,
+    log_inertia,
+    noisy_volume,
+    part_of_noise,
 )
 from sgp_ros.physics.parts import PLACES
 from sgp_ros.rigid.rigid_body import mass_matrix, torque_regressor
@@ -88,7 +90,8 @@ class Equations:
             smoothing of the states, and the noise of measured efforts.
         noise_part: (k,) part of d that this noise makes, in mean squares.
         effort_noise: (k,) its mean square, the part of `model_error` that no inertia changes.
-        carried: (k,) log of the inertia that efforts show, see `carried_inertia`.
+        carried: (k,) log of the inertia that efforts show, see `carried_inertia` and `inertia`.
+        loop: what holds the motion.
         free: the same equations where dry friction holds fewer joints, or None.
         instants: number of efforts whose instant is unknown: k where they are measured, else 0.
     """
@@ -107,6 +110,7 @@ class Equations:
     noise_part: np.ndarray
     effort_noise: np.ndarray
     carried: np.ndarray
+    loop: Loop
     free: Equations | None = None
     instants: int = 0
 
@@ -226,11 +230,10 @@ class Equations:
     def inertia(self, w: np.ndarray, added: np.ndarray) -> np.ndarray:
         """Return the log of the inertia at each joint, relative to the nominal one, (k,).
 
-        Their sum is the mean of log det(M / M nominal) for changed bodies and what is added to M;
-        joints differ by the diagonal of M. What is measured is the motion: a model of other
-        inertia must not gain from residuals in smaller units of effort. That holds as far as they
-        are not noise of measured efforts, which no inertia changes. Minus infinity where the mass
-        matrix is not positive, infinity where the nominal robot has a joint without inertia.
+        It is that of changed bodies and what is added to M, see `log_inertia`. What is measured is
+        the motion: a model of other inertia must not gain from residuals in smaller units of
+        effort. That holds as far as they are not noise of measured efforts, which no inertia
+        changes, and as far as gains of drives leave it, see `Loop`.
 
         Args:
             w: (p,) instants and change of the bodies.
@@ -239,16 +242,10 @@ class Equations:
         if self.motion.is_static:  # efforts are measured there, no motion is predicted
             return np.zeros(self.motion.tree.size)
         tree, q = self.motion.tree, self.poses[0].position
-        nominal = mass_matrix(tree, tree.parameters, q)
         changed = self.with_bodies(self.poses[0], w).tree
         M = mass_matrix(changed, changed.parameters, q) + added
-        if np.linalg.eigvalsh(M)[:, 0].min() <= 0.0:
-            return np.full(M.shape[1], -np.inf)
-        if (np.diagonal(nominal, 0, 1, 2) <= 0.0).any():
-            return np.full(M.shape[1], np.inf)
-        whole = (np.linalg.slogdet(M)[1] - np.linalg.slogdet(nominal)[1]).mean()
-        own = np.log(np.diagonal(M, 0, 1, 2) / np.diagonal(nominal, 0, 1, 2)).mean(axis=0)
-        return noisy_volume(own + (whole - own.sum()) / len(own), self.noise_part)
+        log = log_inertia(M, mass_matrix(tree, tree.parameters, q))
+        return noisy_volume(self.loop.volume(log), self.noise_part)
 
 
 def joint_name(motion: ObservedMotion, joint: int) -> str:
@@ -290,11 +287,12 @@ def make_equations(
     inertia = motion.mass_diagonal.mean(axis=0)
     variance = inertia**2 * (2 * np.pi) ** 4 * raw.noise_density * bandwidth.cutoff**5 / 5.0
     noise = measured_noise(raw, motion, bandwidth)
-    carried = carried_inertia(motion, low, inertial, d)
+    loop = Loop.of(motion, bandwidth.cutoff)
+    carried = loop.volume(carried_inertia(motion, low, inertial, d))
     error = np.exp(2.0 * carried) * smoothing_error(raw, motion, low, bandwidth)
     equations = Equations(
         motion, low, motion.time[low.rows], d, bases, directions, power, np.sqrt(variance),
         np.ones(motion.position.shape), resting(raw, motion, bandwidth),
-        error + noise, part_of_noise(noise, d), noise, carried, instants=m,
+        error + noise, part_of_noise(noise, d), noise, carried, loop, instants=m,
     )  # fmt: skip
     return replace(equations.with_dry_friction(motion.dry_joints), free=None)

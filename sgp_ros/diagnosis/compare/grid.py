@@ -11,8 +11,6 @@ import numpy as np
 import scipy  # its parts load when they are used
 
 from sgp_ros.batch.acceptance import Accepted
-from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
-from sgp_ros.robots.observed_motion import ObservedMotion
 
 INSTANT_SPREAD = 12**-0.5
 """Prior standard deviation of the instant of a measured effort, in periods: uniform over one."""
@@ -99,48 +97,6 @@ def effort_noise(
     chance = math.sqrt(2.0 / rows + _MEDIAN / lines)
     level = _levels(effort, segments, step, edges).min(axis=0)
     return np.asarray(cutoff * level * (1.0 + 2.0 * chance))
-
-
-def part_of_noise(noise: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """Return what part of discrepancies d (N, k) noise of mean squares (k,) makes, (k,)."""
-    return np.asarray(np.minimum(noise / np.maximum((d**2).mean(axis=0), 1e-300), 1.0))
-
-
-def noisy_volume(volume: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """Return logarithms of the units of residuals, (k,), part of which is noise of efforts.
-
-    Only the part that the motion shows is measured in units of motion.
-    """
-    return np.asarray(0.5 * np.log(part + (1.0 - part) * np.exp(2.0 * volume)))
-
-
-def carried_inertia(
-    motion: ObservedMotion, low: ParallelFilter, inertial: np.ndarray, d: np.ndarray
-) -> np.ndarray:
-    """Return the log of the inertia that efforts show, relative to the nominal one, (k,).
-
-    A rotor behind a gear can be hundreds of times the link that it turns, and what a perfect model
-    leaves is relative to it. It is the slope of the discrepancy over the acceleration, beside
-    gravity, a spring, and friction of the joint; never below the nominal one.
-
-    Args:
-        motion: n rows.
-        low: from n to N rows.
-        inertial: (N, k) forces of each joint's own acceleration, nominal [N m or N].
-        d: (N, k) discrepancy [N m or N].
-    """
-    found = np.zeros(d.shape[1])
-    if motion.is_static:
-        return found
-    q, v = motion.position, motion.velocity
-    states = [low(x) for x in (np.ones_like(q), q, np.sin(q), np.cos(q), v, np.sign(v))]
-    for j in np.flatnonzero(motion.tree.is_actuated[: len(found)] & motion.moves):
-        x = np.stack([inertial[:, j], *(s[:, j] for s in states)], axis=1)
-        x = x / np.maximum(np.sqrt((x**2).mean(axis=0)), 1e-300)
-        size = max(np.sqrt((inertial[:, j] ** 2).mean()), 1e-300)
-        slope = np.linalg.lstsq(x, d[:, j], rcond=1e-6)[0][0] / size
-        found[j] = np.log(max(1.0 - slope, 1.0))
-    return found
 
 
 def _levels(

@@ -3,9 +3,10 @@
 `d = low(tau_nominal(q, v, a) - tau) = low(X) b + noise` with everyday unknowns b: inertial
 parameters and, per joint, viscous and dry friction, an offset and a rotor, each with a wide normal
 prior.
-The evidence has b integrated out (Laplace), for the nominal robot alone, with bodies, and with
-friction too; the best of the three counts, so that an error of the connection must explain what
-all three leave. Beside friction, rows where it may hold a joint say nothing of that joint.
+The evidence has b integrated out (Laplace), for the nominal robot alone, with bodies, with
+friction too, and with a load; the best of these counts, so that an error of the connection must
+explain what all of them leave. Beside friction, rows where it may hold a joint say nothing of
+that joint.
 
 Where every joint has a recorded effort it is the evidence of the efforts, given the motion. A
 joint without a motor has none that tells the size of its bodies, and a drive makes its effort of
@@ -19,18 +20,18 @@ place of bodies and friction. Viscous friction is left out there: with `kd` it i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.bodies import body_directions
-from sgp_ros.diagnosis.compare.grid import noisy_volume, part_of_noise
+from sgp_ros.diagnosis.compare.bodies import body_directions, load_precision
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.rest import resting
 from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, measured_noise, observe
+from sgp_ros.diagnosis.compare.volume import Loop, log_inertia, noisy_volume, part_of_noise
 from sgp_ros.diagnosis.criteria import FORCE_ACCURACY, INDEPENDENT_ROWS, SHAPE_ERROR
 from sgp_ros.diagnosis.setup.correction import Acting, Correction, delayed
-from sgp_ros.diagnosis.setup.unknowns import EVERYDAY, Unknowns
+from sgp_ros.diagnosis.setup.unknowns import EVERYDAY, Agreement, Unknowns
 from sgp_ros.physics.drive import Servo
 from sgp_ros.rigid.rigid_body import mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
@@ -47,42 +48,11 @@ _KEPT = 50
 _MOTIONS = 8
 """Corrected motions of which the columns are remembered."""
 _FRICTION = 2
-"""Number of the set of unknowns with friction."""
+"""Number of the first set of unknowns with friction; the next has a load too."""
 _MOST_INACCURATE = 0.05
 """Share of an effort that is small beside the forces in it which these may leave."""
 FRICTION = 0.3
 """Prior standard deviation of friction and offset, relative to the rms of the joint's effort."""
-
-
-@dataclass(frozen=True, eq=False)
-class Agreement:
-    """How well a corrected recording agrees with its robot.
-
-    Attributes:
-        evidence: logarithm, best of the sets of unknowns [nats].
-        unknowns: number of the set that is best: 0 none, 1 bodies or rotors, 2 friction too.
-        left: (k,) share of the mean squared effort that is left with them.
-        discrepancy: (N, k) from the nominal robot, relative to the rms effort of each joint.
-        rest: (N, k) what is left of it with the unknowns.
-        share: (k,) `left` with the errors of signals and filters that no model explains.
-        rows: of all that count as independent.
-    """
-
-    evidence: float
-    unknowns: int
-    left: np.ndarray
-    discrepancy: np.ndarray
-    rest: np.ndarray
-    share: np.ndarray
-    rows: float
-
-    def leaves_less(self, other: Agreement) -> bool:
-        """Return whether less of the efforts is left; stiffer drives move with less error."""
-        return float(np.log(self.share / other.share).sum()) < 0.0
-
-    def distance(self, other: Agreement) -> float:
-        """Return the greatest share of a joint's effort by which two discrepancies differ."""
-        return float(((self.discrepancy - other.discrepancy) ** 2).mean(axis=0).max())
 
 
 class Probe:
@@ -133,10 +103,11 @@ class Probe:
         noise = every * measured_noise(raw, motion, bandwidth)
         self._noise_part = part_of_noise(noise, self.filter(d))
         self._pose = np.linspace(0, len(pick) - 1, 24).astype(int)
-        M = mass_matrix(tree, tree.parameters, self.motion.position[self._pose])
-        self.nominal_inertia = float(np.linalg.slogdet(M)[1].mean())
+        self._M = mass_matrix(tree, tree.parameters, self.motion.position[self._pose])
+        self._loop = Loop.of(motion, bandwidth.cutoff)
         inertia = self.motion.mass_diagonal.mean(axis=0)
         self._rotors = np.diag(inertia) if knows_bodies else None
+        self._load = load_precision(self.directions, tree)
         self._known: dict[float, Acting] = {}
         self._columns: dict[tuple[object, ...], tuple[Unknowns, Unknowns]] = {}
         self._moving = ~resting(raw, motion, bandwidth)[pick]
@@ -165,12 +136,16 @@ class Probe:
             other = delayed(self.full.effort, self._raw, clock)
         return Acting(proportional, damping, other)
 
-    def agreement(self, correction: Correction, unknowns: int | None = None) -> Agreement:
+    def agreement(
+        self, correction: Correction, unknowns: int | None = None,
+        nominal: np.ndarray | None = None,
+    ) -> Agreement:  # fmt: skip
         """Return how well the recording agrees with the robot once it is corrected.
 
         Args:
             correction: what is undone.
             unknowns: number of the set of unknowns; None for the best.
+            nominal: see `Agreement`, of all that are compared; None for that of this correction.
         """
         motion = correction.motion(self.motion, self.acting(correction.clock))
         moving = self._moving[:, correction.order]
@@ -185,15 +160,22 @@ class Probe:
         volume = float(noisy_volume(units, self._noise_part).sum())
         rows = min(INDEPENDENT_ROWS, len(both[0]))
         found = []
-        for number in range(3) if unknowns is None else (unknowns,):
-            d = both[number == _FRICTION]
-            value, rest, share, w = self._with(number, d, columns[number == _FRICTION], power)
-            shift = self._log_inertia(motion.tree, w, motion.position[self._pose])
+        for number in range(4 if self._rotors is None else 3) if unknowns is None else (unknowns,):
+            d = both[number >= _FRICTION]
+            own = np.minimum((d**2).mean(axis=0) / power, 1.0)
+            floor = self._floor(own if nominal is None else nominal) * power
+            value, rest, share, w = self._with(
+                number, d, columns[number >= _FRICTION], power, floor
+            )
+            inertia = self._log_inertia(motion.tree, w, motion.position[self._pose])
+            shift = float(self._loop.volume(inertia, correction.kp, correction.kd).sum())
             if np.isfinite(shift):  # else bodies that cannot be
                 shift = 0.0 if self.full.has_all_efforts else shift + volume
             left = (rest**2).mean(axis=0) / power
             found.append(
-                Agreement(value + rows * shift, number, left, d / rms, rest / rms, share, rows)
+                Agreement(
+                    value + rows * shift, number, left, d / rms, rest / rms, share, rows, own
+                )
             )
         return max(found, key=lambda f: f.evidence)
 
@@ -242,47 +224,47 @@ class Probe:
             return found
         return found.of_known_bodies(self.filter(motion.acceleration * moving), self._rotors)
 
-    def _log_inertia(self, tree: Tree, w: np.ndarray, poses: np.ndarray) -> float:
-        """Return the mean of log det M of changed bodies or rotors less the nominal one."""
+    def _log_inertia(self, tree: Tree, w: np.ndarray, poses: np.ndarray) -> np.ndarray:
+        """Return that of changed bodies or rotors, (k,)."""
         if self._rotors is None:
             changed = tree.parameters + (w @ self.directions).reshape(tree.parameters.shape)
-            M = mass_matrix(tree, changed, poses)
-        else:
-            M = mass_matrix(tree, tree.parameters, poses) + self._rotors * w
-        if not np.isfinite(M).all() or np.linalg.eigvalsh(M)[:, 0].min() <= 0.0:
-            return -np.inf
-        return float(np.linalg.slogdet(M)[1].mean()) - self.nominal_inertia
+            return log_inertia(mass_matrix(tree, changed, poses), self._M)
+        return log_inertia(mass_matrix(tree, tree.parameters, poses) + self._rotors * w, self._M)
+
+    def _floor(self, nominal: np.ndarray) -> np.ndarray:
+        """Return the share of each effort, (k,), that no model explains."""
+        floor = 1e-5 + SHAPE_ERROR * nominal
+        return floor + self._inaccuracy if self.full.has_all_efforts else floor
 
     def _with(
-        self, number: int, d: np.ndarray, unknowns: Unknowns, power: np.ndarray
+        self, number: int, d: np.ndarray, unknowns: Unknowns, power: np.ndarray, floor: np.ndarray
     ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
         """Return the evidence of efforts, what is left, its share, and changes of bodies.
 
-        For a set of unknowns of unit prior: none, bodies, or bodies and friction.
+        For a set of unknowns: none, bodies, these and friction, and a load too.
         """
         N, k = d.shape
         rows = min(INDEPENDENT_ROWS, N)
-        square = (d**2).mean(axis=0)
-        floor = (1e-5 + SHAPE_ERROR * np.minimum(square / power, 1.0)) * power
-        if self.full.has_all_efforts:
-            floor += self._inaccuracy * power
         p = unknowns.bodies.shape[2]
         size = FRICTION * np.sqrt(power)
-        count = (0, p, p + EVERYDAY * k)[number]
-        variance, left = square + floor, d
+        count = (0, p, p + EVERYDAY * k)[min(number, _FRICTION)]
+        prior = np.eye(count)
+        if number > _FRICTION:
+            prior[:p, :p] = self._load
+        variance, left = (d**2).mean(axis=0) + floor, d
         occam, b = 0.0, np.zeros(count)
         products = unknowns.products(d, size) if count else None
         for _ in range(_ROUNDS if products is not None else 0):
             assert products is not None
             A, g = (x[:count, ...] for x in products.weighted(rows / N / variance))
-            A = A[:, :count] + np.eye(count)
+            A = A[:, :count] + prior
             b = np.linalg.solve(A, g)
             left = d - unknowns.force(b, size)
             variance = (left**2).mean(axis=0) + floor
         if count:
-            occam = 0.5 * float(np.linalg.slogdet(A)[1])
+            occam = 0.5 * float(np.linalg.slogdet(A)[1] - np.linalg.slogdet(prior)[1])
         share = variance / power
-        value = -0.5 * rows * float(np.log(share).sum()) - 0.5 * float(b @ b) - occam
+        value = -0.5 * rows * float(np.log(share).sum()) - 0.5 * float(b @ prior @ b) - occam
         return value, left, share, b[:p] if count else np.zeros(p)
 
 

@@ -19,10 +19,15 @@ from scipy import optimize
 from sgp_ros.diagnosis.criteria import GAINS_STD
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.errors import Hypothesis
-from sgp_ros.diagnosis.setup.evidence import Agreement, Probe
+from sgp_ros.diagnosis.setup.evidence import Probe
+from sgp_ros.diagnosis.setup.unknowns import Agreement
 
 _FLAT = 1e-3
 """Curvature below which a direction changes nothing [nats per squared step]."""
+_UNCHANGED = 1e-3
+"""Evidence below which a number changes nothing [nats]."""
+_WIDER = (1.0, 3.0, 9.0, 27.0)
+"""Steps, relative to the first, at which a scale is asked whether it changes anything."""
 _IMPOSSIBLE = 1e9
 _SLOPE = 0.02
 """Difference from which slopes are taken [steps]."""
@@ -166,3 +171,25 @@ class Together:
         variance = (vectors**2 / np.maximum(values, _FLAT)).sum(axis=1)
         ends = np.cumsum([len(x) for x in self.numbers])[:-1]
         return tuple(np.split(np.abs(self._steps) * np.sqrt(variance), ends))
+
+
+def value_of(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> float:
+    """Return the evidence of a hypothesis with its numbers x on top of a correction [nats]."""
+    if not h.is_possible(x):
+        return -np.inf
+    return probe.agreement(h.applied(base, x)).evidence
+
+
+def spread(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> np.ndarray:
+    """Return the standard deviations of numbers from the curvature of the evidence, (m,)."""
+    std = np.full(len(x), np.inf)
+    centre = value_of(probe, base, h, x)
+    for i, step in enumerate(h.steps_at(x)):
+        for wider in _WIDER if h.exact else (1.0,):  # bodies may make up for most of a scale
+            e = np.zeros(len(x))
+            e[i] = 0.3 * wider * step
+            bend = 2.0 * centre - value_of(probe, base, h, x - e) - value_of(probe, base, h, x + e)
+            if bend > _UNCHANGED:
+                std[i] = e[i] / np.sqrt(bend)
+                break
+    return std

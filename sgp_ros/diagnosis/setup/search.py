@@ -12,16 +12,13 @@ from scipy import optimize
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, PER_EFFECT, PER_PARAMETER
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.errors import Hypothesis, hypotheses
-from sgp_ros.diagnosis.setup.evidence import Agreement, Probe
-from sgp_ros.diagnosis.setup.joint import Together
+from sgp_ros.diagnosis.setup.evidence import Probe
+from sgp_ros.diagnosis.setup.joint import Together, spread, value_of
+from sgp_ros.diagnosis.setup.unknowns import Agreement
 
 _REFINED = 6
 """Hypotheses of which the numbers are searched to the end."""
 _MOST = 4
-_FLAT = 1e-3
-"""Evidence below which a number changes nothing [nats]."""
-_WIDER = (1.0, 3.0, 9.0, 27.0)
-"""Steps, relative to the first, at which a scale is asked whether it changes anything."""
 _FAR = 300.0
 """Evidence that a start may lack and still be looked at [nats]."""
 
@@ -100,7 +97,7 @@ def search(probe: Probe) -> Connection:
     chains: list[list[Tried]] = []
     for h in hypotheses(probe.full):
         first = _physics(probe, h) if h.is_physics else None
-        if first is not None and first.worth > start.evidence + PER_EFFECT:
+        if first is not None and _gain(probe, first, none, start) > PER_EFFECT:
             rivals[h.key] = ()
             chains.append(_grown(probe, [first], first.agreement, rivals))
     if all(c[-1].agreement.left.max() > COUNTED_SHARE for c in chains):
@@ -141,12 +138,19 @@ def _grown(
         ranked = _ranked(probe, correction, now, errors, is_beside_delay=is_late)
         if is_late:
             ranked = _beside(probe, errors, ranked)
-        if not ranked or ranked[0].worth < now.evidence + PER_EFFECT:
+        if not ranked or _gain(probe, ranked[0], correction, now) < PER_EFFECT:
             break
         rivals[ranked[0].hypothesis.key] = tuple(ranked[1:])
         errors = _together(probe, [*errors, ranked[0]]) if errors else ranked[:1]
         now = errors[-1].agreement
     return errors
+
+
+def _gain(probe: Probe, tried: Tried, base: Correction, now: Agreement) -> float:
+    """Return what an error is worth beyond its price, for the same errors of shape [nats]."""
+    nominal = np.minimum(tried.agreement.nominal, now.nominal)
+    both = [probe.agreement(c, nominal=nominal).evidence for c in (tried.correction, base)]
+    return both[0] - both[1] - _price(tried.hypothesis)
 
 
 def _of_the_connection(probe: Probe, errors: Sequence[Tried]) -> list[Tried]:
@@ -220,12 +224,12 @@ def _ranked(
     for h in hypotheses(probe.full):
         if h.key in known:
             continue
-        values = [_value(probe, base, h, x) for x in h.starts]
+        values = [value_of(probe, base, h, x) for x in h.starts]
         best = int(np.argmax(values))
         value, x = values[best], h.starts[best]
         if len(x) and value > now.evidence - _FAR:
             x = _parabola(probe, base, h, x)
-            value = max(value, _value(probe, base, h, x))
+            value = max(value, value_of(probe, base, h, x))
         screened.append((value, h, x))
     screened.sort(key=lambda s: -s[0])
     if is_beside_delay:  # with other numbers of the delay, gains are others too
@@ -237,23 +241,17 @@ def _ranked(
     return sorted(found, key=lambda t: -t.worth)
 
 
-def _value(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> float:
-    if not h.is_possible(x):
-        return -np.inf
-    return probe.agreement(h.applied(base, x)).evidence
-
-
 def _parabola(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> np.ndarray:
     """Return x after one step to the vertex along each number, where that is better."""
     x = x.copy()
     for i, step in enumerate(h.steps_at(x)):
         e = np.zeros(len(x))
         e[i] = step
-        low, mid, high = (_value(probe, base, h, x + s * e) for s in (-1.0, 0.0, 1.0))
+        low, mid, high = (value_of(probe, base, h, x + s * e) for s in (-1.0, 0.0, 1.0))
         bend = low - 2.0 * mid + high
         move = 0.5 * (low - high) / bend if bend < 0.0 else float(np.sign(high - low))
         trial = x + np.clip(move, -3.0, 3.0) * e
-        if _value(probe, base, h, trial) > mid:
+        if value_of(probe, base, h, trial) > mid:
             x = trial
     return x
 
@@ -265,11 +263,11 @@ def _refined(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> Tr
     if m:
         simplex = np.concatenate([x[None], x + np.diag(h.steps_at(x))])
         found = optimize.minimize(
-            lambda y: -_value(probe, base, h, y), x, method='Nelder-Mead',
+            lambda y: -value_of(probe, base, h, y), x, method='Nelder-Mead',
             options={'initial_simplex': simplex, 'maxfev': 45 * m, 'xatol': 1e-6, 'fatol': 0.02},
         )  # fmt: skip
         x = h.canonical(found.x)
-        std = _spread(probe, base, h, x)
+        std = spread(probe, base, h, x)
         is_known = np.isfinite(std)
         x = np.where(is_known, x, h.neutral)
         x = _of_a_unit(probe, base, h, x) if is_known.all() else x
@@ -280,21 +278,6 @@ def _refined(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> Tr
 def _of_a_unit(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> np.ndarray:
     """Return the number of a unit that fits as well as x, less the price of a number, or x."""
     units = [np.array([unit]) for unit in h.exact]
-    best = max(units, key=lambda unit: _value(probe, base, h, unit), default=x)
-    is_as_good = _value(probe, base, h, best) > _value(probe, base, h, x) - PER_PARAMETER
+    best = max(units, key=lambda unit: value_of(probe, base, h, unit), default=x)
+    is_as_good = value_of(probe, base, h, best) > value_of(probe, base, h, x) - PER_PARAMETER
     return best if is_as_good else x
-
-
-def _spread(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> np.ndarray:
-    """Return the standard deviations of numbers from the curvature of the evidence, (m,)."""
-    std = np.full(len(x), np.inf)
-    centre = _value(probe, base, h, x)
-    for i, step in enumerate(h.steps_at(x)):
-        for wider in _WIDER if h.exact else (1.0,):  # bodies may make up for most of a scale
-            e = np.zeros(len(x))
-            e[i] = 0.3 * wider * step
-            bend = 2.0 * centre - _value(probe, base, h, x - e) - _value(probe, base, h, x + e)
-            if bend > _FLAT:
-                std[i] = e[i] / np.sqrt(bend)
-                break
-    return std

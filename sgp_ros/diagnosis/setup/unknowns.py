@@ -1,4 +1,4 @@
-"""Columns of the everyday unknowns beside which errors of a connection are looked for."""
+"""Everyday unknowns beside which errors of a connection are looked for, and what they leave."""
 
 from __future__ import annotations
 
@@ -12,6 +12,40 @@ from sgp_ros.robots.observed_motion import ObservedMotion
 
 EVERYDAY = 4
 """Everyday forces of a joint: viscous and dry friction, an offset, a rotor."""
+
+
+@dataclass(frozen=True, eq=False)
+class Agreement:
+    """How well a corrected recording agrees with its robot.
+
+    Attributes:
+        evidence: logarithm, best of the sets of unknowns [nats].
+        unknowns: number of the set that is best: 0 none, 1 bodies or rotors, 2 friction too, 3 a
+            load too.
+        left: (k,) share of the mean squared effort that is left with them.
+        discrepancy: (N, k) from the nominal robot, relative to the rms effort of each joint.
+        rest: (N, k) what is left of it with the unknowns.
+        share: (k,) `left` with the errors of signals and filters that no model explains.
+        rows: of all that count as independent.
+        nominal: (k,) share that the nominal robot leaves, of which a part has another shape.
+    """
+
+    evidence: float
+    unknowns: int
+    left: np.ndarray
+    discrepancy: np.ndarray
+    rest: np.ndarray
+    share: np.ndarray
+    rows: float
+    nominal: np.ndarray
+
+    def leaves_less(self, other: Agreement) -> bool:
+        """Return whether less of the efforts is left; stiffer drives move with less error."""
+        return float(np.log(self.share / other.share).sum()) < 0.0
+
+    def distance(self, other: Agreement) -> float:
+        """Return the greatest share of a joint's effort by which two discrepancies differ."""
+        return float(((self.discrepancy - other.discrepancy) ** 2).mean(axis=0).max())
 
 
 @dataclass(frozen=True, eq=False)

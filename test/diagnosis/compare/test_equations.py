@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.compare.bodies import body_directions
+from sgp_ros.diagnosis.compare.bodies import body_directions, load_precision
 from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.grid import INSTANT_SPREAD
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
@@ -68,6 +68,21 @@ def test_directions_are_one_deviation_of_mass_centre_and_inertia(robots):
         step = centre[2] - before[2]
         assert about + moved[0] * step**2 == pytest.approx(size, rel=1e-9)
         assert np.linalg.matrix_rank(own) == 10
+
+
+def test_a_load_widens_the_last_body_alone(robots):
+    """By a quarter of all that moves, beyond the link; a link without inertia carries none."""
+    _, tree = robots[2]
+    narrow = body_directions(tree)
+    wide = np.linalg.inv(load_precision(narrow, tree))
+    np.testing.assert_allclose(wide[:10], np.eye(20)[:10])
+    covariances = np.eye(10), wide[10:, 10:]
+    both = [np.sqrt(np.diag(narrow[10:].T @ x @ narrow[10:]))[10:] for x in covariances]
+    mass = 0.25 * tree.parameters[:, 0].sum()
+    assert both[1][0] == pytest.approx(np.hypot(both[0][0], mass))
+    assert (both[1] > both[0]).all()
+    hollow = replace(tree, parameters=np.zeros_like(tree.parameters))
+    np.testing.assert_array_equal(load_precision(body_directions(hollow), hollow), np.eye(20))
 
 
 def test_rows_in_which_dry_friction_holds_ask_nothing(equations_for, dry):

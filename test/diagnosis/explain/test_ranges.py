@@ -10,6 +10,7 @@ import pytest
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
+from sgp_ros.diagnosis.compare.volume import Loop
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
@@ -73,7 +74,7 @@ def equations_of(truth):
     empty = (np.zeros((len(d), 0)),) * d.shape[1]
     return Equations(
         seen, low, seen.time[rows], d, empty, np.zeros((0, 20)), power, np.full(2, 1e-9),
-        np.ones(seen.position.shape), still, *[np.zeros(2)] * 4,
+        np.ones(seen.position.shape), still, *[np.zeros(2)] * 4, Loop.of(seen, CUTOFF),
     )  # fmt: skip
 
 
@@ -90,7 +91,7 @@ CASES = [
     *_levels('stribeck_friction', 'stribeck_velocity', (0.05, 0.4, 3.0), coulomb=0.1, static=0.4),
     *_levels('friction_drift', 'time_constant', (0.2, 2.0, 12.0, 30.0), start=0.6, end=0.1,
              kind='coulomb'),
-    *_levels('hysteresis', 'presliding', (0.01, 0.1, 1.0, 3.0), level=0.4),
+    *_levels('hysteresis', 'presliding', (0.001, 0.01, 0.1, 1.0, 3.0), level=0.4),
     *_levels('command_delay', 'delay', (0.0005, 0.004, 0.05, 0.3, 0.7)),
     *_levels('actuator_lag', 'time_constant', (0.0005, 0.004, 0.05, 0.3, 0.7)),
     *_levels('dead_zone', 'width', (0.01, 0.3, 1.5)),

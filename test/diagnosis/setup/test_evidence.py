@@ -85,3 +85,15 @@ def test_efforts_read_within_a_period_of_the_positions_have_no_other_clock(
     raw = collect(events_of(world, effort=read, commands=False)[::4], robot)
     errors = search(Probe(raw, tree, choose_bandwidth(raw, tree))).errors
     assert [e.hypothesis.effect for e in errors] == expected
+
+
+@pytest.mark.parametrize('k', [1, 2])
+def test_a_load_is_no_error_of_the_connection(tmp_path, k):
+    """As heavy as the last link: a scale of the efforts would leave less to bodies."""
+    *others, last = CHAINS[k]
+    far = last.centre + 0.15
+    centre = 0.5 * (last.centre + far)
+    inertia = last.inertia + last.mass * ((last.centre - centre) ** 2 + (far - centre) ** 2)
+    loaded = replace(last, mass=2.0 * last.mass, centre=centre, inertia=inertia)
+    world = simulate((*others, loaded), 1, 12.0, reach=1.5)
+    assert not search(probe_of(world, *robot_of(tmp_path, CHAINS[k]))).errors
