@@ -57,12 +57,12 @@ class Hysteresis(Effect):
         return np.asarray(span * np.array([0.003, 0.01, 0.03, 0.07, 0.15, 0.3, 0.6])[:, None])
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        """Return the way of half a row, which is Coulomb friction, and twice the whole range.
+        """Return a twentieth of the way of a row, which is Coulomb friction, and twice the range.
 
         Over the range, a longer presliding is a spring.
         """
         q = motion.position[:, place.joint]
-        row = 0.5 * float(np.mean(np.abs(motion.velocity[:, place.joint]))) * motion.step
+        row = 0.05 * float(np.mean(np.abs(motion.velocity[:, place.joint]))) * motion.step
         starts = self.starts(motion, place)
         return np.minimum(starts[0], row), np.maximum(starts[-1], [2.0 * float(np.ptp(q))])
 
