@@ -10,7 +10,7 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import ADEQUATE_REST, COUNTED_SHARE, PER_EFFECT, SLIGHT_REST
 from sgp_ros.diagnosis.explain.candidates import fit
-from sgp_ros.diagnosis.explain.credibility import is_credible
+from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
 from sgp_ros.diagnosis.explain.joint_search import by_joint, uncoupled, usual
 from sgp_ros.diagnosis.explain.regression import Columns
@@ -120,18 +120,40 @@ def _more(columns: Columns, found: Comparison) -> list[Model]:
 
     It does not if its residual counts as physics, if it is not adequate, or if its bodies are so
     unlikely that they may imitate missing physics. The search starts from that model and from the
-    laws that nearly every joint has, with bodies that may differ.
+    laws that nearly every joint has, with bodies that may differ, or with a load.
     """
     by_score = _ranked([found.base, *found.singles, *found.pairs])
     best = next((m for m in by_score if not m.effects or is_credible(m)), found.base)
     limit = np.clip(ADEQUATE_REST * found.base.left, SLIGHT_REST, COUNTED_SHARE)
     if (best.left < limit).all() and 0.5 * float(best.w @ best.w) < PER_EFFECT:
         return []
-    starts = [best, usual(columns, fit(columns, (), best.sigma, is_free=True))]
+    everyday = usual(columns, fit(columns, (), best.sigma, is_free=True))
+    loaded = _loaded(columns, everyday)
+    starts = [best] if loaded else [best, everyday]
     if isinstance(best.frame.equations.motion.drive, Servo):
         starts += _late(columns, best.sigma)
-    models = [model for start in starts for model in by_joint(columns, start)]
+    models = [*loaded, *(model for start in starts for model in by_joint(columns, start))]
     return _ranked(m for m in models if len(m.effects) > 2)
+
+
+def _loaded(columns: Columns, everyday: Model) -> list[Model]:
+    """Return models of a search from the laws that nearly every joint has beside a load.
+
+    A load is no law to add to bodies that may differ, and beside stated bodies not the first law
+    that a robot asks for whose joints all have friction. None where changed bodies are as good, or
+    where the load goes as other laws come.
+    """
+    motion = columns.equations(frozenset()).motion
+    base = fit(columns, (), everyday.sigma, is_free=False)
+    starts = [
+        usual(columns, base, (EffectAt(law, place, shape),))
+        for law in motion.catalogue.values() if law.is_body
+        for place in law.places(motion)
+        for shape in law.starts(motion, place)
+    ]  # fmt: skip
+    best = max(starts, key=lambda m: m.score, default=everyday)
+    found = by_joint(columns, best) if gain(best, everyday) > PER_EFFECT else []
+    return [m for m in found if any(s.effect.is_body for s in m.effects)]
 
 
 def _late(columns: Columns, sigma: np.ndarray) -> Iterator[Model]:

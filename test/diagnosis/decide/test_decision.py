@@ -152,6 +152,32 @@ def test_more_than_two_effects_are_found_where_joints_lack_several(equations_for
     assert asserted == truth
 
 
+@pytest.mark.parametrize('mass', [1.0, 2.0])
+def test_a_load_is_found_beside_friction_of_all_joints(equations_for, mass):
+    """More than the last link weighs: bodies that may differ would stand for it, or for a part.
+
+    The inertia that the efforts show is that of the load too, and so is what a perfect model
+    leaves: the friction of the wrist stays above it.
+    """
+    first, last = CHAINS[2]
+    whole, tip = last.mass + mass, 0.35
+    centre = (last.mass * last.centre + mass * tip) / whole
+    about = last.inertia + last.mass * (last.centre - centre) ** 2 + mass * (tip - centre) ** 2
+    loaded = replace(last, mass=whole, centre=centre, inertia=about)
+    world = simulate(
+        (first, loaded), 1, 12.0, reach=1.5,
+        force=lambda t, q, v: (-1.5 * v[0] - 0.5 * math.tanh(100.0 * v[0]),
+                               -0.4 * v[1] - 0.3 * math.tanh(100.0 * v[1])),
+    )  # fmt: skip
+    _, equations = equations_for(world)
+    model = decide(equations, compare_models(equations, lambda _share: None)).model
+    found = {(s.name, s.place.joint): s.report(equations.motion) for s in model.effects}
+    friction = {(f'{kind}_friction', j) for kind in ('viscous', 'coulomb') for j in (0, 1)}
+    assert set(found) == {('payload', 1), *friction}
+    assert found['payload', 1]['mass'] == pytest.approx(mass, rel=0.01)
+    assert found['payload', 1]['z'] == pytest.approx(-tip, rel=0.01)
+
+
 def test_what_leaves_next_to_nothing_is_adequate_whatever_it_explained(damped):
     """A rest that is no physics condemns no model, though there was little to explain."""
     comparison = _comparison(damped, fitted(damped, 'viscous_friction'))
