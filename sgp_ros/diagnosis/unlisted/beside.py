@@ -10,8 +10,10 @@ from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import ADEQUATE_REST, COUNTED_SHARE
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.unlisted.shapes import SmoothForce
 from sgp_ros.physics.catalogue import CONSTANT_LOAD, COULOMB_FRICTION, VISCOUS_FRICTION
@@ -65,6 +67,39 @@ def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
     if scale.worth(best) <= scale.worth(model):
         return model
     return earned(columns, scale, best, joint)
+
+
+def refined(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
+    """Return a model with a richer law in place of a plain one beside its formula, if worth more.
+
+    Friction that creeps before it slides, or has another level each way, is that beside a formula
+    too; what plain friction leaves of it would be taken for an error of the formula.
+
+    Args:
+        columns: of the recording.
+        scale: of mean squares.
+        model: with a formula at the joint.
+        joint: index.
+    """
+    laws = model.frame.equations.motion.catalogue.values()
+    trials = []
+    for plain in own_effects(model, joint):
+        richer = [e for e in laws if plain.name in e.plain and not e.has_source]
+        others = tuple(s for s in model.effects if s is not plain)
+        if richer:
+            base = fit(columns, others, model.sigma, is_free=model.is_free, w=model.w,
+                       still=len(others))  # fmt: skip
+            first: dict[object, EffectAt] = {}
+            for _, s in screen(columns, base, richer, (joint,)):
+                first.setdefault(s.key, s)
+            trials += [
+                fit(columns, (*others, s), model.sigma, is_free=model.is_free, w=model.w, rounds=2,
+                    steps=10)
+                for s in first.values()
+            ]  # fmt: skip
+    possible = [t for t in trials if is_credible(t)]
+    best = max(possible, key=scale.worth, default=model)
+    return best if scale.worth(best) > scale.worth(model) else model
 
 
 def says_less(equations: Equations, model: Model, joint: int) -> bool:

@@ -29,6 +29,7 @@ from sgp_ros.diagnosis.unlisted.beside import (
     is_slight,
     law_of,
     own_effects,
+    refined,
     says_less,
 )
 from sgp_ros.diagnosis.unlisted.formulas import FoundLaw, curve_of, formulas
@@ -37,6 +38,7 @@ from sgp_ros.diagnosis.unlisted.shapes import (
     SMOOTHED,
     SmoothForce,
     Variable,
+    beside_each,
     smooth_at_bound,
     smooth_of,
     unlike,
@@ -128,6 +130,7 @@ def search(
     ranked = sorted([*again, *ranked[EARNED:]], key=lambda m: -scale.worth(m))
     first = (i for i, m in enumerate(ranked) if not says_less(equations, m, joint))
     ranked = ranked[next(first, 0) :]
+    ranked[:1] = [refined(look.columns, scale, m, joint) for m in ranked[:1]]
     free = look.free(ranked[0]) if ranked else (np.zeros(0), 0)
     floor = float(scale.power[joint] * scale.floor[joint])
     return Searched(joint, listed, smooth[0], tuple(ranked), free, floor, slight)
@@ -154,11 +157,10 @@ class _Look:
         found.sort(key=lambda m: -self.scale.worth(m))
         found += self.more(found[0]) if found else ()
         found.sort(key=lambda m: -self.scale.worth(m))
-        if found and not smooth_of(found[0], self.joint)[1].is_of_own_speed:
-            found.append(self._finer(found[0], smooth_of(found[0], self.joint)[1]))
-            found.sort(key=lambda m: -self.scale.worth(m))
-        plain = next((m for m in found if self._variable(m).is_plain), None)
-        least = self.scale.worth(plain) + ALIKE if plain is not None else -np.inf
+        found += [self._finer(m, x) for m, x in beside_each(found, self.joint)[:SHAPES]]
+        found.sort(key=lambda m: -self.scale.worth(m))
+        plain = [self.scale.worth(m) for m in found if self._variable(m).is_plain]
+        least = max(plain) + ALIKE if plain else -np.inf
         return [m for m in found if self._variable(m).is_plain or self.scale.worth(m) > least]
 
     def _variable(self, model: Model) -> Variable:

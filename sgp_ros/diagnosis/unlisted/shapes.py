@@ -282,3 +282,16 @@ def unlike(smooth: list[Model], joint: int) -> list[Model]:
         key = force.variable, gate, model.key - {placed.key}, model.is_free
         found.setdefault(key, model)
     return list(found.values())
+
+
+def beside_each(smooth: list[Model], joint: int) -> list[tuple[Model, SmoothForce]]:
+    """Return the best model beside each choice of other effects; they come best first.
+
+    Left out are those of the joint's own speed, whose knots are dense where friction changes.
+    """
+    found: dict[object, tuple[Model, SmoothForce]] = {}
+    for model in smooth:
+        placed, force = smooth_of(model, joint)
+        if not force.is_of_own_speed:
+            found.setdefault(model.key - {placed.key}, (model, force))
+    return list(found.values())

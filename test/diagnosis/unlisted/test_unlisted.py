@@ -254,6 +254,25 @@ def test_a_law_is_found_beside_friction_that_was_not_named(equations_for):
     assert found.laws[0].left[0] < 0.1 * COUNTED_SHARE
 
 
+def test_a_law_in_a_narrow_region_is_found_beside_friction(equations_for):
+    """A magnet that holds near one pose: too narrow for the spline that is compared first."""
+    a, x0, w0 = -19.0, 0.4, 0.15
+
+    def well(_t, q, _v):
+        return (a * (q[0] - x0) * math.exp(-(((q[0] - x0) / w0) ** 2)),)
+
+    world = simulate(CHAINS[1], 11, 20.0, force=well, dry=lambda _t, _q, _s: 0.3, reach=2.0)
+    _, equations = equations_for(world)
+    comparison = compare_models(equations, lambda _share: None)
+    listed = fitted(equations, 'torque_gain')  # stands for friction as long as the well is there
+    found = search(equations, Scale.of(equations, comparison), listed, 0, is_open=True)
+    assert found is not None
+    (friction,) = (s for s in found.laws[0].effects if s.name == 'coulomb_friction')
+    assert friction.coefficients[0] == pytest.approx(0.3, rel=0.03)
+    numbers = law_of(found.laws[0], 0).report(equations.motion)
+    assert [numbers[x] for x in ('a', 'x0', 'w0')] == pytest.approx([a, x0, w0], rel=0.03)
+
+
 def test_a_finer_spline_has_columns_of_its_own(equations_for):
     """Columns known for a spline are not those of one with other pieces."""
     _, equations = equations_for(simulate(CHAINS[1], 11, 10.0, force=_brake))
