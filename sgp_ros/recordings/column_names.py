@@ -24,6 +24,8 @@ _QUANTITIES = {
     'index frame episode task reward done error ff feedforward',
 }
 _WORDS = {word: role for role, words in _QUANTITIES.items() for word in words.split()}
+_MOMENT = 'M'
+"""Symbol of a torque, as a capital."""
 _TARGETS = frozenset({
     'des', 'desired', 'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'ref',
     'reference', 'setpoint', 'goal', 'action', 'actions', 'ctrl', 'control', 'u', 'sp', 'd',
@@ -89,6 +91,8 @@ def meaning(name: str) -> Meaning:
             is_target = True
         elif word in _WORDS and not (word in {'i', 'd', 't', 'index'} and role):
             role = _stronger(role, _WORDS[word])
+        elif words[i] == _MOMENT:
+            role = _stronger(role, EFFORT)
         else:
             rest.append(words[i])
         i += 1

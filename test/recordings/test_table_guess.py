@@ -60,6 +60,8 @@ def _read(path, folder, hints=HINTS, rate=None):
         ('p_gain', 'kp', False, '', ''),
         ('knee.eff', 'effort', False, 'knee', ''),
         ('ddq', 'other', False, '', ''),
+        ('M_boom [Nm]', 'effort', False, 'boom', 'N m'),
+        ('boom_m', '', False, 'boom', 'm'),
         ('base_pan_load_pct', 'effort', False, 'base_pan', '%'),
         ('Load [%]', 'effort', False, '', '%'),
     ],
