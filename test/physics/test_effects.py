@@ -688,7 +688,7 @@ def test_an_eccentric_encoder_is_right_to_first_order_of_its_size():
 
 @pytest.mark.parametrize(('turns', 'is_one'), [(0.15, False), (2.0, True)])
 def test_a_small_part_of_a_wave_is_a_zero_and_a_scale_of_the_encoder(turns, is_one):
-    """Whatever its amplitude and phase."""
+    """At any phase, and so at any amplitude."""
     law, j = EFFECTS['encoder_eccentricity'], 0
     periods = turns * 2.0 * math.pi / np.ptp(MOTION.position[:, j])
     for phase in (0.0, 1.5, 3.0):

@@ -23,7 +23,7 @@ _LINES = 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Loop:
-    """What holds the motion of k joints within a band.
+    """Drives and inertias that hold the motion of k joints within a band.
 
     Attributes:
         inertia: (k,) nominal [kg m^2 or kg].

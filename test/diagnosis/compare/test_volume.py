@@ -1,4 +1,4 @@
-"""What of a motion the residual of an effort stands for."""
+"""Volume of a motion that the residual of an effort stands for."""
 
 from __future__ import annotations
 
