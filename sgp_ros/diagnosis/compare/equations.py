@@ -230,10 +230,9 @@ class Equations:
     def inertia(self, w: np.ndarray, added: np.ndarray) -> np.ndarray:
         """Return the log of the inertia at each joint, relative to the nominal one, (k,).
 
-        It is that of changed bodies and what is added to M, see `log_inertia`. What is measured is
-        the motion: a model of other inertia must not gain from residuals in smaller units of
-        effort. That holds as far as they are not noise of measured efforts, which no inertia
-        changes, and as far as gains of drives leave it, see `Loop`.
+        Of changed bodies and what is added to M, see `log_inertia`. The motion is measured, so a
+        model of other inertia must not gain from residuals in smaller units of effort, except
+        from noise of measured efforts, and as far as gains of drives leave it, see `Loop`.
 
         Args:
             w: (p,) instants and change of the bodies.
@@ -241,11 +240,14 @@ class Equations:
         """
         if self.motion.is_static:  # efforts are measured there, no motion is predicted
             return np.zeros(self.motion.tree.size)
-        tree, q = self.motion.tree, self.poses[0].position
-        changed = self.with_bodies(self.poses[0], w).tree
-        M = mass_matrix(changed, changed.parameters, q) + added
-        log = log_inertia(M, mass_matrix(tree, tree.parameters, q))
+        tree = self.with_bodies(self.poses[0], w).tree
+        M = mass_matrix(tree, tree.parameters, self.poses[0].position) + added
+        log = log_inertia(M, self._nominal_mass)
         return noisy_volume(self.loop.volume(log), self.noise_part)
+
+    @cached_property
+    def _nominal_mass(self) -> np.ndarray:
+        return mass_matrix(self.motion.tree, self.motion.tree.parameters, self.poses[0].position)
 
 
 def joint_name(motion: ObservedMotion, joint: int) -> str:
