@@ -138,7 +138,7 @@ def _grown(
         ranked = _ranked(probe, correction, now, errors, is_beside_delay=is_late)
         if is_late:
             ranked = _beside(probe, errors, ranked)
-        if not ranked or _gain(probe, ranked[0], correction, now) < PER_EFFECT:
+        if not ranked or _gain(probe, ranked[0], correction, now) <= 0.0:
             break
         rivals[ranked[0].hypothesis.key] = tuple(ranked[1:])
         errors = _together(probe, [*errors, ranked[0]]) if errors else ranked[:1]
