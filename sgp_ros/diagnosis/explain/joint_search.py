@@ -10,7 +10,7 @@ follows.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,7 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model, adds_to_usual
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.diagnosis.explain.screening import Trial, screen
+from sgp_ros.diagnosis.explain.screening import distinct, screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
@@ -170,7 +170,7 @@ def _grown(columns: Columns, model: Model, block: _Block) -> Model:
             laws = tuple(e for e in laws if adds_to_usual(e))
         if not laws or (left < SLIGHT_REST and strain < PER_EFFECT):
             break
-        found = _distinct(screen(columns, model, laws, block.joints), TRIALS)
+        found = distinct(screen(columns, model, laws, block.joints), TRIALS)
         arranged = _arranged(model, block)
         trials = [_fitted(columns, model, arranged, s) for s in found]
         counted = [
@@ -215,7 +215,7 @@ def _changes(
         is_richer = len(s.effect.quantities) > 1
         if others and (is_richer or not is_simple):
             joints = (s.place.joint,) if is_own else None
-            found = _distinct(screen(columns, without, others, joints), 1)
+            found = distinct(screen(columns, without, others, joints), 1)
             yield from (_fitted(columns, model, arranged, other) for other in found)
 
 
@@ -250,13 +250,13 @@ def coupled(columns: Columns, model: Model) -> Iterator[Model]:
     blocks = [b for b in _blocks(model) if b.joints]
     for block in blocks:
         laws = [e for e in block.effects if e.plain and e.has_source]
-        for s in _distinct(screen(columns, model, laws, block.joints), 1):
+        for s in distinct(screen(columns, model, laws, block.joints), 1):
             ends = {s.place.joint, s.place.source}
             kept = tuple(o for o in model.effects if not _is_part(o, s, ends))
             trial = fit(columns, kept, model.sigma, is_free=model.is_free, w=model.w,
                         still=len(kept))  # fmt: skip
             found = screen(columns, trial, [s.effect], block.joints)
-            for best in _distinct([t for t in found if t[1].place == s.place], 1):
+            for best in distinct([t for t in found if t[1].place == s.place], 1):
                 trial = _fitted(columns, trial, (kept, len(kept)), best)
                 for other in blocks:
                     if ends & set(other.joints or ()):
@@ -272,11 +272,3 @@ def _is_part(other: EffectAt, coupled: EffectAt, ends: set[int]) -> bool:
     """
     is_own = other.name in coupled.effect.plain and other.place.joint == coupled.place.joint
     return is_own or {other.place.joint, other.place.source} == ends
-
-
-def _distinct(found: Sequence[Trial], count: int) -> list[EffectAt]:
-    """Return the best shape of each of the best `count` effects at places."""
-    best: dict[object, EffectAt] = {}
-    for _, candidate in found:
-        best.setdefault(candidate.key, candidate)
-    return list(best.values())[:count]

@@ -64,6 +64,14 @@ def screen(
     return sorted(found, key=lambda t: -t[0])
 
 
+def distinct(found: Iterable[Trial], count: int | None = None) -> list[EffectAt]:
+    """Return the best shape of each of the best `count` effects at places; None for all."""
+    best: dict[object, EffectAt] = {}
+    for _, candidate in found:
+        best.setdefault(candidate.key, candidate)
+    return list(best.values())[:count]
+
+
 def _free_places(effect: Effect, model: Model, motion: ObservedMotion) -> Iterator[Place]:
     """Yield the places of a law that the model does not have yet; further ones too for a wave."""
     for place in effect.places(motion):

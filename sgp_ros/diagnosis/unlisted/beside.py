@@ -13,7 +13,7 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.diagnosis.explain.screening import screen
+from sgp_ros.diagnosis.explain.screening import distinct, screen
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.unlisted.shapes import SmoothForce
 from sgp_ros.physics.catalogue import CONSTANT_LOAD, COULOMB_FRICTION, VISCOUS_FRICTION
@@ -89,13 +89,10 @@ def refined(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
         if richer:
             base = fit(columns, others, model.sigma, is_free=model.is_free, w=model.w,
                        still=len(others))  # fmt: skip
-            first: dict[object, EffectAt] = {}
-            for _, s in screen(columns, base, richer, (joint,)):
-                first.setdefault(s.key, s)
             trials += [
                 fit(columns, (*others, s), model.sigma, is_free=model.is_free, w=model.w, rounds=2,
                     steps=10)
-                for s in first.values()
+                for s in distinct(screen(columns, base, richer, (joint,)))
             ]  # fmt: skip
     possible = [t for t in trials if is_credible(t)]
     best = max(possible, key=scale.worth, default=model)

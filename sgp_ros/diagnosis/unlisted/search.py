@@ -21,7 +21,7 @@ from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.diagnosis.explain.screening import screen
+from sgp_ros.diagnosis.explain.screening import distinct, screen
 from sgp_ros.diagnosis.unlisted.beside import (
     beside,
     earned,
@@ -273,10 +273,7 @@ class _Look:
         self, base: Model, effects: list[SmoothForce] | list[FoundLaw], count: int | None
     ) -> Iterator[Model]:
         """Yield the best of some effects beside a model, fitted."""
-        best: dict[object, EffectAt] = {}
-        for _, trial in screen(self.columns, base, effects, (self.joint,)):
-            best.setdefault(trial.key, trial)
-        for trial in list(best.values())[:count]:
+        for trial in distinct(screen(self.columns, base, effects, (self.joint,)), count):
             model = fit(self.columns, (*base.effects, trial), base.sigma, is_free=base.is_free,
                         w=base.w, rounds=2, steps=10)  # fmt: skip
             if model.is_possible() and np.isfinite(model.score):
