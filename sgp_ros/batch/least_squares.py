@@ -168,7 +168,7 @@ def correlation_factor(residual: np.ndarray, along: np.ndarray | None = None) ->
     `along`, rho is the product of both autocorrelations.
     """
     r = residual - residual.mean()
-    x = np.ones(len(r)) if along is None or not along.any() else along
+    x = np.zeros(len(r)) if along is None else along
     power, size = float(r @ r), float(x @ x)
     if power <= 0.0:
         return 1.0
@@ -177,5 +177,5 @@ def correlation_factor(residual: np.ndarray, along: np.ndarray | None = None) ->
         rho = float(r[lag:] @ r[:-lag]) / power
         if rho < _LEAST_CORRELATION:
             break
-        total += 2.0 * rho * (float(x[lag:] @ x[:-lag]) / size if along is not None else 1.0)
+        total += 2.0 * rho * (float(x[lag:] @ x[:-lag]) / size if size > 0.0 else 1.0)
     return max(total, 1.0)
