@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
-from sgp_ros.diagnosis.unlisted import assertion
+from sgp_ros.diagnosis.unlisted import assertion, shapes
 from sgp_ros.diagnosis.unlisted.assertion import _in_plain_laws, with_laws
 from sgp_ros.diagnosis.unlisted.beside import earned, is_bent, law_of
 from sgp_ros.diagnosis.unlisted.formulas import Range, texts
@@ -271,6 +272,21 @@ def test_a_law_in_a_narrow_region_is_found_beside_friction(equations_for):
     assert friction.coefficients[0] == pytest.approx(0.3, rel=0.03)
     numbers = law_of(found.laws[0], 0).report(equations.motion)
     assert [numbers[x] for x in ('a', 'x0', 'w0')] == pytest.approx([a, x0, w0], rel=0.03)
+
+
+def test_each_choice_of_listed_effects_gets_a_finer_spline(monkeypatch):
+    """The best beside each; none of the own speed, whose knots are dense already."""
+
+    def model(*listed, own_speed=False):
+        force = SimpleNamespace(is_of_own_speed=own_speed)
+        return SimpleNamespace(key=frozenset({*listed, 'smooth'}), force=force)
+
+    monkeypatch.setattr(
+        shapes, 'smooth_of', lambda m, _joint: (SimpleNamespace(key='smooth'), m.force)
+    )
+    best, worse, other = model('gain'), model('gain'), model('friction')
+    found = shapes.beside_each([model('gain', own_speed=True), best, worse, other], 0)
+    assert found == [(best, best.force), (other, other.force)]
 
 
 def test_a_finer_spline_has_columns_of_its_own(equations_for):
