@@ -35,12 +35,16 @@ _UNITS = {
     's': 's', 'ms': 'ms', 'us': 'us', 'ns': 'ns', 'nsec': 'ns', 'nanosec': 'ns', 'msec': 'ms',
     'rad': 'rad', 'radians': 'rad', 'deg': 'deg', 'degs': 'deg', 'degree': 'deg',
     'degrees': 'deg', 'rev': 'rev', 'turns': 'rev', 'm': 'm', 'mm': 'mm', 'rpm': 'rpm',
-    'nm': 'N m', 'mnm': 'mN m', 'n': 'N', 'kn': 'kN', 'a': 'A', 'ma': 'mA', 'ticks': 'counts',
-    'pct': '%', 'percent': '%',
+    'nm': 'N m', 'mnm': 'mN m', 'knm': 'kN m', 'n': 'N', 'kn': 'kN', 'mn': 'mN',
+    'a': 'A', 'ma': 'mA', 'ticks': 'counts', 'pct': '%', 'percent': '%',
     'counts': 'counts', 'nmm': 'N mm', 'ncm': 'N cm', 'kgfcm': 'kgf cm', 'kgcm': 'kgf cm',
 }  # fmt: skip
+_PER_SECOND = {'degps': 'deg', 'radps': 'rad', 'mmps': 'mm', 'mps': 'm'}
+_PREFIXED = r'(?<![A-Za-z])[mk](N|Nm|Nmm|A)(?![A-Za-z])'
+"""Units with a capital inside, which begins no word."""
 _LONG_UNITS = frozenset({
     'rad', 'deg', 'degrees', 'rpm', 'counts', 'ticks', 'mm', 'nm', 'nmm', 'ncm', 'kgfcm', 'kgcm',
+    'mnm', 'knm',
     'ms', 'ns', 'us', 'pct', 'percent',
 })  # fmt: skip
 """Units that nothing else means, wherever they stand."""
@@ -110,7 +114,8 @@ def _stronger(before: str, found: str) -> str:
 
 
 def _words(name: str) -> list[str]:
-    bare = re.sub(r'([a-z])([A-Z])', r'\1 \2', re.sub(r'mA\b', 'ma', name))
+    bare = re.sub(_PREFIXED, lambda unit: unit[0].lower(), name)
+    bare = re.sub(r'([a-z])([A-Z])', r'\1 \2', bare)
     bare = re.sub(
         r'([A-Za-z])(\d)', r'\1 \2', re.sub('°(?!C)', ' deg ', bare.replace('%', ' pct '))
     )
@@ -119,12 +124,15 @@ def _words(name: str) -> list[str]:
 
 def _unit(words: list[str]) -> tuple[list[str], str]:
     """Return the words without a unit behind them, and the unit, such as `rad s` for rad/s."""
-    if len(words) > 1 and words[-1].lower() == 's' and words[-2].lower() in _UNITS:
-        unit = _UNITS[words[-2].lower()]
+    ends = [w.lower() for w in words[-2:]]
+    if len(words) > 1 and ends[-1] in _PER_SECOND:
+        return words[:-1], f'{_PER_SECOND[ends[-1]]}/s'
+    if len(words) > 1 and ends[-1] == 's' and ends[0] in _UNITS:
+        unit = _UNITS[ends[0]]
         if unit in {'rad', 'deg', 'rev', 'm', 'mm', 'counts'}:
             return words[:-2], f'{unit}/s'
-    if len(words) > 2 and [w.lower() for w in words[-2:]] == ['n', 'm']:
-        return words[:-2], 'N m'
+    if len(words) > 2 and ends[-1] == 'm' and ends[0] in {'n', 'kn', 'mn'}:
+        return words[:-2], f'{_UNITS[ends[0]]} m'
     if len(words) > 1 and words[-1].lower() in _UNITS:
         return words[:-1], _UNITS[words[-1].lower()]
     inside = [i for i, w in enumerate(words) if w.lower() in _LONG_UNITS]

@@ -91,7 +91,9 @@ def _flattened(prefix: str, content: Mapping[str, object]) -> Iterator[tuple[str
                 stacked = np.array(arrays)
                 if stacked.ndim == 2 and stacked.dtype.kind in 'fiub':
                     yield place, stacked
-        elif isinstance(value, np.ndarray) and value.ndim and value.dtype.kind in 'fiub':
+            if cells and all(isinstance(c, str) for c in cells):
+                yield place, np.array(cells)
+        elif isinstance(value, np.ndarray) and value.ndim and value.dtype.kind in 'fiubU':
             yield place, value
 
 

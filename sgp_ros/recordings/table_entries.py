@@ -11,6 +11,7 @@ import numpy as np
 
 from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.column_names import (
+    COMMAND,
     EFFORT,
     OTHER,
     POSITION,
@@ -24,8 +25,9 @@ Columns = dict[str, np.ndarray]
 _NAMES = ('names', 'joint_names', 'joints', 'name')
 _DIGITS = '0123456789'
 _ROLES = {
-    'rad': POSITION, 'deg': POSITION, 'rad/s': VELOCITY, 'deg/s': VELOCITY, 'rpm': VELOCITY,
-    'N m': EFFORT, 'mN m': EFFORT, 'N mm': EFFORT, 'N cm': EFFORT, 'kgf cm': EFFORT,
+    **dict.fromkeys(('rad', 'deg', 'mm'), POSITION),
+    **dict.fromkeys(('rad/s', 'deg/s', 'rpm', 'm/s', 'mm/s'), VELOCITY),
+    **dict.fromkeys(('N m', 'mN m', 'kN m', 'N mm', 'N cm', 'kgf cm', 'mN', 'kN'), EFFORT),
 }  # fmt: skip
 """Units that only one quantity of a joint has."""
 
@@ -100,12 +102,13 @@ def entries_of(columns: Columns, rows: int, features: Mapping[str, Sequence[str]
 
 def _named_by_units(entries: list[Entry]) -> list[Entry]:
     """Let a unit say the quantity where no name does: `elbow_deg` is a position."""
-    named = {e.said.role for e in entries if not e.said.is_target}
-    roles = {unit: role for unit, role in _ROLES.items() if role not in named}
-    return [
-        e if e.said.role else replace(e, said=replace(e.said, role=roles.get(e.said.unit, '')))
-        for e in entries
-    ]
+    named = {(e.said.role, e.said.is_target) for e in entries}
+    found = []
+    for e in entries:
+        role = _ROLES.get(e.said.unit, '')
+        is_open = e.said.role in {'', COMMAND} and role and (role, e.said.is_target) not in named
+        found.append(replace(e, said=replace(e.said, role=role)) if is_open else e)
+    return found
 
 
 def _labelled(entries: list[Entry]) -> list[Entry]:
@@ -125,7 +128,8 @@ def _labelled(entries: list[Entry]) -> list[Entry]:
         for e in group:
             label = e.label or e.said.joint or '_'.join(e.said.rest[common:])
             if not e.label and len(plain) > 1 and common:
-                label = '_'.join(e.said.rest[common:]) or label
+                own = replace(e.said, rest=e.said.rest[common:])
+                label = own.joint or '_'.join(own.rest) or label
             found.append(Entry(e.column, e.index, e.said, label, e.numbers))
     return found
 
@@ -173,8 +177,7 @@ def joint_names(
 ) -> dict[str, str]:
     """Return the label of each joint's column and its name."""
     labels = list(positions)
-    listed = next((columns[n] for n in _NAMES if n in columns), None)
-    names = [str(x) for x in listed.ravel()] if listed is not None else []
+    names = _listed(columns, hints)
     if len(set(names)) == len(labels) and all(not x.strip(_DIGITS) for x in labels):
         return dict(zip(labels, names, strict=True))
     if not hints:
@@ -202,6 +205,16 @@ def joint_names(
         f'those of the robot: {", ".join(h.name for h in hints)}',
         'write a map, or a robot YAML with these joints (docs/import.md)',
     )  # fmt: skip
+
+
+def _listed(columns: Columns, hints: Sequence[JointHint]) -> list[str]:
+    """Return the joints in the order of the columns, where the table lists them."""
+    texts = {n: [str(t) for t in x.ravel()] for n, x in columns.items() if x.dtype.kind == 'U'}
+    for listed in texts.values():
+        known = [next((h.name for h in hints if _same(t, h.name)), '') for t in listed]
+        if all(known) and len(set(known)) == len(listed):
+            return known
+    return next((texts[n] for n in _NAMES if n in texts), [])
 
 
 def _same(label: str, name: str) -> bool:

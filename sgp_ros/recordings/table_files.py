@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -9,13 +10,19 @@ from pathlib import Path
 import numpy as np
 
 from sgp_ros.errors import RecordingError
+from sgp_ros.recordings.column_names import TIME, meaning
 from sgp_ros.recordings.model_files import require_unpacked
 from sgp_ros.recordings.table_apart import READERS, load_apart, require_bounded
 from sgp_ros.recordings.table_formats import refuse
 from sgp_ros.recordings.table_text import load_text
+from sgp_ros.recordings.table_units import as_numbers
 from sgp_ros.strangers import readable, require_file
 
 Columns = dict[str, np.ndarray]
+_SECONDS = {
+    'sec': ('nanosec', 'nsec'), 'secs': ('nsecs', 'nanosecs'), 'seconds': ('nanoseconds',),
+}  # fmt: skip
+"""Ends of the names of a ROS stamp's two parts."""
 ENDINGS = (
     '.csv', '.tsv', '.txt', '.dat', '.npz', '.mat', '.h5', '.hdf5', '.parquet', '.json', '.jsonl',
 )  # fmt: skip
@@ -41,6 +48,7 @@ def load_columns(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]
     require_file(path, 'TABLE_MB')
     with readable(path, RecordingError, f'one of {", ".join(ENDINGS)}'):
         columns, lines = _load(path, path.suffix.lower(), remarks)
+        columns = _in_one_order(_with_whole_stamps(columns))
         require_bounded(path, columns)
         return columns, lines
 
@@ -53,6 +61,56 @@ def _load(path: Path, suffix: str, remarks: list[str]) -> tuple[Columns, Sequenc
     if suffix in {'.csv', '.tsv', '.txt', '.dat'}:
         return load_text(path, remarks)
     raise RecordingError(f'{path} has the file type {suffix!r}', f'one of {", ".join(ENDINGS)}')
+
+
+def _with_whole_stamps(columns: Columns) -> Columns:
+    """Return a table in which seconds and nanoseconds of a ROS stamp are one column of texts.
+
+    `header.stamp.sec` and `header.stamp.nanosec` become `header.stamp`, with all its decimals.
+    """
+    found = dict(columns)
+    for name, seconds in columns.items():
+        end = re.split(r'[^A-Za-z]', name)[-1]
+        head = name.removesuffix(end)
+        for other in _SECONDS.get(end.lower(), ()):
+            rest = next((x for x in columns if x.lower() == f'{head}{other}'.lower()), None)
+            if rest is None:
+                continue
+            a, b = as_numbers(seconds), as_numbers(columns[rest])
+            if a is None or b is None or a.ndim != 1 or a.shape != b.shape:
+                continue
+            if np.isfinite(a).all() and (a % 1 == 0).all() and ((b >= 0) & (b < 1e9)).all():
+                texts = [f'{s:.0f}.{n:09.0f}' for s, n in zip(a, b, strict=True)]
+                whole = head.rstrip('._/ ')
+                whole = whole if meaning(whole).role == TIME else f'{head}stamp'
+                found = {k: x for k, x in found.items() if k not in {name, rest}}
+                found[whole] = np.array(texts)
+    return found
+
+
+def _in_one_order(columns: Columns) -> Columns:
+    """Return a table in which names of joints that each row repeats stand once.
+
+    Lists of numbers beside them, such as `position` beside `name`, follow the order of the first
+    row. Names that differ between rows in more than their order are left out.
+    """
+    found = dict(columns)
+    for name, texts in columns.items():
+        if texts.ndim != 2 or texts.dtype.kind != 'U':
+            continue
+        del found[name]
+        order = np.argsort(texts, axis=1)
+        is_permuted = (np.take_along_axis(texts, order, 1) == np.sort(texts[0])).all()
+        if not is_permuted or len(set(texts[0])) != texts.shape[1]:
+            continue
+        found[name] = texts[0]
+        if (texts != texts[0]).any():
+            at = order[:, np.argsort(order[0])]
+            for other, x in columns.items():
+                is_beside = other.rpartition('.')[0] == name.rpartition('.')[0]
+                if is_beside and x.shape == texts.shape and x.dtype.kind in 'fiu':
+                    found[other] = np.take_along_axis(x, at, 1)
+    return found
 
 
 def _load_npz(path: Path, remarks: list[str]) -> Columns:

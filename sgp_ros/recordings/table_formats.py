@@ -11,6 +11,7 @@ import numpy as np
 
 from sgp_ros.errors import RecordingError
 from sgp_ros.optional import optional_package
+from sgp_ros.recordings.column_names import meaning
 from sgp_ros.strangers import read_text, require_within
 
 Columns = dict[str, np.ndarray]
@@ -81,6 +82,8 @@ def feature_names(path: Path) -> dict[str, list[str]]:
 def load_hdf5(path: Path, *, is_matlab: bool = False) -> Columns:
     """Return the datasets of an HDF5 file under dotted names.
 
+    A unit that only the attributes of a dataset state follows its name: `axis.torque [kN m]`.
+
     Args:
         path: of the file.
         is_matlab: MATLAB writes the axes of an array in reverse order.
@@ -93,11 +96,20 @@ def load_hdf5(path: Path, *, is_matlab: bool = False) -> Columns:
     columns: Columns = {}
 
     def enter(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and item.dtype.kind in 'fiub' and item.shape:
+        if not isinstance(item, h5py.Dataset) or not item.shape:
+            return
+        name = name.replace('/', '.')
+        units = (item.attrs.get(x) for x in ('unit', 'units', 'Unit', 'Units'))
+        unit = next((u for u in units if isinstance(u, str) and u.strip()), '')
+        if unit and not meaning(name).unit:
+            name = f'{name} [{unit.strip()}]'
+        if h5py.check_string_dtype(item.dtype) is not None:
+            columns[name] = np.array(item.asstr(errors='replace')[()], dtype=str)
+        elif item.dtype.kind in 'fiub':
             array = np.asarray(item[()])
             array = array.T if is_matlab else array
             flat = array.ravel() if array.ndim == 2 and 1 in array.shape else array
-            columns[name.replace('/', '.')] = flat
+            columns[name] = flat
 
     try:
         with h5py.File(path, 'r') as file:
@@ -163,7 +175,9 @@ def _enter(columns: Columns, name: str, values: list[Any]) -> None:
         none = [None] * lengths.pop()
         values = [none if x is None else x for x in values]
         rows = [[np.nan if y is None else y for y in x] for x in values]
-        if all(isinstance(y, int | float) for x in rows for y in x):
+        if rows[0] and all(isinstance(y, str) for x in rows for y in x):
+            columns[name] = np.array(rows)
+        elif all(isinstance(y, int | float) for x in rows for y in x):
             columns[name] = np.array(rows, dtype=np.float64)
     elif all(isinstance(x, int) for x in values):
         columns[name] = np.array(values)

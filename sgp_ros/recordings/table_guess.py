@@ -89,8 +89,8 @@ def guess_map(
     _add_velocities(found, entries, joints, positions, units, seconds, guess)
     _add_efforts(found, entries, joints, hinted, guess)
     guess.content['joints'] = found
-    _add_commands(entries, joints, positions, units, guess)
     add_gains(columns, entries, joints, rows, guess)
+    _add_commands(entries, joints, positions, units, guess)
     if not (
         {'commands', 'targets'} & set(guess.content) or any('effort' in x for x in found.values())
     ):
@@ -262,16 +262,13 @@ def _add_commands(
     if open_ones and not any(named.values()):
         alike = [follows(e.numbers, positions[x].numbers) for x, e in open_ones.items()]
         column = next(iter(open_ones.values())).column
+        said = (
+            f'It is unclear what {column} commands, and the positions do not follow it: ignored.'
+        )
         if float(np.median(alike)) > 0.5:
             named[POSITION] = open_ones
-            guess.unsure.append(
-                f'{column} stays close to the positions: taken as position targets.'
-            )
-        else:
-            guess.unsure.append(
-                f'It is unclear what {column} commands, and the positions do not follow it: '
-                'ignored. Enter it under `targets` or `commands` in the map.'
-            )
+            said = f'{column} stays close to the positions: taken as position targets.'
+        guess.unsure.append(said)
     copies = [x for x, e in named[POSITION].items()
               if np.array_equal(e.numbers, positions[x].numbers, equal_nan=True)]  # fmt: skip
     if named[POSITION] and len(copies) == len(named[POSITION]):
@@ -285,15 +282,19 @@ def _add_commands(
         }
         for x in joints if x in named[POSITION] or x in named[VELOCITY]
     }  # fmt: skip
+    columns = ', '.join(dict.fromkeys(e.column for e in named[EFFORT].values()))
+    measured = any('effort' in x for x in guess.content['joints'].values())
+    if targets and columns and not measured and 'gains' not in guess.content:
+        guess.unsure.append(f'{columns} is used; the targets are not, as no gains are given.')
+        targets = {}
     if targets:
         guess.content['targets'] = targets
-        if named[EFFORT]:
-            columns = dict.fromkeys(e.column for e in named[EFFORT].values())
+        if columns:
             guess.unsure.append(
-                f'{", ".join(columns)} is ignored: there are targets too, and it is not known '
-                'which of the two the drives follow.'
+                f'{columns} is ignored: there are targets too, and it is not known which of the '
+                'two the drives follow.'
             )
-    elif named[EFFORT]:
+    elif columns:
         guess.content['commands'] = {
             joints[x]: e.place(e.said.unit if e.said.unit in _EFFORTS else 'N m')
             for x, e in named[EFFORT].items()

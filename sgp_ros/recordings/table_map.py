@@ -58,8 +58,8 @@ UNITS: dict[str, dict[str, float | None]] = {
         'rpm': 2.0 * math.pi / 60.0, 'counts/s': None,
     },
     'effort': {
-        'N': 1.0, 'kN': 1e3, 'N m': 1.0, 'Nm': 1.0, 'mN m': 1e-3, 'mNm': 1e-3,
-        'N mm': 1e-3, 'N cm': 1e-2, 'kgf cm': _KGF * 1e-2, 'kgf': _KGF,
+        'N': 1.0, 'mN': 1e-3, 'kN': 1e3, 'N m': 1.0, 'Nm': 1.0, 'mN m': 1e-3, 'mNm': 1e-3,
+        'kN m': 1e3, 'kNm': 1e3, 'N mm': 1e-3, 'N cm': 1e-2, 'kgf cm': _KGF * 1e-2, 'kgf': _KGF,
         'A': None, 'V': None, '%': None, 'counts': None,
     },
 }  # fmt: skip

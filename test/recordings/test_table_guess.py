@@ -14,7 +14,7 @@ import yaml
 from scipy.io import savemat
 
 from sgp_ros.cli import main
-from sgp_ros.engine.samples import POSITION, VELOCITY, CommandSample, JointSample
+from sgp_ros.engine.samples import EFFORT, POSITION, VELOCITY, CommandSample, JointSample
 from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.column_names import meaning
 from sgp_ros.recordings.imports import import_table
@@ -62,6 +62,9 @@ def _read(path, folder, hints=HINTS, rate=None):
         ('ddq', 'other', False, '', ''),
         ('M_boom [Nm]', 'effort', False, 'boom', 'N m'),
         ('boom_m', '', False, 'boom', 'm'),
+        ('moment_mNm', 'effort', False, '', 'mN m'),
+        ('boom.torque [kN m]', 'effort', False, 'boom', 'kN m'),
+        ('j4.ActVel_degps', 'velocity', False, '4', 'deg/s'),
         ('base_pan_load_pct', 'effort', False, 'base_pan', '%'),
         ('Load [%]', 'effort', False, '', '%'),
     ],
@@ -220,6 +223,74 @@ def test_every_format_gives_the_same(tmp_path, ending):
     _, states, _ = _read(path, tmp_path)
     for wanted, channel in ((Q, 'position'), (DQ, 'velocity'), (TAU, 'effort')):
         np.testing.assert_allclose([getattr(s, channel) for s in states], wanted)
+
+
+@pytest.mark.parametrize('ending', ['npz', 'h5', 'mat', 'jsonl', 'parquet'])
+def test_names_of_joints_in_the_table_tell_the_order_of_its_columns(tmp_path, ending):
+    """Whatever the list is called; a list in each row may change its order."""
+    path, names = tmp_path / f'log.{ending}', ['elbow', 'shoulder']
+    arrays = {'t': T, 'q': Q[:, ::-1], 'tau': TAU[:, ::-1]}
+    if ending == 'npz':
+        np.savez(path, axis_names=np.array(names), **arrays)
+    elif ending == 'mat':
+        savemat(path, {'axis_names': np.array(names, dtype=object), **arrays})
+    elif ending == 'h5':
+        with h5py.File(path, 'w') as file:
+            file['axis_names'] = names
+            file.update(arrays)
+    else:
+        turn = [slice(None), slice(None, None, -1)]
+        rows = [
+            {'t': T[i], 'axis': names[turn[i % 2]], 'q': Q[i, ::-1][turn[i % 2]].tolist(),
+             'tau': TAU[i, ::-1][turn[i % 2]].tolist()} for i in range(len(T))
+        ]  # fmt: skip
+        if ending == 'parquet':
+            pq.write_table(pa.Table.from_pylist(rows), path)
+        else:
+            path.write_text('\n'.join(map(json.dumps, rows)))
+    _, states, _ = _read(path, tmp_path)
+    order = [states[0].names.index(hint.name) for hint in HINTS]
+    np.testing.assert_allclose([s.position[order] for s in states], Q)
+    np.testing.assert_allclose([s.effort[order] for s in states], TAU)
+
+
+@pytest.mark.parametrize(
+    ('before', 'parts'), [('header.stamp.', ('secs', 'nsecs')), ('', ('sec', 'nanosec'))]
+)
+def test_the_two_parts_of_a_stamp_of_ros_are_one_time(tmp_path, before, parts):
+    """As tools write JointState messages, to the nanosecond."""
+    stamps = 1_731_400_000_900_000_001 + np.arange(len(T)) * 5_000_000
+    header = ','.join([*(before + part for part in parts), 'shoulder_pos', 'elbow_pos'])
+    rows = [f'{s // 10**9},{s % 10**9},{a},{b}' for s, (a, b) in zip(stamps, Q, strict=True)]
+    (tmp_path / 'log.csv').write_text('\n'.join([header, *rows]))
+    _, states, _ = _read(tmp_path / 'log.csv', tmp_path)
+    assert [s.stamp_ns for s in states] == stamps.tolist()
+
+
+def test_the_attributes_of_a_dataset_tell_its_unit(tmp_path):
+    with h5py.File(tmp_path / 'log.h5', 'w') as file:
+        file['log/t'] = T
+        for name, x, unit in (('actual_pos', np.degrees(Q), 'deg'), ('torque', TAU, 'kN m')):
+            for i, joint in enumerate(('shoulder', 'elbow')):
+                file[f'log/{joint}/{name}'] = x[:, i]
+                file[f'log/{joint}/{name}'].attrs['unit'] = unit
+    _, states, _ = _read(tmp_path / 'log.h5', tmp_path)
+    order = [states[0].names.index(hint.name) for hint in HINTS]
+    np.testing.assert_allclose([s.position[order] for s in states], Q)
+    np.testing.assert_allclose([s.effort[order] for s in states], 1e3 * TAU)
+
+
+def test_a_commanded_effort_beside_targets_without_gains_is_what_drives(tmp_path):
+    """With gains, or a measured effort, the targets are kept, as the drives may follow them."""
+    asked = {'t [s]': T, 'x [mm]': 1e3 * Q[:, 0], 'x_ref [mm]': 1e3 * LATE[:, 0]}
+    force = {'F_cmd [mN]': 1e3 * TAU[:, 0]}
+    slide = (JointHint('stage', slides=True),)
+    summary, _, commands = _read(_npz(tmp_path, **asked, **force), tmp_path, slide)
+    assert {c.kind for c in commands} == {EFFORT}
+    np.testing.assert_allclose([c.effort[0] for c in commands], TAU[:, 0])
+    assert any('no gains are given' in said for said in summary.unsure)
+    path = _npz(tmp_path, **asked, **force, kp=np.array([9.0]), kd=np.array([1.0]))
+    assert {c.kind for c in _read(path, tmp_path, slide)[2]} == {POSITION}
 
 
 @pytest.mark.parametrize('name', ['log.pkl', 'log.zarr', 'log.npy', 'policy.pt'])
