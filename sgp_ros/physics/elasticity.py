@@ -1,22 +1,21 @@
 """Springs between motor and link.
 
-A hidden state enters the equations of motion without being simulated. The twist of the spring
-follows from the torque in it, `(K + D d/dt) delta = tau`, and this torque from the balance of
-either side; none of the two resonates, so the force that the spring makes is a polynomial in d/dt
-of known signals, whatever the resonance. Its derivatives are taken up to the bandwidth of the
+The twist of the spring follows from the torque in it, `(K + D d/dt) delta = tau`, and this torque
+from the balance of the side without friction: of the link, where the encoder is on it; else of
+the motor, whose friction is then looked for on the link, or of the link, which swings on the
+spring under a motor that moves as measured. Derivatives are taken up to the bandwidth of the
 motion, see `smooth`. Source: Spong 1987.
 """
 
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import numpy as np
-from numba import njit
 
 from sgp_ros.physics.drawing import Drawn, Scene, UnsuitableError
 from sgp_ros.physics.effect import Effect, Numbers
+from sgp_ros.physics.hidden_states import behind, derivatives, on_spring, resonator, smooth
 from sgp_ros.physics.motion import SeenMotion
 from sgp_ros.physics.parts import (
     MOTOR,
@@ -31,83 +30,16 @@ from sgp_ros.physics.parts import (
 _POSES = 200
 _MOST_OF_LINK = 0.95
 _LEAST_OF_LINK = 0.005
+_LEAST_STIFFNESS = 0.1
+"""Of spring and gravity together, relative to the spring alone."""
 _SOFTEST_HZ = 1.0
 """Frequency of the link on its spring below which no joint is a joint."""
 _SOFT = 0.9
 """Part of that softness from which on a fit has run into its bound."""
+_BEYOND = 0.1
+"""By which the share of the motor may leave what makes sense: neither end is a bound."""
 _SETTLING = 0.2
 """Longest ratio of damping to stiffness, relative to the period of the softest spring."""
-_WIDER = 2.0
-"""Frequency at which half is left of signals that are differentiated, over the bandwidth."""
-_SHARP = 5.0
-_SECOND = np.convolve([1 / 90, -1 / 12 - 4 / 90, 1 + 2 / 12 + 6 / 90, -1 / 12 - 4 / 90, 1 / 90],
-                      [1.0, -2.0, 1.0])  # fmt: skip
-_FIRST = np.array([1.0, -9.0, 45.0, 0.0, -45.0, 9.0, -1.0]) / 60.0
-
-
-def _convolved(x: np.ndarray, weights: np.ndarray, starts: tuple[int, ...]) -> np.ndarray:
-    """Return x (n,) under symmetric or odd weights, the ends repeated, stretch by stretch."""
-    ends, parts = np.ones(len(weights) // 2), []
-    for part in np.split(x, starts[1:]):
-        padded = np.concatenate([part[0] * ends, part, part[-1] * ends])
-        parts.append(np.convolve(padded, weights, mode='valid'))
-    return np.concatenate(parts)
-
-
-def smooth(motion: SeenMotion, x: np.ndarray) -> np.ndarray:
-    """Return a signal (n,) without what lies far above the bandwidth, where no equation is."""
-    wide = _WIDER * motion.bandwidth * motion.step
-    if not wide < 0.4:
-        return x
-    return _convolved(x, _low_pass(wide), motion.starts)
-
-
-@lru_cache(maxsize=16)
-def _low_pass(wide: float) -> np.ndarray:
-    """Return weights of a low-pass filter of unit gain, for a frequency per row."""
-    half = max(2, round(1.6 / wide))
-    t = np.arange(-half, half + 1)
-    weights = np.sinc(2.0 * wide * t) * np.kaiser(len(t), _SHARP)
-    return np.asarray(weights / weights.sum())
-
-
-def derivatives(motion: SeenMotion, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the first and the second derivative of a smooth signal, (n,) each."""
-    return (_convolved(x, _FIRST, motion.starts) / motion.step,
-            _convolved(x, _SECOND, motion.starts) / motion.step**2)  # fmt: skip
-
-
-@njit(cache=True)
-def _behind(x: np.ndarray, time_constant: complex, step: float) -> np.ndarray:
-    """Return y of `T y' + y = x`, exact where x is straight between rows; it starts settled."""
-    y = x.copy()
-    if abs(time_constant) <= 1e-6 * step:
-        return y
-    keep = np.exp(-step / time_constant)
-    slow = (1.0 - keep) * time_constant / step
-    for i in range(1, len(x)):
-        y[i] = keep * y[i - 1] + (slow - keep) * x[i - 1] + (1.0 - slow) * x[i]
-    return y
-
-
-def resonator(
-    u: np.ndarray, a: float, b: float, step: float, *, is_settled: bool = True
-) -> np.ndarray:
-    """Return y of `a y'' + b y' + y = b u' + u` by partial fractions.
-
-    It starts settled under the first u, or else at rest at 0.
-    """
-    root = np.sqrt(complex(b * b - 4.0 * a))
-    root = root if abs(root) > 1e-6 * abs(b) else complex(1e-6 * b)
-    y = np.zeros(len(u), dtype=np.complex128)
-    for sign in (1.0, -1.0):
-        pole = (sign * root - b) / (2.0 * a)
-        residue = (b * pole + 1.0) / (sign * root)
-        part = _behind(u.astype(np.complex128), -1.0 / pole, step)
-        if not is_settled:
-            part -= u[0] * np.exp(pole * step * np.arange(len(u)))
-        y += -residue / pole * part
-    return y.real
 
 
 def _some(motion: SeenMotion) -> slice:
@@ -118,10 +50,24 @@ def twist_of(
     motion: SeenMotion, place: Place, shape: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return by how much the motor leads the link per 1/K, and two derivatives, (n,) each."""
-    j, (J, _, settling) = place.joint, shape
-    given = motion.effort[:, j] if place.kind == 'motor' else motion.nominal_effort[:, j]
+    j, (J, softness, settling) = place.joint, shape[:3]
+    share = float(shape[3]) if place.kind == 'motor' else 1.0
+    given = share * motion.nominal_effort[:, j] + (1.0 - share) * motion.effort[:, j]
     torque = smooth(motion, given - J * motion.acceleration[:, j])
-    parts = [_behind(x, settling, motion.step) for x in np.split(torque, motion.starts[1:])]
+    if place.kind == 'link' or share * softness <= 0.0:
+        parts = [behind(x, settling, motion.step) for x in np.split(torque, motion.starts[1:])]
+    else:
+        by_q, by_v, by_a = (x[:, j] for x in motion.effort_slopes(j))
+        scale = share * softness
+        terms = (scale * np.maximum(by_a - J, _LEAST_OF_LINK * np.abs(by_a) + 1e-12),
+                 np.maximum(settling + scale * by_v, 0.0),
+                 np.maximum(1.0 + scale * by_q, _LEAST_STIFFNESS))  # fmt: skip
+        v, a = motion.velocity[:, j], motion.acceleration[:, j]
+        all_ = np.column_stack([torque, *terms, motion.effort[:, j] - J * a, v, a])
+        parts = [
+            on_spring(x[0], tuple(x[1:4]), x[4], x[5:].T, settling, motion.step)
+            for x in (part.T.copy() for part in np.split(all_, motion.starts[1:]))
+        ]
     twist = np.concatenate(parts)
     return twist, *derivatives(motion, twist)
 
@@ -136,6 +82,12 @@ def _of_softness(motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndar
     force = by_q * twist[:, None] + by_v * speed[:, None] + by_a * change[:, None]
     force[:, j] -= J * change
     return np.asarray(force[:, :, None])
+
+
+def _with_friction_on_motor(at: Placed) -> np.ndarray | None:
+    """Return the shape with friction on the motor in place of the link."""
+    is_open = at.place.kind == 'motor' and at.shape[3] < 0.5
+    return np.array([*at.shape[:3], 1.0]) if is_open else None
 
 
 class JointElasticity(Effect):
@@ -159,8 +111,12 @@ class JointElasticity(Effect):
         Quantity('stiffness', 'N m/rad', low=0.0, is_positive=True),
         Quantity('damping', 'N m s/rad', low=0.0, is_scored=False),
         Quantity('motor_inertia', 'kg m2', 1e-12, is_positive=True, is_scored=False),
+        Quantity('motor_friction', '1', is_optional=True, is_scored=False, kinds=('motor',)),
     )  # fmt: skip
-    small = SmallEffect(_of_softness, lambda start, c: np.array([start[0], c[0], start[2]]))
+    small = SmallEffect(
+        _of_softness, lambda start, c: np.array([start[0], c[0], *start[2:]]),
+        _with_friction_on_motor,
+    )  # fmt: skip
     kinds = ('motor', 'link')
     kind_word = 'encoder'
     site = MOTOR
@@ -173,13 +129,15 @@ class JointElasticity(Effect):
     def model(self, numbers: Numbers, kind: str = '') -> tuple[np.ndarray, np.ndarray]:
         K = numbers['stiffness']
         damping = numbers.get('damping', 0.0)
-        return np.array([numbers.get('motor_inertia', math.nan), 1.0 / K, damping / K]), np.ones(1)
+        shape = [numbers.get('motor_inertia', math.nan), 1.0 / K, damping / K]
+        share = [numbers.get('motor_friction', 0.0)] if kind == 'motor' else []
+        return np.array(shape + share), np.ones(1)
 
     def report(self, at: Placed, motion: SeenMotion) -> dict[str, Value]:
-        J, compliance, settling = (float(x) for x in at.shape)
+        J, compliance, settling, *share = (float(x) for x in at.shape)
         return {
             'stiffness': 1.0 / compliance, 'damping': settling / compliance, 'motor_inertia': J,
-            self.kind_word: at.place.kind,
+            **({'motor_friction': share[0]} if share else {}), self.kind_word: at.place.kind,
         }  # fmt: skip
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
@@ -199,7 +157,7 @@ class JointElasticity(Effect):
         M the inertia while the others are free. c is a, or for an encoder on the motor
         `(M - J) (M_jj - J) / (M K)`.
         """
-        j, (J, compliance, settling) = at.place.joint, at.shape
+        j, (J, compliance, settling) = at.place.joint, at.shape[:3]
         M = motion.free_inertia(j, _some(motion))
         a = compliance * J * (M - J) / M
         c = a
@@ -216,9 +174,10 @@ class JointElasticity(Effect):
         None where nothing is known of the inertia.
         """
         if motion.free_inertia(place.joint, _some(motion)) <= 0.0:
-            return np.zeros((0, 3))
-        (least, stiff, _), (most, _, slowest) = self.bounds(motion, place)
-        return np.array([[J, stiff, T] for J in np.geomspace(least, most, 5)[1:]
+            return np.zeros((0, 4 if place.kind == 'motor' else 3))
+        (least, stiff, *_), (most, _, slowest, *_) = self.bounds(motion, place)
+        share = [0.0] if place.kind == 'motor' else []
+        return np.array([[J, stiff, T, *share] for J in np.geomspace(least, most, 5)[1:]
                          for T in (0.0, 0.05 * slowest)])  # fmt: skip
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
@@ -227,11 +186,18 @@ class JointElasticity(Effect):
         free = motion.free_inertia(j, _some(motion))
         rate = 2.0 * math.pi * _SOFTEST_HZ
         softest = 1.0 / (float(motion.mass_diagonal[:, j].mean()) * rate**2)
-        low = np.array([_LEAST_OF_LINK * free, 1e-9 * softest, 0.0])
-        return low, np.array([_MOST_OF_LINK * free, softest, _SETTLING / rate])
+        low, high = (
+            [_LEAST_OF_LINK * free, 1e-9 * softest, 0.0],
+            [_MOST_OF_LINK * free, softest, _SETTLING / rate],
+        )
+        if place.kind == 'motor':
+            low, high = [*low, -_BEYOND], [*high, 1.0 + _BEYOND]
+        return np.array(low), np.array(high)
 
     def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
-        return relative_scales(*self.bounds(motion, place), shape)
+        low, high = self.bounds(motion, place)
+        found = relative_scales(low[:3], high[:3], shape[:3])
+        return np.concatenate([found, np.ones(len(shape) - 3)])
 
     def draw(self, scene: Scene) -> Drawn:
         """Return a spring of a motor whose link carries no other, by its softness."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from sgp_ros.physics.drawing import Drawn, Scene, UnsuitableError
 from sgp_ros.physics.effect import Effect, Numbers
-from sgp_ros.physics.elasticity import derivatives, resonator, smooth
+from sgp_ros.physics.hidden_states import derivatives, resonator, smooth
 from sgp_ros.physics.motion import SeenMotion
 from sgp_ros.physics.parts import BASE, Place, Placed, Quantity, Value, relative_scales
 

@@ -206,10 +206,13 @@ class SmallEffect:
         columns: from motion, place and one of the effect's `starts` to forces per coefficient, as
             those of an `Effect`.
         shape: from that start and coefficients (m,) to the shape of the effect itself, (s,).
+        turned: from a shape to another, (s,), that a search starts from too, where a law has two
+            optima; None for none.
     """
 
     columns: Callable[[SeenMotion, Place, np.ndarray], np.ndarray]
     shape: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    turned: Callable[[Placed], np.ndarray | None] = lambda _at: None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -180,6 +180,8 @@ def searched(
 ) -> tuple[EffectAt, ...]:
     """Return candidates with better shapes, by Levenberg-Marquardt in bounds.
 
+    A law that has a second start beside its shape, see `SmallEffect`, is searched from both.
+
     Args:
         frame: scaled equations.
         columns: of the recording.
@@ -188,14 +190,27 @@ def searched(
         w: (p,) change of the bodies to start from; None for none.
         still: so many of the first candidates keep their shapes.
     """
+    if not sum(len(s.shape) for s in candidates[still:]):
+        return candidates
+    starts = [candidates]
+    for i, s in enumerate(candidates[still:], start=still):
+        turned = None if s.effect.small is None else s.effect.small.turned(s)
+        if turned is not None:
+            starts.append((*candidates[:i], s.with_shape(turned), *candidates[i + 1 :]))
+    bench = Bench(frame, columns, w)
+    found = [_descended(bench, frame, start, steps, still) for start in starts]
+    return min(found, key=lambda x: x[0])[1]
+
+
+def _descended(
+    bench: Bench, frame: Frame, candidates: tuple[EffectAt, ...], steps: int, still: int
+) -> tuple[float, tuple[EffectAt, ...]]:
+    """Return the cost and the candidates to which a search leads from their shapes."""
     fixed, free = candidates[:still], candidates[still:]
     low, high = shape_bounds(frame.equations, free)
-    if not len(low):
-        return candidates
     x = np.clip(np.concatenate([s.shape for s in free]), low, high)
     span = np.maximum(shape_scales(frame.equations, free), 1e-12)
     owner = np.repeat(np.arange(len(free)), [len(s.shape) for s in free])
-    bench = Bench(frame, columns, w)
     candidates = *fixed, *with_shapes(free, x)
     cost, damping = bench.cost(candidates), 1e-2
     for _ in range(steps):
@@ -221,4 +236,4 @@ def searched(
             damping *= 6.0
         if not improved or gain < 1e-6:
             break
-    return candidates
+    return cost, candidates

@@ -80,7 +80,7 @@ class ElasticDynamics(DiagnosedDynamics):
         M[:, :k, :k] = links
         drive = np.column_stack([drive, np.zeros((len(q), len(self.springs)))])
         for i, s in enumerate(self.springs):
-            j, motor, (J, compliance, settling) = s.place.joint, k + i, s.shape
+            j, motor, (J, compliance, settling) = s.place.joint, k + i, s.shape[:3]
             torque = (q[:, motor] - q[:, j] + settling * (v[:, motor] - v[:, j])) / compliance
             M[:, j, j] -= J
             M[:, motor, motor] = J
