@@ -17,7 +17,7 @@ _MOST_OF_LINK = 0.9
 
 
 @njit(cache=True)
-def _bristle(q: np.ndarray, presliding: float) -> np.ndarray:
+def bristle(q: np.ndarray, presliding: float) -> np.ndarray:
     """Return z of `dz/dt = (v - |v| z) / presliding`, exact for a steady direction per step."""
     z = np.zeros(len(q))
     for i in range(1, len(q)):
@@ -49,7 +49,7 @@ class Hysteresis(Effect):
     has_memory = True
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
-        return -_bristle(motion.position[:, place.joint], float(shape[0]))[:, None]
+        return -bristle(motion.position[:, place.joint], float(shape[0]))[:, None]
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
         q = motion.position[:, place.joint]

@@ -11,9 +11,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sgp_ros.apps.simulation import write_simulated
+from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
+from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import nominal_tree
+from sgp_ros.simulation.assembly import make_simulation
+from sgp_ros.simulation.recording import simulate as simulated
+from sgp_ros.simulation.sensors import Sensors
+from sgp_ros.simulation.tree_simulator import tree_simulator
 
 GRAVITY = 9.81
 PERIOD = 0.005
@@ -260,3 +267,16 @@ def heavier(chain, body, factor):
         links[body], mass=factor * links[body].mass, inertia=factor * links[body].inertia
     )
     return tuple(links)
+
+
+def recorded(folder, text, effects, *, seconds=20.0, rate_hz=200.0):
+    """Return trajectory and nominal tree of a simulated robot that measures its effort."""
+    path = folder / 'robot.urdf'
+    path.write_text(text)
+    simulation = make_simulation(
+        tree_simulator(text), effects=effects, seed=5, rate_hz=rate_hz,
+        sensors=Sensors(measures_velocity=True, measures_effort=True),
+    )  # fmt: skip
+    write_simulated(simulated(simulation, seconds), folder / 'robot.mcap')
+    robot = load_robot(str(path))
+    return collect(open_recording(folder / 'robot.mcap').events(), robot), nominal_tree(robot)

@@ -8,10 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
+from sgp_ros.physics.memory import bristle
 from sgp_ros.robots.observed_motion import ObservedMotion
 
-EVERYDAY = 4
-"""Everyday forces of a joint: viscous and dry friction, an offset, a rotor."""
+EVERYDAY = 8
+"""Everyday forces of a joint: viscous and dry friction, an offset, a rotor, four of presliding."""
+_PERIODS = (0.125, 0.4, 1.2, 3.6)
+"""Times in which friction builds up, in periods of the cut-off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,18 +53,18 @@ class Agreement:
 
 @dataclass(frozen=True, eq=False)
 class Products:
-    """Products of the columns of p bodies and four everyday forces, joint by joint.
+    """Products of the columns of p bodies and eight everyday forces, joint by joint.
 
     Attributes:
-        G: (k, p + 4, p + 4) with themselves.
-        g: (k, p + 4) with the discrepancy.
+        G: (k, p + 8, p + 8) with themselves.
+        g: (k, p + 8) with the discrepancy.
     """
 
     G: np.ndarray
     g: np.ndarray
 
     def weighted(self, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the sums over joints with weights (k,), (P, P) and (P,) for P = p + 4 k."""
+        """Return the sums over joints with weights (k,), (P, P) and (P,) for P = p + 8 k."""
         k, p = len(weight), self.G.shape[1] - EVERYDAY
         G, g = self.G * weight[:, None, None], self.g * weight[:, None]
         A, b = np.zeros((p + EVERYDAY * k,) * 2), np.zeros(p + EVERYDAY * k)
@@ -80,8 +83,9 @@ class Unknowns:
     Attributes:
         nominal: (N, k) of the nominal robot [N m or N].
         bodies: (N, k, p) per standard deviation of each inertial parameter's change.
-        friction: (N, k, 4) of a unit of viscous and dry friction, of an offset, and of a rotor at
-            each joint; of none where the size of its inertia would be open.
+        friction: (N, k, 8) of a unit of viscous and dry friction, of an offset, of a rotor at
+            each joint, of none where the size of its inertia would be open, and of what dry
+            friction lacks while it builds up, over ways from short to long.
     """
 
     nominal: np.ndarray
@@ -96,7 +100,8 @@ class Unknowns:
         """Return those of a motion with its regressor (n, k, 10 b), behind a filter.
 
         Rows in which a joint is not `moving` (n, k) are left out of its equation. Rotors are there
-        where efforts are explained: of a motion they leave the size of all inertia open.
+        where efforts are explained: of a motion they leave the size of all inertia open. Of
+        friction that builds up in a short time only the impulse that it lacks is seen.
         """
         tree, v = motion.tree, motion.velocity * moving
         k = tree.size
@@ -106,7 +111,14 @@ class Unknowns:
         size = np.maximum(np.sqrt((v * v).mean(axis=0)), 1e-12)
         a = motion.acceleration * (moving * has_rotors)
         a = a / np.maximum(np.sqrt((a * a).mean(axis=0)), 1e-12)
-        friction = np.stack([v / size, motion.direction * moving, 1.0 * moving, a], axis=2)
+        pace = np.sqrt((motion.acceleration**2).mean(axis=0))
+        parts = [v / size, motion.direction * moving, 1.0 * moving, a]
+        for periods in _PERIODS:
+            ways = np.maximum(0.5 * (periods / low.cutoff) ** 2 * pace, 1e-12)
+            both = zip(motion.position.T, ways, strict=True)
+            built = np.column_stack([bristle(q, float(way)) for q, way in both])
+            parts.append((built - motion.direction) * moving)
+        friction = np.stack(parts, axis=2)
         return cls(nominal, bodies, low(friction))
 
     def of_known_bodies(self, acceleration: np.ndarray, rotors: np.ndarray) -> Unknowns:
@@ -136,7 +148,7 @@ class Unknowns:
         return Products(self._squares * scale[:, :, None] * scale[:, None, :], g * scale)
 
     def force(self, b: np.ndarray, size: np.ndarray) -> np.ndarray:
-        """Return the efforts of unknowns b (p,) or (p + 4 k,), (N, k) [N m or N]."""
+        """Return the efforts of unknowns b (p,) or (p + 8 k,), (N, k) [N m or N]."""
         k, p = self.bodies.shape[1:]
         found = self.bodies @ b[:p]
         if len(b) > p:

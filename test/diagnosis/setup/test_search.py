@@ -17,6 +17,8 @@ from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.gains import read_gains
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.registry import load_robot
+from test.diagnosis.worlds import recorded
+from test.simulation.trees import arm
 
 SHARED = Path(__file__).parents[4] / 'shared'
 CASES = SHARED / 'practice2' / 'cases'
@@ -57,6 +59,14 @@ def test_an_error_of_the_connection_is_found_with_its_numbers(case, key, numbers
 @pytest.mark.parametrize('folder', ['practice2/cases/case_05', 'practice/cases/case_05'])
 def test_friction_is_no_error_of_the_connection(folder):
     assert not _found(*_raw(SHARED / folder))
+
+
+@pytest.mark.parametrize('presliding', [0.005, 0.02])
+def test_friction_that_builds_up_is_no_late_clock(tmp_path, presliding):
+    """After each reversal it lags as late efforts would."""
+    effects = [f'hysteresis:joint={joint},level={level},presliding={presliding}'
+               for joint, level in (('shoulder', 5.0), ('elbow', 2.0))]  # fmt: skip
+    assert not _found(*recorded(tmp_path, arm(), effects))
 
 
 def test_a_delay_of_targets_is_physics_and_not_a_clock():
