@@ -52,7 +52,10 @@ def is_credible(model: Model) -> bool:
     is_finite = is_finite and _delivers(model)
     equations = model.frame.equations
     return is_finite and all(
-        s.effect.is_inside(s, motion) and _is_confined(s, motion) and _is_needed(s, equations)
+        s.effect.is_inside(s, motion)
+        and _is_confined(s, motion)
+        and _is_needed(s, equations)
+        and shows_waves(s, equations)
         for s in model.effects
     )
 
@@ -93,6 +96,28 @@ def _is_needed(s: EffectAt, equations: Equations) -> bool:
         return False
     left = beyond_plain(s, s.columns(equations.motion) @ s.coefficients, equations)
     return float((left**2).mean()) > SLIGHT_REST * float(equations.power[s.place.joint])
+
+
+def shows_waves(s: EffectAt, equations: Equations) -> bool:
+    """Return whether a ripple is seen over whole waves, wherever it is seen.
+
+    A short wave passes the filter only where the joint turns back. There it is one number for each
+    place, and would explain whatever else happens at rest. The way and the visits are weighted by
+    the power that passes.
+    """
+    wave = s.effect.wave(equations.motion, s.place)
+    if wave is None:
+        return True
+    angle = s.shape[0] * wave.phase
+    x = equations.compact(
+        np.column_stack([np.cos(angle), np.sin(angle)]), s.place.joint, is_inertial=False
+    )
+    z = x[:, 0] + 1j * x[:, 1]
+    power = np.abs(z) ** 2
+    turned = np.abs(np.angle(z[1:] * np.conj(z[:-1])))
+    waves = float((np.minimum(power[1:], power[:-1]) * turned).sum()) / (2.0 * np.pi)
+    visits = 0.5 * float(np.abs(np.diff(power)).sum())
+    return waves >= visits
 
 
 def _is_confined(s: EffectAt, motion: ObservedMotion) -> bool:

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.explain.credibility import _delivers, is_credible
+from sgp_ros.diagnosis.explain.credibility import _delivers, is_credible, shows_waves
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 from test.diagnosis.fitted_models import fitted
 
 
@@ -20,3 +24,11 @@ def test_a_motor_delivers_what_it_was_commanded(equations_for, perfect, times, c
     assert gain == pytest.approx(1.0 / times, rel=0.02)
     assert _delivers(model) == credible
     assert is_credible(model) == credible
+
+
+@pytest.mark.parametrize(('periods', 'shown'), [(1.0, True), (8.0, True), (300.0, False)])
+def test_a_ripple_is_seen_over_whole_waves(equations_for, perfect, periods, shown):
+    """One so short that it passes the filter only where the joint turns back is none."""
+    _, equations = equations_for(perfect[1])
+    ripple = EffectAt(EFFECTS['cogging'], Place(0), np.array([periods]))
+    assert shows_waves(ripple, equations) == shown
