@@ -12,7 +12,7 @@ from sgp_ros.diagnosis.criteria import ADEQUATE_REST, COUNTED_SHARE, PER_EFFECT,
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
-from sgp_ros.diagnosis.explain.joint_search import by_joint, uncoupled, usual
+from sgp_ros.diagnosis.explain.joint_search import built_up, by_joint, uncoupled, usual
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import COMMAND_DELAY
@@ -120,7 +120,8 @@ def _more(columns: Columns, found: Comparison) -> list[Model]:
 
     It does not if its residual counts as physics, if it is not adequate, or if its bodies are so
     unlikely that they may imitate missing physics. The search starts from that model and from the
-    laws that nearly every joint has, with bodies that may differ, or with a load.
+    laws that nearly every joint has, with bodies that may differ, or with a load; and from
+    friction that builds up at every joint, where no more is missing.
     """
     by_score = _ranked([found.base, *found.singles, *found.pairs])
     best = next((m for m in by_score if not m.effects or is_credible(m)), found.base)
@@ -130,6 +131,9 @@ def _more(columns: Columns, found: Comparison) -> list[Model]:
     everyday = usual(columns, fit(columns, (), best.sigma, is_free=True))
     loaded = _loaded(columns, everyday)
     starts = [best] if loaded else [best, everyday]
+    built = built_up(columns, everyday)
+    if (built.left < limit).all():
+        starts.append(built)
     if isinstance(best.frame.equations.motion.drive, Servo):
         starts += _late(columns, best.sigma)
     models = [*loaded, *(model for start in starts for model in by_joint(columns, start))]

@@ -33,6 +33,8 @@ from sgp_ros.physics.parts import JOINT, MOTOR, PLACES, Place
 
 SWEEPS = 4
 """Most sweeps over the joints."""
+_BUILT_UP = 0.3
+"""Way over which friction builds up in a gear, of the shortest one that is looked for alone."""
 TRIALS = 3
 """Screened candidates that are fitted."""
 
@@ -122,6 +124,22 @@ def usual(columns: Columns, base: Model, first: tuple[EffectAt, ...] = ()) -> Mo
         if len(kept) == len(pairs):
             return model
         effects = tuple(EffectAt(s.effect, s.place, s.shape) for s in kept)
+
+
+def built_up(columns: Columns, model: Model) -> Model:
+    """Return the model with dry friction that builds up at every joint, as it does in gears.
+
+    At one joint after the other another law would first imitate it: a play, a lag, a delay.
+    """
+    motion = model.frame.equations.motion
+    richer = {e.plain: e for e in motion.catalogue.values() if e.has_memory and not e.has_source}
+    swapped = model.effects
+    for s in swapped:
+        law = richer.get((s.name,))
+        if law is not None:
+            built = EffectAt(law, s.place, _BUILT_UP * law.starts(motion, s.place)[0])
+            swapped = tuple(built if o is s else o for o in swapped)
+    return fit(columns, swapped, model.sigma, is_free=model.is_free, w=model.w)
 
 
 def _blocks(model: Model) -> Iterator[_Block]:

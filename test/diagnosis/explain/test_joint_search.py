@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis.compare.equations import make_equations
+from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth
 from sgp_ros.diagnosis.criteria import (
     COUNTED_SHARE,
     EVIDENCE,
@@ -21,6 +23,7 @@ from sgp_ros.diagnosis.explain.fitted_model import beyond_plain, floors
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.joint_search import (
     _large,
+    built_up,
     by_joint,
     coupled,
     uncoupled,
@@ -31,7 +34,8 @@ from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
-from test.diagnosis.worlds import CHAINS, simulate
+from test.diagnosis.worlds import CHAINS, recorded, simulate
+from test.simulation.trees import arm
 
 TRUTH = {('viscous_friction', 0), ('spring', 0), ('viscous_friction', 1)}
 
@@ -202,6 +206,22 @@ def test_the_usual_laws_of_every_joint_are_those_that_can_be_there(equations):
     assert {('viscous_friction', 0), ('viscous_friction', 1)} <= _keys(found)
     assert all(s.is_possible(equations.motion) for s in found.effects)
     assert min(found.filtered_shares) > COUNTED_SHARE
+
+
+def test_friction_that_builds_up_at_every_joint_is_found_at_once(tmp_path):
+    """At one joint after the other a play or a lag would first imitate it."""
+    truth = {'shoulder': (2.0, 0.004), 'elbow': (1.0, 0.006)}
+    raw, tree = recorded(tmp_path, arm(), [
+        f'hysteresis:joint={joint},level={level},presliding={way}'
+        for joint, (level, way) in truth.items()
+    ])  # fmt: skip
+    columns, base = _start(make_equations(raw, tree, choose_bandwidth(raw, tree)))
+    effects = built_up(columns, usual(columns, base)).effects
+    found = {tree.moving_names[s.place.joint]: s for s in effects if s.name == 'hysteresis'}
+    assert set(found) == set(truth)
+    for joint, (level, way) in truth.items():
+        assert found[joint].coefficients[0] == pytest.approx(level, rel=0.05)
+        assert found[joint].shape[0] == pytest.approx(way, rel=0.3)
 
 
 def test_a_coupling_law_takes_the_place_of_all_that_stands_for_it(equations_for):
