@@ -177,12 +177,12 @@ def _best(model: Model, trials: Iterable[Model], *, is_whole: bool = True) -> Mo
 def _grown(columns: Columns, model: Model, block: _Block) -> Model:
     """Add the effects of a block that are worth their price, as long as something is left.
 
-    That is a residual, or bodies so unlikely that they may imitate the missing physics. Laws that
-    nearly every joint has, or that add to these, may be small and are sought in any residual that
-    is not slight.
+    That is a residual, or bodies so unlikely that they may imitate the missing physics; then a law
+    must make them likelier. Laws that nearly every joint has, or that add to these, may be small
+    and are sought in any residual that is not slight.
     """
     while True:
-        left, strain = block.left(model), 0.5 * float(model.w @ model.w)
+        left, strain = block.left(model), _strain(model)
         laws = block.effects
         if left < COUNTED_SHARE and strain < PER_EFFECT:
             laws = tuple(e for e in laws if adds_to_usual(e))
@@ -191,6 +191,9 @@ def _grown(columns: Columns, model: Model, block: _Block) -> Model:
         found = distinct(screen(columns, model, laws, block.joints), TRIALS)
         arranged = _arranged(model, block)
         trials = [_fitted(columns, model, arranged, s) for s in found]
+        if left < COUNTED_SHARE:
+            trials = [t for t in trials if adds_to_usual(t.effects[-1].effect)
+                      or strain - _strain(t) > PER_EFFECT]  # fmt: skip
         counted = [
             t for t in trials if t.shares[-1] > COUNTED_SHARE or t.effects[-1].effect.is_usual
         ]
@@ -199,6 +202,11 @@ def _grown(columns: Columns, model: Model, block: _Block) -> Model:
             break
         model = better
     return model
+
+
+def _strain(model: Model) -> float:
+    """Return how unlikely the bodies of a model are [nats]."""
+    return 0.5 * float(model.w @ model.w)
 
 
 def _shrunk(columns: Columns, model: Model, block: _Block) -> Model:

@@ -13,6 +13,7 @@ from sgp_ros.diagnosis.criteria import (
     COUNTED_SHARE,
     EVIDENCE,
     INDEPENDENT_ROWS,
+    PER_EFFECT,
     PER_UNUSUAL,
     SLIGHT_REST,
 )
@@ -22,6 +23,8 @@ from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import beyond_plain, floors
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.joint_search import (
+    _Block,
+    _grown,
     _large,
     built_up,
     by_joint,
@@ -34,7 +37,7 @@ from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
-from test.diagnosis.worlds import CHAINS, recorded, simulate
+from test.diagnosis.worlds import CHAINS, heavier, recorded, simulate
 from test.simulation.trees import arm
 
 TRUTH = {('viscous_friction', 0), ('spring', 0), ('viscous_friction', 1)}
@@ -285,6 +288,22 @@ def test_friction_too_small_to_count_is_found_beside_what_counts(equations_for):
     found = by_joint(columns, start)[0]
     assert _keys(found) == {('cogging', 0), ('viscous_friction', 0)}
     assert min(found.shares) < COUNTED_SHARE
+
+
+def test_unlikely_bodies_make_room_only_for_a_law_that_makes_them_likelier(
+    equations_for, monkeypatch
+):
+    """Beside a rest that does not count, a rare law may not come for the sake of the rest."""
+    equations = equations_for(simulate(heavier(CHAINS[2], 1, 4.0), 7, 10.0))[1]
+    columns, model = _start(equations)
+    assert model.left.max() < COUNTED_SHARE
+    assert 0.5 * float(model.w @ model.w) > PER_EFFECT
+    rare = _Block((EFFECTS['backlash'],), (0,))
+    monkeypatch.setattr(
+        'sgp_ros.diagnosis.explain.joint_search._best',
+        lambda _model, trials, **_: next(iter(trials), None),
+    )
+    assert _grown(columns, model, rare) is model
 
 
 def test_laws_that_few_joints_have_cost_more_once(equations):
