@@ -31,7 +31,7 @@ from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, measu
 from sgp_ros.diagnosis.compare.volume import Loop, log_inertia, noisy_volume, part_of_noise
 from sgp_ros.diagnosis.criteria import FORCE_ACCURACY, INDEPENDENT_ROWS, SHAPE_ERROR
 from sgp_ros.diagnosis.setup.correction import Acting, Correction, delayed
-from sgp_ros.diagnosis.setup.unknowns import EVERYDAY, Agreement, Unknowns
+from sgp_ros.diagnosis.setup.unknowns import EVERYDAY, PLAIN, Agreement, Unknowns
 from sgp_ros.physics.drive import Servo
 from sgp_ros.rigid.rigid_body import mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
@@ -49,6 +49,10 @@ _MOTIONS = 8
 """Corrected motions of which the columns are remembered."""
 _FRICTION = 2
 """Number of the first set of unknowns with friction; the next has a load too."""
+SUDDEN = 4
+"""Number of the set with friction that turns at once, which `agreement` tries only if asked."""
+_NONE = 1e12
+"""Prior precision of what is not there."""
 _MOST_INACCURATE = 0.05
 """Share of an effort that is small beside the forces in it which these may leave."""
 FRICTION = 0.3
@@ -241,7 +245,8 @@ class Probe:
     ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
         """Return the evidence of efforts, what is left, its share, and changes of bodies.
 
-        For a set of unknowns: none, bodies, these and friction, and a load too.
+        For a set of unknowns: none, bodies, these and friction, and a load too; or bodies and
+        friction that turns at once.
         """
         N, k = d.shape
         rows = min(INDEPENDENT_ROWS, N)
@@ -249,8 +254,11 @@ class Probe:
         size = FRICTION * np.sqrt(power)
         count = (0, p, p + EVERYDAY * k)[min(number, _FRICTION)]
         prior = np.eye(count)
-        if number > _FRICTION:
+        if number == _FRICTION + 1:
             prior[:p, :p] = self._load
+        if number == SUDDEN:
+            built = [p + EVERYDAY * j + i for j in range(k) for i in range(PLAIN, EVERYDAY)]
+            prior[built, built] = _NONE
         variance, left = (d**2).mean(axis=0) + floor, d
         occam, b = 0.0, np.zeros(count)
         products = unknowns.products(d, size) if count else None

@@ -12,7 +12,7 @@ from scipy import optimize
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, PER_EFFECT, PER_PARAMETER
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.errors import Hypothesis, hypotheses
-from sgp_ros.diagnosis.setup.evidence import Probe
+from sgp_ros.diagnosis.setup.evidence import SUDDEN, Probe
 from sgp_ros.diagnosis.setup.joint import Together, spread, value_of
 from sgp_ros.diagnosis.setup.unknowns import Agreement
 
@@ -147,10 +147,18 @@ def _grown(
 
 
 def _gain(probe: Probe, tried: Tried, base: Correction, now: Agreement) -> float:
-    """Return what an error is worth beyond its price, for the same errors of shape [nats]."""
+    """Return what an error is worth beyond its price, for the same errors of shape [nats].
+
+    Friction that builds up lags as another clock would: this must be worth it beside friction
+    that turns at once too.
+    """
     nominal = np.minimum(tried.agreement.nominal, now.nominal)
-    both = [probe.agreement(c, nominal=nominal).evidence for c in (tried.correction, base)]
-    return both[0] - both[1] - _price(tried.hypothesis)
+    is_of_clock = tried.correction.clock != base.clock
+    gains = []
+    for unknowns in (None, SUDDEN) if is_of_clock else (None,):
+        both = [probe.agreement(c, unknowns, nominal).evidence for c in (tried.correction, base)]
+        gains.append(both[0] - both[1] - _price(tried.hypothesis))
+    return min(gains)
 
 
 def _of_the_connection(probe: Probe, errors: Sequence[Tried]) -> list[Tried]:

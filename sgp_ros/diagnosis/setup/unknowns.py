@@ -11,8 +11,8 @@ from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.physics.memory import bristle
 from sgp_ros.robots.observed_motion import ObservedMotion
 
-EVERYDAY = 8
-"""Everyday forces of a joint: viscous and dry friction, an offset, a rotor, four of presliding."""
+PLAIN, EVERYDAY = 4, 8
+"""Forces of a joint: viscous and dry friction, an offset, a rotor; these and presliding."""
 _PERIODS = (0.125, 0.4, 1.2, 3.6)
 """Times in which friction builds up, in periods of the cut-off."""
 

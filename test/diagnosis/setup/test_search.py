@@ -10,9 +10,9 @@ import pytest
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.errors import hypotheses
-from sgp_ros.diagnosis.setup.evidence import Probe
+from sgp_ros.diagnosis.setup.evidence import SUDDEN, Probe
 from sgp_ros.diagnosis.setup.joint import Together
-from sgp_ros.diagnosis.setup.search import _refined, search
+from sgp_ros.diagnosis.setup.search import _gain, _refined, search
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.gains import read_gains
 from sgp_ros.robots.nominal import nominal_model
@@ -67,6 +67,19 @@ def test_friction_that_builds_up_is_no_late_clock(tmp_path, presliding):
     effects = [f'hysteresis:joint={joint},level={level},presliding={presliding}'
                for joint, level in (('shoulder', 5.0), ('elbow', 2.0))]  # fmt: skip
     assert not _found(*recorded(tmp_path, arm(), effects))
+
+
+@pytest.mark.parametrize(('clock', 'gain'), [(0.0, 40.0), (0.02, 5.0)])
+def test_another_clock_is_worth_it_beside_either_kind_of_friction(clock, gain):
+    """What only friction that builds up makes likely may be play, or a spring."""
+    none = Correction.none(1)
+    late = replace(none, clock=clock, scale=np.array([2.0]))
+    evidence = {None: 50.0, SUDDEN: 15.0}
+    probe = SimpleNamespace(agreement=lambda c, unknowns, _nominal: SimpleNamespace(
+        evidence=evidence[unknowns] * (c is late)))  # fmt: skip
+    now = SimpleNamespace(nominal=np.ones(1))
+    tried = SimpleNamespace(agreement=now, correction=late, hypothesis=SimpleNamespace(names=()))
+    assert _gain(probe, tried, none, now) == pytest.approx(gain)
 
 
 def test_a_delay_of_targets_is_physics_and_not_a_clock():
