@@ -106,8 +106,7 @@ def require_units(events: Iterable[Event], robot: Robot) -> None:
     if wrong:
         raise RecordingError(
             '; '.join(wrong), 'the units stated by the map or by the column names',
-            'state the unit, or a gear ratio as `scale`, in a map, or omit --robot if its limits '
-            'are wrong',
+            'state unit or gear ratio (`scale`) in a map, or omit --robot if its limits are wrong',
         )  # fmt: skip
 
 

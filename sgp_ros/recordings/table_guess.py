@@ -291,8 +291,7 @@ def _add_commands(
         guess.content['targets'] = targets
         if columns:
             guess.unsure.append(
-                f'{columns} is ignored: there are targets too, and it is not known which of the '
-                'two the drives follow.'
+                f'{columns} is ignored: it is not known if the drives follow it or the targets.'
             )
     elif columns:
         guess.content['commands'] = {

@@ -227,7 +227,7 @@ def test_every_format_gives_the_same(tmp_path, ending):
 
 @pytest.mark.parametrize('ending', ['npz', 'h5', 'mat', 'jsonl', 'parquet'])
 def test_names_of_joints_in_the_table_tell_the_order_of_its_columns(tmp_path, ending):
-    """Whatever the list is called; a list in each row may change its order."""
+    """The list may have any name; one in each row may change its order."""
     path, names = tmp_path / f'log.{ending}', ['elbow', 'shoulder']
     arrays = {'t': T, 'q': Q[:, ::-1], 'tau': TAU[:, ::-1]}
     if ending == 'npz':

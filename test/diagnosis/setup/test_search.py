@@ -71,7 +71,7 @@ def test_friction_that_builds_up_is_no_late_clock(tmp_path, presliding):
 
 @pytest.mark.parametrize(('clock', 'gain'), [(0.0, 40.0), (0.02, 5.0)])
 def test_another_clock_is_worth_it_beside_either_kind_of_friction(clock, gain):
-    """What only friction that builds up makes likely may be play, or a spring."""
+    """Likely only beside friction that builds up, it may be play, or a spring."""
     none = Correction.none(1)
     late = replace(none, clock=clock, scale=np.array([2.0]))
     evidence = {None: 50.0, SUDDEN: 15.0}
