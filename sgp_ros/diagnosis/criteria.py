@@ -132,9 +132,6 @@ CARRIED_REST = 0.1
 
 Friction that is a third larger or smaller than it was leaves that.
 """
-LOST_REST = 0.5
-"""Rest of a model where it was not fitted, as part of the discrepancy, from which on it is as
-good as none there [1]. Convention."""
 CARRIED_ERROR = 4.0
 """Ratio of mean squared errors from which held-out ones are not those of the fit [1]. Convention.
 """

@@ -43,7 +43,7 @@ from sgp_ros.diagnosis.prove.held_out import HELD_OUT
 from sgp_ros.diagnosis.prove.overlay import overlays
 from sgp_ros.diagnosis.prove.prediction import FinalModel, diagnosed_bodies
 from sgp_ros.diagnosis.prove.processes import final_model, harm
-from sgp_ros.diagnosis.prove.proof import lost, not_carried_over, prove, reasons_to_doubt
+from sgp_ros.diagnosis.prove.proof import not_carried_over, prove, reasons_to_doubt
 from sgp_ros.diagnosis.reference import (
     Reference,
     against_model,
@@ -158,8 +158,7 @@ def _diagnosed(
     progress(1.0)
     certainty = certainty_of((*findings, *differ), comparison, connected.trust, decision.verdict)
     vain = reasons_to_doubt({'train': proofs['train']}, recordings.still)
-    vain_or_lost = {*vain, *lost(proofs, recordings.still)}
-    findings = doubted(findings, vain_or_lost, tree.moving_names)
+    findings = doubted(findings, vain, tree.moving_names)
     is_doubted = rests_on(doubts, findings, tree.moving_names)
     remarks = (*bound_remarks(decision), *on_z, *chain(*doubts.values()))
     return Diagnosis(

@@ -26,7 +26,7 @@ from sgp_ros.diagnosis.compare.trajectory import (
     observe,
     parallel_filter,
 )
-from sgp_ros.diagnosis.criteria import CARRIED_ERROR, CARRIED_REST, LEAST_SHARE, LOST_REST
+from sgp_ros.diagnosis.criteria import CARRIED_ERROR, CARRIED_REST, LEAST_SHARE
 from sgp_ros.diagnosis.prove.prediction import FinalModel, accelerations
 from sgp_ros.diagnosis.prove.rollouts import cut, roll_out
 from sgp_ros.diagnosis.result import Proof
@@ -146,15 +146,6 @@ def reasons_to_doubt(
     for joint, reason in not_carried_over(proofs, still).items():
         found.setdefault(joint, []).append(reason)
     return {joint: tuple(reasons) for joint, reasons in found.items()}
-
-
-def lost(proofs: Mapping[str, Proof], still: Collection[str]) -> frozenset[str]:
-    """Return the joints at which what explains them explains less than half of another part."""
-    others = {stem: proof for stem, proof in proofs.items() if stem != 'train'}
-    return frozenset(
-        joint for joint in not_carried_over(proofs, still) for proof in others.values()
-        if proof.nmse_after[joint] > LOST_REST * proof.nmse_before[joint]
-    )  # fmt: skip
 
 
 def not_carried_over(proofs: Mapping[str, Proof], still: Collection[str]) -> dict[str, str]:

@@ -10,7 +10,6 @@ from scipy import signal
 
 from sgp_ros.diagnosis.prove.proof import (
     correlation_time,
-    lost,
     mean_interval,
     not_carried_over,
     ratio_interval,
@@ -129,15 +128,6 @@ def test_what_does_harm_elsewhere_does_not_carry_over(after, low, is_reported):
     far.intervals['nmse_before'] = {'elbow': (3e-6, 3e-5)}
     found = not_carried_over({'train': _proof(0.13, 8e-6, (7e-6, 9e-6)), 'far': far}, ())
     assert bool(found) is is_reported
-
-
-@pytest.mark.parametrize(('after', 'is_lost'), [(0.15, False), (0.3, True)])
-def test_what_explains_less_than_half_elsewhere_is_lost(after, is_lost):
-    other = _proof(0.4, after, (0.1, 0.5))
-    proofs = {'train': _proof(0.4, 0.004, (0.003, 0.005)), 'held_out': other}
-    assert not_carried_over(proofs, ())
-    assert lost(proofs, ()) == ({'elbow'} if is_lost else frozenset())
-    assert not lost(proofs, ('elbow',))
 
 
 def test_noise_that_was_there_before_is_no_failure():
