@@ -53,7 +53,10 @@ LAWS: dict[str, Law] = {
     'velocity_filter_lag': Law(actuation.velocity_lag),
     'coupled_friction': Law(friction.coupled),
     'motor_speed_limit': Law(actuation.speed_limit),
-    'joint_elasticity': Law(actuation.elasticity),
+    # simulated friction is all on the link, whatever share a diagnosis gave the motor
+    'joint_elasticity': Law(
+        actuation.elasticity, own=(EffectParameter('motor_friction', '1', default=0.0),)
+    ),
     'mount_elasticity': Law(changed=mounted),
 }
 """Several effects in a motor act in this order, from the command to the joint."""
