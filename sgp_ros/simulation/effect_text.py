@@ -108,15 +108,24 @@ def _value(parameter: EffectParameter | None, word: str) -> Value:
 def with_defaults(
     parameters: Iterable[EffectParameter], given: Mapping[str, Value]
 ) -> dict[str, Value]:
-    """Return the given values and those of parameters that have a default."""
-    return {p.name: p.default for p in parameters if p.default is not None} | dict(given)
+    """Return the given values and those of parameters of their kind that have a default."""
+    wanted = _of_kind(parameters, given)
+    return {p.name: p.default for p in wanted if p.default is not None} | dict(given)
+
+
+def _of_kind(
+    parameters: Iterable[EffectParameter], given: Mapping[str, Value]
+) -> list[EffectParameter]:
+    """Return the parameters that an effect has by the words among its values."""
+    words = {given.get(p.name) for p in parameters if p.choices}
+    return [p for p in parameters if not p.kinds or words & set(p.kinds)]
 
 
 def _problems(
     law: Law, parameters: Iterable[EffectParameter], given: Mapping[str, Value]
 ) -> list[str]:
     values = with_defaults(parameters, given)
-    wanted = [p for p in parameters if not p.kinds or values.get('kind') in p.kinds]
+    wanted = _of_kind(parameters, values)
     known = {parameter.name for parameter in wanted}
     problems = [f'there is no parameter {name}' for name in values if name not in known]
     for parameter in wanted:

@@ -20,6 +20,7 @@ SIMULATORS: dict[str, Simulator] = {
 
 _EDGE = EffectParameter('edge', 'rad', low=0.0, default=0.0)
 _CONTACT_HZ = EffectParameter('contact_hz', 'Hz', low=1.0, default=60.0)
+_MOTOR_FRICTION = EffectParameter('motor_friction', '1', kinds=('motor',), default=0.0)
 
 LAWS: dict[str, Law] = {
     'viscous_friction': Law(friction.viscous),
@@ -54,9 +55,7 @@ LAWS: dict[str, Law] = {
     'coupled_friction': Law(friction.coupled),
     'motor_speed_limit': Law(actuation.speed_limit),
     # simulated friction is all on the link, whatever share a diagnosis gave the motor
-    'joint_elasticity': Law(
-        actuation.elasticity, own=(EffectParameter('motor_friction', '1', default=0.0),)
-    ),
+    'joint_elasticity': Law(actuation.elasticity, own=(_MOTOR_FRICTION,)),
     'mount_elasticity': Law(changed=mounted),
 }
 """Several effects in a motor act in this order, from the command to the joint."""

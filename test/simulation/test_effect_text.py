@@ -77,6 +77,16 @@ def test_effects_that_were_not_read_from_text_are_checked_too():
         make_simulation('reaction_wheel', effects=[EffectAt.wanted(COULOMB_FRICTION, 'pole', {})])
 
 
+def test_a_parameter_of_one_kind_belongs_to_no_other():
+    """Whichever word says the kind; only a motor's encoder leaves friction on the motor unseen."""
+    spring = 'joint_elasticity:joint=pole,stiffness=9,damping=0,motor_inertia=0.1'
+    parse_effect(f'{spring},encoder=motor')
+    parse_effect(f'{spring},encoder=motor,motor_friction=1')
+    parse_effect(f'{spring},encoder=link')
+    with pytest.raises(ConfigError, match='no parameter motor_friction'):
+        parse_effect(f'{spring},encoder=link,motor_friction=1')
+
+
 def test_physical_parameters_are_read_as_numbers():
     """`NAME=value`, refused with an example otherwise."""
     assert parse_physical(['pole_viscosity=0', 'gravity = 1.62']) == {
