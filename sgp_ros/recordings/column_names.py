@@ -1,7 +1,8 @@
 """Meaning of the name of a column: a quantity, a joint, a unit, measured or asked for.
 
 Names are cut into words at dots, slashes, underscores, brackets, changes of case and before
-digits. Words that name a quantity, a unit or a target are taken out; what is left names the joint.
+digits. Words that name a quantity, a unit or a target, in English or German, are taken out; what
+is left names the joint.
 """
 
 from __future__ import annotations
@@ -13,11 +14,14 @@ TIME, POSITION, VELOCITY, EFFORT, CURRENT = 'time', 'position', 'velocity', 'eff
 COMMAND, KP, KD, OTHER = 'command', 'kp', 'kd', 'other'
 
 _QUANTITIES = {
-    TIME: 't time times timestamp timestamps stamp stamps sec secs seconds clock',
-    POSITION: 'q qs pos position positions qpos angle angles theta jointpos encoder enc state',
-    VELOCITY: 'dq qd qdot vel velocity velocities qvel dtheta omega speed thetadot jointvel',
-    EFFORT: 'tau taus torque torques effort efforts eff effs force forces qfrc load moment trq',
-    CURRENT: 'i current currents amps curr',
+    TIME: 't time times timestamp timestamps stamp stamps sec secs seconds clock zeit',
+    POSITION: 'q qs pos position positions qpos angle angles theta jointpos encoder enc state '
+    'winkel lage',
+    VELOCITY: 'dq qd qdot vel velocity velocities qvel dtheta omega speed thetadot jointvel '
+    'geschwindigkeit drehzahl',
+    EFFORT: 'tau taus torque torques effort efforts eff effs force forces qfrc load moment trq '
+    'drehmoment kraft',
+    CURRENT: 'i current currents amps curr strom',
     KP: 'kp stiffness pgain',
     KD: 'kd dgain',
     OTHER: 'ddq qdd qddot acc accel acceleration accelerations qacc temperature temp voltage '
@@ -29,12 +33,14 @@ _MOMENT = 'M'
 _TARGETS = frozenset({
     'des', 'desired', 'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'ref',
     'reference', 'setpoint', 'goal', 'action', 'actions', 'ctrl', 'control', 'u', 'sp', 'd',
+    'soll',
 })  # fmt: skip
 _PLAIN_TARGETS = _TARGETS - {'d'}
 _UNITS = {
     's': 's', 'ms': 'ms', 'us': 'us', 'ns': 'ns', 'nsec': 'ns', 'nanosec': 'ns', 'msec': 'ms',
     'rad': 'rad', 'radians': 'rad', 'deg': 'deg', 'degs': 'deg', 'degree': 'deg',
-    'degrees': 'deg', 'rev': 'rev', 'turns': 'rev', 'm': 'm', 'mm': 'mm', 'rpm': 'rpm',
+    'degrees': 'deg', 'grad': 'deg', 'rev': 'rev', 'turns': 'rev', 'm': 'm', 'mm': 'mm',
+    'rpm': 'rpm',
     'nm': 'N m', 'mnm': 'mN m', 'knm': 'kN m', 'n': 'N', 'kn': 'kN', 'mn': 'mN',
     'a': 'A', 'ma': 'mA', 'ticks': 'counts', 'pct': '%', 'percent': '%',
     'counts': 'counts', 'nmm': 'N mm', 'ncm': 'N cm', 'kgfcm': 'kgf cm', 'kgcm': 'kgf cm',
@@ -51,6 +57,7 @@ _LONG_UNITS = frozenset({
 _FILLER = frozenset({
     'joint', 'joints', 'states', 'observation', 'obs', 'data', 'msg', 'robot', 'motor', 'actual',
     'measured', 'meas', 'act', 'raw', 'list', 'sensor', 'log', 'the', 'value', 'values', 'j',
+    'ist',
 })  # fmt: skip
 _PAIRS = {('p', 'gain'): KP, ('d', 'gain'): KD, ('q', 'dot'): VELOCITY, ('theta', 'dot'): VELOCITY,
           ('q', 'ddot'): OTHER, ('d', 'q'): VELOCITY, ('feed', 'forward'): OTHER}  # fmt: skip

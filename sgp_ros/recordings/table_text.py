@@ -6,35 +6,30 @@ decimals stay texts.
 
 from __future__ import annotations
 
-import csv
-import re
 from array import array
-from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from sgp_ros.errors import RecordingError
+from sgp_ros.recordings.table_header import (
+    TITLES,
+    cells_of,
+    header_of,
+    is_value,
+    names_of,
+    with_units,
+)
 from sgp_ros.recordings.table_units import as_numbers, is_number
 from sgp_ros.strangers import read_lines, require_within
 
 Columns = dict[str, np.ndarray]
-Numbered = tuple[int, str]
-"""A line and its number."""
 
 _OF_SPREADSHEETS = 'Windows-1252'
-_DELIMITERS = (';', '\t', ',', ' ')
-_COMMENTS = '#%'
-_COMMENTS_KEPT, _TITLES = 100, 20
-"""Lines of comment that may hold the header, and lines without a number behind it."""
 _FEW = 0.1
 """Share of the cells of a column up to which cells without a number are mistakes."""
-_IN_BRACKETS = re.compile(r'\[[^\[\]]*\]')
-_APART = re.compile(r'\[[^\[\]]*\]|\S+')
-_TIME = re.compile(r'\d{4}-\d\d-\d\d[T ]\d')
 _BLOCK = 1 << 22
 """Characters of a block: its rows times its longest line."""
 _DIGITS, _FINE = 15, 1e6
@@ -44,6 +39,8 @@ _RAGGED = '[lists of different lengths]'
 
 def load_text(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]]:
     """Return the columns of a CSV file by name, and the line of each row.
+
+    A unit in a line below the header follows the name: `angle [deg]`.
 
     Args:
         path: of the file.
@@ -71,18 +68,20 @@ def _load(path: Path, remarks: list[str], encoding: str) -> tuple[Columns, Seque
     require_within(n, 'ROWS', f'number of lines of {path}')
     read = read_lines(path, 'TABLE_MB', encoding)
     lines = ((i, x) for i, x in enumerate(read, start=1) if x.strip())
-    header, mark, rest = _header(path, lines)
-    names = _names(path, header, mark)
+    header, mark, rest = header_of(path, lines)
+    names = names_of(path, header, mark)
     require_within(n * len(names), 'CELLS', f'number of cells of {path}')
     table = _Blocks(path, names, mark)
     skipped: list[int] = []
+    called = names
     for number, line in rest:
         if '\0' in line:
             raise RecordingError(f'{path} contains NUL characters', 'a CSV file in UTF-8')
-        row = _cells(line, mark)
-        if not table.lines and not any(map(_is_value, row)):
+        row = cells_of(line, mark)
+        if not table.lines and not any(map(is_value, row)):
             skipped.append(number)  # a second line of the header, such as units
-            if len(skipped) > _TITLES:
+            called = with_units(called, row)
+            if len(skipped) > TITLES:
                 break
         elif len(row) == len(names):
             table.add(number, row, len(line))
@@ -104,7 +103,7 @@ def _load(path: Path, remarks: list[str], encoding: str) -> tuple[Columns, Seque
     columns = table.columns()
     for name, column in columns.items():
         _require_numbers(path, name, column, table.lines, remarks)
-    return columns, table.lines
+    return dict(zip(called, columns.values(), strict=True)), table.lines
 
 
 class _Blocks:
@@ -202,87 +201,6 @@ def _require_numbers(
             said, 'a number, or an empty cell for a missing one', 'correct it, or drop the column'
         )
     remarks.append(f'{said} is not a number; a column with {len(wrong)} such cells is not used')
-
-
-def _header(path: Path, lines: Iterator[Numbered]) -> tuple[str, str, Iterator[Numbered]]:
-    """Return the header, what separates its cells, and the numbered lines behind it.
-
-    Lines of comment are left out; the last one before the numbers is the header where no other is.
-    """
-    kept: deque[str] = deque(maxlen=_COMMENTS_KEPT)
-    first: Numbered = (0, '')
-    for number, line in lines:
-        if line.lstrip()[0] not in _COMMENTS:
-            first = number, line
-            break
-        kept.append(line.lstrip(_COMMENTS + ' '))
-    comments, is_empty = list(kept), not first[1]
-    rest = ((i, line) for i, line in lines if line.lstrip()[0] not in _COMMENTS)
-    mark = _mark(first[1] or (comments[-1] if comments else ''))
-    if not is_empty and not any(map(_is_value, _cells(first[1], mark))):
-        header, below = _below_titles(first, rest)
-        return header, _mark(header), below
-    titles = [line for line in comments if len(_cells(line, _mark(line))) > 1]
-    width = len(_cells(first[1], mark))
-    fitting = [line for line in titles if is_empty or len(_cells(line, _mark(line))) == width]
-    if not fitting and not is_empty:
-        raise RecordingError(
-            f'{path} has no header: line {first[0]} already contains numbers',
-            'column names in the first line, such as t,q,tau',
-            'add that line',
-        )
-    return (fitting or comments or [''])[-1], mark, chain([] if is_empty else [first], rest)
-
-
-def _below_titles(first: Numbered, rest: Iterator[Numbered]) -> tuple[str, Iterator[Numbered]]:
-    """Return the line of the names of columns, below titles of the log, and the lines behind it.
-
-    It is the first one with as many cells as the numbers, all different; else the very first.
-    """
-    above = [first]
-    for numbered in rest:
-        above.append(numbered)
-        if len(above) > _TITLES or any(map(_is_value, _cells(numbered[1], _mark(numbered[1])))):
-            break
-    for i, (_, line) in enumerate(above[:-1]):
-        cells = _cells(line, mark := _mark(line))
-        if len(cells) == len(_cells(above[-1][1], mark)) == len(set(cells)):
-            return line, chain(above[i + 1 :], rest)
-    return first[1], chain(above[1:], rest)
-
-
-def _names(path: Path, header: str, mark: str) -> list[str]:
-    """Return the names of the columns."""
-    if '\0' in header:
-        raise RecordingError(f'{path} contains NUL characters', 'a CSV file in UTF-8')
-    names = [name.strip().strip('"') for name in _cells(header, mark)]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise RecordingError(f'{path} has several columns named {twice}', 'unique names')
-    return names
-
-
-def _mark(line: str) -> str:
-    """Return what separates the cells of a line; what stands in brackets does not count."""
-    bare = _IN_BRACKETS.sub('', line)
-    return next((mark for mark in _DELIMITERS if mark in bare.strip()), ',')
-
-
-def _cells(line: str, mark: str) -> list[str]:
-    """Return the cells of a line; a list in brackets or quotes is one cell."""
-    if mark == ' ':
-        return line.split() if '[' not in line else _APART.findall(line)
-    kept = _IN_BRACKETS.sub(lambda m: m.group().replace(mark, '\0'), line)
-    cells = next(csv.reader([kept], delimiter=mark), [])
-    return [cell.replace('\0', mark) for cell in cells]
-
-
-def _is_value(cell: str) -> bool:
-    """Return whether a cell holds a number, a list or a time."""
-    text = cell.strip()
-    if text.startswith('[') or _TIME.match(text):
-        return True
-    return is_number(text.replace(',', '.'))
 
 
 def _column(cells: np.ndarray) -> np.ndarray:

@@ -110,6 +110,8 @@ def read_table(
     path = Path(path)
     remarks: list[str] = []
     columns, lines = loaded or load_columns(path, remarks)
+    bare = {n.rpartition(' [')[0]: x for n, x in columns.items() if n.endswith(']')}
+    columns = bare | dict(columns)  # a map may leave out units that stood beside the name
     table_map = check_map(content, columns)
     quantities = {
         f'{joint}.{channel}': quantity

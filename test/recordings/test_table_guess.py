@@ -146,6 +146,34 @@ def test_the_torque_of_a_single_joint_is_its_own_whatever_it_is_called(tmp_path,
     assert said in ' '.join(summary.unsure)
 
 
+@pytest.mark.parametrize(
+    ('header', 'units'),
+    [('time,shoulder,elbow', 's,deg,deg'), ('time,shoulder_pos,elbow_pos', '(s),(deg),[deg]')],
+)
+def test_units_in_a_line_below_the_names_are_those_of_the_columns(tmp_path, header, units):
+    """Degrees of a joint that turns without end cannot be told from radians by their range."""
+    rows = [','.join(map(repr, row)) for row in np.column_stack([T, np.degrees(Q)]).tolist()]
+    (tmp_path / 'log.csv').write_text('\n'.join([header, units, *rows]))
+    endless = (JointHint('shoulder'), JointHint('elbow'))
+    _, states, _ = _read(tmp_path / 'log.csv', tmp_path, endless)
+    np.testing.assert_allclose([s.position for s in states], Q, atol=1e-12)
+
+
+def test_a_trace_with_german_words_is_read(tmp_path):
+    """Semicolons, decimal commas; joints by their numbers, currents without their factor."""
+    header = (
+        'Zeit [ms];A1 Soll [Grad];A2 Soll [Grad];A1 Ist [Grad];A2 Ist [Grad];A1 Strom [A];'
+        'A2 Strom [A]'
+    )
+    table = np.column_stack([1e3 * T, np.degrees(LATE), np.degrees(Q), TAU])
+    rows = [';'.join(map(repr, row)).replace('.', ',') for row in table.tolist()]
+    (tmp_path / 'log.csv').write_text('\n'.join([header, *rows]))
+    summary, states, _ = _read(tmp_path / 'log.csv', tmp_path)
+    np.testing.assert_allclose([s.position for s in states], Q, atol=1e-12)
+    np.testing.assert_allclose([s.effort for s in states], TAU, atol=1e-12)
+    assert 'torque of 1 A' in ' '.join(summary.unsure)
+
+
 def test_a_load_in_per_cent_asks_for_the_torque_of_one(tmp_path):
     """As servos report it; the number goes into the map."""
     path = _npz(tmp_path, t=T, q=Q, load_pct=100.0 * TAU)

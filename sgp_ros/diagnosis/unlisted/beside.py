@@ -46,6 +46,8 @@ def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
 
     They were chosen before the formula was known, and may have imitated a part of it. One after
     the other goes, and the formula and all others are fitted again, as long as that is worth more.
+    Shapes are searched again where they may have made up for what goes: those at the joint, if
+    it acts there. O(effects at the joint) such searches; all shapes of an arm would be hundreds.
 
     Args:
         columns: of the recording.
@@ -53,20 +55,29 @@ def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
         model: with a formula at the joint.
         joint: index.
     """
-    law = law_of(model, joint)
-    trials = []
-    for out in model.effects:
-        left = tuple(s for s in model.effects if s is not out)
+    law, trials = law_of(model, joint), []
+    elsewhere = tuple(s for s in model.effects if not _acts_at(s, joint))
+    here = tuple(s for s in model.effects if _acts_at(s, joint))
+    for out in (*elsewhere, *here):
+        far, near = (tuple(s for s in x if s is not out) for x in (elsewhere, here))
+        still = len(far) if out in here else len(far) + len(near)
         if out is not law:
             trials += [
-                fit(columns, left, model.sigma, is_free=is_free, rounds=2, steps=10)
+                fit(columns, (*far, *near), model.sigma, is_free=is_free, rounds=2, steps=10,
+                    still=still)
                 for is_free in dict.fromkeys((False, model.is_free))
-            ]
+            ]  # fmt: skip
     possible = [t for t in trials if t.is_possible() and np.isfinite(t.score)]
     best = max(possible, key=scale.worth, default=model)
     if scale.worth(best) <= scale.worth(model):
         return model
     return earned(columns, scale, best, joint)
+
+
+def _acts_at(s: EffectAt, joint: int) -> bool:
+    """Return whether an effect acts at a joint, alone or among others."""
+    is_own = s.effect.site in {JOINT, MOTOR} and s.place.joint >= 0
+    return not is_own or joint in {s.place.joint, s.place.source}
 
 
 def refined(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
