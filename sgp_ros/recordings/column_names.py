@@ -33,7 +33,7 @@ _MOMENT = 'M'
 _TARGETS = frozenset({
     'des', 'desired', 'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'ref',
     'reference', 'setpoint', 'goal', 'action', 'actions', 'ctrl', 'control', 'u', 'sp', 'd',
-    'soll',
+    'soll', 'set',
 })  # fmt: skip
 _PLAIN_TARGETS = _TARGETS - {'d'}
 _UNITS = {

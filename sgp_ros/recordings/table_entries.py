@@ -58,6 +58,10 @@ class Entry:
     label: str
     numbers: np.ndarray
 
+    def unit_of_position(self, usual: str) -> str:
+        """Return the unit of a position that the name states, or else the usual one."""
+        return self.said.unit if self.said.unit in {'rad', 'deg', 'rev', 'm', 'mm'} else usual
+
     def place(self, unit: str, **more: float) -> dict[str, Any]:
         """Return the entry of a map."""
         index = {} if self.index is None else {'index': self.index}
@@ -85,6 +89,7 @@ def entries_of(columns: Columns, rows: int, features: Mapping[str, Sequence[str]
             continue
         parts = features.get(name, ())
         wide = array if array.ndim == 2 else array[:, None]
+        units = re.split(r'[\s,;]+', name.rpartition('[')[2].rstrip(' ]'))
         for i in range(wide.shape[1]):
             numbers = as_numbers(wide[:, i])
             if numbers is None:
@@ -95,6 +100,8 @@ def entries_of(columns: Columns, rows: int, features: Mapping[str, Sequence[str]
                 role = inner.role if inner.role not in {'', OTHER} else said.role
                 said = Meaning(role, said.is_target, inner.rest, inner.unit or said.unit)
                 label = inner.joint or parts[i]
+            if len(units) == wide.shape[1] > 1:
+                said = replace(said, unit=meaning(f'value [{units[i]}]').unit)
             index = i if array.ndim == 2 else None
             found.append(Entry(name, index, said, label, numbers))
     return _labelled(_named_by_units(found))
@@ -201,7 +208,7 @@ def joint_names(
             )
         return {x: h.name for x, h in zip(order, hints, strict=True)}
     raise RecordingError(
-        f'positions of {len(labels)} joints (columns {", ".join(labels)})',
+        f'positions of {len(labels)} joints ({", ".join(e.column for e in positions.values())})',
         f'those of the robot: {", ".join(h.name for h in hints)}',
         'write a map, or a robot YAML with these joints (docs/import.md)',
     )  # fmt: skip

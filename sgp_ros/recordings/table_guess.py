@@ -42,6 +42,7 @@ from sgp_ros.recordings.table_units import (
     as_numbers,
     follows,
     position_unit,
+    slide_unit,
     time_unit,
     velocity_unit,
 )
@@ -176,24 +177,22 @@ def _position_units(
     positions: Mapping[str, Entry], joints: Mapping[str, str], hinted: Mapping[str, JointHint],
     guess: Guess,
 ) -> dict[str, str]:  # fmt: skip
-    units = {}
-    turning = [x for x in positions if not _hint(joints[x], hinted).slides]
+    hints = {x: hinted.get(joints[x], JointHint(joints[x])) for x in positions}
     said = {x: positions[x].said.unit for x in positions}
     ranges = [
-        (positions[x].numbers, _hint(joints[x], hinted).lower, _hint(joints[x], hinted).upper)
-        for x in turning if said[x] not in {'rad', 'deg', 'rev', 'counts', 'm', 'mm'}
+        (positions[x].numbers, hint.lower, hint.upper) for x, hint in hints.items()
+        if not hint.slides and said[x] not in {'rad', 'deg', 'rev', 'counts', 'm', 'mm'}
     ]  # fmt: skip
     angle, is_sure = position_unit(ranges, are_joints_known=bool(hinted))
     if ranges and not is_sure:
         guess.unsure.append(f'Positions go beyond one turn and are assumed to be in {angle}.')
-    for x in positions:
-        known = said[x] in {'rad', 'deg', 'rev', 'm', 'mm'}
-        units[x] = said[x] if known else (angle if x in turning else 'm')
+    units = {}
+    for x, hint in hints.items():
+        slide = slide_unit(positions[x].numbers, hint.lower, hint.upper) if hint.slides else ''
+        units[x] = positions[x].unit_of_position(slide or angle)
+        if units[x] == 'mm' != said[x]:
+            guess.unsure.append(f'{joints[x]} is assumed to be in mm, to stay within its range.')
     return units
-
-
-def _hint(name: str, hinted: Mapping[str, JointHint]) -> JointHint:
-    return hinted.get(name, JointHint(name))
 
 
 def _add_velocities(
@@ -228,7 +227,7 @@ def _add_efforts(
         if unit in {'A', '%'}:
             open_unit, more = unit, {'scale': 1e-3 if e.said.unit == 'mA' else 1.0}
         elif unit not in _EFFORTS:
-            unit = 'N' if _hint(joints[label], hinted).slides else 'N m'
+            unit = 'N' if joints[label] in hinted and hinted[joints[label]].slides else 'N m'
         found[joints[label]]['effort'] = e.place(unit, **more)
     if open_unit:
         guess.unsure.append(
@@ -277,7 +276,7 @@ def _add_commands(
         named[POSITION] = {}
     targets = {
         joints[x]: {
-            kind: e[x].place(units[x] if kind == POSITION else f'{units[x]}/s')
+            kind: e[x].place(e[x].unit_of_position(units[x]) + '/s' * (kind == VELOCITY))
             for kind, e in ((POSITION, named[POSITION]), (VELOCITY, named[VELOCITY])) if x in e
         }
         for x in joints if x in named[POSITION] or x in named[VELOCITY]

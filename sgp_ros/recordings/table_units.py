@@ -90,6 +90,16 @@ def position_unit(
     return ('deg' if largest > 6.0 * np.pi else 'rad'), False
 
 
+def slide_unit(numbers: np.ndarray, lower: float, upper: float) -> str:
+    """Return `mm` of a sliding joint whose range [m] holds its numbers (n,) only so, else `m`."""
+    low, high, margin = np.nanmin(numbers), np.nanmax(numbers), 0.1 * (upper - lower)
+
+    def fits(factor: float) -> bool:
+        return bool(low * factor >= lower - margin and high * factor <= upper + margin)
+
+    return 'mm' if np.isfinite(margin) and fits(1e-3) and not fits(1.0) else 'm'
+
+
 def velocity_unit(
     velocity: np.ndarray, position: np.ndarray, seconds: np.ndarray, unit: str, said: str
 ) -> tuple[str, str]:

@@ -159,6 +159,38 @@ def test_units_in_a_line_below_the_names_are_those_of_the_columns(tmp_path, head
     np.testing.assert_allclose([s.position for s in states], Q, atol=1e-12)
 
 
+def test_units_of_the_columns_of_a_matrix_may_be_listed(tmp_path):
+    """In an attribute, one for each column, of arrays that are named alike."""
+    with h5py.File(tmp_path / 'log.h5', 'w') as log:
+        log['time_us'] = np.round(1e6 * T)
+        for name, x in (('actual_position', Q), ('set_position', LATE)):
+            log[name] = x * [np.degrees(1.0), 1e3]
+            log[name].attrs['unit'] = 'deg mm'
+        log['joint_force'] = TAU
+        log['joint_force'].attrs['unit'] = 'Nm kN'
+    hints = (JointHint('shoulder'), replace(HINTS[1], slides=True))
+    _, states, commands = _read(tmp_path / 'log.h5', tmp_path, hints)
+    np.testing.assert_allclose([s.position for s in states], Q, atol=1e-12)
+    np.testing.assert_allclose([s.effort for s in states], TAU * [1.0, 1e3], atol=1e-12)
+    np.testing.assert_allclose([c.effort for c in commands], LATE, atol=1e-12)
+
+
+def test_targets_have_their_own_unit(tmp_path):
+    """Set angles in degrees beside measured ones in radians."""
+    path = _npz(tmp_path, t=T, q=Q, q_des_deg=np.degrees(LATE), tau=TAU)
+    _, _, commands = _read(path, tmp_path)
+    np.testing.assert_allclose([c.effort for c in commands], LATE, atol=1e-12)
+
+
+def test_a_slide_that_fits_its_range_only_in_millimetres_is_in_these(tmp_path):
+    """It is said, as degrees of a joint are that goes beyond one turn."""
+    path = _npz(tmp_path, t=T, q=Q * [1.0, 1e3], tau=TAU)
+    hints = (HINTS[0], replace(HINTS[1], slides=True))
+    summary, states, _ = _read(path, tmp_path, hints)
+    np.testing.assert_allclose([s.position for s in states], Q, atol=1e-12)
+    assert 'elbow is assumed to be in mm' in ' '.join(summary.unsure)
+
+
 def test_a_trace_with_german_words_is_read(tmp_path):
     """Semicolons, decimal commas; joints by their numbers, currents without their factor."""
     header = (
