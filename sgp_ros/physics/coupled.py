@@ -20,15 +20,29 @@ def _scale(signal: np.ndarray, place: Place) -> float:
     return float(own / max(other, 1e-12))
 
 
-def _ratio_bounds(signal: np.ndarray, place: Place) -> tuple[np.ndarray, np.ndarray]:
-    """Return bounds of `signal_joint + ratio signal_source`: beyond, it is the source alone."""
-    most = np.array([_LOPSIDED * max(_scale(signal, place), 1.0)])
+def _sizes(motion: SeenMotion, signal: np.ndarray, place: Place) -> tuple[float, float]:
+    """Return ratios with which both motions count in their sum, and both efforts feel it.
+
+    A screw that a small motor turns has its friction in either, though its own share of the speed
+    is next to nothing. Without efforts of both, the second is the first.
+    """
+    moves, efforts = _scale(signal, place), motion.effort[:, [place.joint, place.source]]
+    own, other = efforts.std(axis=0)
+    return moves, float(other / own) if min(own, other) > 0.0 else moves
+
+
+def _ratio_bounds(
+    motion: SeenMotion, signal: np.ndarray, place: Place
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return bounds of `signal_joint + ratio signal_source`: beyond, the joint feels nothing."""
+    most = np.array([_LOPSIDED * max(*_sizes(motion, signal, place), 1.0)])
     return -most, most
 
 
-def _ratios(signal: np.ndarray, place: Place) -> np.ndarray:
-    """Return ratios of gears and those with which both motions count, (starts, 1)."""
-    sizes = [1.0, *(_scale(signal, place) * np.array([0.5, 1.0, 2.0]))]
+def _ratios(motion: SeenMotion, signal: np.ndarray, place: Place) -> np.ndarray:
+    """Return ratios of gears and those with which both motions or efforts count, (starts, 1)."""
+    both = dict.fromkeys(_sizes(motion, signal, place))
+    sizes = [1.0, *(size * part for size in both for part in (0.5, 1.0, 2.0))]
     return np.array([sign * size for size in sizes for sign in (1.0, -1.0)])[:, None]
 
 
@@ -73,12 +87,12 @@ class JointCoupling(Effect):
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
         if place.kind == 'torque':
             return np.zeros((1, 0))
-        return _ratios(motion.position, place)
+        return _ratios(motion, motion.position, place)
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
         if place.kind == 'torque':
             return np.zeros(0), np.zeros(0)
-        return _ratio_bounds(motion.position, place)
+        return _ratio_bounds(motion, motion.position, place)
 
     def draw(self, scene: Scene) -> Drawn:
         """Return a coupling of two joints, of motors where it is one of torques."""
@@ -167,10 +181,10 @@ class CoupledFriction(Effect):
         return [Place(j, source=i) for j, i in pairs if i in moving]
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
-        return _ratios(motion.velocity, place)
+        return _ratios(motion, motion.velocity, place)
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        return _ratio_bounds(motion.velocity, place)
+        return _ratio_bounds(motion, motion.velocity, place)
 
     def draw(self, scene: Scene) -> Drawn:
         """Return it on a motor and the joint that carries it."""

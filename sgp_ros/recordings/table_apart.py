@@ -1,4 +1,4 @@
-"""Columns of MAT, HDF5, Parquet and JSON files, read in a process of its own.
+"""Columns of MAT, HDF5, Parquet, JSON and YAML files, read in a process of its own.
 
 It sends arrays back, no objects.
 """
@@ -17,13 +17,13 @@ from scipy.io.matlab import MatReadError
 
 from sgp_ros.apart import read_apart
 from sgp_ros.errors import RecordingError
-from sgp_ros.recordings.table_formats import load_hdf5, load_json, load_parquet
+from sgp_ros.recordings.table_formats import load_hdf5, load_json, load_messages, load_parquet
 from sgp_ros.strangers import require_within
 
 Columns = dict[str, np.ndarray]
 
 _NAMES = 'names'
-_KINDS = 'a MATLAB .mat, an HDF5, a Parquet or a JSON file'
+_KINDS = 'a MATLAB .mat, an HDF5, a Parquet, a JSON or a YAML file'
 _COPIES = 3
 """Of what is sent, while it is: packed, received and as arrays."""
 
@@ -102,5 +102,6 @@ READERS: dict[str, Callable[[Path], Columns]] = {
     **dict.fromkeys(('.h5', '.hdf5', '.hdf'), load_hdf5),
     **dict.fromkeys(('.parquet', '.pq'), load_parquet),
     **dict.fromkeys(('.json', '.jsonl', '.ndjson'), load_json),
+    **dict.fromkeys(('.yaml', '.yml'), load_messages),
 }
 """Ending to what reads such a file."""

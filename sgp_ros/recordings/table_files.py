@@ -25,6 +25,7 @@ _SECONDS = {
 """Ends of the names of a ROS stamp's two parts."""
 ENDINGS = (
     '.csv', '.tsv', '.txt', '.dat', '.npz', '.mat', '.h5', '.hdf5', '.parquet', '.json', '.jsonl',
+    '.yaml',
 )  # fmt: skip
 """Of files that are read."""
 

@@ -1,8 +1,9 @@
-"""Columns of Parquet, HDF5 and JSON files by name, and the formats that are refused."""
+"""Columns of Parquet, HDF5, JSON and YAML files by name, and the formats that are refused."""
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from sgp_ros.errors import RecordingError
+from sgp_ros.markup import YAMLError, load_yaml
 from sgp_ros.optional import optional_package
 from sgp_ros.recordings.column_names import meaning
 from sgp_ros.strangers import read_text, require_within
@@ -41,6 +43,8 @@ def refuse(path: Path) -> None:
 def load_parquet(path: Path) -> Columns:
     """Return the columns of a Parquet file; lists of one length are matrices.
 
+    Times and durations become numbers, `timestamp [ns]`.
+
     Raises:
         RecordingError: a damaged file.
         ConfigError: pyarrow is missing.
@@ -53,8 +57,12 @@ def load_parquet(path: Path) -> Columns:
             f'{path.name} cannot be read ({" ".join(str(error).split())})', 'a Parquet file'
         ) from error
     columns: Columns = {}
-    for name in table.column_names:
-        _enter(columns, name, table.column(name).to_pylist())
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        kind = re.match(r'(timestamp|duration)\[(\w+)', str(column.type))
+        if kind is None:
+            _enter(columns, name, column.to_pylist())
+        else:
+            _enter(columns, f'{name} [{kind[2]}]', column.cast('int64').to_pylist())
     return columns
 
 
@@ -141,12 +149,7 @@ def load_json(path: Path) -> Columns:
         ) from None
     columns: Columns = {}
     if isinstance(content, list) and content and all(isinstance(x, dict) for x in content):
-        records = [dict(_flattened('', x)) for x in content]
-        names = dict.fromkeys(name for record in records for name in record)
-        megabytes = 8e-6 * len(records) * len(names)
-        require_within(megabytes, 'UNPACKED_MB', f'size of the table {path} in MB')
-        for name in names:
-            _enter(columns, name, [record.get(name) for record in records])
+        columns = _of_records(path, [dict(_flattened('', x)) for x in content])
     elif isinstance(content, dict):
         for name, value in _flattened('', content):
             if isinstance(value, list):
@@ -155,6 +158,47 @@ def load_json(path: Path) -> Columns:
         raise RecordingError(
             f'{path.name} contains no table', 'an object of lists, or a list of records'
         )
+    return columns
+
+
+def load_messages(path: Path) -> Columns:
+    """Return the columns of messages between lines `---`, as `ros2 topic echo` prints them.
+
+    A message that is cut off, or another text between them, is a row without numbers in its lists.
+
+    Raises:
+        RecordingError: not even half of them are messages of one kind.
+    """
+    texts = re.split(r'(?m)^---\s*$', read_text(path, 'TABLE_MB'))
+    records = [_message(text) for text in texts if text.strip()]
+    shapes = [{n: len(x) if isinstance(x, list) else -1 for n, x in r.items()} for r in records]
+    usual = max(shapes, key=len, default={})
+    whole = [r for r, shape in zip(records, shapes, strict=True) if shape == usual]
+    if not usual or 2 * len(whole) < len(records):
+        raise RecordingError(
+            f'{path.name} is no stream of messages',
+            'what `ros2 topic echo` of a sensor_msgs/JointState prints',
+        )
+    empty = {n: None if isinstance(x, list) else x for n, x in whole[0].items()}
+    found = (r if shape == usual else empty for r, shape in zip(records, shapes, strict=True))
+    return _of_records(path, list(found))
+
+
+def _message(text: str) -> dict[str, Any]:
+    try:
+        content = load_yaml(text)
+    except YAMLError:
+        return {}
+    return dict(_flattened('', content)) if isinstance(content, dict) else {}
+
+
+def _of_records(path: Path, records: list[dict[str, Any]]) -> Columns:
+    columns: Columns = {}
+    names = dict.fromkeys(name for record in records for name in record)
+    megabytes = 8e-6 * len(records) * len(names)
+    require_within(megabytes, 'UNPACKED_MB', f'size of the table {path} in MB')
+    for name in names:
+        _enter(columns, name, [record.get(name) for record in records])
     return columns
 
 

@@ -263,6 +263,61 @@ def test_lerobot_columns_have_the_names_of_its_info(tmp_path):
     assert summary.quality['gaps'] == 1
 
 
+def test_times_of_parquet_are_those_of_the_states(tmp_path):
+    """As a data frame with times writes them: nanoseconds since 1970."""
+    stamps = 1_700_000_000_000_000_000 + np.round(1e9 * T).astype(np.int64)
+    table = pa.table(
+        {'timestamp': stamps.astype('datetime64[ns]'), 'q': list(Q), 'tau': list(TAU)}
+    )
+    pq.write_table(table, tmp_path / 'log.parquet')
+    _, states, _ = _read(tmp_path / 'log.parquet', tmp_path)
+    assert [s.stamp_ns for s in states] == stamps.tolist()
+
+
+MESSAGE = """header:
+  stamp:
+    sec: {0}
+    nanosec: {1}
+  frame_id: ''
+name:
+- elbow
+- shoulder
+position:
+- {2}
+- {3}
+velocity: []
+effort:
+- {4}
+- {5}
+"""
+
+
+def _echoed(q=Q):
+    """Return what `ros2 topic echo` prints."""
+    return '---\n'.join(
+        MESSAGE.format(7, round(1e9 * t), *map(float, (*x[::-1], *u[::-1])))
+        for t, x, u in zip(T, q, TAU, strict=True)
+    )
+
+
+def test_messages_that_were_printed_are_a_table(tmp_path):
+    """Another text between them, or the end that was cut off, is a row that is ignored."""
+    (tmp_path / 'log.yaml').write_text(
+        'A message was lost!!!\n\tcount: 1\n---\n' + _echoed()[:-60]
+    )
+    summary, states, _ = _read(tmp_path / 'log.yaml', tmp_path)
+    np.testing.assert_allclose([s.position[::-1] for s in states], Q[:-1])
+    np.testing.assert_allclose([s.effort[::-1] for s in states], TAU[:-1])
+    assert states[1].stamp_ns - states[0].stamp_ns == 5_000_000
+    assert '2 of 201 rows ignored' in ' '.join(summary.remarks)
+
+
+def test_other_yaml_is_no_table(tmp_path):
+    (tmp_path / 'robot.yaml').write_text('schema: 1\nurdf: robot.urdf\n')
+    with pytest.raises(RecordingError, match='no column of time'):
+        _read(tmp_path / 'robot.yaml', tmp_path)
+
+
 @pytest.mark.parametrize('ending', ['h5', 'mat', 'json', 'jsonl', 'parquet'])
 def test_every_format_gives_the_same(tmp_path, ending):
     arrays = {'t': T, 'q': Q, 'dq': DQ, 'tau': TAU}
