@@ -16,6 +16,7 @@ from test.diagnosis.worlds import CHAINS, Link, events_of, simulate
 SECONDS = 6.0
 LOAD, ARM = 0.5, 0.35
 """Point mass [kg] and its distance from the joint [m]."""
+GAIN = 0.86
 
 
 def _loaded(link):
@@ -30,10 +31,16 @@ def _friction(level):
     return {'dry': lambda t, q, s: level}
 
 
+def _weak(commands, _now):
+    """Return what a motor of a lower torque constant gives."""
+    return [GAIN * u for u in commands[-1]]
+
+
 WORLDS = {
     'alike': ((CHAINS[1], _friction(0.4)), (CHAINS[1], _friction(0.4))),
     'payload': ((CHAINS[1], _friction(0.4)), ((_loaded(CHAINS[1][0]),), _friction(0.4))),
     'friction': ((CHAINS[1], _friction(0.6)), (CHAINS[1], _friction(0.3))),
+    'motor': ((CHAINS[1], _friction(0.4)), (CHAINS[1], _friction(0.4) | {'motor': _weak})),
 }
 """Chain and options of the first and the second recording."""
 
@@ -98,6 +105,17 @@ def test_friction_that_is_lower_in_the_second_differs(found):
     assert (
         one.proofs['train'].nmse_after['joint0'] < 0.02 * one.proofs['train'].nmse_before['joint0']
     )
+
+
+def test_a_torque_constant_differs_once_a_motor_was_replaced(found):
+    """The friction, which the second recording shows larger, is common."""
+    one = found('motor')
+    assert [(f.joint, f.effect) for f in one.findings] == [('joint0', 'coulomb_friction')]
+    assert one.findings[0].parameters['level'].value == pytest.approx(0.4, rel=0.03)
+    (gain,) = one.differences
+    assert (gain.recording, gain.joint, gain.effect) == ('warm', 'joint0', 'torque_gain')
+    assert gain.parameters['gain'].value == pytest.approx(GAIN, rel=0.02)
+    assert gain.probability > 0.5
 
 
 def test_recordings_of_different_rates_lie_on_the_grid_of_the_slower(robots):

@@ -92,7 +92,9 @@ class InRecording(Effect):
 def may_differ(law: Effect) -> bool:
     """Return whether a law is looked for in single recordings.
 
-    Loads, mounts and friction change from one to the next; motors and couplings hardly do.
+    Loads, mounts and friction change from one to the next, and a torque constant with its motor or
+    amplifier; other laws of motors and couplings hardly do.
     """
-    of_motor = law.has_source or law.is_of_command or bool(law.effort_columns(''))
+    is_gain = law.effort_columns('') and len(law.quantities) == 1
+    of_motor = law.has_source or law.is_of_command or (law.effort_columns('') and not is_gain)
     return law.is_force and not of_motor and (not law.shape_names() or law.is_on_tree)

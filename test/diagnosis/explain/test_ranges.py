@@ -107,7 +107,7 @@ CASES = [
     *_levels('payload', 'z', (0.1, -0.5), x=0.05, y=0.03, mass=1.0),
     *_levels('gravity_tilt', 'roll', (0.02, 0.15, -0.3), pitch=0.1),
     *_levels('joint_coupling', 'ratio', (-6.0, 0.2, 3.0), stiffness=0.8, kind='spring'),
-    *_levels('coupled_friction', 'ratio', (-6.0, -1.0, 0.2, 3.0), coulomb=0.3, viscous=0.1),
+    *_levels('coupled_friction', 'ratio', (-6.0, -1.0, 0.2, 3.0, 25.0), coulomb=0.3, viscous=0.1),
     *_levels('end_stop', 'position', (-0.9, 0.0, 1.2), stiffness=20.0, damping=0.2, side='upper'),
     *_levels('limit_friction', 'onset', (-1.0, 0.3, 1.2), amplitude=1.0, side='upper'),
     *_levels('position_friction', 'lo', (-1.1, 0.0, 0.3), hi=0.4, amplitude=0.3, kind='coulomb'),
