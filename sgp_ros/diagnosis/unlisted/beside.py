@@ -144,6 +144,24 @@ def is_slight(listed: Model, smooth: Model, joint: int) -> bool:
     return bool((apart**2).mean() < COUNTED_SHARE * smooth.frame.equations.power[joint])
 
 
+def is_creep(columns: Columns, scale: Scale, listed: Model, smooth: Model, joint: int) -> bool:
+    """Return whether a smooth force of the joint's own speed in the past refines its friction.
+
+    Friction that creeps before it slides and grows as it rests follows an earlier speed a little
+    better than plain laws do. Where these are adequate, that is no law of its own.
+    """
+    law = law_of(smooth, joint)
+    variable = law.effect.variable if law and isinstance(law.effect, SmoothForce) else None
+    if variable is None or not variable.memory or (variable.kind, variable.index) != ('dq', joint):
+        return False
+    own = own_effects(listed, joint)
+    usual = tuple(s for s in listed.effects if s not in own or s.effect.is_usual)
+    if len(usual) < len(listed.effects):
+        listed = fit(columns, usual, listed.sigma, is_free=listed.is_free, w=listed.w,
+                     still=len(usual))  # fmt: skip
+    return bool(scale.excess(listed)[joint] < 1.0)
+
+
 def is_bent(listed: Model, smooth: Model, joint: int) -> bool:
     """Return whether a listed law was distorted to imitate a smooth force.
 

@@ -26,6 +26,7 @@ from sgp_ros.diagnosis.unlisted.beside import (
     beside,
     earned,
     is_bent,
+    is_creep,
     is_slight,
     law_of,
     own_effects,
@@ -112,6 +113,8 @@ def search(
         return None
     is_near = smooth[0].mean_square[joint] > NEARLY * listed.mean_square[joint]
     if is_near and not is_bent(listed, smooth[0], joint):
+        return None
+    if is_creep(look.columns, scale, listed, smooth[0], joint):
         return None
     slight = is_slight(listed, smooth[0], joint)
     if slight and smooth[0].mean_square[joint] > NEARLY**2 * listed.mean_square[joint]:

@@ -7,7 +7,14 @@ from dataclasses import replace
 import pytest
 
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE
-from sgp_ros.diagnosis.unlisted.beside import is_bent, is_slight
+from sgp_ros.diagnosis.decide.scale import Scale
+from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.comparison import compare_models
+from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.diagnosis.unlisted.beside import is_bent, is_creep, is_slight
+from sgp_ros.diagnosis.unlisted.tried import smooth_forces
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 from test.diagnosis.fitted_models import fitted
 
 
@@ -30,3 +37,24 @@ def test_only_laws_whose_place_a_smooth_force_takes_are_in_question(damped):
     assert not is_slight(listed, replace(without, residual=smooth.residual), 0)
     assert not is_slight(_with_rest(smooth, 2.0 * COUNTED_SHARE), smooth, 0)
     assert not is_bent(listed, smooth, 0)
+
+
+def test_adequate_friction_keeps_its_name_against_an_earlier_speed(damped):
+    """Not against a force of the speed now, of a position, nor where it is not adequate."""
+    scale, columns = Scale.of(damped, compare_models(damped, lambda _: None)), Columns(damped)
+    listed = fitted(damped, 'viscous_friction')
+    unused = fitted(damped, 'viscous_friction', 'cogging')
+    forces = {e.variable.text: e for e in smooth_forces(damped.motion, 0) if not e.gate}
+
+    def smooth(text):
+        candidate = EffectAt(
+            forces[text], Place(0), forces[text].starts(damped.motion, Place(0))[0]
+        )
+        return fit(columns, (candidate,), listed.sigma, is_free=False)
+
+    late = smooth('lag(dq[joint0], T)')
+    assert is_creep(columns, scale, listed, late, 0)
+    assert is_creep(columns, scale, unused, late, 0)
+    assert not is_creep(columns, scale, fitted(damped, 'cogging'), late, 0)
+    assert not is_creep(columns, scale, listed, smooth('dq[joint0]'), 0)
+    assert not is_creep(columns, scale, listed, smooth('lag(q[joint0], T)'), 0)
