@@ -97,7 +97,7 @@ def guess_map(
     ):
         guess.unsure.append(
             f'No torque, current or command was recognised among {", ".join(sorted(columns))}: '
-            'enter it in the map, as nothing can be diagnosed without one.'
+            'enter it in the map, or list joints without a motor as `passive` in a robot YAML.'
         )
     return guess
 
