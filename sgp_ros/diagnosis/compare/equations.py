@@ -21,13 +21,13 @@ from functools import cached_property
 import numpy as np
 
 from sgp_ros.diagnosis.compare.bodies import Factor, body_directions
+from sgp_ros.diagnosis.compare.effort_noise import measured_noise, noise_beside_laws
 from sgp_ros.diagnosis.compare.grid import effort_change
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.rest import resting
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
     RawTrajectory,
-    measured_noise,
     observe,
     parallel_filter,
     smoothing_error,
@@ -288,7 +288,7 @@ def make_equations(
     power = np.where(motion.moves & (power > 0.0), power, 1.0)
     inertia = motion.mass_diagonal.mean(axis=0)
     variance = inertia**2 * (2 * np.pi) ** 4 * raw.noise_density * bandwidth.cutoff**5 / 5.0
-    noise = measured_noise(raw, motion, bandwidth)
+    noise = noise_beside_laws(measured_noise(raw, motion, bandwidth), d, bases, motion, low)
     loop = Loop.of(motion, bandwidth.cutoff)
     carried = loop.volume(carried_inertia(motion, low, inertial, d))
     error = np.exp(2.0 * carried) * smoothing_error(raw, motion, low, bandwidth)

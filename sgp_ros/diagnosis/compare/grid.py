@@ -16,13 +16,6 @@ INSTANT_SPREAD = 12**-0.5
 """Prior standard deviation of the instant of a measured effort, in periods: uniform over one."""
 _POSITIONS = 0.3, 0.48
 """Frequencies at which no robot moves, in parts of the rate."""
-_EFFORTS = 0.225, 0.32
-"""Frequencies below which noise of efforts is looked for at the latest, and at the most: a
-recording that was thinned has less above."""
-_MEDIAN = 3.0
-"""Relative variance of the median of a spectrum, times its lines, with that of the window."""
-_ABOVE = 1.5
-"""Cut-offs from which it is looked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,34 +65,10 @@ def noise_density(position: np.ndarray, segments: Sequence[slice], step: float) 
         segments: stretches of rows without a pause; the longest is looked at.
         step: of the grid [s].
     """
-    return _levels(position, segments, step, np.array(_POSITIONS))[0]
+    return spectral_levels(position, segments, step, np.array(_POSITIONS))[0]
 
 
-def effort_noise(
-    effort: np.ndarray, segments: Sequence[slice], step: float, cutoff: float
-) -> np.ndarray:
-    """Return the mean square that noise of measured efforts may have below a cut-off, (k,).
-
-    It is taken for white, at the lowest level that the spectra have in a quarter of the band
-    above: motion, ripple and the noise of a current loop there are not noise of the measurement.
-    Two standard deviations of that level, and of the chance of so many rows, are added.
-
-    Args:
-        effort: (n, k) [N m or N].
-        segments: stretches of rows without a pause; the longest is looked at.
-        step: of the grid [s].
-        cutoff: [Hz].
-    """
-    latest, highest = _EFFORTS
-    edges = np.linspace(min(_ABOVE * cutoff * step, latest), highest, 5)
-    rows = 2.0 * cutoff * step * sum(s.stop - s.start for s in segments)
-    lines = (edges[1] - edges[0]) * max(s.stop - s.start for s in segments)
-    chance = math.sqrt(2.0 / rows + _MEDIAN / lines)
-    level = _levels(effort, segments, step, edges).min(axis=0)
-    return np.asarray(cutoff * level * (1.0 + 2.0 * chance))
-
-
-def _levels(
+def spectral_levels(
     x: np.ndarray, segments: Sequence[slice], step: float, edges: np.ndarray
 ) -> np.ndarray:
     """Return the one-sided spectral densities of x (n, k) between edges (b + 1,), (b, k).

@@ -17,7 +17,7 @@ import numpy as np
 from sgp_ros.batch.acceptance import USUAL, Accepted, HeldCommands, accept
 from sgp_ros.batch.command_kinds import are_efforts, are_positions, with_recorded_gains
 from sgp_ros.batch.zero_phase import ZeroPhase
-from sgp_ros.diagnosis.compare.grid import Stretch, effort_noise, noise_density
+from sgp_ros.diagnosis.compare.grid import Stretch, noise_density
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import EFFORT, POSITION, Event
@@ -265,13 +265,6 @@ def _servo(targets: RecordedCommands, gains: Gains, motion: ObservedMotion) -> S
         targets, motion.step, motion.starts, gains.kp, gains.kd, motion.position,
         motion.velocity, held, gains.is_recorded, ripple,
     )  # fmt: skip
-
-
-def measured_noise(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) -> np.ndarray:
-    """Return the mean square of the noise that measured efforts have in the band, (k,)."""
-    if motion.drive is not None or motion.is_static:
-        return np.zeros(motion.tree.size)
-    return effort_noise(motion.effort, raw.segments, raw.step, bandwidth.cutoff)
 
 
 def smoothing_error(

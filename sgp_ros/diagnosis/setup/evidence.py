@@ -25,9 +25,10 @@ from dataclasses import replace
 import numpy as np
 
 from sgp_ros.diagnosis.compare.bodies import body_directions, load_precision
+from sgp_ros.diagnosis.compare.effort_noise import measured_noise
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.rest import resting
-from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, measured_noise, observe
+from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, observe
 from sgp_ros.diagnosis.compare.volume import Loop, log_inertia, noisy_volume, part_of_noise
 from sgp_ros.diagnosis.criteria import FORCE_ACCURACY, INDEPENDENT_ROWS, SHAPE_ERROR
 from sgp_ros.diagnosis.setup.correction import Acting, Correction, delayed

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.compare.grid import effort_noise
+from sgp_ros.diagnosis.compare.effort_noise import effort_noise
 from sgp_ros.diagnosis.compare.trajectory import (
     HIGHEST_CUTOFF_HZ,
     LOWEST_CUTOFF_HZ,
