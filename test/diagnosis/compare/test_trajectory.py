@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.compare.effort_noise import effort_noise
+from sgp_ros.diagnosis.compare.effort_noise import effort_noise, noise_beside_laws
+from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.trajectory import (
     HIGHEST_CUTOFF_HZ,
     LOWEST_CUTOFF_HZ,
@@ -202,3 +204,25 @@ def test_the_noise_of_efforts_is_told_from_motion_and_ripple(cutoff):
     assert found.max() < 1.6
     (none,) = effort_noise(seen[:, None], [slice(0, n)], step, cutoff)
     assert none < 0.01 * in_band
+
+
+@pytest.mark.parametrize('level', [0.0, 0.5])
+def test_friction_of_a_slow_motion_is_no_noise(level):
+    """At a low rate its steps fill the spectrum; without them the bound is as before."""
+    step, n, sigma, cutoff = 0.02, 4000, 0.02, 3.0
+    t = step * np.arange(n)
+    v = np.sin(2.0 * np.pi * 0.25 * t) + 0.4 * np.sin(2.0 * np.pi * 0.61 * t)
+    noise = sigma * np.random.default_rng(0).standard_normal((n, 20))
+    effort = level * np.sign(v)[:, None] + noise
+    low = ParallelFilter(1.0 / step, cutoff, (slice(0, n),))
+    d = low(effort)
+    motion = SimpleNamespace(
+        velocity=np.repeat(v[:, None], 20, axis=1), bandwidth=cutoff, step=step
+    )
+    spectral = effort_noise(effort, [slice(0, n)], step, cutoff)
+    in_band = 2.0 * sigma**2 * step * cutoff
+    bases = [np.zeros((len(d), 0))] * 20
+    found = noise_beside_laws(spectral, d, bases, motion, low) / in_band
+    assert (np.median(spectral) > 5.0 * in_band) == (level > 0.0)
+    assert np.quantile(found, 0.1) > 0.9
+    assert found.max() < 1.6
