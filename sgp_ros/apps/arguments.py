@@ -212,10 +212,8 @@ def _add_import(add: AddCommand) -> None:
         'Turn a table (CSV, NPZ, MAT, Parquet, HDF5, JSON, echoed YAML) into an MCAP recording.',
         'sgp import log.npz --robot arm.xml --out out/import',
     )  # fmt: skip
-    parser.add_argument(
-        'table', metavar='FILE',
-        help='.csv, .npz, .mat, .parquet, .h5, .json, .jsonl, or .yaml of ros2 topic echo',
-    )  # fmt: skip
+    parser.add_argument('table', metavar='FILE', help='.csv, .npz, .mat, .parquet, .h5, .json, '
+                        '.jsonl, or .yaml of ros2 topic echo')  # fmt: skip
     parser.add_argument('--map', dest='map_path', metavar='YAML',
                         help='columns and units (default: guessed and written)')  # fmt: skip
     parser.add_argument('--robot', metavar='ROBOT', help='robot that the columns belong to')
