@@ -70,6 +70,8 @@ def noise_beside_laws(
         motion: whose friction may be Coulomb and viscous, with a constant load.
         low: filter of the rows.
     """
+    if not noise.any():  # as of commands
+        return noise
     v, found = motion.velocity, noise.copy()
     laws = low(np.sign(v)), low(v)
     count = 2.0 * motion.bandwidth * motion.step * len(v)  # independent rows
