@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.compare.effort_noise import effort_noise, noise_beside_laws
+from sgp_ros.diagnosis.compare.effort_noise import effort_noise, measured_noise, noise_beside_laws
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.trajectory import (
     HIGHEST_CUTOFF_HZ,
     LOWEST_CUTOFF_HZ,
     SHORTEST_ROWS,
+    Bandwidth,
     choose_bandwidth,
     collect,
     observe,
@@ -21,7 +22,16 @@ from sgp_ros.diagnosis.compare.trajectory import (
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import JointSample, frozen_array
 from sgp_ros.errors import RecordingError
-from test.diagnosis.worlds import CHAINS, PERIOD, START_NS, World, events_of, robot_of, shown
+from test.diagnosis.worlds import (
+    CHAINS,
+    PERIOD,
+    START_NS,
+    World,
+    events_of,
+    robot_of,
+    shown,
+    simulate,
+)
 
 
 def _states(events):
@@ -226,3 +236,17 @@ def test_friction_of_a_slow_motion_is_no_noise(level):
     assert (np.median(spectral) > 5.0 * in_band) == (level > 0.0)
     assert np.quantile(found, 0.1) > 0.9
     assert found.max() < 1.6
+
+
+def test_equations_hold_no_more_noise_than_their_bodies_leave(equations_for):
+    """Of efforts measured at a low rate, whose control fills the spectrum above the cut-off."""
+    world = simulate(CHAINS[1], 3, 24.0)
+    slow = World(*(getattr(world, f.name)[::4] for f in fields(World)))
+    sigma = 0.01 * slow.command.std()
+    noise = sigma * np.random.default_rng(0).standard_normal(slow.command.shape)
+    raw, equations = equations_for(slow, effort=slow.command + noise, commands=False)
+    cutoff = equations.motion.bandwidth
+    spectral = measured_noise(raw, equations.motion, Bandwidth(cutoff, np.inf))
+    in_band = 2.0 * sigma**2 * raw.step * cutoff
+    assert spectral > 1.5 * in_band
+    assert equations.effort_noise == pytest.approx(in_band, rel=0.2)
