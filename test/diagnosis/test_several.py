@@ -64,11 +64,23 @@ def found(robots):
     return make
 
 
+def _require_common_friction(one, level, tolerance):
+    """Require Coulomb friction of a level to be all that is common."""
+    assert [(f.joint, f.effect) for f in one.findings] == [('joint0', 'coulomb_friction')]
+    assert one.findings[0].parameters['level'].value == pytest.approx(level, rel=tolerance)
+
+
+def _difference(one, effect):
+    """Return what differs, an effect in the second recording."""
+    (found,) = one.differences
+    assert (found.recording, found.joint, found.effect) == ('warm', 'joint0', effect)
+    return found
+
+
 def test_two_recordings_of_one_machine_give_one_answer(found):
     """The friction that both have, and nothing that differs."""
     one = found('alike')
-    assert [(f.joint, f.effect) for f in one.findings] == [('joint0', 'coulomb_friction')]
-    assert one.findings[0].parameters['level'].value == pytest.approx(0.4, rel=0.02)
+    _require_common_friction(one, 0.4, 0.02)
     assert one.recordings == ('cold', 'warm')
     assert one.differences == ()
     assert differences_text(one) == ['nothing, between cold and warm']
@@ -77,10 +89,8 @@ def test_two_recordings_of_one_machine_give_one_answer(found):
 
 def test_a_load_taken_up_differs_and_what_is_common_stays(found):
     one = found('payload')
-    assert [(f.joint, f.effect) for f in one.findings] == [('joint0', 'coulomb_friction')]
-    assert one.findings[0].parameters['level'].value == pytest.approx(0.4, rel=0.05)
-    (load,) = one.differences
-    assert (load.recording, load.joint, load.effect) == ('warm', 'joint0', 'payload')
+    _require_common_friction(one, 0.4, 0.05)
+    load = _difference(one, 'payload')
     # one joint tells the moment and the inertia of a mass, not where it is
     mass, z = (load.parameters[name].value for name in ('mass', 'z'))
     assert mass * z == pytest.approx(-LOAD * ARM, rel=0.05)
@@ -92,10 +102,8 @@ def test_a_load_taken_up_differs_and_what_is_common_stays(found):
 def test_friction_that_is_lower_in_the_second_differs(found):
     """The first recording stands for what is common."""
     one = found('friction')
-    assert [(f.joint, f.effect) for f in one.findings] == [('joint0', 'coulomb_friction')]
-    assert one.findings[0].parameters['level'].value == pytest.approx(0.6, rel=0.03)
-    (less,) = one.differences
-    assert (less.recording, less.joint, less.effect) == ('warm', 'joint0', 'coulomb_friction')
+    _require_common_friction(one, 0.6, 0.03)
+    less = _difference(one, 'coulomb_friction')
     assert less.parameters['level'].value == pytest.approx(0.3, rel=0.03)
     assert less.difference['level'].value == pytest.approx(-0.3, rel=0.03)
     assert less.difference['level'].std > 0.0
@@ -110,10 +118,8 @@ def test_friction_that_is_lower_in_the_second_differs(found):
 def test_a_torque_constant_differs_once_a_motor_was_replaced(found):
     """The friction, which the second recording shows larger, is common."""
     one = found('motor')
-    assert [(f.joint, f.effect) for f in one.findings] == [('joint0', 'coulomb_friction')]
-    assert one.findings[0].parameters['level'].value == pytest.approx(0.4, rel=0.03)
-    (gain,) = one.differences
-    assert (gain.recording, gain.joint, gain.effect) == ('warm', 'joint0', 'torque_gain')
+    _require_common_friction(one, 0.4, 0.03)
+    gain = _difference(one, 'torque_gain')
     assert gain.parameters['gain'].value == pytest.approx(GAIN, rel=0.02)
     assert gain.probability > 0.5
 
