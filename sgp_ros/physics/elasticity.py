@@ -10,13 +10,16 @@ motion, see `smooth`. Source: Spong 1987.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from sgp_ros.physics.drawing import Drawn, Scene, UnsuitableError
 from sgp_ros.physics.effect import Effect, Numbers
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.hidden_states import behind, derivatives, on_spring, resonator, smooth
-from sgp_ros.physics.motion import SeenMotion
+from sgp_ros.physics.motion import SeenMotion, Structure
 from sgp_ros.physics.parts import (
     MOTOR,
     Place,
@@ -38,6 +41,10 @@ _SOFT = 0.9
 """Part of that softness from which on a fit has run into its bound."""
 _BEYOND = 0.1
 """By which the share of the motor may leave what makes sense: neither end is a bound."""
+_MOST_BESIDE = 20.0
+"""Largest motor that the nominal robot lacks, relative to the link."""
+BARE = 'motor beside'
+"""Encoder on a motor whose inertia the nominal robot lacks: an `armature` of the joint has it."""
 _SETTLING = 0.2
 """Longest ratio of damping to stiffness, relative to the period of the softest spring."""
 
@@ -46,24 +53,34 @@ def _some(motion: SeenMotion) -> slice:
     return slice(None, None, max(1, len(motion.time) // _POSES))
 
 
+def is_on_motor(place: Place) -> bool:
+    """Return whether the encoder is on the motor."""
+    return place.kind != 'link'
+
+
+def _inside(place: Place, shape: np.ndarray) -> float:
+    """Return the part of a motor's inertia that the nominal robot has."""
+    return 0.0 if place.kind == BARE else float(shape[0])
+
+
 def twist_of(
     motion: SeenMotion, place: Place, shape: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return by how much the motor leads the link per 1/K, and two derivatives, (n,) each."""
-    j, (J, softness, settling) = place.joint, shape[:3]
-    share = float(shape[3]) if place.kind == 'motor' else 1.0
-    given = share * motion.nominal_effort[:, j] + (1.0 - share) * motion.effort[:, j]
-    torque = smooth(motion, given - J * motion.acceleration[:, j])
+    j, (J, softness, settling), inside = place.joint, shape[:3], _inside(place, shape)
+    share = float(shape[3]) if is_on_motor(place) else 1.0
+    a, effort = motion.acceleration[:, j], motion.effort[:, j] - J * motion.acceleration[:, j]
+    given = share * (motion.nominal_effort[:, j] - inside * a) + (1.0 - share) * effort
+    torque = smooth(motion, given)
     if place.kind == 'link' or share * softness <= 0.0:
         parts = [behind(x, settling, motion.step) for x in np.split(torque, motion.starts[1:])]
     else:
         by_q, by_v, by_a = (x[:, j] for x in motion.effort_slopes(j))
         scale = share * softness
-        terms = (scale * np.maximum(by_a - J, _LEAST_OF_LINK * np.abs(by_a) + 1e-12),
+        terms = (scale * np.maximum(by_a - inside, _LEAST_OF_LINK * np.abs(by_a) + 1e-12),
                  np.maximum(settling + scale * by_v, 0.0),
                  np.maximum(1.0 + scale * by_q, _LEAST_STIFFNESS))  # fmt: skip
-        v, a = motion.velocity[:, j], motion.acceleration[:, j]
-        all_ = np.column_stack([torque, *terms, motion.effort[:, j] - J * a, v, a])
+        all_ = np.column_stack([torque, *terms, effort, motion.velocity[:, j], a])
         parts = [
             on_spring(x[0], tuple(x[1:4]), x[4], x[5:].T, settling, motion.step)
             for x in (part.T.copy() for part in np.split(all_, motion.starts[1:]))
@@ -80,13 +97,29 @@ def _of_softness(motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndar
         return np.asarray(-J * change[:, None])
     by_q, by_v, by_a = motion.effort_slopes(j)
     force = by_q * twist[:, None] + by_v * speed[:, None] + by_a * change[:, None]
-    force[:, j] -= J * change
+    force[:, j] -= _inside(place, shape) * change
     return np.asarray(force[:, :, None])
+
+
+def with_rotors(effects: Sequence[EffectAt]) -> tuple[EffectAt, ...]:
+    """Return effects with one J, that of the rotor, where it is beside its spring."""
+    rotors = {s.place: float(s.coefficients[0]) for s in effects if s.effect.is_inertial}
+    return tuple(
+        s.with_shape(np.array([rotors[own], *s.shape[1:]]))
+        if s.place.kind == BARE and rotors.get(own := Place(s.place.joint), 0.0) > 0.0
+        else s
+        for s in effects
+    )
+
+
+def _word(kind: str) -> str:
+    """Return where the encoder is."""
+    return 'motor' if kind == BARE else kind
 
 
 def _with_friction_on_motor(at: Placed) -> np.ndarray | None:
     """Return the shape with friction on the motor in place of the link."""
-    is_open = at.place.kind == 'motor' and at.shape[3] < 0.5
+    is_open = is_on_motor(at.place) and at.shape[3] < 0.5
     return np.array([*at.shape[:3], 1.0]) if is_open else None
 
 
@@ -97,7 +130,9 @@ class JointElasticity(Effect):
     `J theta'' + tau = u`, `(K + D d/dt)(theta - q) = tau`. Encoder on the link: the nominal robot
     has `tau = M q'' + h - J q''` and lacks `J (theta - q)''`. Encoder on the motor:
     `tau = u - J theta''`, and the nominal efforts, but for those of the motor, are those of
-    another position; to first order in the twist. Shape is (J, 1/K, D/K).
+    another position; to first order in the twist. Shape is (J, 1/K, D/K), and with the encoder on
+    the motor the part of the friction that is there. `BARE` is for robot files without rotors: the
+    inertia of the link is then all that the nominal robot has; see `with_rotors`.
     """
 
     name = 'joint_elasticity'
@@ -126,18 +161,29 @@ class JointElasticity(Effect):
     sees_acceleration = True
     has_memory = True
 
+    def places(self, motion: SeenMotion) -> list[Place]:
+        """Return both encoders, and motors without a rotor in the robot file."""
+        found = super().places(motion)
+        return [*found, *(replace(p, kind=BARE) for p in found if is_on_motor(p))]
+
+    def stated_quantities(self, kind: str = '') -> tuple[Quantity, ...]:
+        return super().stated_quantities(_word(kind))
+
+    def stated_words(self, place: Place, tree: Structure) -> dict[str, str]:
+        return super().stated_words(replace(place, kind=_word(place.kind)), tree)
+
     def model(self, numbers: Numbers, kind: str = '') -> tuple[np.ndarray, np.ndarray]:
         K = numbers['stiffness']
         damping = numbers.get('damping', 0.0)
         shape = [numbers.get('motor_inertia', math.nan), 1.0 / K, damping / K]
-        share = [numbers.get('motor_friction', 0.0)] if kind == 'motor' else []
+        share = [numbers.get('motor_friction', 0.0)] if kind != 'link' else []
         return np.array(shape + share), np.ones(1)
 
     def report(self, at: Placed, motion: SeenMotion) -> dict[str, Value]:
         J, compliance, settling, *share = (float(x) for x in at.shape)
         return {
             'stiffness': 1.0 / compliance, 'damping': settling / compliance, 'motor_inertia': J,
-            **({'motor_friction': share[0]} if share else {}), self.kind_word: at.place.kind,
+            **({'motor_friction': share[0]} if share else {}), self.kind_word: _word(at.place.kind),
         }  # fmt: skip
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
@@ -158,11 +204,12 @@ class JointElasticity(Effect):
         `(M - J) (M_jj - J) / (M K)`.
         """
         j, (J, compliance, settling) = at.place.joint, at.shape[:3]
-        M = motion.free_inertia(j, _some(motion))
+        beside = J - _inside(at.place, at.shape)
+        M = motion.free_inertia(j, _some(motion)) + beside
         a = compliance * J * (M - J) / M
         c = a
-        if at.place.kind == 'motor':
-            c *= (float(motion.mass_diagonal[:, j].mean()) - J) / J
+        if is_on_motor(at.place):
+            c *= (float(motion.mass_diagonal[:, j].mean()) + beside - J) / J
         u = motion.effort[:, j]
         parts = [x - resonator(x, a, settling, motion.step)
                  for x in np.split(u, motion.starts[1:])]  # fmt: skip
@@ -174,9 +221,9 @@ class JointElasticity(Effect):
         None where nothing is known of the inertia.
         """
         if motion.free_inertia(place.joint, _some(motion)) <= 0.0:
-            return np.zeros((0, 4 if place.kind == 'motor' else 3))
+            return np.zeros((0, 4 if is_on_motor(place) else 3))
         (least, stiff, *_), (most, _, slowest, *_) = self.bounds(motion, place)
-        share = [0.0] if place.kind == 'motor' else []
+        share = [0.0] if is_on_motor(place) else []
         return np.array([[J, stiff, T, *share] for J in np.geomspace(least, most, 5)[1:]
                          for T in (0.0, 0.05 * slowest)])  # fmt: skip
 
@@ -190,7 +237,9 @@ class JointElasticity(Effect):
             [_LEAST_OF_LINK * free, 1e-9 * softest, 0.0],
             [_MOST_OF_LINK * free, softest, _SETTLING / rate],
         )
-        if place.kind == 'motor':
+        if place.kind == BARE:
+            high[0] = _MOST_BESIDE * free
+        if is_on_motor(place):
             low, high = [*low, -_BEYOND], [*high, 1.0 + _BEYOND]
         return np.array(low), np.array(high)
 

@@ -67,23 +67,20 @@ def behind(x: np.ndarray, time_constant: complex, step: float) -> np.ndarray:
 
 @njit(cache=True)
 def _swung(
-    u: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray, step: float, x: float, v: float
+    u: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray, step: float, starts: np.ndarray
 ) -> np.ndarray:
-    """Return y and y' of `a y'' + b y' + c y = u`, (n, 2), that start from x and v.
+    """Return y and y' of `a y'' + b y' + c y = u`, (m, n, 2), that start from m of them, (m, 2).
 
-    Exact where u is straight and the rest constant. What swings faster than the rows show is
-    damped.
+    Only the first is driven by u; the others swing freely. Exact where u is straight and the rest
+    constant. What swings faster than the rows show is damped.
     """
-    y = np.empty((len(u), 2))
-    y[0] = x, v
+    y = np.empty((len(starts), len(u), 2))
+    y[:, 0] = starts
     for i in range(1, len(u)):
         A, C = max(a[i], 1e-12 * step * step * c[i]), c[i]
         fast = min(1.0, max(0.0, np.sqrt(C / A) * step - 1.0))
         B = b[i] + 2.0 * fast * np.sqrt(A * C)
         slope = (u[i] - u[i - 1]) / step
-        # what follows the straight line, and the rest, which decays
-        at = (u[i - 1] - B * slope / C) / C
-        rest, speed = x - at, v - slope / C
         decay, square = 0.5 * B / A, C / A - 0.25 * B * B / (A * A)
         if square > 0.0:
             rate = np.sqrt(square)
@@ -94,10 +91,13 @@ def _swung(
             slow, quick = np.exp((rate - decay) * step), np.exp(-(rate + decay) * step)
             gone, cos = 1.0, 0.5 * (slow + quick)
             sin = 0.5 * (slow - quick) / rate if rate * step > 1e-6 else step * slow
-        kept = gone * (rest * (cos + decay * sin) + speed * sin)
-        turned = gone * (speed * (cos - decay * sin) - rest * C / A * sin)
-        x, v = u[i] / C - B * slope / (C * C) + kept, turned + slope / C
-        y[i] = x, v
+        # the straight line that the driven one follows; all else decays
+        line, rise, end = (u[i - 1] - B * slope / C) / C, slope / C, u[i] / C - B * slope / (C * C)
+        for k in range(len(starts)):
+            rest, speed = y[k, i - 1, 0] - line, y[k, i - 1, 1] - rise
+            y[k, i, 0] = end + gone * (rest * (cos + decay * sin) + speed * sin)
+            y[k, i, 1] = rise + gone * (speed * (cos - decay * sin) - rest * C / A * sin)
+            line, rise, end = 0.0, 0.0, 0.0
     return y
 
 
@@ -117,10 +117,10 @@ def on_spring(
         settling: ratio of damping to stiffness [s].
         step: between rows [s].
     """
-    none, (a, b, c) = np.zeros(len(torque)), terms
-    forced = _swung(torque, a, b, c, step, float(torque[0] / c[0]), 0.0)
+    a, b, c = terms
     swing = math.sqrt(float(c[0] / a[0]))
-    free = [_swung(none, a, b, c, step, x, v) for x, v in ((1.0, 0.0), (0.0, swing))]
+    starts = np.array([[float(torque[0] / c[0]), 0.0], [1.0, 0.0], [0.0, swing]])
+    forced, *free = _swung(torque, a, b, c, step, starts)
     gone = 2.0 * _TIMES_GONE * float(a[0]) / max(float(b[0]), 1e-300)
     n = max(_LEAST_GONE, int(min(gone / step, len(torque))))
     rest = acting - forced[:, 0] - settling * forced[:, 1]

@@ -76,7 +76,10 @@ class Plant:
         self._actions = tuple(pairs)
         self._currents = tuple(x for x in pairs if x[0].current)
         self._behind = tuple(x for x in pairs if not x[0].current)
-        self._inertias = tuple((x.joint, x.inertia) for x, _ in pairs if x.inertia)
+        self._inertias = tuple(
+            (j, sum(x.inertia for x, _ in pairs if x.joint == j))
+            for j in dict.fromkeys(x.joint for x, _ in pairs if x.inertia)
+        )  # a rotor that one law adds is taken from the link by another
         dry = [x for x in pairs if x[0].dry_level is not None]
         joints = sorted({x.joint for x, _ in dry if x.geared is None})
         geared = list(dict.fromkeys((x.joint, *x.geared) for x, _ in dry if x.geared))

@@ -19,7 +19,7 @@ from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import ARMATURE, EFFECTS, VISCOUS_FRICTION
 from sgp_ros.physics.drive import Drive
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.elasticity import twist_of
+from sgp_ros.physics.elasticity import BARE, twist_of
 from sgp_ros.physics.hidden_states import behind, resonator
 from sgp_ros.physics.parts import Place
 from sgp_ros.rigid.tree import read_urdf
@@ -113,6 +113,35 @@ def test_no_friction_or_rotor_is_taken_for_a_resonance(encoder):
     assert numbers['encoder'] == encoder
     assert numbers['stiffness'] == pytest.approx(STIFFNESS, rel=0.1)
     assert both.mean_square.sum() < 0.02 * alone.mean_square.sum()
+
+
+def test_a_rotor_that_the_robot_file_lacks_is_told_from_the_link():
+    """Three times the link, as behind a gear: with the rotor beside the spring both are found."""
+    link = equations('motor').motion.free_inertia(ELBOW, slice(None))
+    rotor, stiffness = 3.0 * link, link * (2.0 * np.pi * 8.0) ** 2
+    found = equations_of(moved([
+        f'armature:joint=elbow,inertia={rotor}',
+        f'joint_elasticity:joint=elbow,stiffness={stiffness},damping=0.01,motor_inertia={rotor},'
+        'encoder=motor',
+    ]))  # fmt: skip
+    columns, start = Columns(found), np.sqrt((found.d**2).mean(axis=0)) + 1e-9
+    left, models = {}, {}
+    for kind in ('motor', BARE):
+        place = Place(ELBOW, kind)
+        springs = [t for t in screen(columns, fit(columns, (), start, is_free=False), [LAW])
+                   if t[1].place == place]  # fmt: skip
+        beside = EffectAt(ARMATURE, Place(ELBOW))
+        models[kind] = fit(columns, (beside, springs[0][1]), start, is_free=False, steps=30)
+        left[kind] = float(models[kind].mean_square[ELBOW] / (found.d[:, ELBOW] ** 2).mean())
+    armature, spring = models[BARE].effects
+    numbers = spring.report(found.motion)
+    assert float(armature.coefficients[0]) == pytest.approx(rotor, rel=0.1)
+    assert numbers['motor_inertia'] == pytest.approx(rotor, rel=0.1)
+    assert numbers['stiffness'] == pytest.approx(stiffness, rel=0.1)
+    assert numbers['encoder'] == 'motor'
+    other = models['motor'].effects[1].report(found.motion)
+    assert other['motor_inertia'] < 0.5 * rotor
+    assert left[BARE] < left['motor']
 
 
 def test_a_motor_on_a_spring_has_its_own_equation():

@@ -14,6 +14,7 @@ from sgp_ros.diagnosis.explain.inertia_slope import InertiaSlope
 from sgp_ros.diagnosis.explain.regression import Columns, dry_joints
 from sgp_ros.diagnosis.explain.shape_search import UNSEEN, searched
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.elasticity import with_rotors
 
 
 def fit(
@@ -55,7 +56,9 @@ def fit(
             frame = _held(frame, slope, model, model.w, model.sigma)
         steps = max(steps // 2, 4)
     assert model is not None
-    return _solved(frame, columns, candidates, w)
+    model = _solved(frame, columns, candidates, w)
+    one = with_rotors(model.effects)
+    return model if one == model.effects else _solved(frame, columns, one, w)
 
 
 def _held(

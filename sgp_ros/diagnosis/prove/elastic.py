@@ -14,7 +14,7 @@ import numpy as np
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.prove.dynamics import DiagnosedDynamics
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.elasticity import JointElasticity, twist_of
+from sgp_ros.physics.elasticity import JointElasticity, is_on_motor, twist_of
 from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -53,7 +53,7 @@ class ElasticDynamics(DiagnosedDynamics):
         for s in self.springs:
             j = s.place.joint
             twist, rate, _ = (s.shape[1] * x[rows] for x in twist_of(seen, s.place, s.shape))
-            if s.place.kind == 'motor':
+            if is_on_motor(s.place):
                 motors.append((q[:, j].copy(), v[:, j].copy()))
                 q[:, j] -= twist
                 v[:, j] -= rate
@@ -66,7 +66,7 @@ class ElasticDynamics(DiagnosedDynamics):
         k = x.shape[-1] - len(self.springs)
         shown = x[..., :k].copy()
         for i, s in enumerate(self.springs):
-            if s.place.kind == 'motor':
+            if is_on_motor(s.place):
                 shown[..., s.place.joint] = x[..., k + i]
         return shown
 
