@@ -346,6 +346,8 @@ def test_the_report_says_the_numbers_that_went_into_the_columns(name, shape, c, 
         ('limit_friction', [1.0], [-0.7], {'side': 1}), ('spring', [], [-3.0, 0.0], {}),
         ('armature', [], [-0.02], {}), ('hysteresis', [0.1], [-0.3], {}),
         ('joint_coupling', [0.5], [-4.0], {'kind': 'spring', 'source': 2}),
+        ('joint_coupling', [0.002], [4.0], {'kind': 'spring', 'source': 2}),
+        ('joint_coupling', [-200.0], [4.0], {'kind': 'spring', 'source': 2}),
         ('end_stop', [1.0], [-300.0, 4.0], {'side': 1}), ('torque_gain', [], [-1.5], {}),
         ('payload', [-0.1, 0, 0, 0], [1.0], {}),
         ('coupled_friction', [1.0], [0.3, -0.2], {'source': 2}),
@@ -354,7 +356,10 @@ def test_the_report_says_the_numbers_that_went_into_the_columns(name, shape, c, 
     ],
 )  # fmt: skip
 def test_what_no_physics_can_do_is_not_possible(name, shape, c, variant):
-    """Friction does not drive, springs do not repel, encoders do not run backwards."""
+    """Friction does not drive, springs do not repel, encoders do not run backwards.
+
+    A cable or a motor that feels one joint alone couples none.
+    """
     assert not report(name, 0, shape, c, **variant)[1]
 
 
