@@ -10,7 +10,7 @@ kd (dq - dq')`. That is what users of position control see.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +27,7 @@ from sgp_ros.diagnosis.compare.trajectory import (
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.locate.remainder import Remainder
 from sgp_ros.diagnosis.prove.prediction import FinalModel
-from sgp_ros.diagnosis.prove.rollouts import RolloutWindows, cut, roll_outs
+from sgp_ros.diagnosis.prove.rollouts import RolloutWindows, cut, roll_outs, substeps
 from sgp_ros.diagnosis.shown import Overlay, Replay
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.gains import Gains
@@ -35,7 +35,7 @@ from sgp_ros.robots.observed_motion import ObservedMotion
 
 _HORIZONS_S = {'open_0.5': 0.5, 'open_2': 2.0}
 _LONGEST_S = 10.0
-"""Of a replay of the whole recording: it is integrated step by step."""
+"""Of a replay, which is integrated step by step; less of a stiff model."""
 _KEPT_S = 60.0
 _FAR = 10.0
 """Ranges of the recording beyond which a replay is not stable."""
@@ -93,13 +93,15 @@ class _View:
         """Effort that acted, (N, k)."""
         return self.low(self.motion.effort)[: len(self.rows)]
 
-    @property
-    def modes(self) -> list[_Mode]:
-        """Replays of the recording: windows and, in closed loop, gains."""
+    def modes(self, final: FinalModel, sides: Iterable[_Side]) -> list[_Mode]:
+        """Return the replays of the recording: windows and, in closed loop, gains."""
         trim = ZeroPhase(1.0 / self.raw.step, self.bandwidth.state_cutoff).trim
         gains = self.raw.gains
         known = None if gains is None or gains.is_recorded else gains
-        return _modes(self.motion, trim, known)
+        short = cut(self.motion, trim, min(_HORIZONS_S.values()))
+        stiff = [substeps(short, s.model, final.equations, s.remainders) for s in sides]
+        longest = _LONGEST_S / max(stiff) if len(short.first) else _LONGEST_S
+        return _modes(self.motion, trim, known, longest)
 
 
 def overlays(
@@ -118,7 +120,7 @@ def overlays(
     views = {stem: view for stem, view in found.items() if view is not None}
     both = _Side(final.nominal, ()), _Side(final.model, final.remainders)
     sides = dict(zip(names, both, strict=False))
-    modes = [(stem, *mode) for stem, view in views.items() for mode in view.modes]
+    modes = [(stem, *m) for stem, view in views.items() for m in view.modes(final, sides.values())]
     replays: dict[str, dict[str, dict[str, Replay]]] = {stem: {} for stem in views}
     for gains in {id(g): g for *_, g in modes}.values():
         own = [(stem, mode, windows) for stem, mode, windows, g in modes if g is gains]
@@ -141,13 +143,14 @@ _Mode = tuple[str, RolloutWindows, Gains | None]
 """Name, windows and, in closed loop, gains of a replay."""
 
 
-def _modes(motion: ObservedMotion, trim: int, gains: Gains | None) -> list[_Mode]:
-    """Return each replay that has a window."""
+def _modes(motion: ObservedMotion, trim: int, gains: Gains | None, longest: float) -> list[_Mode]:
+    """Return each replay that has a window and is not too long."""
     end = motion.starts[1] if len(motion.starts) > 1 else len(motion.time)
-    whole = min((end - 2 * trim - 2) * motion.step, _LONGEST_S)
+    whole = min((end - 2 * trim - 2) * motion.step, longest)
     found: list[_Mode] = []
     for name, horizon in _HORIZONS_S.items():
-        found.append((name, cut(motion, trim, horizon), None))
+        if horizon <= longest:
+            found.append((name, cut(motion, trim, horizon), None))
     if whole > 0.0:
         windows = cut(motion, trim, whole)
         one = RolloutWindows(motion, windows.first[:1], windows.stride, windows.steps)

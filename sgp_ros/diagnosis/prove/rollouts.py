@@ -151,6 +151,15 @@ def roll_outs(
     return [(one.q, one.ended) for one in sets]
 
 
+def substeps(
+    windows: RolloutWindows, model: Model, equations: Equations,
+    remainders: tuple[Remainder, ...] = (),
+) -> int:  # fmt: skip
+    """Return how many substeps a step of a roll-out takes: what is to be integrated is stiff."""
+    one = _Set(windows, model, equations, remainders, None)
+    return _substeps(one, one.loads, windows.stride * windows.motion.step)
+
+
 class _Set:
     """Windows of one recording, their loads, and their latest roll-out.
 
