@@ -63,6 +63,12 @@ def _inside(place: Place, shape: np.ndarray) -> float:
     return 0.0 if place.kind == BARE else float(shape[0])
 
 
+def _on_motor(motion: SeenMotion, place: Place, shape: np.ndarray) -> float:
+    """Return the nominal damping that acts on a motor with the encoder."""
+    damping = float(motion.tree.damping[place.joint])
+    return float(shape[3]) * damping if is_on_motor(place) else 0.0
+
+
 def twist_of(
     motion: SeenMotion, place: Place, shape: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -70,7 +76,8 @@ def twist_of(
     j, (J, softness, settling), inside = place.joint, shape[:3], _inside(place, shape)
     share = float(shape[3]) if is_on_motor(place) else 1.0
     a, effort = motion.acceleration[:, j], motion.effort[:, j] - J * motion.acceleration[:, j]
-    given = share * (motion.nominal_effort[:, j] - inside * a) + (1.0 - share) * effort
+    link = motion.nominal_effort[:, j] - _on_motor(motion, place, shape) * motion.velocity[:, j]
+    given = share * (link - inside * a) + (1.0 - share) * effort
     torque = smooth(motion, given)
     if place.kind == 'link' or share * softness <= 0.0:
         parts = [behind(x, settling, motion.step) for x in np.split(torque, motion.starts[1:])]
@@ -78,7 +85,7 @@ def twist_of(
         by_q, by_v, by_a = (x[:, j] for x in motion.effort_slopes(j))
         scale = share * softness
         terms = (scale * np.maximum(by_a - inside, _LEAST_OF_LINK * np.abs(by_a) + 1e-12),
-                 np.maximum(settling + scale * by_v, 0.0),
+                 np.maximum(settling + scale * (by_v - _on_motor(motion, place, shape)), 0.0),
                  np.maximum(1.0 + scale * by_q, _LEAST_STIFFNESS))  # fmt: skip
         all_ = np.column_stack([torque, *terms, effort, motion.velocity[:, j], a])
         parts = [
@@ -97,7 +104,7 @@ def _of_softness(motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndar
         return np.asarray(-J * change[:, None])
     by_q, by_v, by_a = motion.effort_slopes(j)
     force = by_q * twist[:, None] + by_v * speed[:, None] + by_a * change[:, None]
-    force[:, j] -= _inside(place, shape) * change
+    force[:, j] -= _inside(place, shape) * change + _on_motor(motion, place, shape) * speed
     return np.asarray(force[:, :, None])
 
 

@@ -170,10 +170,12 @@ def test_hidden_states_follow_their_filters():
                                    atol=1e-9)  # fmt: skip
 
 
-def test_friction_of_the_motor_does_not_reach_the_spring():
+@pytest.mark.parametrize('damping', [0.0, 3.0])
+def test_friction_of_the_motor_does_not_reach_the_spring(damping):
     """The link swings under the motor, from any state at the start, whatever the motor takes.
 
-    Of a link on a spring, on the motor's side of which is friction of the size of the effort.
+    Of a link on a spring, on the motor's side of which is friction of the size of the effort, a
+    part of which the robot file may have.
     """
     step, link, J, K, D, G = 0.002, 0.3, 0.05, 216.0, 0.55, 6.0
     t = step * np.arange(6000)
@@ -183,14 +185,15 @@ def test_friction_of_the_motor_does_not_reach_the_spring():
     theta, v, a = (0.02 * x.sum(axis=1) for x in shapes)
     twist = theta - signal.lsim(([D, K], [link, D, K + G]), theta, t)[1]
     spring = K * twist + D * np.gradient(twist, step)
-    effort = J * a + 5.0 * np.sign(v) + spring
+    effort = J * a + 5.0 * np.sign(v) + damping * v + spring
     begun = slice(500, None)  # where it swings already
-    nominal = (link + J) * a + G * theta
+    nominal = (link + J) * a + damping * v + G * theta
     motion = SimpleNamespace(
         velocity=v[begun, None], acceleration=a[begun, None], effort=effort[begun, None],
         nominal_effort=nominal[begun, None],
         step=step, starts=(0, 2500), bandwidth=50.0,
-        effort_slopes=lambda _j: [np.full((5500, 1), x) for x in (G, 0.0, link + J)],
+        tree=SimpleNamespace(damping=np.array([damping])),
+        effort_slopes=lambda _j: [np.full((5500, 1), x) for x in (G, damping, link + J)],
     )  # fmt: skip
     place, shape = Place(0, 'motor'), np.array([J, 1.0 / K, D / K, 1.0])
     off = {}
