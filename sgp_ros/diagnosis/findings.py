@@ -47,7 +47,7 @@ def asserted(
     model = decision.model
     common = [i for i, s in enumerate(model.effects) if not isinstance(s.effect, InRecording)]
     forces = [model.forces[i] for i in common]
-    std = reported_std(model, Columns(equations)) if common else ()
+    std = reported_std(model, Columns(equations), decision.unknown) if common else ()
     findings = [
         doubted_if_none(_finding(decision, model, i, std[i], chances), model.effects[i])
         for i in common

@@ -190,7 +190,8 @@ class JointElasticity(Effect):
         J, compliance, settling, *share = (float(x) for x in at.shape)
         return {
             'stiffness': 1.0 / compliance, 'damping': settling / compliance, 'motor_inertia': J,
-            **({'motor_friction': share[0]} if share else {}), self.kind_word: _word(at.place.kind),
+            **({'motor_friction': share[0]} if share else {}),
+            self.kind_word: _word(at.place.kind),
         }  # fmt: skip
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:

@@ -119,10 +119,10 @@ def test_a_rotor_that_the_robot_file_lacks_is_told_from_the_link():
     """Three times the link, as behind a gear: with the rotor beside the spring both are found."""
     link = equations('motor').motion.free_inertia(ELBOW, slice(None))
     rotor, stiffness = 3.0 * link, link * (2.0 * np.pi * 8.0) ** 2
+    numbers = f'stiffness={stiffness},damping=0.01,motor_inertia={rotor}'
     found = equations_of(moved([
         f'armature:joint=elbow,inertia={rotor}',
-        f'joint_elasticity:joint=elbow,stiffness={stiffness},damping=0.01,motor_inertia={rotor},'
-        'encoder=motor',
+        f'joint_elasticity:joint=elbow,{numbers},encoder=motor',
     ]))  # fmt: skip
     columns, start = Columns(found), np.sqrt((found.d**2).mean(axis=0)) + 1e-9
     left, models = {}, {}

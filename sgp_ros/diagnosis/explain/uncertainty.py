@@ -2,11 +2,14 @@
 
 The covariance is that of least squares, `(J^T J)^-1` with J the derivatives of the scaled
 residual by coefficients and shapes after the inertial parameters are projected out, widened by
-the correlation of the residual in time. Reported values follow by the delta method.
+the correlation of the residual in time, joint by joint where something is left unknown: as
+`A^-1 J^T F J A^-1` with `A = J^T J` and F by how much (White 1980). Reported values follow by the
+delta method.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -32,10 +35,11 @@ def _force(
     return total
 
 
-def covariance(model: Model, columns: Columns) -> np.ndarray:
+def covariance(model: Model, columns: Columns, unknown: Collection[int] = ()) -> np.ndarray:
     """Return the covariance of all free coefficients, then all shapes, (c + s, c + s).
 
-    A shape that nothing depends on may lie anywhere within its bounds.
+    A shape that nothing depends on may lie anywhere within its bounds. `unknown` are joints which
+    the model does not describe: what is left there says nothing of the others.
     """
     frame = Frame.of(model.frame.equations, model.sigma, is_free=model.is_free, weight=1.0)
     free = [
@@ -62,25 +66,34 @@ def covariance(model: Model, columns: Columns) -> np.ndarray:
             (a, fa), (b, fb) = moved
             slopes.append(((fa - fb) / max(a - b, 1e-300))[:, :, None])
         parts.append(frame.projected(np.concatenate(slopes, axis=2)))
-    J = np.concatenate(parts, axis=1) if parts else np.zeros((1, 0))
+    J = np.concatenate(parts, axis=1) if parts else np.zeros((model.residual.size, 0))
     scale = np.sqrt((J * J).sum(axis=0))
     is_seen = scale > UNSEEN * scale.max(initial=0.0)
     scale[~is_seen] = np.inf
-    inverse = np.linalg.pinv((J / scale).T @ (J / scale), rcond=1e-10)
-    C = inverse / scale / scale[:, None] * _inflation(model)
+    J = J / scale
+    inverse = np.linalg.pinv(J.T @ J, rcond=1e-10)
+    J *= np.sqrt(_inflation(model, unknown, len(J)))[:, None]
+    C = inverse @ (J.T @ J) @ inverse / scale / scale[:, None]
     spans = np.concatenate([np.zeros(len(scale) - len(low)), high - low])
     return np.asarray(C + np.diag(np.where(is_seen, 0.0, spans**2 / 12.0)))
 
 
-def _inflation(model: Model) -> float:
-    """Return by how much correlation in time widens the covariance, at least 1."""
-    return max(correlation_factor(r) for r in model.residual.T)
+def _inflation(model: Model, unknown: Collection[int], rows: int) -> np.ndarray:
+    """Return by how much correlation in time widens the error of each row, at least 1, (rows,)."""
+    factors = np.array([correlation_factor(r) for r in model.residual.T])
+    is_open = np.isin(np.arange(len(factors)), list(unknown))
+    common = float(factors[~is_open].max(initial=1.0))
+    found = np.full(rows, common)
+    found[: model.residual.size] = np.tile(np.where(is_open, factors, common), len(model.residual))
+    return found
 
 
-def reported_std(model: Model, columns: Columns) -> list[dict[str, float]]:
+def reported_std(
+    model: Model, columns: Columns, unknown: Collection[int] = ()
+) -> list[dict[str, float]]:
     """Return the standard deviation of each reported number of each candidate."""
     motion = model.frame.equations.motion
-    C = covariance(model, columns)
+    C = covariance(model, columns, unknown)
     free = sum(len(s.coefficients) for s in model.effects if not s.effect.is_given)
     result, at, shape_at = [], 0, free
     for s in model.effects:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sgp_ros.batch.least_squares import correlation_factor
 from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import Bandwidth, collect
 from sgp_ros.diagnosis.explain.candidates import fit
@@ -100,3 +101,19 @@ def test_a_number_that_nothing_depends_on_may_be_anything(equations_for, viscous
     name = 'xyz'[axis]
     assert std[name] == pytest.approx((high - low)[1 + axis] / np.sqrt(12.0), rel=1e-3)
     assert all(np.isfinite(x) for x in std.values())
+
+
+def test_what_is_unknown_at_one_joint_does_not_widen_the_numbers_of_another(robots):
+    """Slow noise at the second joint, which the model does not describe."""
+    robot, tree = robots[2]
+    forces = simulate(CHAINS[2], 7, 8.0, force=lambda t, q, v: (-0.3 * v[0], 0.0))
+    equations = make_equations(collect(events_of(forces), robot), tree, Bandwidth(10.0, 25.0))
+    rng, N = np.random.default_rng(2), len(equations.d)
+    slow = np.repeat(rng.normal(0.0, 0.5, N // 40 + 1), 40)[:N]
+    noisy = replace(equations, d=equations.d + np.column_stack([rng.normal(0.0, 0.1, N), slow]))
+    columns, candidate = Columns(noisy), EffectAt(EFFECTS['viscous_friction'], Place(0))
+    model = fit(columns, (candidate,), np.full(2, 0.1), is_free=False)
+    common, apart = (float(covariance(model, columns, j)[0, 0]) for j in ((), (1,)))
+    alone = max(correlation_factor(model.residual[:, 0]), 1.0)
+    assert common > 5.0 * apart
+    assert apart == pytest.approx(common * alone / correlation_factor(model.residual[:, 1]))
