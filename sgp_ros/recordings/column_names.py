@@ -14,7 +14,7 @@ TIME, POSITION, VELOCITY, EFFORT, CURRENT = 'time', 'position', 'velocity', 'eff
 COMMAND, KP, KD, OTHER = 'command', 'kp', 'kd', 'other'
 
 _QUANTITIES = {
-    TIME: 't time times timestamp timestamps stamp stamps sec secs seconds clock zeit',
+    TIME: 't ts time times timestamp timestamps stamp stamps sec secs seconds clock zeit',
     POSITION: 'q qs pos position positions qpos angle angles theta jointpos encoder enc state '
     'winkel lage',
     VELOCITY: 'dq qd qdot vel velocity velocities qvel dtheta omega speed thetadot jointvel '

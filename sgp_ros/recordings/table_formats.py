@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -149,7 +150,7 @@ def load_json(path: Path) -> Columns:
         ) from None
     columns: Columns = {}
     if isinstance(content, list) and content and all(isinstance(x, dict) for x in content):
-        columns = _of_records(path, [dict(_flattened('', x)) for x in content])
+        columns = _of_records(path, _alike([dict(_flattened('', x)) for x in content]))
     elif isinstance(content, dict):
         for name, value in _flattened('', content):
             if isinstance(value, list):
@@ -171,17 +172,15 @@ def load_messages(path: Path) -> Columns:
     """
     texts = re.split(r'(?m)^---\s*$', read_text(path, 'TABLE_MB'))
     records = [_message(text) for text in texts if text.strip()]
-    shapes = [{n: len(x) if isinstance(x, list) else -1 for n, x in r.items()} for r in records]
+    shapes = [_shape(r) for r in records]
     usual = max(shapes, key=len, default={})
-    whole = [r for r, shape in zip(records, shapes, strict=True) if shape == usual]
-    if not usual or 2 * len(whole) < len(records):
+    if not usual or 2 * shapes.count(usual) < len(records):
         raise RecordingError(
             f'{path.name} is no stream of messages',
             'what `ros2 topic echo` of a sensor_msgs/JointState prints',
         )
-    empty = {n: None if isinstance(x, list) else x for n, x in whole[0].items()}
-    found = (r if shape == usual else empty for r, shape in zip(records, shapes, strict=True))
-    return _of_records(path, list(found))
+    found = [r if s == usual else {} for r, s in zip(records, shapes, strict=True)]
+    return _of_records(path, _alike(found))
 
 
 def _message(text: str) -> dict[str, Any]:
@@ -190,6 +189,30 @@ def _message(text: str) -> dict[str, Any]:
     except YAMLError:
         return {}
     return dict(_flattened('', content)) if isinstance(content, dict) else {}
+
+
+def _shape(record: Mapping[str, Any]) -> dict[str, int]:
+    """Return the lengths of the lists of a record, -1 for what is none."""
+    return {n: len(x) if isinstance(x, list) else -1 for n, x in record.items()}
+
+
+def _alike(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return records, those without a list of the usual one without numbers in its lists.
+
+    Such are headers, and messages between the states.
+    """
+    kinds = Counter(frozenset(_shape(r).items()) for r in records)
+    usual = dict(kinds.most_common(1)[0][0])
+    lists = [n for n, size in usual.items() if size >= 0]
+    if not lists:
+        return records
+    first = next(r for r in records if _shape(r) == usual)
+    empty = {n: None if n in lists else x for n, x in first.items()}
+    return [
+        r if any(isinstance(r.get(n), list) for n in lists)
+        else empty | {n: r[n] for n in usual if n in r and n not in lists}
+        for r in records
+    ]  # fmt: skip
 
 
 def _of_records(path: Path, records: list[dict[str, Any]]) -> Columns:

@@ -118,14 +118,15 @@ def _time(columns: Columns, rows: int, rate_hz: float | None, guess: Guess) -> n
         name for name, x in columns.items()
         if x.shape[:1] == (rows,) and x.size == rows and _may_be_time(meaning(name))
     ]  # fmt: skip
-    named.sort(key=lambda name: (not meaning(name).role, 'des' in name.lower(), len(name)))
+    named.sort(key=lambda n: (not meaning(n).role, 'des' in n.lower(), len(n)))
+    named.sort(key=lambda n: 'header' not in n.lower())  # when it was measured, not when it came
     for name in named if rate_hz is None else ():
         stamps = as_numbers(columns[name])
         if stamps is None:  # texts, such as those of ISO 8601
             guess.content['time'] = {'column': name, 'unit': 's'}
             return np.arange(rows, dtype=np.float64)
         unit, is_sure = time_unit(stamps, meaning(name).unit)
-        if not unit:
+        if not unit or not np.ptp(stamps):
             continue
         if not is_sure:
             guess.unsure.append(f'The time column {name} is assumed to be in {unit}.')

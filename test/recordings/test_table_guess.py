@@ -24,6 +24,7 @@ from sgp_ros.recordings.table_entries import JointHint
 T = np.arange(200) * 0.005
 Q = np.column_stack([np.sin(3.0 * T), 0.5 * np.cos(2.0 * T)])
 DQ = np.column_stack([3.0 * np.cos(3.0 * T), -np.sin(2.0 * T)])
+LATE_S = 1e-4 * np.random.default_rng(3).uniform(1.0, 30.0, 200)
 TAU = np.column_stack([np.cos(T), np.sin(5.0 * T)])
 LATE = np.column_stack([np.sin(3.0 * T + 0.1), 0.5 * np.cos(2.0 * T + 0.1)])
 HINTS = (JointHint('shoulder', lower=-2.0, upper=2.0), JointHint('elbow', lower=-2.0, upper=2.0))
@@ -56,6 +57,7 @@ def _read(path, folder, hints=HINTS, rate=None):
         ('joint1_current_mA', 'current', False, '1', 'mA'),
         ('observation.state', 'position', False, '', ''),
         ('action', 'command', True, '', ''),
+        ('ts', 'time', False, '', ''),
         ('target_velocity', 'velocity', True, '', ''),
         ('p_gain', 'kp', False, '', ''),
         ('knee.eff', 'effort', False, 'knee', ''),
@@ -310,6 +312,30 @@ def test_messages_that_were_printed_are_a_table(tmp_path):
     np.testing.assert_allclose([s.effort[::-1] for s in states], TAU[:-1])
     assert states[1].stamp_ns - states[0].stamp_ns == 5_000_000
     assert '2 of 201 rows ignored' in ' '.join(summary.remarks)
+
+
+@pytest.mark.parametrize('is_stamped', [True, False])
+def test_the_stamp_of_the_header_is_the_time_unless_nobody_set_it(tmp_path, is_stamped):
+    """As `rostopic echo -p` prints it: when a message came, and when it was measured."""
+    came, stamp = (np.round(1e9 * (x + 1.5e9)).astype(np.int64) for x in (LATE_S + T, T))
+    _, states, _ = _read(_npz(tmp_path, **{
+        '%time': came, 'field.header.stamp': stamp * is_stamped, 'field.position0': Q[:, 0],
+        'field.effort0': TAU[:, 0],
+    }), tmp_path, (JointHint('arm'),))  # fmt: skip
+    assert [s.stamp_ns for s in states] == (stamp if is_stamped else came).tolist()
+
+
+def test_lines_between_the_records_are_rows_without_numbers(tmp_path):
+    """A header with more than a record has, and what a log says in between."""
+    lines = [{'type': 'meta', 'robot': 'arm', 'joints': ['a', 'b'], 'host': 'lab', 'version': 2}]
+    lines += [{'type': 'state', 'ts': t, 'pos': list(q), 'eff': list(u)}
+              for t, q, u in zip(T, Q, TAU, strict=True)]  # fmt: skip
+    lines.insert(70, {'type': 'log', 'ts': T[69] + 1e-3, 'msg': 'warm'})
+    (tmp_path / 'log.jsonl').write_text('\n'.join(map(json.dumps, lines)))
+    summary, states, _ = _read(tmp_path / 'log.jsonl', tmp_path)
+    np.testing.assert_allclose([s.position for s in states], Q)
+    np.testing.assert_allclose([s.effort for s in states], TAU)
+    assert '2 of 202 rows ignored' in ' '.join(summary.remarks)
 
 
 def test_other_yaml_is_no_table(tmp_path):
