@@ -221,9 +221,9 @@ def _connected(
         compared(recordings.corrected(correction), correction.tree(tree), next(each)),
         correction=correction,
     )
-    if corrected.several.decision.verdict == 'unexplained':
-        is_explained = plain.several.decision.verdict != 'unexplained'
-        said = () if is_explained else (setup_advice(found),)
+    is_free = any(len(e.numbers) for e in found.errors)  # and may imitate a law
+    if is_free and corrected.several.decision.verdict == 'unexplained':
+        said = (setup_advice(found),) * (plain.several.decision.verdict == 'unexplained')
         return replace(plain, remarks=(*said, *plain.remarks))
     price, rare = price_of(found)
     gain = _gain(plain, corrected, price)

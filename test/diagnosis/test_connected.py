@@ -15,13 +15,42 @@ from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.unknowns import Agreement
 
 
-def _of(cutoff):
+def _of(cutoff, verdict='missing_physics'):
     """Return what a comparison up to a cut-off [Hz] returns, as far as it is asked."""
-    several = SimpleNamespace(decision=SimpleNamespace(verdict='missing_physics'))
+    several = SimpleNamespace(decision=SimpleNamespace(verdict=verdict))
     recordings = SimpleNamespace(
         remarks=(), corrected=lambda _c: None, learned=SimpleNamespace(gains=None)
     )
     return Connected(recordings, SimpleNamespace(filter=SimpleNamespace(cutoff=cutoff)), several)
+
+
+def _found(monkeypatch, compare, numbers):
+    """Return an error of the connection that is worth its price, with what compares recordings."""
+    for name, stub in {
+        'compared': compare, '_gain': lambda *_: 100.0, 'error_finding': lambda *_: None,
+        'equal_errors': lambda _: (), '_stands_for_gains': lambda *_: False,
+        'setup_advice': lambda _: 'advice',
+    }.items():  # fmt: skip
+        monkeypatch.setattr(connected, name, stub)
+    hypothesis = SimpleNamespace(names=numbers, is_of_gains=False)
+    correction = SimpleNamespace(tree=lambda tree: tree)
+    error = SimpleNamespace(
+        correction=correction, numbers=numbers, remedy='', hypothesis=hypothesis
+    )
+    return SimpleNamespace(errors=(error,), delay_std=0.0)
+
+
+@pytest.mark.parametrize('verdict', ['missing_physics', 'unexplained'])
+@pytest.mark.parametrize(('numbers', 'is_asserted'), [((), True), ((0.02,), False)])
+def test_something_unknown_beside_it_hides_no_error_without_numbers(
+    monkeypatch, verdict, numbers, is_asserted
+):
+    """A reversed joint imitates no unknown law; an offset may, and is advice beside it."""
+    found = _found(monkeypatch, lambda *_: _of(10.0, 'unexplained'), numbers)
+    each = connected.in_halves(lambda _: None)
+    said = connected._connected(_of(10.0, verdict), found, None, each)
+    assert len(said.findings) == is_asserted
+    assert ('advice' in said.remarks) is (verdict == 'unexplained' and not is_asserted)
 
 
 @pytest.mark.parametrize(('plain', 'corrected', 'times'), [(25.0, 25.0, 1), (25.0, 9.0, 2)])
@@ -33,20 +62,9 @@ def test_a_band_is_compared_once(monkeypatch, plain, corrected, times):
         compared.append(most_hz)
         return _of(most_hz)
 
-    for name, stub in {
-        'compared': compare, '_gain': lambda *_: 100.0, 'error_finding': lambda *_: None,
-        'equal_errors': lambda _: (), '_stands_for_gains': lambda *_: False,
-    }.items():  # fmt: skip
-        monkeypatch.setattr(connected, name, stub)
-    correction = SimpleNamespace(tree=lambda tree: tree)
-    error = SimpleNamespace(
-        correction=correction,
-        numbers=(),
-        remedy='',
-        hypothesis=SimpleNamespace(names=(), is_of_gains=False),
-    )
-    found = SimpleNamespace(errors=(error,), delay_std=0.0)
+    found = _found(monkeypatch, compare, ())
     each = connected.in_halves(lambda _: None)
+    correction = found.errors[0].correction
     assert connected._connected(_of(plain), found, None, each).correction is correction
     assert len(compared) == times
     assert compared[-1] == corrected
