@@ -217,8 +217,8 @@ def _add_import(add: AddCommand) -> None:
     parser.add_argument('--map', dest='map_path', metavar='YAML',
                         help='columns and units (default: guessed and written)')  # fmt: skip
     parser.add_argument('--robot', metavar='ROBOT', help='robot that the columns belong to')
-    parser.add_argument('--rate', type=_above(0.0), metavar='HZ',
-                        help='sampling rate of a table without a time column [Hz]')  # fmt: skip
+    parser.add_argument('--group', metavar='NAME', help='which of several recordings in the file')
+    parser.add_argument('--rate', type=_above(0.0), metavar='HZ', help='rate without times [Hz]')
 
 
 def _add_check(add: AddCommand) -> None:

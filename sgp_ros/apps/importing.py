@@ -19,6 +19,7 @@ from sgp_ros.robots.robot import Robot
 def run_import(
     table: str, out: Path, progress: Callable[[float], None], *, map_path: str | None = None,
     robot: str | None = None, rate: float | None = None, is_forced: bool = False,
+    group: str | None = None,
 ) -> dict[str, object]:  # fmt: skip
     """Write a table as a recording, see `import_table`.
 
@@ -30,16 +31,18 @@ def run_import(
         robot: whose joints these are; None where that is not known.
         rate: of the rows of a table without times [Hz].
         is_forced: whether files that no import wrote are replaced.
+        group: whose columns alone are read; None for all.
 
     Raises:
         ConfigError: such a file is in the way.
     """
     model = None if robot is None else load_robot(robot)
-    path = out if out.suffix == '.mcap' else out / f'{Path(table).stem}.mcap'
+    stem = Path(table).stem if group is None else f'{Path(table).stem}_{group}'
+    path = out if out.suffix == '.mcap' else out / f'{stem}.mcap'
     with replacing_results(path.parent, imports_of(path), keeps_others=not is_forced):
         summary = import_table(
             table, map_path, path, _hints(model), rate,
-            lambda events: None if model is None else require_units(events, model),
+            lambda events: None if model is None else require_units(events, model), group,
         )  # fmt: skip
     progress(1.0)
     for remark in summary.remarks:

@@ -338,6 +338,22 @@ def test_lines_between_the_records_are_rows_without_numbers(tmp_path):
     assert '2 of 202 rows ignored' in ' '.join(summary.remarks)
 
 
+def test_one_of_several_recordings_in_a_file_is_chosen(tmp_path):
+    """Targets with times of their own are no recording; a map says which columns are meant."""
+    path = _npz(tmp_path, **{
+        'sim.t': T, 'sim.q': Q, 'sim.tau': TAU, 'real.stamp': T, 'real.pos': 2.0 * Q,
+        'real.torque': TAU, 'targets.t': T, 'targets.q_des': Q,
+    })  # fmt: skip
+    with pytest.raises(RecordingError, match=r'several recordings: sim, real; .* --group sim'):
+        _read(path, tmp_path)
+    with pytest.raises(RecordingError, match="no group 'rael'"):
+        import_table(path, None, tmp_path, HINTS, group='rael')
+    for group, factor in (('sim', 1.0), ('real', 2.0)):
+        summary = import_table(path, None, tmp_path / group, HINTS, group=group)
+        states = [e for e in open_recording(summary.path).events() if isinstance(e, JointSample)]
+        np.testing.assert_allclose([s.position for s in states], factor * Q)
+
+
 def test_other_yaml_is_no_table(tmp_path):
     (tmp_path / 'robot.yaml').write_text('schema: 1\nurdf: robot.urdf\n')
     with pytest.raises(RecordingError, match='no column of time'):
