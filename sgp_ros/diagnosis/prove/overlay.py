@@ -101,7 +101,7 @@ class _View:
         short = cut(self.motion, trim, min(_HORIZONS_S.values()))
         stiff = [substeps(short, s.model, final.equations, s.remainders) for s in sides]
         longest = _LONGEST_S / max(stiff) if len(short.first) else _LONGEST_S
-        return _modes(self.motion, trim, known, longest)
+        return replays(self.motion, trim, known, longest)
 
 
 def overlays(
@@ -121,18 +121,18 @@ def overlays(
     both = _Side(final.nominal, ()), _Side(final.model, final.remainders)
     sides = dict(zip(names, both, strict=False))
     modes = [(stem, *m) for stem, view in views.items() for m in view.modes(final, sides.values())]
-    replays: dict[str, dict[str, dict[str, Replay]]] = {stem: {} for stem in views}
+    shown: dict[str, dict[str, dict[str, Replay]]] = {stem: {} for stem in views}
     for gains in {id(g): g for *_, g in modes}.values():
         own = [(stem, mode, windows) for stem, mode, windows, g in modes if g is gains]
         for name, s in sides.items():
             rolled = roll_outs([w for *_, w in own], s.model, final.equations, s.remainders, gains)
             for (stem, mode, windows), positions in zip(own, rolled, strict=True):
-                shown = _replayed(windows, views[stem].rows, *positions)
-                replays[stem].setdefault(mode, {})[name] = shown
+                replay = _replayed(windows, views[stem].rows, *positions)
+                shown[stem].setdefault(mode, {})[name] = replay
     return {
         stem: Overlay(
             view.motion.time[view.rows], view.motion.position[view.rows], view.acting,
-            view.efforts(final, sides), replays[stem],
+            view.efforts(final, sides), shown[stem],
             float(view.motion.time[-1] - view.motion.time[0]),
         )
         for stem, view in views.items()
@@ -143,15 +143,15 @@ _Mode = tuple[str, RolloutWindows, Gains | None]
 """Name, windows and, in closed loop, gains of a replay."""
 
 
-def _modes(motion: ObservedMotion, trim: int, gains: Gains | None, longest: float) -> list[_Mode]:
-    """Return each replay that has a window and is not too long."""
+def replays(motion: ObservedMotion, trim: int, gains: Gains | None, longest: float) -> list[_Mode]:
+    """Return each replay that has a window and is not too long, the whole if others are not."""
     end = motion.starts[1] if len(motion.starts) > 1 else len(motion.time)
     whole = min((end - 2 * trim - 2) * motion.step, longest)
     found: list[_Mode] = []
     for name, horizon in _HORIZONS_S.items():
         if horizon <= longest:
             found.append((name, cut(motion, trim, horizon), None))
-    if whole > 0.0:
+    if whole > 0.0 and max(_HORIZONS_S.values()) <= longest:
         windows = cut(motion, trim, whole)
         one = RolloutWindows(motion, windows.first[:1], windows.stride, windows.steps)
         # under the efforts of a drive alone, every model soon leaves what that drive followed

@@ -13,7 +13,8 @@ from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.prove import rollouts
 from sgp_ros.diagnosis.prove.dynamics import dynamics_of
-from sgp_ros.diagnosis.prove.rollouts import cut, roll_out
+from sgp_ros.diagnosis.prove.overlay import replays
+from sgp_ros.diagnosis.prove.rollouts import cut, roll_out, substeps
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
@@ -162,6 +163,17 @@ def test_stiff_friction_is_integrated_in_smaller_steps(equations_for, perfect):
     q, ends = roll_out(windows, stiff, equations)
     assert ends.all()
     assert np.ptp(q[:, 5:], axis=1).max() < 0.05 * np.sqrt(windows.held.max())
+    assert substeps(windows, stiff, equations) > 4 * substeps(windows, model, equations)
+
+
+def test_replays_of_a_stiff_model_are_the_short_ones(equations_for, perfect):
+    """As many steps are taken whatever the model."""
+    _, equations = equations_for(perfect[1])
+    shown = {
+        longest: [name for name, *_ in replays(equations.motion, TRIM, None, longest)]
+        for longest in (10.0, 1.0)
+    }
+    assert shown == {10.0: ['open_0.5', 'open_2', 'open_whole'], 1.0: ['open_0.5']}
 
 
 def test_windows_follow_each_other_and_cross_no_pause(equations_for, perfect):
