@@ -76,12 +76,10 @@ class JointCoupling(Effect):
     def effort_columns(self, kind: str) -> tuple[int, ...]:
         return (0,) if kind == 'torque' else ()
 
-    def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
+    def is_inside(self, at: Placed, motion: SeenMotion) -> bool:
         """Return whether both positions count where a cable pulls; else it is a spring of one."""
         if at.place.kind == 'torque':
             return True
-        if not super().is_possible(at, motion):
-            return False
         ratio, scale = abs(float(at.shape[0])), _scale(motion.position, at.place)
         return scale / _LOPSIDED < ratio < scale * _LOPSIDED
 

@@ -108,9 +108,19 @@ def _of_softness(motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndar
     return np.asarray(force[:, :, None])
 
 
+def _rotors(effects: Sequence[EffectAt]) -> dict[Place, float]:
+    return {s.place: float(s.coefficients[0]) for s in effects if s.effect.is_inertial}
+
+
+def have_rotors(effects: Sequence[EffectAt]) -> bool:
+    """Return whether each motor that the nominal robot lacks is beside its spring."""
+    rotors = _rotors(effects)
+    return all(Place(s.place.joint) in rotors for s in effects if s.place.kind == BARE)
+
+
 def with_rotors(effects: Sequence[EffectAt]) -> tuple[EffectAt, ...]:
     """Return effects with one J, that of the rotor, where it is beside its spring."""
-    rotors = {s.place: float(s.coefficients[0]) for s in effects if s.effect.is_inertial}
+    rotors = _rotors(effects)
     return tuple(
         s.with_shape(np.array([rotors[own], *s.shape[1:]]))
         if s.place.kind == BARE and rotors.get(own := Place(s.place.joint), 0.0) > 0.0
