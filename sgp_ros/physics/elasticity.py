@@ -76,7 +76,8 @@ def twist_of(
     j, (J, softness, settling), inside = place.joint, shape[:3], _inside(place, shape)
     share = float(shape[3]) if is_on_motor(place) else 1.0
     a, effort = motion.acceleration[:, j], motion.effort[:, j] - J * motion.acceleration[:, j]
-    link = motion.nominal_effort[:, j] - _on_motor(motion, place, shape) * motion.velocity[:, j]
+    damping = _on_motor(motion, place, shape)
+    link = motion.nominal_effort[:, j] - damping * motion.velocity[:, j]
     given = share * (link - inside * a) + (1.0 - share) * effort
     torque = smooth(motion, given)
     if place.kind == 'link' or share * softness <= 0.0:
@@ -85,7 +86,7 @@ def twist_of(
         by_q, by_v, by_a = (x[:, j] for x in motion.effort_slopes(j))
         scale = share * softness
         terms = (scale * np.maximum(by_a - inside, _LEAST_OF_LINK * np.abs(by_a) + 1e-12),
-                 np.maximum(settling + scale * (by_v - _on_motor(motion, place, shape)), 0.0),
+                 np.maximum(settling + scale * (by_v - damping), 0.0),
                  np.maximum(1.0 + scale * by_q, _LEAST_STIFFNESS))  # fmt: skip
         all_ = np.column_stack([torque, *terms, effort, motion.velocity[:, j], a])
         parts = [
