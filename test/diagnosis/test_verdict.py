@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis import findings
 from sgp_ros.diagnosis.connected import Connected
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, SLIGHT_REST
 from sgp_ros.diagnosis.findings import verdict_of
@@ -49,3 +50,22 @@ def test_a_weight_that_is_held_hides_no_wrong_mass():
     calm = SimpleNamespace(verdict='parameters_only')
     assert verdict_of(calm, (), (), left, gained, ()) == 'parameters_only'
     assert verdict_of(calm, (), (), nominal.left, gained, ()) == 'no_mismatch'
+
+
+class AskedError(Exception):
+    """With the joints that intervals are told of."""
+
+
+def test_intervals_of_findings_are_told_which_joints_are_unknown(monkeypatch):
+    """A rest there widens no interval of another joint."""
+
+    def reported_std(_model, _columns, unknown=()):
+        raise AskedError(unknown)
+
+    monkeypatch.setattr(findings, 'reported_std', reported_std)
+    monkeypatch.setattr(findings, 'Columns', lambda equations: equations)
+    model = SimpleNamespace(effects=(SimpleNamespace(effect=None),), forces=(None,))
+    decision = SimpleNamespace(model=model, unknown=(1,))
+    with pytest.raises(AskedError) as asked:
+        findings.asserted(None, decision, (), (), None, ())
+    assert asked.value.args == ((1,),)
