@@ -24,8 +24,8 @@ Keys of a quantity: `column`, `unit`, `index` (which column of a matrix in NPZ o
 
     value in SI = scale * (column in unit) + offset
 
-Units are those of `UNITS`. counts, A, V and % need a `scale` that leads to SI, or to the unit of
-effort that the robot states. A member of a MAT structure is written `data.q`.
+Units are those of `table_units.UNITS`. counts, A, V and % need a `scale` that leads to SI, or to
+the unit of effort that the robot states. A member of a MAT structure is written `data.q`.
 """
 
 from __future__ import annotations
@@ -45,27 +45,9 @@ from sgp_ros.markup import YAMLError, load_yaml
 from sgp_ros.recordings.command_types import COMMAND_TYPES, FLOAT64_ARRAY
 from sgp_ros.recordings.messages import JOINT_STATE
 from sgp_ros.recordings.table_files import Columns
+from sgp_ros.recordings.table_units import TIME_UNITS, UNITS
 from sgp_ros.recordings.typestore import new_message
 from sgp_ros.strangers import read_text
-
-_ANGLE = math.pi / 180.0
-_KGF = 9.80665
-_POSITION = {'m': 1.0, 'mm': 1e-3, 'rad': 1.0, 'deg': _ANGLE, 'rev': 2.0 * math.pi}
-UNITS: dict[str, dict[str, float | None]] = {
-    'position': {**_POSITION, 'counts': None},
-    'velocity': {
-        **{f'{unit}/s': factor for unit, factor in _POSITION.items()},
-        'rpm': 2.0 * math.pi / 60.0, 'counts/s': None,
-    },
-    'effort': {
-        'N': 1.0, 'mN': 1e-3, 'kN': 1e3, 'N m': 1.0, 'Nm': 1.0, 'mN m': 1e-3, 'mNm': 1e-3,
-        'kN m': 1e3, 'kNm': 1e3, 'N mm': 1e-3, 'N cm': 1e-2, 'kgf cm': _KGF * 1e-2, 'kgf': _KGF,
-        'A': None, 'V': None, '%': None, 'counts': None,
-    },
-}  # fmt: skip
-"""Unit to its factor to SI, per quantity; None where only a `scale` can tell."""
-
-TIME_UNITS = {'s': 1_000_000_000, 'ms': 1_000_000, 'us': 1000, 'ns': 1}
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,10 +1,30 @@
-"""Units that the numbers of a column tell."""
+"""Units that a map may state, and those that the numbers of a column tell."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
+
+_ANGLE = math.pi / 180.0
+_KGF = 9.80665
+_POSITION = {'m': 1.0, 'mm': 1e-3, 'rad': 1.0, 'deg': _ANGLE, 'rev': 2.0 * math.pi}
+UNITS: dict[str, dict[str, float | None]] = {
+    'position': {**_POSITION, 'counts': None},
+    'velocity': {
+        **{f'{unit}/s': factor for unit, factor in _POSITION.items()},
+        'rpm': 2.0 * math.pi / 60.0, 'counts/s': None,
+    },
+    'effort': {
+        'N': 1.0, 'mN': 1e-3, 'kN': 1e3, 'N m': 1.0, 'Nm': 1.0, 'mN m': 1e-3, 'mNm': 1e-3,
+        'kN m': 1e3, 'kNm': 1e3, 'N mm': 1e-3, 'N cm': 1e-2, 'kgf cm': _KGF * 1e-2, 'kgf': _KGF,
+        'A': None, 'V': None, '%': None, 'counts': None,
+    },
+}  # fmt: skip
+"""Unit to its factor to SI, per quantity; None where only a `scale` can tell."""
+
+TIME_UNITS = {'s': 1_000_000_000, 'ms': 1_000_000, 'us': 1000, 'ns': 1}
 
 _EPOCHS = ((1e17, 'ns'), (1e14, 'us'), (1e11, 'ms'), (1e8, 's'))
 """Least number of a time since 1970, and its unit."""
