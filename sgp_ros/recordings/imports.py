@@ -11,12 +11,12 @@ import numpy as np
 import yaml
 
 from sgp_ros.engine.samples import CommandSample, JointSample
-from sgp_ros.errors import ConfigError, RecordingError
-from sgp_ros.recordings.column_names import POSITION, TIME, meaning
-from sgp_ros.recordings.table_entries import Columns, JointHint
+from sgp_ros.errors import ConfigError
+from sgp_ros.recordings.table_entries import JointHint
 from sgp_ros.recordings.table_files import load_columns
 from sgp_ros.recordings.table_formats import feature_names
 from sgp_ros.recordings.table_gains import is_recorded
+from sgp_ros.recordings.table_groups import one_recording
 from sgp_ros.recordings.table_guess import guess_map
 from sgp_ros.recordings.table_map import read_map
 from sgp_ros.recordings.tables import Table, read_table
@@ -92,7 +92,7 @@ def import_table(
     path, out = Path(path), Path(out)
     remarks: list[str] = []
     columns, lines = load_columns(path, remarks)
-    loaded = _of_group(path, columns, group, is_guessed=map_path is None), lines
+    loaded = one_recording(path, columns, group, is_guessed=map_path is None), lines
     unsure: list[str] = []
     if map_path is None:
         guess = guess_map(loaded[0], hints, feature_names(path), rate_hz)
@@ -113,32 +113,6 @@ def import_table(
         _written(out_path, 'map', content) if map_path is None else None,
         _gains(out_path, content.get('gains')), quality(table),
     )  # fmt: skip
-
-
-def _of_group(path: Path, columns: Columns, group: str | None, *, is_guessed: bool) -> Columns:
-    """Return the columns of a group, or all; refuse to guess which of several is meant.
-
-    Groups with times and positions of their own are recordings, such as `sim.q` and `real.q`.
-    """
-    said: dict[str, set[str]] = {}
-    for name in columns:
-        head, _, rest = name.partition('.')
-        if rest and not meaning(rest).is_target:
-            said.setdefault(head, set()).add(meaning(rest).role)
-    several = [head for head, roles in said.items() if {TIME, POSITION} <= roles]
-    if group is None and is_guessed and len(several) > 1:
-        raise RecordingError(
-            f'{path.name} contains several recordings: {", ".join(several)}', 'one',
-            f'choose it, such as by --group {several[0]}',
-        )  # fmt: skip
-    if group is None:
-        return columns
-    found = {
-        n.removeprefix(f'{group}.'): x for n, x in columns.items() if n.startswith(f'{group}.')
-    }
-    if not found:
-        raise RecordingError(f'{path.name} has no group {group!r}', f'one of {sorted(said)}')
-    return found
 
 
 def quality(table: Table) -> dict[str, Any]:

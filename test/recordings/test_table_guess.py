@@ -354,6 +354,31 @@ def test_one_of_several_recordings_in_a_file_is_chosen(tmp_path):
         np.testing.assert_allclose([s.position for s in states], factor * Q)
 
 
+def test_names_with_another_last_word_are_recordings_of_one_file(tmp_path):
+    """Also with matrices on their sides; what has no such word belongs to each of them."""
+    arrays = {'t_train': T[None], 'q_train': Q.T, 'tau_train': TAU.T,
+              't_test': T[:150], 'q_test': 2.0 * Q[:150].T, 'tau_test': TAU[:150].T,
+              'kp': [3.0, 2.0], 'kd': 1.0}  # fmt: skip
+    path = _npz(tmp_path, **arrays)
+    with pytest.raises(RecordingError, match=r'several recordings: train, test; .*--group train'):
+        _read(path, tmp_path)
+    for group, q in (('train', Q), ('test', 2.0 * Q[:150])):
+        summary = import_table(path, None, tmp_path / group, HINTS, group=group)
+        states = [e for e in open_recording(summary.path).events() if isinstance(e, JointSample)]
+        np.testing.assert_allclose([s.position for s in states], q)
+        assert yaml.safe_load(summary.gains_path.read_text())['kp']['shoulder'] == 3.0
+        again = import_table(path, summary.map_path, tmp_path / 'again', group=group)
+        assert again.samples == len(q)
+
+
+@pytest.mark.parametrize('has_time', [True, False])
+def test_a_matrix_with_one_row_a_joint_is_turned(tmp_path, has_time):
+    path = _npz(tmp_path, q=Q.T, tau=TAU.T, **({'t': T} if has_time else {}))
+    _, states, _ = _read(path, tmp_path, rate=None if has_time else 200.0)
+    np.testing.assert_allclose([s.position for s in states], Q)
+    np.testing.assert_allclose([s.effort for s in states], TAU)
+
+
 def test_other_yaml_is_no_table(tmp_path):
     (tmp_path / 'robot.yaml').write_text('schema: 1\nurdf: robot.urdf\n')
     with pytest.raises(RecordingError, match='no column of time'):
