@@ -12,6 +12,7 @@ import numpy as np
 from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.column_names import (
     COMMAND,
+    CURRENT,
     EFFORT,
     OTHER,
     POSITION,
@@ -24,6 +25,7 @@ from sgp_ros.recordings.table_units import as_numbers
 Columns = dict[str, np.ndarray]
 _NAMES = ('names', 'joint_names', 'joints', 'name')
 _DIGITS = '0123456789'
+_SYMBOL = re.compile(r'([uyz])[_.]?(\d*)')
 _ROLES = {
     **dict.fromkeys(('rad', 'deg', 'mm'), POSITION),
     **dict.fromkeys(('rad/s', 'deg/s', 'rpm', 'm/s', 'mm/s'), VELOCITY),
@@ -138,6 +140,28 @@ def _labelled(entries: list[Entry]) -> list[Entry]:
                 own = replace(e.said, rest=e.said.rest[common:])
                 label = own.joint or '_'.join(own.rest) or label
             found.append(Entry(e.column, e.index, e.said, label, e.numbers))
+    return found
+
+
+def of_signals(entries: Sequence[Entry], guess: Guess) -> list[Entry]:
+    """Let `y` be positions and `u` efforts, as of any system, where no name tells positions."""
+    symbols = [_SYMBOL.fullmatch(e.column.rpartition('.')[2].lower()) for e in entries]
+    letters = [m[1] if m else '' for m in symbols]
+    measured = {e.said.role for e in entries if not e.said.is_target}
+    if POSITION in measured or 'y' not in letters or 'z' in letters:
+        return list(entries)
+    roles = {'y': POSITION} | ({} if {EFFORT, CURRENT} & measured else {'u': EFFORT})
+    found = []
+    for e, symbol in zip(entries, symbols, strict=True):
+        if symbol is None or symbol[1] not in roles:
+            found.append(e)
+            continue
+        said = replace(e.said, role=roles[symbol[1]], is_target=False)
+        found.append(replace(e, said=said, label=symbol[2] if e.index is None else e.label))
+        unit = '' if said.role == POSITION or said.unit else ' in N m or N'
+        guess.unsure.append(f'{e.column} is taken as the {said.role} of a joint{unit}, as no name '
+                            'of a column says what it is.')  # fmt: skip
+    guess.unsure = list(dict.fromkeys(guess.unsure))
     return found
 
 

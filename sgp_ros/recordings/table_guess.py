@@ -30,6 +30,7 @@ from sgp_ros.recordings.table_entries import (
     entries_of,
     joint_names,
     of_one_joint,
+    of_signals,
 )
 from sgp_ros.recordings.table_gains import add_gains
 from sgp_ros.recordings.table_time import guessed_times
@@ -63,7 +64,7 @@ def guess_map(
     guess = Guess()
     rows = _rows(columns)
     seconds = guessed_times(columns, rows, rate_hz, guess)
-    entries = entries_of(columns, rows, features or {})
+    entries = of_signals(entries_of(columns, rows, features or {}), guess)
     positions = chosen(entries, POSITION, guess)
     if not positions:
         texts = sorted(name for name, column in columns.items() if as_numbers(column) is None)

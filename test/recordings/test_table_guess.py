@@ -222,6 +222,24 @@ def test_a_table_in_which_no_torque_is_seen_says_so(tmp_path):
     assert 'No torque' in ' '.join(_read(path, tmp_path)[0].unsure)
 
 
+@pytest.mark.parametrize(
+    'arrays',
+    [{'y': Q, 'u': TAU}, {'y1': Q[:, 0], 'y2': Q[:, 1], 'u1': TAU[:, 0], 'u2': TAU[:, 1]}],
+)
+def test_input_and_output_are_effort_and_position_where_nothing_else_is(tmp_path, arrays):
+    """It is said; beside positions of a better name both stay what they were."""
+    summary, states, commands = _read(_npz(tmp_path, t=T, **arrays), tmp_path)
+    np.testing.assert_allclose([s.position for s in states], Q)
+    np.testing.assert_allclose([s.effort for s in states], TAU)
+    assert commands == []
+    said = ' '.join(summary.unsure)
+    assert 'taken as the position' in said
+    assert 'taken as the effort of a joint in N m' in said
+    summary, states, _ = _read(_npz(tmp_path, t=T, q=2.0 * Q, **arrays), tmp_path)
+    np.testing.assert_allclose([s.position for s in states], 2.0 * Q)
+    assert states[0].effort is None
+
+
 def test_an_action_is_what_the_positions_say(tmp_path):
     """Near them it is their target; else nothing says what it is, and it is left out."""
     summary, _, commands = _read(_npz(tmp_path, t=T, q=Q, action=LATE), tmp_path)
