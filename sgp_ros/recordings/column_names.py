@@ -28,6 +28,7 @@ _QUANTITIES = {
     'index frame episode task reward done error ff feedforward',
 }
 _WORDS = {word: role for role, words in _QUANTITIES.items() for word in words.split()}
+_EFFORTS = frozenset(_QUANTITIES[EFFORT].split())
 _MOMENT = 'M'
 """Symbol of a torque, as a capital."""
 _TARGETS = frozenset({
@@ -109,6 +110,8 @@ def meaning(name: str) -> Meaning:
         i += 1
     if not role and is_target:
         role = COMMAND
+    if not unit and _EFFORTS & {word.lower() for word in words} == {'load'}:
+        unit = '%'  # as servos log it, of the duty cycle: no torque
     return Meaning(role, is_target, tuple(rest), unit)
 
 

@@ -22,14 +22,18 @@ from sgp_ros.strangers import require_within
 
 Columns = dict[str, np.ndarray]
 
-_NAMES = 'names'
+_NAMES, _REMARKS = 'names', 'remarks'
 _KINDS = 'a MATLAB .mat, an HDF5, a Parquet, a JSON or a YAML file'
 _COPIES = 3
 """Of what is sent, while it is: packed, received and as arrays."""
 
 
-def load_apart(path: Path) -> Columns:
+def load_apart(path: Path, remarks: list[str]) -> Columns:
     """Return the arrays of a file with an ending of `READERS` by name.
+
+    Args:
+        path: of the file.
+        remarks: what is left out of it is appended here.
 
     Raises:
         RecordingError: it cannot be read.
@@ -37,17 +41,20 @@ def load_apart(path: Path) -> Columns:
     """
     data = read_apart(f'{__name__}:write_columns', path, RecordingError, _KINDS)
     with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+        remarks += [str(said) for said in arrays[_REMARKS]]
         return {str(name): arrays[f'c{i}'] for i, name in enumerate(arrays[_NAMES])}
 
 
 def write_columns(path: Path, stream: BinaryIO) -> None:
     """Write the arrays of a file as NPZ."""
-    columns = READERS[path.suffix.lower()](path)
+    remarks: list[str] = []
+    columns = READERS[path.suffix.lower()](path, remarks)
     require_bounded(path, columns)
     megabytes = _COPIES * sum(array.nbytes for array in columns.values()) / (1 << 20)
     require_within(megabytes, 'UNPACKED_MB', f'size of the table {path} in MB')
     arrays = {f'c{i}': array for i, array in enumerate(columns.values())}
     arrays[_NAMES] = np.array([*columns], dtype=str)
+    arrays[_REMARKS] = np.array(remarks, dtype=str)
     np.savez(stream, allow_pickle=False, **arrays)
 
 
@@ -97,11 +104,11 @@ def _flattened(prefix: str, content: Mapping[str, object]) -> Iterator[tuple[str
             yield place, value
 
 
-READERS: dict[str, Callable[[Path], Columns]] = {
-    '.mat': _load_mat,
-    **dict.fromkeys(('.h5', '.hdf5', '.hdf'), load_hdf5),
-    **dict.fromkeys(('.parquet', '.pq'), load_parquet),
+READERS: dict[str, Callable[[Path, list[str]], Columns]] = {
+    '.mat': lambda path, _: _load_mat(path),
+    **dict.fromkeys(('.h5', '.hdf5', '.hdf'), lambda path, _: load_hdf5(path)),
+    **dict.fromkeys(('.parquet', '.pq'), lambda path, _: load_parquet(path)),
     **dict.fromkeys(('.json', '.jsonl', '.ndjson'), load_json),
-    **dict.fromkeys(('.yaml', '.yml'), load_messages),
+    **dict.fromkeys(('.yaml', '.yml'), lambda path, _: load_messages(path)),
 }
-"""Ending to what reads such a file."""
+"""Ending to what reads such a file, and appends what is left out of it."""

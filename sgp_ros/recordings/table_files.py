@@ -58,7 +58,7 @@ def _load(path: Path, suffix: str, remarks: list[str]) -> tuple[Columns, Sequenc
     if suffix == '.npz':
         return _load_npz(path, remarks), ()
     if suffix in READERS:
-        return load_apart(path), ()
+        return load_apart(path, remarks), ()
     if suffix in {'.csv', '.tsv', '.txt', '.dat'}:
         return load_text(path, remarks)
     raise RecordingError(f'{path} has the file type {suffix!r}', f'one of {", ".join(ENDINGS)}')

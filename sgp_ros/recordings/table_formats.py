@@ -27,6 +27,8 @@ REFUSED = {
     '.xlsx': 'spreadsheets are not supported',
 }
 """Ending to the reason why such a file is not read."""
+_LISTED = 12
+"""Keys without numbers of rows that are listed by name."""
 _REMEDY = 'save the data with numpy.savez, as CSV or as Parquet'
 
 
@@ -130,10 +132,15 @@ def load_hdf5(path: Path, *, is_matlab: bool = False) -> Columns:
     return columns
 
 
-def load_json(path: Path) -> Columns:
+def load_json(path: Path, remarks: list[str]) -> Columns:
     """Return the columns of a JSON file: of a mapping to lists, or of a list of records.
 
-    In `.jsonl` and `.ndjson` each line is a record.
+    In `.jsonl` and `.ndjson` each line is a record. Lists of records below several keys have the
+    key before the names of their columns.
+
+    Args:
+        path: of the file.
+        remarks: the key that is read, and those that are left out, are appended here.
 
     Raises:
         RecordingError: no JSON, or no table.
@@ -152,13 +159,35 @@ def load_json(path: Path) -> Columns:
     if isinstance(content, list) and content and all(isinstance(x, dict) for x in content):
         columns = _of_records(path, _alike([dict(_flattened('', x)) for x in content]))
     elif isinstance(content, dict):
-        for name, value in _flattened('', content):
-            if isinstance(value, list):
-                _enter(columns, name, value)
+        columns = _of_object(path, content, remarks)
     if not columns:
         raise RecordingError(
-            f'{path.name} contains no table', 'an object of lists, or a list of records'
+            f'{path.name} contains no table',
+            'an object of lists, or a list of records, or one of them below a key',
         )
+    return columns
+
+
+def _of_object(path: Path, content: Mapping[str, Any], remarks: list[str]) -> Columns:
+    """Return the columns of lists, or of lists of records where the longest list is one."""
+    flat = dict(_flattened('', content))
+    lists = {name: x for name, x in flat.items() if isinstance(x, list) and x}
+    tables = {name: x for name, x in lists.items() if all(isinstance(y, dict) for y in x)}
+    if not lists or max(lists, key=lambda n: len(lists[n])) not in tables:
+        tables = {}
+    columns: Columns = {}
+    for name, records in tables.items():
+        found = _of_records(path, _alike([dict(_flattened('', x)) for x in records]))
+        before = f'{name.replace(".", "_")}.' if len(tables) > 1 else ''
+        columns |= {f'{before}{n}': x for n, x in found.items()}
+    for name, values in () if tables else lists.items():
+        _enter(columns, name, values)
+    used = {*tables} or {*columns}
+    left = [name for name in flat if name not in used]
+    if columns and left:
+        read = f'the list of records {" and ".join(tables)} is read; ' * bool(tables)
+        more = f' and {len(left) - _LISTED} more' if len(left) > _LISTED else ''
+        remarks.append(f'{path.name}: {read}{", ".join(left[:_LISTED])}{more} not read')
     return columns
 
 

@@ -69,6 +69,9 @@ def _read(path, folder, hints=HINTS, rate=None):
         ('j4.ActVel_degps', 'velocity', False, '4', 'deg/s'),
         ('base_pan_load_pct', 'effort', False, 'base_pan', '%'),
         ('Load [%]', 'effort', False, '', '%'),
+        ('load', 'effort', False, '', '%'),
+        ('load_torque', 'effort', False, '', ''),
+        ('goal_position', 'position', True, '', ''),
     ],
 )
 def test_names_tell_quantity_joint_and_unit(name, role, is_target, joint, unit):
@@ -214,6 +217,37 @@ def test_a_load_in_per_cent_asks_for_the_torque_of_one(tmp_path):
     summary, states, _ = _read(path, tmp_path)
     assert any('torque of 1 %' in said for said in summary.unsure)
     np.testing.assert_allclose([s.effort for s in states], 100.0 * TAU)
+
+
+def _bench(q):
+    keys = ('timestamp', 'position', 'speed', 'load')
+    rows = np.column_stack([T, q, DQ[:, 0], TAU[:, 0]]).tolist()
+    return [dict(zip(keys, row, strict=True)) for row in rows]
+
+
+def test_records_below_a_key_are_the_table_and_the_header_is_not(tmp_path):
+    """A header gives no gain: its units are not known."""
+    path = tmp_path / 'log.json'
+    header = {'mass': 0.5, 'kp': 16.0, 'kd': 1.0, 'ends': [0.0, 1.0], 'servo': {'name': 'mx'}}
+    path.write_text(json.dumps({**header, 'entries': _bench(Q[:, 0])}))
+    summary, states, _ = _read(path, tmp_path, HINTS[:1])
+    np.testing.assert_allclose([s.position for s in states], Q[:, :1])
+    np.testing.assert_allclose([s.velocity for s in states], DQ[:, :1])
+    said = 'list of records entries is read; mass, kp, kd, ends, servo.name not read'
+    assert said in ' '.join(summary.remarks)
+    assert 'torque of 1 %' in ' '.join(summary.unsure)
+    assert summary.gains_path is None
+
+
+def test_one_of_several_lists_of_records_is_chosen(tmp_path):
+    path = tmp_path / 'log.json'
+    runs = {'one': _bench(Q[:, 0]), 'two': _bench(Q[:, 1])}
+    path.write_text(json.dumps({'mass': 0.5, 'runs': runs}))
+    with pytest.raises(RecordingError, match='--group runs_one'):
+        _read(path, tmp_path, HINTS[:1])
+    summary = import_table(path, None, tmp_path / 'two', HINTS[:1], group='runs_two')
+    states = [e for e in open_recording(summary.path).events() if isinstance(e, JointSample)]
+    np.testing.assert_allclose([s.position for s in states], Q[:, 1:])
 
 
 def test_a_table_in_which_no_torque_is_seen_says_so(tmp_path):
