@@ -206,7 +206,10 @@ def chosen(
 def joint_names(
     positions: Mapping[str, Entry], columns: Columns, hints: Sequence[JointHint], guess: Guess
 ) -> dict[str, str]:
-    """Return the label of each joint's column and its name."""
+    """Return the label of each joint's column and its name.
+
+    Columns of other joints are left out where all joints of the robot have theirs.
+    """
     labels = list(positions)
     names = _listed(columns, hints)
     if len(set(names)) == len(labels) and all(not x.strip(_DIGITS) for x in labels):
@@ -215,11 +218,13 @@ def joint_names(
         plain = [x for x in labels if not x.strip(_DIGITS)]
         first = min((int(x) for x in plain if x), default=0)
         return {x: f'joint_{int(x or first) - first + 1}' if x in plain else x for x in labels}
-    whole = {x: _within(positions[x].column, hints) for x in labels}
+    names_of_robot = [h.name for h in hints]
+    whole = {x: _within(positions[x].column, names_of_robot) for x in labels}
     same = {x: [h.name for h in hints if _same(x, h.name)] for x in labels}
     for matched in (whole, same):
         unique = {x: m[0] for x, m in matched.items() if len(m) == 1}
-        if len(set(unique.values())) == len(labels):
+        is_each = len(set(unique.values())) == len(unique)
+        if is_each and len(unique) in {len(labels), len(hints)}:
             return unique
     if len(labels) == len(hints):
         order = sorted(labels, key=int) if all(x.isdigit() for x in labels) else labels
@@ -236,6 +241,28 @@ def joint_names(
         f'those of the robot: {", ".join(h.name for h in hints)}',
         'write a map, or a robot YAML with these joints (docs/import.md)',
     )  # fmt: skip
+
+
+def of_robot(
+    entries: Sequence[Entry], positions: Mapping[str, Entry], joints: Mapping[str, str],
+    guess: Guess,
+) -> tuple[list[Entry], dict[str, Entry]]:  # fmt: skip
+    """Return entries and positions without those of joints that are not the robot's; say which.
+
+    What has the name of a joint in its own belongs to this joint.
+    """
+    others = [x for x in positions if x not in joints]
+    if others:
+        columns = ', '.join(dict.fromkeys(positions[x].column for x in others))
+        guess.unsure.append(f'The robot has no joint of {columns}: ignored.')
+    labels = {name: x for x, name in joints.items()}
+    found = []
+    for e in entries:
+        is_open = e.index is None and e.label not in positions
+        named = _within(e.column, tuple(labels)) if is_open else []
+        if e.label not in others:
+            found.append(replace(e, label=labels[named[0]]) if named else e)
+    return found, {x: e for x, e in positions.items() if x in joints}
 
 
 def _listed(columns: Columns, hints: Sequence[JointHint]) -> list[str]:
@@ -255,10 +282,10 @@ def _same(label: str, name: str) -> bool:
     return bool(a) and (a in {b, bare} or a.replace('joint', '') == bare)
 
 
-def _within(column: str, hints: Sequence[JointHint]) -> list[str]:
+def _within(column: str, joints: Sequence[str]) -> list[str]:
     """Return the longest of the joints' names that stand in a column's name as words."""
     found = [
-        h.name for h in hints
-        if re.search(rf'(?<![^\W_]){re.escape(h.name)}(?![^\W_])', column, re.IGNORECASE)
+        name for name in joints
+        if re.search(rf'(?<![^\W_]){re.escape(name)}(?![^\W_])', column, re.IGNORECASE)
     ]  # fmt: skip
     return [max(found, key=len)] if found else []

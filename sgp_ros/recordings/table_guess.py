@@ -30,6 +30,7 @@ from sgp_ros.recordings.table_entries import (
     entries_of,
     joint_names,
     of_one_joint,
+    of_robot,
     of_signals,
 )
 from sgp_ros.recordings.table_gains import add_gains
@@ -76,6 +77,7 @@ def guess_map(
         )  # fmt: skip
     entries = of_one_joint(entries, positions, guess)
     joints = joint_names(positions, columns, hints, guess)
+    entries, positions = of_robot(entries, positions, joints, guess)
     hinted = {h.name: h for h in hints}
     units = _position_units(positions, joints, hinted, guess)
     found: dict[str, dict[str, Any]] = {

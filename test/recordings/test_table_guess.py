@@ -133,6 +133,22 @@ def test_columns_that_hold_the_names_of_joints_are_theirs_in_any_order(tmp_path,
     assert not any('order of the robot' in said for said in summary.unsure)
 
 
+def test_columns_of_joints_that_the_robot_lacks_are_left_out(tmp_path):
+    """A robot file of one arm, a table of both: it is said in one line."""
+    other = {f'right_{x}_{k}': 9.0 * T for x in ('shoulder', 'elbow') for k in ('pos', 'vel')}
+    own = {f'left_{x}_{k}': a[:, i] for k, a in (('pos', Q), ('vel', DQ), ('tau', TAU))
+           for i, x in enumerate(('shoulder', 'elbow'))}  # fmt: skip
+    hints = [replace(h, name=f'left_{h.name}') for h in HINTS]
+    path = _npz(tmp_path, t=T, **other, **own)
+    summary, states, _ = _read(path, tmp_path, hints)
+    np.testing.assert_allclose([s.position for s in states], Q)
+    np.testing.assert_allclose([s.effort for s in states], TAU)
+    (said,) = summary.unsure
+    assert said == 'The robot has no joint of right_shoulder_pos, right_elbow_pos: ignored.'
+    with pytest.raises(RecordingError, match='positions of 4 joints'):
+        _read(path, tmp_path, (*HINTS, JointHint('knee')))
+
+
 @pytest.mark.parametrize(
     ('header', 'said'),
     [
