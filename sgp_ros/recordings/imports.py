@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
-from sgp_ros.engine.samples import CommandSample, JointSample
-from sgp_ros.errors import ConfigError
+from sgp_ros.engine.samples import POSITION, VELOCITY, CommandSample, JointSample
+from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.recordings.table_entries import JointHint
 from sgp_ros.recordings.table_files import load_columns
 from sgp_ros.recordings.table_formats import feature_names
@@ -19,10 +19,14 @@ from sgp_ros.recordings.table_gains import is_recorded
 from sgp_ros.recordings.table_groups import one_recording
 from sgp_ros.recordings.table_guess import guess_map
 from sgp_ros.recordings.table_map import read_map
+from sgp_ros.recordings.table_turns import TURN, counted_on
+from sgp_ros.recordings.table_units import ANGLES
 from sgp_ros.recordings.tables import Table, read_table
 from sgp_ros.recordings.writer import RecordingWriter
 from sgp_ros.strangers import replace_file
 
+_OUTSIDE = 0.5
+"""Ranges beyond the limits from which on positions contradict them: stops give way by less."""
 _GAP = 5.0
 """Steps without a row that count as a gap."""
 
@@ -99,7 +103,7 @@ def import_table(
         content, unsure = guess.content, guess.unsure
     else:
         content = dict(read_map(map_path))
-    table = read_table(path, content, loaded)
+    table = _counted_on(read_table(path, content, loaded), _units(content), hints)
     require(table.events())
     out_path = out if out.suffix == '.mcap' else out / f'{path.stem}.mcap'
     out_path.parent.mkdir(parents=True, exist_ok=True)
@@ -113,6 +117,64 @@ def import_table(
         _written(out_path, 'map', content) if map_path is None else None,
         _gains(out_path, content.get('gains')), quality(table),
     )  # fmt: skip
+
+
+def _counted_on(table: Table, units: Mapping[str, str], hints: Sequence[JointHint]) -> Table:
+    """Return a table whose angles, and targets of these, do not wrap; a remark says of which.
+
+    Raises:
+        RecordingError: angles that are stated in degrees or turns are far out of the limits.
+    """
+    hinted = {h.name: h for h in hints}
+    channels, asked = dict(table.channels), table.commands
+    seconds = (np.array(table.stamps_ns) - table.stamps_ns[0]) * 1e-9
+    changed = []
+    for j, name in enumerate(table.joints):
+        hint = hinted.get(name, JointHint(name))
+        if hint.slides or not (name in hinted or units.get(name) in ANGLES):
+            continue
+        angle = table.channels[POSITION][:, j]
+        speed = table.channels[VELOCITY][:, j] if VELOCITY in table.channels else None
+        found = counted_on(angle, seconds, speed, (hint.lower, hint.upper))
+        _require_near(found, units.get(name, ''), hint)
+        if np.array_equal(found, angle):
+            continue
+        changed.append(name)
+        channels[POSITION] = _with_column(channels[POSITION], j, found)
+        if asked is not None and table.command_kind == POSITION and name in table.command_joints:
+            c = table.command_joints.index(name)
+            away = TURN * np.round((found - asked[:, c]) / TURN)  # less than half a turn is left
+            asked = _with_column(asked, c, asked[:, c] + away)
+    if not changed:
+        return table
+    said = f'angles of {", ".join(changed)} wrap: counted on, and shifted by whole turns'
+    return replace(table, channels=channels, commands=asked, remarks=(*table.remarks, said))
+
+
+def _units(content: Mapping[str, Any]) -> dict[str, str]:
+    """Return the unit of the position of each joint in a checked map."""
+    return {str(joint): parts[POSITION]['unit'] for joint, parts in content['joints'].items()}
+
+
+def _with_column(array: np.ndarray, j: int, column: np.ndarray) -> np.ndarray:
+    found = array.copy()
+    found[:, j] = column
+    return found
+
+
+def _require_near(angle: np.ndarray, unit: str, hint: JointHint) -> None:
+    """Refuse angles that are no radians, and far out of the limits of a joint."""
+    one, width = ANGLES.get(unit, 1.0), hint.upper - hint.lower
+    if one == 1.0 or not (np.isfinite(width) and width > 0.0):
+        return
+    low, high = float(angle.min()), float(angle.max())
+    if low < hint.lower - _OUTSIDE * width or high > hint.upper + _OUTSIDE * width:
+        raise RecordingError(
+            f'the positions of {hint.name} go from {low / one:.4g} to {high / one:.4g} {unit}',
+            f'its limits, {hint.lower / one:.4g} to {hint.upper / one:.4g} {unit}',
+            'state its zero (`offset`) or gear ratio (`scale`) in a map, or omit --robot if its '
+            'limits are wrong',
+        )  # fmt: skip
 
 
 def quality(table: Table) -> dict[str, Any]:

@@ -7,14 +7,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-_ANGLE = math.pi / 180.0
+from sgp_ros.recordings.table_turns import TURN, counted_on, has_wraps
+
 _KGF = 9.80665
-_POSITION = {'m': 1.0, 'mm': 1e-3, 'rad': 1.0, 'deg': _ANGLE, 'rev': 2.0 * math.pi}
+ANGLES = {'rad': 1.0, 'deg': math.pi / 180.0, 'rev': TURN}
+"""Units of an angle [rad]."""
+_POSITION = {'m': 1.0, 'mm': 1e-3, **ANGLES}
 UNITS: dict[str, dict[str, float | None]] = {
     'position': {**_POSITION, 'counts': None},
     'velocity': {
         **{f'{unit}/s': factor for unit, factor in _POSITION.items()},
-        'rpm': 2.0 * math.pi / 60.0, 'counts/s': None,
+        'rpm': TURN / 60.0, 'counts/s': None,
     },
     'effort': {
         'N': 1.0, 'mN': 1e-3, 'kN': 1e3, 'N m': 1.0, 'Nm': 1.0, 'mN m': 1e-3, 'mNm': 1e-3,
@@ -32,7 +35,6 @@ _RATES_HZ = (5.0, 20_000.0)
 """Of logs."""
 PER_SECOND = {'s': 1.0, 'ms': 1e3, 'us': 1e6, 'ns': 1e9}
 """Unit of time to its number in a second."""
-_TURN = 2.0 * np.pi
 _MARGIN = 0.3
 """Beyond a range that a position may read [rad]."""
 
@@ -101,13 +103,20 @@ def position_unit(
             largest = max(largest, abs(low), abs(high))
         for unit, factor in (('rad', 1.0), ('deg', np.pi / 180.0)):
             if np.isfinite(lower) and np.isfinite(upper):
-                fits = low * factor >= lower - _MARGIN and high * factor <= upper + _MARGIN
-                votes[unit] += bool(fits)
+                low, high = _ends(factor * numbers, lower, upper)
+                votes[unit] += low >= lower - _MARGIN and high <= upper + _MARGIN
     if votes['rad'] != votes['deg']:
         return ('rad', True) if votes['rad'] > votes['deg'] else ('deg', True)
-    if largest <= _TURN + _MARGIN:
-        return 'rad', all(np.nanmax(np.abs(x)) <= _TURN + _MARGIN for x, _, _ in columns)
+    if largest <= TURN + _MARGIN:
+        return 'rad', all(np.nanmax(np.abs(x)) <= TURN + _MARGIN for x, _, _ in columns)
     return ('deg' if largest > 6.0 * np.pi else 'rad'), False
+
+
+def _ends(angle: np.ndarray, lower: float, upper: float) -> tuple[float, float]:
+    """Return the least and the greatest of angles (n,), counted on where they wrap [rad]."""
+    if has_wraps(angle):
+        angle = counted_on(angle, np.arange(float(len(angle))), limits=(lower, upper))
+    return float(np.nanmin(angle)), float(np.nanmax(angle))
 
 
 def slide_unit(numbers: np.ndarray, lower: float, upper: float) -> str:
@@ -137,6 +146,8 @@ def velocity_unit(
     if said in {'rpm', 'rad/s', 'deg/s', 'rev/s', 'm/s', 'mm/s'}:
         return said, ''
     usual = f'{unit}/s'
+    if unit in ANGLES:
+        position = counted_on(ANGLES[unit] * position, seconds) / ANGLES[unit]
     step = np.diff(seconds)
     good = (step > 0.0) & np.isfinite(np.diff(position)) & np.isfinite(velocity[1:])
     rate = np.diff(position)[good] / step[good]

@@ -203,6 +203,53 @@ def test_targets_have_their_own_unit(tmp_path):
     np.testing.assert_allclose([c.effort for c in commands], LATE, atol=1e-12)
 
 
+FAR = np.column_stack([1.5 * np.cos(3.0 * T), 1.0 + 0.5 * np.cos(2.0 * T)])
+FAR_RATE = np.column_stack([-4.5 * np.sin(3.0 * T), -np.sin(2.0 * T)])
+
+
+@pytest.mark.parametrize('turn', [2.0 * np.pi, 360.0])
+@pytest.mark.parametrize('has_velocity', [True, False])
+def test_angles_that_wrap_are_counted_on_within_the_limits(tmp_path, turn, has_velocity):
+    """The second joint reads one turn too much throughout; the targets wrap elsewhere."""
+    factor = turn / (2.0 * np.pi)
+    q, target = (factor * FAR) % turn, (factor * (FAR + 0.01) + 0.3 * turn) % turn - 0.3 * turn
+    hints = (HINTS[0], JointHint('elbow', lower=-5.6, upper=-4.7))
+    rates = {'dq': factor * FAR_RATE} if has_velocity else {}
+    path = _npz(tmp_path, t=T, q=q, q_des=target, kp=1.0, kd=1.0, **rates)
+    summary, states, commands = _read(path, tmp_path, hints)
+    expected = FAR - [0.0, 2.0 * np.pi]
+    np.testing.assert_allclose([s.position for s in states], expected, atol=1e-9)
+    np.testing.assert_allclose([c.effort for c in commands], expected + 0.01, atol=1e-9)
+    assert 'angles of shoulder, elbow wrap' in ' '.join(summary.remarks)
+    if has_velocity:
+        np.testing.assert_allclose([s.velocity for s in states], FAR_RATE)
+        assert 'velocity' not in ' '.join(summary.unsure)
+
+
+def test_an_angle_without_limits_that_wraps_begins_within_half_a_turn(tmp_path):
+    """One that does not wrap stays."""
+    angle = np.column_stack([3.5 + 5.0 * T, 4.0 + T])
+    path = _npz(tmp_path, t=T, q_rad=angle % (2.0 * np.pi))
+    _, states, _ = _read(path, tmp_path, [])
+    np.testing.assert_allclose([s.position for s in states], angle - [2.0 * np.pi, 0.0])
+
+
+def test_a_step_of_a_turn_that_is_no_wrap_stays(tmp_path):
+    """The steps beside it and the velocity say that it is another motion."""
+    angle = np.where(np.arange(200) < 100, 0.1 + T, 4.5 + T)
+    path = _npz(tmp_path, t=T, q_rad=angle, dq_rad_s=np.ones(200))
+    _, states, _ = _read(path, tmp_path, [])
+    np.testing.assert_array_equal([s.position[0] for s in states], angle)
+
+
+def test_degrees_out_of_the_limits_are_not_said_to_fit_in_degrees(tmp_path):
+    path = _npz(tmp_path, t=T, q_deg=200.0 + 20.0 * Q)
+    with pytest.raises(
+        RecordingError, match=r'go from 200 to 220 deg; expected its limits, -57'
+    ):
+        _read(path, tmp_path, [replace(h, lower=-1.0, upper=1.0) for h in HINTS])
+
+
 def test_a_slide_that_fits_its_range_only_in_millimetres_is_in_these(tmp_path):
     """It is said, as degrees of a joint are that goes beyond one turn."""
     path = _npz(tmp_path, t=T, q=Q * [1.0, 1e3], tau=TAU)
