@@ -7,11 +7,8 @@ the map.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
-from decimal import Decimal, InvalidOperation, Overflow
 from pathlib import Path
 
 import numpy as np
@@ -28,18 +25,14 @@ from sgp_ros.errors import ConfigError, RecordingError
 from sgp_ros.recordings.command_types import COMMAND_TYPES
 from sgp_ros.recordings.table_files import Columns, load_columns
 from sgp_ros.recordings.table_gains import row_gains
-from sgp_ros.recordings.table_map import Quantity, TableMap, TimeBase, check_map
+from sgp_ros.recordings.table_map import Quantity, TableMap, check_map
+from sgp_ros.recordings.table_stamps import column_of, row_stamps
 from sgp_ros.recordings.table_units import as_numbers, is_number
 
-_ISO = re.compile(r'(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:\d\d)?')
 _GREATEST = 1e150
 """Above this a number has no square, so nothing can be computed of it."""
 _LISTED = 5
 """Refused rows that are listed by number."""
-_PAUSE_NS = 10 * 10**9
-"""Between episodes: they are never taken for one motion [ns]."""
-_LATEST_NS = 2**31 * 10**9
-"""First stamp that a ROS message cannot hold [ns]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +120,7 @@ def read_table(
     values = {place: _values(path, columns, quantity) for place, quantity in quantities.items()}
     lengths = {place: len(array) for place, array in values.items()}
     n = next(iter(lengths.values()))
-    stamps_ns = _stamps(path, columns, table_map.time, n)
+    stamps_ns = row_stamps(path, columns, table_map.time, n)
     lengths['time'] = len(stamps_ns)
     if set(lengths.values()) != {n}:
         raise ConfigError(f'{path}: columns of different lengths {lengths}', 'equal lengths')
@@ -205,7 +198,7 @@ def _without_impossible(
 
 def _values(path: Path, columns: Columns, quantity: Quantity) -> np.ndarray:
     """Return one quantity in SI, (n,)."""
-    column = _vector(columns, quantity)
+    column = column_of(columns, quantity)
     if column.dtype.kind != 'U':
         return column.astype(np.float64) * quantity.factor + quantity.offset
     numbers = as_numbers(column)
@@ -216,77 +209,3 @@ def _values(path: Path, columns: Columns, quantity: Quantity) -> np.ndarray:
             'numbers, or an empty cell for a missing value',
         )
     return numbers * quantity.factor + quantity.offset
-
-
-def _stamps(path: Path, columns: Columns, time: TimeBase, n: int) -> tuple[int, ...]:
-    """Return the stamps [ns]; integers and decimal texts are converted without rounding."""
-    if time.quantity is None:
-        period_ns = 10**9 / Decimal(str(time.rate_hz))
-        _require_held(path, (time.start_ns, time.start_ns + (n - 1) * period_ns))
-        return tuple(time.start_ns + round(row * period_ns) for row in range(n))
-    unit_ns = Decimal(str(time.quantity.factor))
-    stamps = []
-    for row, value in enumerate(_vector(columns, time.quantity).tolist(), start=1):
-        stamp_ns = _stamp(value, unit_ns, time.start_ns)
-        if stamp_ns is None or not 0 <= stamp_ns < _LATEST_NS:
-            raise RecordingError(
-                f'{path}, column {time.quantity.column}, row {row}: time {value!r}',
-                'a time between 0 s and 2^31 s since the epoch',
-                'correct the table, or set time.unit and time.start in the map',
-            )
-        stamps.append(stamp_ns)
-    found = _one_after_another(stamps, columns[time.episode]) if time.episode else tuple(stamps)
-    _require_held(path, found)
-    return found
-
-
-def _require_held(path: Path, stamps_ns: Iterable[int | Decimal]) -> None:
-    """Refuse stamps that no message can hold."""
-    wrong = next((s for s in stamps_ns if not 0 <= s < _LATEST_NS), None)
-    if wrong is not None:
-        raise RecordingError(
-            f'{path}: a row at {Decimal(wrong) / 10**9:.6g} s', 'times between 0 s and 2^31 s',
-            'correct time.rate, time.start or time.episode in the map',
-        )  # fmt: skip
-
-
-def _one_after_another(stamps: list[int], episode: np.ndarray) -> tuple[int, ...]:
-    """Return stamps of episodes with a pause between each and the next."""
-    found: list[int] = []
-    later = 0
-    for row, stamp_ns in enumerate(stamps):
-        if row and episode[row] != episode[row - 1]:
-            later = found[-1] + _PAUSE_NS - stamp_ns
-        found.append(stamp_ns + later)
-    return tuple(found)
-
-
-def _stamp(value: float | str, unit_ns: Decimal, start_ns: int) -> int | None:
-    if isinstance(value, str) and _ISO.fullmatch(value.strip()):
-        return _iso_stamp(value.strip())
-    try:
-        stamp = Decimal(str(value)) * unit_ns + start_ns
-        # before rounding: 1e999999999 is a number of a billion digits
-        return round(stamp) if abs(stamp) < _LATEST_NS else None
-    except (InvalidOperation, Overflow):
-        return None
-
-
-def _iso_stamp(text: str) -> int | None:
-    """Return the stamp of an ISO 8601 time, UTC where it names no zone; None of an impossible one.
-
-    Decimals of a second are kept to the nanosecond.
-    """
-    match = _ISO.fullmatch(text)
-    assert match is not None
-    day, clock, decimals, zone = match.groups()
-    try:
-        whole = datetime.fromisoformat(f'{day}T{clock}{(zone or "+00:00").replace("Z", "+00:00")}')
-    except (ValueError, OverflowError):
-        return None
-    return int(whole.timestamp()) * 10**9 + int((decimals or '').ljust(9, '0')[:9])
-
-
-def _vector(columns: Columns, quantity: Quantity) -> np.ndarray:
-    array = columns[quantity.column]
-    return array[:, quantity.index or 0] if array.ndim == 2 else array
