@@ -152,8 +152,9 @@ def _counted_on(table: Table, units: Mapping[str, str], hints: Sequence[JointHin
 
 
 def _units(content: Mapping[str, Any]) -> dict[str, str]:
-    """Return the unit of the position of each joint in a checked map."""
-    return {str(joint): parts[POSITION]['unit'] for joint, parts in content['joints'].items()}
+    """Return the unit of the position of each joint that has one in a checked map."""
+    joints = content['joints'].items()
+    return {str(joint): x[POSITION]['unit'] for joint, x in joints if POSITION in x}
 
 
 def _with_column(array: np.ndarray, j: int, column: np.ndarray) -> np.ndarray:

@@ -12,6 +12,8 @@ A time may also be a text such as `2024-05-01T12:00:00.25Z`, whatever its unit.
 Keys of `time`: `column`, `unit`, `index`, `rate` [Hz], `start`, the epoch [s] that belongs to the
 zero of the column (0 by default), and `episode`, a column that numbers parts whose clocks begin
 anew: they follow each other. A joint has a `position`, and may have `velocity` and `effort`.
+One of which only the velocity was logged, such as a wheel, has no `position`: it is the integral
+of the velocity, from zero.
 `commands` lists joints the same way; they are written in that order, as the type `command_type`
 (`std_msgs/Float64MultiArray` by default, see `command_types` for the others). In their place,
 `targets` lists what drives are told to reach, and `gains` what they do about it:
@@ -206,8 +208,8 @@ class _Check:
     def joint(self, place: str, parts: object) -> dict[str, Quantity]:
         content = self.mapping(place, parts)
         self.keys(place, content, set(UNITS))
-        if 'position' not in content:
-            self.problems.append(f'{place}: position is missing')
+        if not {'position', 'velocity'} & set(content):
+            self.problems.append(f'{place}: position is missing, and no velocity is given')
         return {
             channel: self.scaled(f'{place}.{channel}', content[channel], UNITS[channel])
             for channel in UNITS

@@ -124,6 +124,10 @@ def read_table(
     lengths['time'] = len(stamps_ns)
     if set(lengths.values()) != {n}:
         raise ConfigError(f'{path}: columns of different lengths {lengths}', 'equal lengths')
+    for joint, parts in table_map.joints.items():
+        if POSITION not in parts:
+            values[f'{joint}.position'] = _integral(values[f'{joint}.velocity'], stamps_ns)
+            remarks.append(f'{path.name}: the position of {joint} is the integral of its velocity')
     table = _assemble(table_map, values, stamps_ns)
     gains = row_gains(content.get('gains'), columns, table.command_joints, n)
     table = replace(table, command_gains=gains)
@@ -136,7 +140,7 @@ def _assemble(
     missing = np.full(len(stamps_ns), np.nan)
     channels = {}
     for channel in ('position', 'velocity', 'effort'):
-        if any(channel in parts for parts in table_map.joints.values()):
+        if channel == POSITION or any(channel in x for x in table_map.joints.values()):
             stack = [values.get(f'{joint}.{channel}', missing) for joint in table_map.joints]
             channels[channel] = np.stack(stack, axis=1)  # (n, m)
     joints, kind = tuple(table_map.joints), table_map.command_type
@@ -159,6 +163,16 @@ def _assemble(
         stamps_ns, joints, channels, asked[first], tuple(table_map.targets), kind,
         command_kind=first, command_rates=rates,
     )  # fmt: skip
+
+
+def _integral(velocity: np.ndarray, stamps_ns: Sequence[int]) -> np.ndarray:
+    """Return the integral of a velocity (n,) from zero, by trapezoids; backward steps add none."""
+    known = np.flatnonzero(np.isfinite(velocity))
+    if not len(known):
+        return np.full(len(velocity), np.nan)
+    whole = np.interp(np.arange(len(velocity)), known, velocity[known])
+    seconds = np.maximum(np.diff(np.array(stamps_ns, dtype=np.int64)) * 1e-9, 0.0)
+    return np.concatenate([[0.0], np.cumsum(0.5 * (whole[1:] + whole[:-1]) * seconds)])
 
 
 def _without_impossible(

@@ -70,6 +70,7 @@ def _read(path, folder, hints=HINTS, rate=None):
         ('base_pan_load_pct', 'effort', False, 'base_pan', '%'),
         ('Load [%]', 'effort', False, '', '%'),
         ('load', 'effort', False, '', '%'),
+        ('wheel_rpm', '', False, 'wheel', 'rpm'),
         ('load_torque', 'effort', False, '', ''),
         ('goal_position', 'position', True, '', ''),
     ],
@@ -244,9 +245,7 @@ def test_a_step_of_a_turn_that_is_no_wrap_stays(tmp_path):
 
 def test_degrees_out_of_the_limits_are_not_said_to_fit_in_degrees(tmp_path):
     path = _npz(tmp_path, t=T, q_deg=200.0 + 20.0 * Q)
-    with pytest.raises(
-        RecordingError, match=r'go from 200 to 220 deg; expected its limits, -57'
-    ):
+    with pytest.raises(RecordingError, match=r'go from 200 to 220 deg; expected its limits, -57'):
         _read(path, tmp_path, [replace(h, lower=-1.0, upper=1.0) for h in HINTS])
 
 

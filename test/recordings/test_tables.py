@@ -292,12 +292,26 @@ def test_table_that_cannot_be_read_says_why(name, content, reason, tmp_path):
         read_table(tmp_path / 'nothing.csv', MAP)
 
 
+def test_the_position_of_a_wheel_is_the_integral_of_its_velocity(tmp_path):
+    """In turns of any unit; a velocity that is missing is taken from its neighbours."""
+    text = 't,speed\n0,0\n1,60\n3,60\n4,\n5,60\n'
+    wheel = {'velocity': {'column': 'speed', 'unit': 'rpm'}}
+    path = tmp_path / 'map.yaml'
+    path.write_text(json.dumps({**MAP, 'joints': {'wheel': wheel}}))
+    table = read_table(_csv(tmp_path, text), read_map(path))
+    turns = table.channels['position'][:, 0] / (2.0 * math.pi)
+    np.testing.assert_allclose(turns, [0.0, 0.5, 2.5, 3.5, 4.5])
+    assert table.remarks == ('x.csv: the position of wheel is the integral of its velocity',)
+    assert import_table(tmp_path / 'x.csv', path, tmp_path).samples == 5
+
+
 def test_everything_wrong_with_a_map_is_in_one_error(tmp_path):
     content = {
         'time': {'column': 'time', 'unit': 'h', 'scale': 1.0, 'start': 'now'},
         'joints': {
             'a': {'position': {'column': 'q', 'unit': 'furlong'}, 'jerk': {}},
-            'b': {'velocity': {'column': 'q', 'unit': 'counts/s'}},
+            'b': {'effort': {'column': 'q', 'unit': 'A'}},
+            'e': {'velocity': {'column': 'q', 'unit': 'counts/s'}},
             'c': {'position': {'column': 'q', 'unit': 'rad', 'index': 3, 'scale': 'big'}},
             'd': 7,
         },
@@ -310,7 +324,7 @@ def test_everything_wrong_with_a_map_is_in_one_error(tmp_path):
     for part in (
         "'time': not in the table", "time.unit 'h'", "time: unknown key 'scale'", "start 'now'",
         "'furlong'", "joints.a: unknown key 'jerk'", 'joints.b: position is missing',
-        'joints.b.velocity: unit counts/s needs a scale', 'index 3', "scale 'big'",
+        'joints.e.velocity: unit counts/s needs a scale', 'index 3', "scale 'big'",
         'joints.d: expected a mapping', 'commands.a: unit V needs a scale', "'std_msgs/String'",
         "unknown key 'jonits'", 'the table has t [1], q [1]',
     ):  # fmt: skip
