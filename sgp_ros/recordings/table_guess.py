@@ -21,6 +21,7 @@ from sgp_ros.recordings.column_names import (
     POSITION,
     VELOCITY,
 )
+from sgp_ros.recordings.table_blocks import of_blocks
 from sgp_ros.recordings.table_entries import (
     Columns,
     Entry,
@@ -66,11 +67,12 @@ def guess_map(
     rows = _rows(columns)
     seconds = guessed_times(columns, rows, rate_hz, guess)
     entries = of_signals(entries_of(columns, rows, features or {}), guess)
+    entries = of_blocks(entries, hints, seconds, guess)
     positions = chosen(entries, POSITION, guess)
     if not positions:
         texts = sorted(name for name, column in columns.items() if as_numbers(column) is None)
         raise RecordingError(
-            f'no column of positions among {sorted(set(columns) - set(texts))}'
+            f'no column of positions among {_with_widths(columns, texts)}'
             + f' (not numeric throughout: {texts})' * bool(texts),
             'a name such as q, position, joint1_pos',
             'rename a column, or write a map (docs/import.md)',
@@ -96,6 +98,14 @@ def guess_map(
             'enter it in the map, or list joints without a motor as `passive` in a robot YAML.'
         )
     return guess
+
+
+def _with_widths(columns: Columns, texts: Sequence[str]) -> list[str]:
+    """Return the names of columns of numbers, and of a matrix the number of its columns."""
+    return [
+        f'{name} ({x.shape[1]} columns)' if x.ndim == 2 else name
+        for name, x in sorted(columns.items()) if name not in texts
+    ]  # fmt: skip
 
 
 def _rows(columns: Columns) -> int:

@@ -493,6 +493,26 @@ def test_a_matrix_with_one_row_a_joint_is_turned(tmp_path, has_time):
     np.testing.assert_allclose([s.effort for s in states], TAU)
 
 
+@pytest.mark.parametrize('hints', [HINTS, ()], ids=['robot', 'no robot'])
+@pytest.mark.parametrize('has_accelerations', [True, False])
+def test_blocks_of_a_matrix_without_names_are_told_by_their_changes(
+    tmp_path, hints, has_accelerations
+):
+    """It is said. Where a block is no derivative of the one before, the table is refused."""
+    more = [-9.0 * Q[:, :1], -4.0 * Q[:, 1:]] if has_accelerations else []
+    path = _npz(tmp_path, data=np.column_stack([Q, DQ, *more, TAU]))
+    summary, states, _ = _read(path, tmp_path, hints, rate=200.0)
+    np.testing.assert_allclose([s.position for s in states], Q)
+    np.testing.assert_allclose([s.velocity for s in states], DQ)
+    np.testing.assert_allclose([s.effort for s in states], TAU)
+    assert '0 to 1 are positions, 2 to 3 are velocities' in ' '.join(summary.unsure)
+    width = 8 if has_accelerations else 6
+    for matrix, rate in (([Q, DQ, *more, TAU], 100.0), ([Q, TAU, *more, DQ], 200.0)):
+        path = _npz(tmp_path, data=np.column_stack(matrix))
+        with pytest.raises(RecordingError, match=rf'among \[.data \({width} columns\)'):
+            _read(path, tmp_path, hints, rate=rate)
+
+
 def test_other_yaml_is_no_table(tmp_path):
     (tmp_path / 'robot.yaml').write_text('schema: 1\nurdf: robot.urdf\n')
     with pytest.raises(RecordingError, match='no column of time'):
