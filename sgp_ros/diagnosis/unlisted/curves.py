@@ -45,24 +45,14 @@ class Curve:
     rest: float
 
     @classmethod
-    def of(
-        cls, x: np.ndarray, rows: Callable[[np.ndarray], np.ndarray], at: np.ndarray,
-        force: np.ndarray,
-    ) -> Curve:  # fmt: skip
+    def of(cls, x: np.ndarray, L: np.ndarray, force: np.ndarray) -> Curve:
         """Return the curve of a recording.
 
         Args:
             x: (p,) nodes, rising.
-            rows: from forces (n, m) in time to the rows (N, m) of the regression.
-            at: (n,) the variable in time.
+            L: (N, p), see `hats`.
             force: (N,) of the law, with what is left.
         """
-        columns = []
-        for first in range(0, len(x), _BLOCK):
-            hats = [np.interp(at, x, np.eye(1, len(x), i)[0])
-                    for i in range(first, min(first + _BLOCK, len(x)))]  # fmt: skip
-            columns.append(rows(np.column_stack(hats)))
-        L = np.concatenate(columns, axis=1)
         least = _RIDGE * np.sqrt((L * L).sum(axis=0).max()) * np.eye(len(x))
         both = np.column_stack([np.concatenate([L, least]), np.append(force, np.zeros(len(x)))])
         R = np.asarray(np.linalg.qr(both, mode='r'))
@@ -72,6 +62,40 @@ class Curve:
     def size(self) -> float:
         """Sum of squares that forces of the variable explain."""
         return float(self.y @ self.y)
+
+
+def hats(x: np.ndarray, rows: Callable[[np.ndarray], np.ndarray], at: np.ndarray) -> np.ndarray:
+    """Return the rows of forces that are 1 at one node, 0 at others, linear between, (N, p).
+
+    Args:
+        x: (p,) nodes, rising.
+        rows: from forces (n, m) in time to the rows (N, m) of the regression.
+        at: (n,) the variable in time.
+    """
+    columns = []
+    for first in range(0, len(x), _BLOCK):
+        block = [np.interp(at, x, np.eye(1, len(x), i)[0])
+                 for i in range(first, min(first + _BLOCK, len(x)))]  # fmt: skip
+        columns.append(rows(np.column_stack(block)))
+    return np.concatenate(columns, axis=1)
+
+
+def left_out(L: np.ndarray, r: np.ndarray, part: np.ndarray) -> np.ndarray:
+    """Return what a force between nodes leaves of parts that were left out of its fit, (N,).
+
+    A node counts as if one more row had seen no force there: where nobody was, nothing is said.
+
+    Args:
+        L: (N, p), see `hats`.
+        r: (N,) residual.
+        part: (N,) that each row belongs to.
+    """
+    left, least = r.copy(), float((L.sum(axis=1) ** 2).mean()) * np.eye(L.shape[1])
+    for p in np.unique(part):
+        here = part == p
+        A, b = L[~here], r[~here]
+        left[here] -= L[here] @ np.linalg.solve(A.T @ A + least, A.T @ b)
+    return left
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.criteria import PER_PARAMETER, PER_UNUSUAL
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.unlisted.curves import Curve, Followed, follow
+from sgp_ros.diagnosis.unlisted.curves import Curve, Followed, follow, hats
 from sgp_ros.diagnosis.unlisted.sentences import (
     COEFFICIENTS,
     of_position,
@@ -175,25 +175,27 @@ ROWS = 100.0
 """Rows that count as independent, as everywhere where models are compared."""
 
 
-def curve_of(model: Model, joint: int) -> tuple[Curve, np.ndarray]:
-    """Return the curve of the smooth force that a model has at a joint, and what is left (N,).
+def curve_of(model: Model, joint: int) -> Curve:
+    """Return the curve of the smooth force that a model has at a joint.
 
     Of the joint's own velocity it is one of the force itself, with a jump at rest or without.
     """
     placed, smooth = smooth_of(model, joint)
+    own = model.forces[[s is placed for s in model.effects].index(True)][:, joint]
+    return Curve.of(*nodes_of(smooth, model), own + model.residual[:, joint])
+
+
+def nodes_of(smooth: SmoothForce, model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Return nodes (p,) of the variable of a smooth force, and the rows of forces there (N, p)."""
     equations = model.frame.equations
     motion = equations.motion
-    own = model.forces[[s is placed for s in model.effects].index(True)][:, joint]
     factor = np.ones(1) if smooth.is_of_own_speed else smooth.factors(motion)
 
     def rows(force: np.ndarray) -> np.ndarray:
-        return equations.compact(force * factor[:, None], joint, is_inertial=False)
+        return equations.compact(force * factor[:, None], smooth.joint, is_inertial=False)
 
     nodes = np.unique(smooth.variable.knots(motion, _PIECES))
-    at, target = smooth.variable.values(motion), own + model.residual[:, joint]
-    curve = Curve.of(nodes, rows, at, target)
-    force = np.interp(at, nodes, np.linalg.lstsq(curve.R, curve.y, rcond=None)[0])
-    return curve, target - rows(force[:, None])[:, 0]
+    return nodes, hats(nodes, rows, smooth.variable.values(motion))
 
 
 def _pieces(formula: Formula) -> float:

@@ -8,6 +8,7 @@ with the bodies and all other effects, as every other model is.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -22,6 +23,7 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import distinct, screen
+from sgp_ros.diagnosis.locate.remainder import parts_of
 from sgp_ros.diagnosis.unlisted.beside import (
     beside,
     earned,
@@ -33,7 +35,8 @@ from sgp_ros.diagnosis.unlisted.beside import (
     refined,
     says_less,
 )
-from sgp_ros.diagnosis.unlisted.formulas import FoundLaw, curve_of, formulas
+from sgp_ros.diagnosis.unlisted.curves import left_out
+from sgp_ros.diagnosis.unlisted.formulas import FoundLaw, curve_of, formulas, nodes_of
 from sgp_ros.diagnosis.unlisted.shapes import (
     FINE,
     SMOOTHED,
@@ -65,8 +68,8 @@ class Searched:
         listed: best model of listed effects.
         smooth: best model with a smooth force at the joint.
         laws: models with a formula there, best first.
-        free: what a force of any form leaves in the place of the first formula (N,), and the
-            numbers of that model.
+        free: what a force of any form beside the first formula leaves of parts that were left out
+            of its fit (N,).
         floor: mean square that errors of signals and filters leave.
         is_slight: whether listed effects keep their names where no formula is asserted.
     """
@@ -75,23 +78,24 @@ class Searched:
     listed: Model
     smooth: Model
     laws: tuple[Model, ...]
-    free: tuple[np.ndarray, int]
+    free: np.ndarray
     floor: float
     is_slight: bool = False
 
     @property
     def lack_of_fit(self) -> tuple[float, float]:
-        """Ratio of the residual of the first formula to that of any form, and its chance.
+        """Ratio of what the first formula leaves to what any form beside it does, and its chance.
 
-        The chance is that of the F test on as many rows as are independent (Fisher 1922).
+        A form that follows rests at some positions, or noise, predicts no other part. The chance
+        is that of a mean difference of squares that is not positive, with rows as independent as
+        these differences are.
         """
-        r, size = self.free
-        both = (self.laws[0].residual[:, self.joint], r)
-        law, free = (float(x @ x) / len(x) + self.floor for x in both)
-        more = max(size - self.laws[0].size, 1)
-        rows = max(len(r) / max(correlation_factor(r), 1.0) - size, 1.0)
-        excess = (law - free) / free * rows / more
-        return law / free, float(stats.f.sf(excess, more, rows))
+        law = self.laws[0].residual[:, self.joint] ** 2
+        gain = law - self.free**2
+        rows = len(gain) / correlation_factor(gain)
+        spread = max(float(gain.std()), 1e-300) / math.sqrt(rows)
+        ratio = (law.mean() + self.floor) / ((self.free**2).mean() + self.floor)
+        return float(ratio), float(stats.norm.sf(gain.mean() / spread))
 
 
 def search(
@@ -134,7 +138,7 @@ def search(
     first = (i for i, m in enumerate(ranked) if not says_less(equations, m, joint))
     ranked = ranked[next(first, 0) :]
     ranked[:1] = [refined(look.columns, scale, m, joint) for m in ranked[:1]]
-    free = look.free(ranked[0]) if ranked else (np.zeros(0), 0)
+    free = look.free(ranked[0]) if ranked else np.zeros(0)
     floor = float(scale.power[joint] * scale.floor[joint])
     return Searched(joint, listed, smooth[0], tuple(ranked), free, floor, slight)
 
@@ -221,21 +225,13 @@ class _Look:
             weight = chosen[2]
         return best
 
-    def free(self, model: Model) -> tuple[np.ndarray, int]:
-        """Return the residual of any form in place of a formula (N,), and its count of numbers.
-
-        A fine spline, fitted with all else, or then a force that is linear between many nodes.
-        """
+    def free(self, model: Model) -> np.ndarray:
+        """Return what a force of any form beside a formula leaves of parts left out, (N,)."""
         law = law_of(model, self.joint)
         assert law is not None
         assert isinstance(law.effect, FoundLaw)
-        fine = self._finer(model, law.effect.smooth)
-        curve, left = curve_of(fine, self.joint)
-        spline = fine.residual[:, self.joint]
-        if left @ left > spline @ spline:
-            return spline, fine.size
-        placed, _ = smooth_of(fine, self.joint)
-        return left, fine.size - len(placed.coefficients) + len(curve.x)
+        r = model.residual[:, self.joint]
+        return left_out(nodes_of(law.effect.smooth, model)[1], r, parts_of(len(r)))
 
     def _finer(self, model: Model, coarse: SmoothForce) -> Model:
         """Return a model with a fine spline in the place of the law or smooth force it has."""
@@ -267,7 +263,7 @@ class _Look:
         if known not in self.followed:  # other bodies hardly change what follows it
             scale, rows = self.scale, len(smooth.residual)
             floor = rows * scale.power[self.joint] * scale.floor[self.joint]
-            motion, (curve, _) = smooth.frame.equations.motion, curve_of(smooth, self.joint)
+            motion, curve = smooth.frame.equations.motion, curve_of(smooth, self.joint)
             self.followed[known] = list(formulas(chosen, motion, curve, float(floor), count))
         laws = self.followed[known][:count]
         yield from self._fitted(base, laws, None)

@@ -11,7 +11,7 @@ from sgp_ros.diagnosis.decide.decision import decide
 from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.diagnosis.unlisted.assertion import with_laws
 from sgp_ros.diagnosis.unlisted.beside import law_of
-from sgp_ros.diagnosis.unlisted.curves import Curve, follow
+from sgp_ros.diagnosis.unlisted.curves import Curve, follow, hats, left_out
 from sgp_ros.diagnosis.unlisted.sentences import of_position, of_velocity
 from sgp_ros.physics.formula import read_formula
 from test.diagnosis.worlds import CHAINS, simulate
@@ -114,7 +114,7 @@ def test_a_curve_says_what_a_formula_leaves_of_all_rows(factor):
 
     true = 0.7 * np.tanh((at - 0.3) / 0.4) + 0.2
     y = rows(true[:, None])[:, 0] + rng.normal(0.0, 0.01, 1000)
-    curve = Curve.of(nodes, rows, at, y)
+    curve = Curve.of(nodes, hats(nodes, rows, at), y)
     ranges = {'x0': (-1.0, 2.0), 'w0': (0.05, 5.0)}
     read = read_formula('a*tanh((q[X] - x0)/w0) + d', is_law=True)
     right = follow(read, curve, ranges)
@@ -127,6 +127,25 @@ def test_a_curve_says_what_a_formula_leaves_of_all_rows(factor):
     left = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
     assert straight.left + curve.rest == pytest.approx(left @ left, rel=1e-3)
     assert right.left + curve.rest == pytest.approx(1000 * 1e-4, rel=0.15)
+
+
+def test_a_force_between_nodes_is_judged_on_parts_left_out():
+    """Stiction in poses that come once follows them, and says nothing of others; a wave does."""
+    rng = np.random.default_rng(3)
+    rest = np.repeat(rng.uniform(0.0, 1.0, 60), 30)
+    nodes, part = np.linspace(0.0, 1.0, 41), np.arange(1800) // 150 % 6
+    L = hats(nodes, lambda force: force, rest)
+    held = np.repeat(rng.normal(0.0, 1.0, 60), 30)
+    fitted = held - L @ np.linalg.lstsq(L, held, rcond=None)[0]
+    assert fitted @ fitted < 0.6 * (held @ held)
+    left = left_out(L, held, part)
+    assert left @ left > 0.9 * (held @ held)
+    L = hats(nodes, lambda force: force, at := rng.uniform(0.0, 1.0, 1800))
+    wave = np.sin(20.0 * at) + rng.normal(0.0, 0.1, 1800)
+    left = left_out(L, wave, part)
+    assert left @ left < 0.2 * (wave @ wave)
+    nowhere = left_out(hats(nodes + 7.0, lambda force: force, rest)[:, 1:], wave, part)
+    assert nowhere == pytest.approx(wave)
 
 
 def test_texts_are_told_apart():
