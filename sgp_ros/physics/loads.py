@@ -23,6 +23,8 @@ MECHANICS = 'Khalil and Dombre 2002, Modeling, Identification and Control of Rob
 
 LEAST_PERIODS = 3.0
 """Least periods per revolution for cogging. The schema."""
+_MORE_THAN_ONE = 1.1
+"""Waves in the range of motion from which on a force is one of waves. Convention."""
 
 
 def wave_coefficients(x: Numbers) -> tuple[float, float]:
@@ -161,6 +163,10 @@ class Cogging(Effect):
         if not motion.tree.is_prismatic[j]:
             least = max(least, LEAST_PERIODS)
         return np.array([least]), np.array([max(most_periods(motion, j), 1.5 * least)])
+
+    def is_inside(self, at: Placed, motion: SeenMotion) -> bool:
+        """Return whether more than one wave is seen; a fit that ends there is some other force."""
+        return bool(at.shape[0] > _MORE_THAN_ONE * peak_width(motion, at.place.joint))
 
     def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         return np.array([peak_width(motion, place.joint)])

@@ -695,6 +695,18 @@ def test_an_eccentric_encoder_is_right_to_first_order_of_its_size():
         assert left[0] < linear[0]
 
 
+@pytest.mark.parametrize(('waves', 'is_one'), [(1.0, False), (1.3, True)])
+def test_a_bend_over_the_whole_range_is_no_cogging(waves, is_one):
+    """A fit that ends at one wave in the range would go on; where three are in a turn it may."""
+    law, j = EFFECTS['cogging'], 0
+    low, _ = law.bounds(MOTION, Place(j))
+    assert low[0] > 3.0
+    at = EffectAt(law, Place(j), waves * low, np.ones(2))
+    assert law.is_inside(at, MOTION) is is_one
+    far = replace(MOTION, position=20.0 * MOTION.position)
+    assert law.is_inside(at.with_shape(np.array([3.0])), far)
+
+
 @pytest.mark.parametrize(('turns', 'is_one'), [(0.15, False), (2.0, True)])
 def test_a_small_part_of_a_wave_is_a_zero_and_a_scale_of_the_encoder(turns, is_one):
     """At any phase, and so at any amplitude."""
