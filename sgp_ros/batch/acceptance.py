@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sgp_ros.batch.continuity import jumps, unwrapped
+from sgp_ros.batch.continuity import braked, jumps, unwrapped
 from sgp_ros.engine.clock import on_one_clock
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.intake import Intake, State
@@ -25,6 +25,7 @@ from sgp_ros.robots.robot import Robot
 USUAL = EngineConfig()
 """Settings of the intake where none are given: those of the engine."""
 _COMMON_SHARE = 0.5
+_BRAKED = '{} states with no effort of any drive, at rest: brakes may hold the robot; left out.'
 _SHOWN_JUMPS = 5
 
 
@@ -100,7 +101,9 @@ class Accepted:
     start_ns: int
 
     def stretches(self, max_gap: float) -> list[np.ndarray]:
-        """Return the rows of stretches of one source each, without a pause or a jump of positions.
+        """Return the rows of stretches of one source each, without pause or jump of positions.
+
+        What brakes hold with all drives off is left out.
 
         Args:
             max_gap: longest time between two states without a pause [s].
@@ -108,25 +111,35 @@ class Accepted:
         ends = np.diff(self.stamps_ns) > max_gap * 1e9
         ends |= np.diff(self.is_measured)
         ends |= jumps(self.stamps_ns, self.position)
-        return np.split(np.arange(len(self.stamps_ns)), np.flatnonzero(ends) + 1)
+        ends |= np.diff(self._braked)
+        parts = np.split(np.arange(len(self.stamps_ns)), np.flatnonzero(ends) + 1)
+        return [rows for rows in parts if not self._braked[rows].any()]
 
-    def jump_remarks(self, max_gap: float, start_ns: int) -> tuple[str, ...]:
-        """Say that the clock was set back, and where positions jump, counted from `start_ns`."""
-        said: tuple[str, ...] = ()
-        times = self.counts.clock_jumps
-        if times:
-            said = (f'The stamps go back: treated as {times + 1} recordings.',)
+    @property
+    def _braked(self) -> np.ndarray:
+        return braked(self.stamps_ns, self.position, self.effort)
+
+    def remarks(self, max_gap: float, start_ns: int) -> tuple[str, ...]:
+        """Say that the clock was set back, what brakes hold, and where positions jump.
+
+        Times count from `start_ns`.
+        """
+        said = []
+        if times := self.counts.clock_jumps:
+            said.append(f'The stamps go back: treated as {times + 1} recordings.')
+        if held := int(self._braked.sum()):
+            said.append(_BRAKED.format(held))
         found = jumps(self.stamps_ns, self.position)
         found &= np.diff(self.stamps_ns) <= max_gap * 1e9
         places = 1e-9 * (self.stamps_ns[1:][found] - start_ns)
-        if not len(places):
-            return said
-        shown = ', '.join(f'{t:.6g}' for t in places[:_SHOWN_JUMPS])
-        more = f' and {len(places) - _SHOWN_JUMPS} more' if len(places) > _SHOWN_JUMPS else ''
-        return (
-            *said,
-            f'Positions jump at t = {shown} s{more}: treated as {len(places) + 1} recordings.',
-        )
+        if len(places):
+            more = len(places) - _SHOWN_JUMPS
+            shown = ', '.join(f'{t:.6g}' for t in places[:_SHOWN_JUMPS])
+            shown += f' and {more} more' if more > 0 else ''
+            said.append(
+                f'Positions jump at t = {shown} s: treated as {len(places) + 1} recordings.'
+            )
+        return tuple(said)
 
     def unwrapped(self, robot: Robot) -> Accepted:
         """Return the states with the turns of the robot's joints without limits counted on."""

@@ -6,6 +6,9 @@ resolves the motion. Where two recordings were joined under stamps that go on, o
 its count, one step alone lies far outside of them. It is a jump where it lies further outside than
 `LEAST_SPEEDS` times the highest usual speed goes in that time, and more than `LEAST_STEPS` of the
 usual steps of a joint that moves, which for a coarse encoder are its counts.
+
+Nor does the motion go on where all drives are off and brakes hold the robot: no effort that is
+measured holds it then, and none that is not may be made up.
 """
 
 from __future__ import annotations
@@ -24,6 +27,10 @@ LEAST_STEPS = 8.0
 """Of a jump, in units of the median step that is not zero [1]. Convention."""
 USUAL_SHARE = 0.995
 """Share of the steps that are usual [1]: events that come more often are motion. Convention."""
+OFF_SHARE, LEAST_OFF_S, MOST_FALL_S = 0.1, 1.0, 0.5
+"""Efforts of drives that are off, of the mean square ones [1]; how long they are off at least, and
+how long the robot may move until brakes hold it [s]. Convention."""
+_STILL = 1e-3
 _REACH = 2
 _FEWEST, _FEWEST_UNUSUAL = 16, 2
 _TURN = 2.0 * math.pi
@@ -37,6 +44,34 @@ def jumps(stamps_ns: np.ndarray, position: np.ndarray) -> np.ndarray:
         position: (m, k) [rad or m].
     """
     return _jumps(stamps_ns, np.diff(position, axis=0))
+
+
+def braked(stamps_ns: np.ndarray, position: np.ndarray, effort: np.ndarray) -> np.ndarray:
+    """Return which samples brakes hold, or are about to, with all drives off, (m,) of bool.
+
+    A robot that comes to rest by itself moves for longer after its drives go off.
+
+    Args:
+        stamps_ns: (m,) strictly increasing [ns].
+        position: (m, k) [rad or m].
+        effort: (m, k) measured [N m or N], NaN where none is.
+    """
+    found, seconds = np.zeros(len(stamps_ns), dtype=bool), stamps_ns * 1e-9
+    size = np.sqrt(np.nanmean(effort**2, axis=0)) if np.isfinite(effort).any() else np.zeros(0)
+    if not size.any():
+        return found
+    with np.errstate(invalid='ignore'):
+        is_off = (np.abs(effort) <= OFF_SHARE * size).all(axis=1)
+    reach = _STILL * np.ptp(position, axis=0)
+    edges = np.flatnonzero(np.diff(np.pad(is_off, 1).astype(np.int8)))
+    for first, end in edges.reshape(-1, 2):
+        last = position[end - 1]
+        still = (np.abs(position[first:end] - last) <= reach).all(axis=1)
+        stop = first + (0 if still.all() else int(np.flatnonzero(~still)[-1]) + 1)
+        is_held = seconds[end - 1] - seconds[stop] > LEAST_OFF_S if stop < end else False
+        if is_held and seconds[stop] - seconds[first] < MOST_FALL_S:
+            found[first:end] = True
+    return found
 
 
 def unwrapped(stamps_ns: np.ndarray, position: np.ndarray) -> np.ndarray:

@@ -107,7 +107,7 @@ def collect_signals(
         1.0 / step,
         int(accepted.stamps_ns[0]),
         sum(map(len, stretches)) - sum(map(len, used)),
-        accepted.jump_remarks(config.max_gap, int(accepted.stamps_ns[0])),
+        accepted.remarks(config.max_gap, int(accepted.stamps_ns[0])),
     )
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from sgp_ros.batch.continuity import jumps, unwrapped
+from sgp_ros.batch.continuity import braked, jumps, unwrapped
 from sgp_ros.batch.signals import collect_signals
 from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.engine.samples import JointSample, frozen_array
@@ -151,3 +151,43 @@ def test_only_turns_of_a_joint_without_limits_are_no_joins():
     for joint, count in ((Joint('hinge'), 2), (limited, 5), (Joint('hinge', 'prismatic'), 5)):
         robot = Robot('hinge', (joint,), 'effort', (), ((),))
         assert len(collect_signals(events, robot).segments) == count
+
+
+def _held(fall, rest, load):
+    """Return stamps, positions and efforts of an arm that moves, is switched off, and moves."""
+    step, noise = 0.004, np.random.default_rng(4)
+    moving = np.arange(0.0, 8.0, step)
+    swing = np.column_stack([np.sin(moving), 0.5 * np.cos(1.7 * moving)])
+    down = np.arange(0.0, fall, step)
+    falls = swing[-1] + np.column_stack([-0.3 * down**2, 0.1 * down**2])
+    held = np.repeat(falls[-1:], round(rest / step), axis=0)
+    q = np.concatenate([swing, falls, held, held[-1] + swing - swing[0]])
+    off = np.zeros(len(q), dtype=bool)
+    off[len(swing) : len(swing) + len(falls) + len(held)] = True
+    effort = np.where(off[:, None], 0.0, load + np.cos(q)) + noise.normal(0.0, 0.02, q.shape)
+    return np.round(np.arange(len(q)) * step * 1e9).astype(np.int64), q, effort, off
+
+
+def test_what_brakes_hold_is_left_out_and_said():
+    """From when the drives go off, and the arm sags, until they are on."""
+    stamps, q, effort, off = _held(0.15, 6.0, 3.0)
+    assert (braked(stamps, q, effort) == off).all()
+    events = [
+        JointSample(int(t), ('a', 'b'), frozen_array(x), None, frozen_array(u))
+        for t, x, u in zip(stamps, q, effort, strict=True)
+    ]
+    robot = Robot('arm', (Joint('a'), Joint('b')), 'effort', (), ((), ()))
+    raw = collect(events, robot)
+    assert len(raw.segments) == 2
+    assert sum(len(raw.time[s]) for s in raw.segments) == pytest.approx((~off).sum(), abs=2)
+    (said,) = (x for x in raw.remarks if 'brakes' in x)
+    assert said.startswith(f'{off.sum()} states')
+
+
+@pytest.mark.parametrize(
+    ('fall', 'rest', 'load'), [(2.0, 6.0, 3.0), (0.15, 0.5, 3.0), (0.15, 6.0, np.nan)]
+)
+def test_free_motion_short_rests_and_commanded_efforts_are_kept(fall, rest, load):
+    """A pendulum that swings out has no brake, and what no sensor measures is not zero."""
+    stamps, q, effort, _ = _held(fall, rest, load)
+    assert not braked(stamps, q, effort).any()

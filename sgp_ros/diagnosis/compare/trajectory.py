@@ -139,7 +139,7 @@ def collect(
     drive, remarks = _drive(accepted, robot, config, gains, measured=measured)
     if drive is not None and has_recorded_gains:
         drive = with_recorded_gains(drive, events, robot)
-    remarks += accepted.jump_remarks(config.max_gap, start_ns)
+    remarks += accepted.remarks(config.max_gap, start_ns)
     position = np.concatenate([part.position for part in parts])
     return RawTrajectory(
         np.concatenate([part.time for part in parts]), step, position,
