@@ -17,6 +17,7 @@ from sgp_ros.diagnosis.explain.screening import distinct, screen
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.unlisted.shapes import SmoothForce
 from sgp_ros.physics.catalogue import CONSTANT_LOAD, COULOMB_FRICTION, VISCOUS_FRICTION
+from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.law import FormulaLaw
 from sgp_ros.physics.parts import JOINT, MOTOR, Place
@@ -147,19 +148,26 @@ def is_slight(listed: Model, smooth: Model, joint: int) -> bool:
 def is_creep(columns: Columns, scale: Scale, listed: Model, smooth: Model, joint: int) -> bool:
     """Return whether a smooth force of the joint's own speed in the past refines its friction.
 
-    Friction that creeps before it slides and grows as it rests follows an earlier speed a little
-    better than plain laws do. Where these are adequate, that is no law of its own.
+    Friction that creeps before it slides, is larger at rest and differs with direction follows an
+    earlier speed a little better than plain laws do, or laws that say one of these. Where they are
+    adequate, that is no law of its own.
     """
     law = law_of(smooth, joint)
     variable = law.effect.variable if law and isinstance(law.effect, SmoothForce) else None
     if variable is None or not variable.memory or (variable.kind, variable.index) != ('dq', joint):
         return False
     own = own_effects(listed, joint)
-    usual = tuple(s for s in listed.effects if s not in own or s.effect.is_usual)
+    usual = tuple(s for s in listed.effects if s not in own or _is_friction(s.effect))
     if len(usual) < len(listed.effects):
         listed = fit(columns, usual, listed.sigma, is_free=listed.is_free, w=listed.w,
                      still=len(usual))  # fmt: skip
     return bool(scale.excess(listed)[joint] < 1.0)
+
+
+def _is_friction(law: Effect) -> bool:
+    """Return whether every joint may have a law, or it is a richer one of its dry friction."""
+    is_dry = COULOMB_FRICTION.name in law.plain and law.drawn_over == 'velocity'
+    return law.is_usual or law in PLAIN or (is_dry and not law.has_source)
 
 
 def is_bent(listed: Model, smooth: Model, joint: int) -> bool:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE
@@ -58,3 +60,12 @@ def test_adequate_friction_keeps_its_name_against_an_earlier_speed(damped):
     assert not is_creep(columns, scale, fitted(damped, 'cogging'), late, 0)
     assert not is_creep(columns, scale, listed, smooth('dq[joint0]'), 0)
     assert not is_creep(columns, scale, listed, smooth('lag(q[joint0], T)'), 0)
+    asked = []
+
+    def excess(model):
+        asked.append([s.name for s in model.effects])
+        return np.ones(1)
+
+    creeps = fitted(damped, 'hysteresis', 'cogging', 'constant_load')
+    assert not is_creep(columns, SimpleNamespace(excess=excess), creeps, late, 0)
+    assert asked == [['hysteresis', 'constant_load']]
