@@ -28,6 +28,7 @@ ENDINGS = (
     '.yaml',
 )  # fmt: skip
 """Of files that are read."""
+_PACKED = {'.gz', '.bz2', '.xz', '.zst', '.zip', '.tar', '.tgz', '.7z'}
 
 
 def load_columns(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]]:
@@ -61,7 +62,10 @@ def _load(path: Path, suffix: str, remarks: list[str]) -> tuple[Columns, Sequenc
         return load_apart(path, remarks), ()
     if suffix in {'.csv', '.tsv', '.txt', '.dat'}:
         return load_text(path, remarks)
-    raise RecordingError(f'{path} has the file type {suffix!r}', f'one of {", ".join(ENDINGS)}')
+    raise RecordingError(
+        f'{path} has the file type {suffix!r}', f'one of {", ".join(ENDINGS)}',
+        'unpack it first' if suffix in _PACKED else '',
+    )  # fmt: skip
 
 
 def _with_whole_stamps(columns: Columns) -> Columns:

@@ -282,6 +282,7 @@ def test_missing_cells_and_texts_are_no_mistakes(tmp_path):
         ('x.mat', b'MATLAB 7.3 MAT-file'.ljust(124) + b'\x00\x02IM', 'HDF5'),
         ('x.mat', b'hello', 'cannot be read'),
         ('x.xls', b'hello', "file type '.xls'"),
+        ('x.csv.gz', b'hello', 'unpack it first'),
     ],
 )
 def test_table_that_cannot_be_read_says_why(name, content, reason, tmp_path):
