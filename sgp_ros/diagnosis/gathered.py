@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -88,11 +88,15 @@ class Recordings:
 
     def corrected(self, correction: Correction) -> Recordings:
         """Return the recordings as they were."""
+        return self.changed(correction.recording)
+
+    def changed(self, change: Callable[[RawTrajectory], RawTrajectory]) -> Recordings:
+        """Return all recordings after a change of each."""
         return replace(
             self,
-            learned=correction.recording(self.learned),
-            kept={name: correction.recording(raw) for name, raw in self.kept.items()},
-            held={stem: correction.recording(raw) for stem, raw in self.held.items()},
+            learned=change(self.learned),
+            kept={name: change(raw) for name, raw in self.kept.items()},
+            held={stem: change(raw) for stem, raw in self.held.items()},
         )
 
 

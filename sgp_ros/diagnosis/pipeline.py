@@ -9,6 +9,11 @@ from itertools import chain
 import numpy as np
 
 from sgp_ros.batch.acceptance import USUAL
+from sgp_ros.diagnosis.compare.creeping import (
+    creeping_friction,
+    creeping_remark,
+    with_creeping,
+)
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies, open_remark, with_open_bodies
 from sgp_ros.diagnosis.compare.sufficiency import require_signed
@@ -117,9 +122,12 @@ def diagnose(
     require_signed(recordings.learned, tree.moving_names)
     recordings = recordings.thinned() if is_thinned else recordings
     tree = with_open_bodies(recordings.learned, tree, unstated)
+    creeping = creeping_friction(recordings.learned, tree)
     recordings = replace(
-        recordings, unstated=unstated,
-        remarks=(*recordings.remarks, *open_remark(tree, unstated)),
+        recordings.changed(lambda raw: with_creeping(raw, creeping)), unstated=unstated,
+        remarks=(
+            *recordings.remarks, *open_remark(tree, unstated), *creeping_remark(creeping)
+        ),
     )  # fmt: skip
     try:
         connected = with_laws(connect(recordings, tree, lambda x: progress(0.05 + 0.85 * x)))
