@@ -90,7 +90,8 @@ def left_out(L: np.ndarray, r: np.ndarray, part: np.ndarray) -> np.ndarray:
         r: (N,) residual.
         part: (N,) that each row belongs to.
     """
-    left, least = r.copy(), float((L.sum(axis=1) ** 2).mean()) * np.eye(L.shape[1])
+    size = max(float((L.sum(axis=1) ** 2).mean()), 1e-300)
+    left, least = r.copy(), size * np.eye(L.shape[1])
     for p in np.unique(part):
         here = part == p
         A, b = L[~here], r[~here]
