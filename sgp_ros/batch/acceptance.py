@@ -111,9 +111,10 @@ class Accepted:
         ends = np.diff(self.stamps_ns) > max_gap * 1e9
         ends |= np.diff(self.is_measured)
         ends |= jumps(self.stamps_ns, self.position)
-        ends |= np.diff(self._braked)
+        held = self._braked
+        ends |= np.diff(held)
         parts = np.split(np.arange(len(self.stamps_ns)), np.flatnonzero(ends) + 1)
-        return [rows for rows in parts if not self._braked[rows].any()]
+        return [rows for rows in parts if not held[rows[0]]]
 
     @property
     def _braked(self) -> np.ndarray:

@@ -15,7 +15,7 @@ import numpy as np
 TURN = 2.0 * math.pi
 _MISS = 0.1 * TURN
 """By which a step less its turn may miss the motion around it [rad]. Convention."""
-_MARGIN = 0.3
+MARGIN = 0.3
 """Beyond its limits that a joint may read [rad]."""
 _EDGE = 0.01
 """Beyond a turn that angles which wrap may reach by rounding [rad]."""
@@ -85,6 +85,6 @@ def _shift(angle: np.ndarray, limits: tuple[float, float], *, has_wraps: bool) -
     low, high = float(angle.min()), float(angle.max())
     nearest = TURN * round((lower + upper - low - high) / (2.0 * TURN))
     for shift in (0.0, nearest):
-        if lower - _MARGIN <= low + shift and high + shift <= upper + _MARGIN:
+        if lower - MARGIN <= low + shift and high + shift <= upper + MARGIN:
             return shift
     return None

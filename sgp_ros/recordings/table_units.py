@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sgp_ros.recordings.table_turns import TURN, counted_on, has_wraps
+from sgp_ros.recordings.table_turns import MARGIN, TURN, counted_on, has_wraps
 
 _KGF = 9.80665
 ANGLES = {'rad': 1.0, 'deg': math.pi / 180.0, 'rev': TURN}
@@ -33,10 +33,8 @@ _EPOCHS = ((1e17, 'ns'), (1e14, 'us'), (1e11, 'ms'), (1e8, 's'))
 """Least number of a time since 1970, and its unit."""
 _RATES_HZ = (5.0, 20_000.0)
 """Of logs."""
-PER_SECOND = {'s': 1.0, 'ms': 1e3, 'us': 1e6, 'ns': 1e9}
+PER_SECOND = {unit: 1e9 / ns for unit, ns in TIME_UNITS.items()}
 """Unit of time to its number in a second."""
-_MARGIN = 0.3
-"""Beyond a range that a position may read [rad]."""
 
 
 def as_numbers(column: np.ndarray) -> np.ndarray | None:
@@ -104,11 +102,11 @@ def position_unit(
         for unit, factor in (('rad', 1.0), ('deg', np.pi / 180.0)):
             if np.isfinite(lower) and np.isfinite(upper):
                 low, high = _ends(factor * numbers, lower, upper)
-                votes[unit] += low >= lower - _MARGIN and high <= upper + _MARGIN
+                votes[unit] += low >= lower - MARGIN and high <= upper + MARGIN
     if votes['rad'] != votes['deg']:
         return ('rad', True) if votes['rad'] > votes['deg'] else ('deg', True)
-    if largest <= TURN + _MARGIN:
-        return 'rad', all(np.nanmax(np.abs(x)) <= TURN + _MARGIN for x, _, _ in columns)
+    if largest <= TURN + MARGIN:
+        return 'rad', all(np.nanmax(np.abs(x)) <= TURN + MARGIN for x, _, _ in columns)
     return ('deg' if largest > 6.0 * np.pi else 'rad'), False
 
 
