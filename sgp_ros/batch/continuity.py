@@ -57,11 +57,11 @@ def braked(stamps_ns: np.ndarray, position: np.ndarray, effort: np.ndarray) -> n
         effort: (m, k) measured [N m or N], NaN where none is.
     """
     found, seconds = np.zeros(len(stamps_ns), dtype=bool), stamps_ns * 1e-9
-    size = np.sqrt(np.nanmean(effort**2, axis=0)) if np.isfinite(effort).any() else np.zeros(0)
+    effort = effort[:, np.isfinite(effort).any(axis=0)]
+    size = np.sqrt(np.nanmean(effort**2, axis=0))
     if not size.any():
         return found
-    with np.errstate(invalid='ignore'):
-        is_off = (np.abs(effort) <= OFF_SHARE * size).all(axis=1)
+    is_off = (np.abs(effort) <= OFF_SHARE * size).all(axis=1)
     reach = _STILL * np.ptp(position, axis=0)
     edges = np.flatnonzero(np.diff(np.pad(is_off, 1).astype(np.int8)))
     for first, end in edges.reshape(-1, 2):

@@ -172,6 +172,8 @@ def test_what_brakes_hold_is_left_out_and_said():
     """From when the drives go off, and the arm sags, until they are on."""
     stamps, q, effort, off = _held(0.15, 6.0, 3.0)
     assert (braked(stamps, q, effort) == off).all()
+    unmeasured = np.column_stack([effort, np.full(len(q), np.nan)])
+    assert (braked(stamps, q, unmeasured) == off).all()
     events = [
         JointSample(int(t), ('a', 'b'), frozen_array(x), None, frozen_array(u))
         for t, x, u in zip(stamps, q, effort, strict=True)
