@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.compare.creeping import (
@@ -63,6 +64,16 @@ def test_friction_that_acts_at_once_stays_as_it_is_stated(dry, robots):
     assert creeping_remark({}) == ()
     none = simulate(CHAINS[1], 4, 10.0)
     raw = collect(events_of(none, effort=none.command, commands=False), robot, _stated(tree, 0.2))
+    assert creeping_friction(raw, tree) == {}
+
+
+def test_a_way_that_noise_would_give_is_not_stated(robots):
+    robot, tree = robots[1]
+    world = simulate(CHAINS[1], 4, 20.0)
+    held = LEVEL * bristle(world.position[:, 0], WAY)
+    noise = np.random.default_rng(1).normal(0.0, 10.0, len(held))
+    effort = world.command + (held + noise)[:, None]
+    raw = collect(events_of(world, effort=effort, commands=False), robot, _stated(tree))
     assert creeping_friction(raw, tree) == {}
 
 
