@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.creeping import acting_at_once
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.fitted_model import Model, extra_force
 from sgp_ros.diagnosis.locate.remainder import Remainder
@@ -199,19 +200,20 @@ def dynamics_of(
 ) -> DiagnosedDynamics:
     """Return the dynamics of a model fitted on `equations` for the recording of a motion."""
     tree = equations.with_bodies(motion, model.w).tree
-    local, stated = _part(model, _is_local), _chosen(motion.stated, _is_local)
+    local, stated = _part(model, _is_local), _stated(motion, _is_local)
     return DiagnosedDynamics(local, tree, motion.step, remainders, stated)
 
 
 def remembered_force(model: Model, motion: ObservedMotion, tree: Tree) -> np.ndarray:
     """Return the force of the effects with memory along a motion, (n, k) [N m or N]."""
-    stated = _chosen(motion.stated, _has_memory)
+    stated = _stated(motion, _has_memory)
     return extra_force(_part(model, _has_memory), replace(motion, tree=tree, stated=stated))
 
 
 def remembers(model: Model, motion: ObservedMotion) -> bool:
     """Return whether some effect of a model or of the nominal robot has memory."""
-    return any(_has_memory(x.effect) for x in (*model.effects, *motion.known))
+    stated = _stated(motion, _has_memory)
+    return bool(stated) or any(_has_memory(x.effect) for x in model.effects)
 
 
 def _has_memory(effect: Effect) -> bool:
@@ -233,6 +235,11 @@ def _sees_no_acceleration(effect: Effect) -> bool:
 def _chosen(stated: tuple[EffectAt, ...], is_in: Callable[[Effect], bool]) -> tuple[EffectAt, ...]:
     """Return some of the effects that the nominal robot has."""
     return tuple(x for x in stated if is_in(x.effect) and not x.effect.is_open)
+
+
+def _stated(motion: ObservedMotion, is_in: Callable[[Effect], bool]) -> tuple[EffectAt, ...]:
+    """Return some of the effects that the nominal robot has, as a simulation has them."""
+    return _chosen(acting_at_once(motion.stated), is_in)
 
 
 def _part(model: Model, is_in: Callable[[Effect], bool]) -> Model:

@@ -31,9 +31,13 @@ def _stated(tree, level=LEVEL):
 
 @pytest.fixture(scope='module')
 def creeps():
+    return _creeping(LEVEL)
+
+
+def _creeping(level):
     """Measured efforts that overcome friction which builds up over a way."""
     world = simulate(CHAINS[1], 4, 20.0)
-    held = LEVEL * bristle(world.position[:, 0], WAY)
+    held = level * bristle(world.position[:, 0], WAY)
     return events_of(world, effort=world.command + held[:, None], commands=False)
 
 
@@ -82,3 +86,14 @@ def test_a_machine_whose_stated_friction_creeps_shows_no_mismatch(creeps, robots
     found = diagnose(creeps, robot, tree, {}, stated=_stated(tree))
     assert found.verdict == 'no_mismatch'
     assert any('builds up over a way' in said for said in found.remarks)
+
+
+def test_simulations_hold_where_friction_takes_most_of_the_effort(robots):
+    """A force along the motion before answers too late: nearly all of its windows diverge."""
+    robot, tree = robots[1]
+    found = diagnose(_creeping(20.0), robot, tree, {}, stated=_stated(tree, 20.0))
+    assert any('builds up over a way' in said for said in found.remarks)
+    proof = found.proofs['train']
+    assert proof.rollouts > 20
+    assert proof.failed == 0
+    assert proof.rollout_after['joint0'] < 0.1
