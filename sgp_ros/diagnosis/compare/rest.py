@@ -9,6 +9,10 @@ from sgp_ros.robots.observed_motion import ObservedMotion
 
 _SLOW, _CREEP = 1e-3, 1e-2
 """Speeds, of the mean square one, below which a joint rests, and below which it may."""
+_NOISES = 4.0
+"""Noises below which a speed is none."""
+_PUSHED = 0.1
+"""Acceleration, of the mean square one, below which a slow joint neither stops nor starts."""
 _NARROW = 1e-2
 """Part of its range within which a joint stays that rests, as dry friction gives way a little."""
 
@@ -17,21 +21,37 @@ def resting(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) ->
     """Return where joints rest, (n, k).
 
     They are slower there than the noise of the velocity for some time; or they creep, and stay
-    within a small part of their range: friction is elastic before it slides.
+    within a small part of their range: friction is elastic before it slides. What leads there is
+    motion.
     """
     noise = np.sqrt((2 * np.pi) ** 2 * raw.noise_density * bandwidth.state_cutoff**3 / 3.0)
-    typical = np.sqrt((motion.velocity**2).mean(axis=0))
+    typical, pushes = (
+        np.sqrt((x**2).mean(axis=0)) for x in (motion.velocity, motion.acceleration)
+    )
     shortest = max(4, round(0.03 / raw.step))
     rests = np.zeros(motion.velocity.shape, dtype=bool)
     for j in range(motion.velocity.shape[1]):
         q, speed = motion.position[:, j], np.abs(motion.velocity[:, j])
-        least = 4.0 * float(noise[j])
-        surely, perhaps = max(least, _SLOW * typical[j]), max(least, _CREEP * typical[j])
+        push = np.abs(motion.acceleration[:, j]) / max(float(pushes[j]), 1e-300)
+        noisy, least = _NOISES * float(noise[j]), _SLOW * float(typical[j])
+        surely, perhaps = max(noisy, least), max(noisy, _CREEP * typical[j])
         for part in _slow(speed, surely, shortest):
-            rests[part, j] = True
+            rests[_standing(speed, push, part, least), j] = True
         for part in _slow(speed, perhaps, shortest):
-            rests[part, j] |= np.ptp(q[part]) < _NARROW * np.ptp(q)
+            if np.ptp(q[part]) < _NARROW * np.ptp(q):
+                rests[_standing(speed, push, part, least), j] = True
     return rests
+
+
+def _standing(speed: np.ndarray, push: np.ndarray, part: slice, least: float) -> slice:
+    """Return a stretch without the rows at its ends in which a joint still slows down, or starts.
+
+    Noise of a velocity is that of the whole recording, with what jitter of stamps makes of the
+    motion: a joint that slows down is slower than that before it stands.
+    """
+    noise = max(_NOISES * float(np.median(speed[part])), least)
+    there = np.flatnonzero((speed[part] <= noise) | (push[part] < _PUSHED))
+    return slice(part.start + int(there[0]), part.start + int(there[-1]) + 1)
 
 
 def _slow(speed: np.ndarray, limit: float, shortest: int) -> list[slice]:

@@ -13,12 +13,14 @@ STEP = 0.005
 BANDWIDTH = Bandwidth(4.0, 10.0)
 
 
-def rests(velocity):
-    """Return where a joint of these speeds rests, with next to no noise."""
+def rests(velocity, noise_density=1e-20):
+    """Return where a joint of these speeds rests, usually with next to no noise."""
+    position = STEP * np.cumsum(velocity)[:, None]
+    acceleration = np.gradient(velocity)[:, None] / STEP
     motion = SimpleNamespace(
-        velocity=velocity[:, None], position=STEP * np.cumsum(velocity)[:, None]
+        velocity=velocity[:, None], position=position, acceleration=acceleration
     )
-    raw = SimpleNamespace(step=STEP, noise_density=np.full(1, 1e-20))
+    raw = SimpleNamespace(step=STEP, noise_density=np.full(1, noise_density))
     return resting(raw, motion, BANDWIDTH)[:, 0]
 
 
@@ -46,3 +48,21 @@ def test_a_reversal_is_no_rest_and_a_still_joint_is():
     found = rests(speed)
     assert found[still].all()
     assert not found[190:210].any()
+
+
+def test_a_joint_that_slows_down_moves_until_it_stands():
+    """Jitter of stamps makes a noise of fast motions, which is none of the stop."""
+    slowing = np.linspace(1.0, 0.0, 200)
+    speed = np.concatenate([np.ones(400), slowing, np.zeros(300), slowing[::-1], np.ones(400)])
+    noisy = rests(speed, 2e-7)
+    assert noisy[610:890].all()
+    assert not noisy[:590].any()
+    assert not noisy[910:].any()
+
+
+def test_a_joint_without_any_speed_rests():
+    still = SimpleNamespace(
+        velocity=np.zeros((50, 1)), position=np.ones((50, 1)), acceleration=np.full((50, 1), 1e-9)
+    )
+    raw = SimpleNamespace(step=STEP, noise_density=np.full(1, 1e-20))
+    assert resting(raw, still, BANDWIDTH).all()
