@@ -21,6 +21,9 @@ from sgp_ros.rigid.tree import Tree
 
 _WAYS = 16
 """Ways over which friction may build up that are compared, from least to greatest."""
+_UNLIKE = 0.5
+"""Part of its level by which friction that creeps may differ from what is stated, and may act at
+once beside it. A law of another size, such as that of a bundle of cables, is none of the file."""
 _CHANGE = (COULOMB_FRICTION, HYSTERESIS)
 """Laws that `with_creeping` takes off and adds."""
 
@@ -84,7 +87,8 @@ def _creeping(equations: Equations, stated: EffectAt) -> EffectAt | None:
     dry = stated.force(motion)[:, [j]]
     beside = np.column_stack([motion.velocity[:, j], motion.acceleration[:, j], dry[:, 0]])
     X = np.column_stack([equations.bases[j], equations.compact(beside, j, is_inertial=False)])
-    Q = np.linalg.qr(X / np.maximum(np.linalg.norm(X, axis=0), 1e-300))[0]
+    scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+    Q = np.linalg.qr(X / scale)[0]
 
     def left(y: np.ndarray) -> float:
         rest = y - Q @ (Q.T @ y)
@@ -95,9 +99,15 @@ def _creeping(equations: Equations, stated: EffectAt) -> EffectAt | None:
         replace(stated, effect=HYSTERESIS, shape=np.array([way]))
         for way in np.geomspace(low, high, _WAYS)
     ]
-    changes = np.column_stack([x.force(motion)[:, j] for x in trials]) - dry
-    rests = [left(equations.d[:, j] - c)
-             for c in equations.compact(changes, j, is_inertial=False).T]  # fmt: skip
+    columns = np.column_stack([x.force(motion)[:, j] for x in trials]) - dry
+    changes = equations.compact(columns, j, is_inertial=False).T
+    rests = [left(equations.d[:, j] - change) for change in changes]
     best = int(np.argmin(rests))
     gain = 0.5 * INDEPENDENT_ROWS * math.log(left(equations.d[:, j]) / rests[best])
-    return trials[best] if gain > ALIKE and 0 < best < _WAYS - 1 else None
+    if gain <= ALIKE or best in {0, _WAYS - 1}:
+        return None
+    # of friction of any level that acts at once, beside any that creeps
+    found = np.linalg.lstsq(np.column_stack([changes[best], X / scale]), equations.d[:, j])[0]
+    creeps, more = found[0], found[-1] / scale[-1]
+    at_once = 1.0 + more - creeps
+    return trials[best] if abs(creeps - 1.0) < _UNLIKE and abs(at_once) < _UNLIKE else None

@@ -81,6 +81,17 @@ def test_a_way_that_noise_would_give_is_not_stated(robots):
     assert creeping_friction(raw, tree) == {}
 
 
+def test_friction_that_a_bundle_of_cables_adds_is_none_of_the_file(robots):
+    """Its level is another one, and what the file states acts at once beside it."""
+    robot, tree = robots[1]
+    world = simulate(CHAINS[1], 4, 20.0)
+    q, v = world.position[:, 0], world.velocity[:, 0]
+    held = 1.5 * bristle(q, 0.08) + 0.4 * np.sign(v)
+    effort = world.command + held[:, None]
+    raw = collect(events_of(world, effort=effort, commands=False), robot, _stated(tree, 0.4))
+    assert creeping_friction(raw, tree) == {}
+
+
 def test_a_machine_whose_stated_friction_creeps_shows_no_mismatch(creeps, robots):
     robot, tree = robots[1]
     found = diagnose(creeps, robot, tree, {}, stated=_stated(tree))
