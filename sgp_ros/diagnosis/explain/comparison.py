@@ -24,6 +24,8 @@ FIRST, SECOND, PARENTS = 12, 5, 6
 
 MOST_SINGLES, MOST_PAIRS = 8, 3
 """Of those the best that are fitted to all rows of a long recording, for each base and parent."""
+BENT = 1.0
+"""Strain of bodies from which a model with those of the robot file is looked for [nats]."""
 EXCHANGES = 2
 """Times that an effect of the best pair is exchanged for another."""
 
@@ -121,13 +123,21 @@ def _more(columns: Columns, found: Comparison) -> list[Model]:
     It does not if its residual counts as physics, if it is not adequate, or if its bodies are so
     unlikely that they may imitate missing physics. The search starts from that model and from the
     laws that nearly every joint has, with bodies that may differ, or with a load; and from
-    friction that builds up at every joint, where no more is missing.
+    friction that builds up at every joint, where no more is missing. Bodies that change at all may
+    imitate a rotor, a load, a spring: it starts from the best model with those of the file, too.
     """
     by_score = _ranked([found.base, *found.singles, *found.pairs])
-    best = next((m for m in by_score if not m.effects or is_credible(m)), found.base)
+    sound = [m for m in by_score if not m.effects or is_credible(m)]
+    best = next(iter(sound), found.base)
     limit = np.clip(ADEQUATE_REST * found.base.left, SLIGHT_REST, COUNTED_SHARE)
-    if (best.left < limit).all() and 0.5 * float(best.w @ best.w) < PER_EFFECT:
-        return []
+    strain = 0.5 * float(best.w @ best.w)
+    stated: list[Model] = []
+    if best.is_free and strain > BENT:
+        stated = _as_stated(
+            columns, best, next((m for m in sound if not m.is_free), found.nominal)
+        )
+    if (best.left < limit).all() and strain < PER_EFFECT:
+        return _ranked(stated)
     everyday = usual(columns, fit(columns, (), best.sigma, is_free=True))
     loaded = _loaded(columns, everyday)
     starts = [best] if loaded else [best, everyday]
@@ -136,8 +146,24 @@ def _more(columns: Columns, found: Comparison) -> list[Model]:
         starts.append(built)
     if isinstance(best.frame.equations.motion.drive, Servo):
         starts += _late(columns, best.sigma)
-    models = [*loaded, *(model for start in starts for model in by_joint(columns, start))]
+    models = [*stated, *loaded, *(model for start in starts for model in by_joint(columns, start))]
     return _ranked(m for m in models if len(m.effects) > 2)
+
+
+def _as_stated(columns: Columns, best: Model, stated: Model) -> list[Model]:
+    """Return models of a search beside the bodies of the robot file.
+
+    Args:
+        columns: of the recording.
+        best: model with other bodies, whose laws a second search starts from if the first one does
+            not lead to a better model.
+        stated: best model with the bodies of the file.
+    """
+    found = by_joint(columns, stated)
+    if any(gain(m, best) > 0.0 for m in found):
+        return found
+    laws = fit(columns, best.effects, best.sigma, is_free=False)
+    return [*found, *by_joint(columns, laws)]
 
 
 def _loaded(columns: Columns, everyday: Model) -> list[Model]:
