@@ -17,13 +17,18 @@ _MOST_OF_LINK = 0.9
 
 
 @njit(cache=True)
+def deflected(z: np.ndarray, way: np.ndarray, presliding: float) -> np.ndarray:
+    """Return z of `dz/dt = (v - |v| z) / presliding` after a way in one direction."""
+    sign = np.sign(way)
+    return sign + (z - sign) * np.exp(-np.abs(way) / presliding)
+
+
+@njit(cache=True)
 def bristle(q: np.ndarray, presliding: float) -> np.ndarray:
     """Return z of `dz/dt = (v - |v| z) / presliding`, exact for a steady direction per step."""
     z = np.zeros(len(q))
     for i in range(1, len(q)):
-        way = q[i] - q[i - 1]
-        sign = 1.0 if way > 0.0 else -1.0
-        z[i] = sign + (z[i - 1] - sign) * np.exp(-abs(way) / presliding)
+        z[i] = deflected(z[i - 1], q[i] - q[i - 1], presliding)
     return z
 
 

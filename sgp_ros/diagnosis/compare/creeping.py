@@ -24,8 +24,6 @@ _WAYS = 16
 _UNLIKE = 0.5
 """Part of its level by which friction that creeps may differ from what is stated, and may act at
 once beside it. A law of another size, such as that of a bundle of cables, is none of the file."""
-_CHANGE = (COULOMB_FRICTION, HYSTERESIS)
-"""Laws that `with_creeping` takes off and adds."""
 
 
 def creeping_friction(raw: RawTrajectory, tree: Tree) -> Mapping[str, EffectAt]:
@@ -57,20 +55,6 @@ def with_creeping(raw: RawTrajectory, creeping: Mapping[str, EffectAt]) -> RawTr
         for x in raw.stated if x.effect is COULOMB_FRICTION and x.joint in creeping
     ]  # fmt: skip
     return replace(raw, stated=(*raw.stated, *off, *creeping.values()))
-
-
-def acting_at_once(stated: tuple[EffectAt, ...]) -> tuple[EffectAt, ...]:
-    """Return effects of the nominal robot, `with_creeping` or not, as the robot file states them.
-
-    The force of a memory is that of a motion before, and answers a simulated one too late where
-    friction holds most of an effort: there it acts at once.
-    """
-
-    def undoes(x: EffectAt, y: EffectAt) -> bool:
-        is_change = (x.effect, y.effect) in (_CHANGE, _CHANGE[::-1])
-        return is_change and x.joint == y.joint and x.coefficients[0] == -y.coefficients[0]
-
-    return tuple(x for x in stated if not any(undoes(x, y) for y in stated))
 
 
 def creeping_remark(creeping: Mapping[str, EffectAt]) -> tuple[str, ...]:

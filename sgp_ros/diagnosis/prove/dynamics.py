@@ -1,7 +1,8 @@
 """The forward dynamics of a diagnosed model, for many states at once.
 
-Effects without memory, bodies and processes are evaluated at each state. The force of effects that
-remember is handed in with the efforts: it belongs to a trajectory, not to a state.
+Effects without memory, bodies and processes are evaluated at each state. Friction that creeps has
+a state of its own, and so answers the simulated motion. The force of other effects that remember
+is handed in with the efforts: it belongs to a trajectory, not to a state.
 """
 
 from __future__ import annotations
@@ -12,13 +13,13 @@ from functools import cached_property
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.creeping import acting_at_once
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.fitted_model import Model, extra_force
 from sgp_ros.diagnosis.locate.remainder import Remainder
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.elasticity import JointElasticity
+from sgp_ros.physics.memory import Hysteresis, bristle, deflected
 from sgp_ros.rigid.rigid_body import mass_and_bias
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.gains import Gains
@@ -36,7 +37,8 @@ class DiagnosedDynamics:
     """Equations of motion `M(q) a = drive` of k joints, see `batch.forward.ForcedMotion`.
 
     The loads are, row by row, the commanded effort (k), the force of effects that
-    remember (k), the time since the first state (1), and the recording (1), see `ObservedMotion`.
+    remember (k), the time since the first state (1), the recording (1), see `ObservedMotion`, and
+    where each friction that creeps was last, with its deflection there (2 each).
 
     Attributes:
         model: effects without memory.
@@ -44,6 +46,7 @@ class DiagnosedDynamics:
         step: of the recording [s].
         remainders: processes beside the model.
         stated: effects without memory that the nominal robot has, beside those of its tree.
+        bristles: friction that creeps, of both.
     """
 
     model: Model
@@ -51,6 +54,7 @@ class DiagnosedDynamics:
     step: float
     remainders: tuple[Remainder, ...] = ()
     stated: tuple[EffectAt, ...] = ()
+    bristles: tuple[EffectAt, ...] = ()
 
     def equations(
         self, q: np.ndarray, v: np.ndarray, loads: np.ndarray
@@ -62,7 +66,7 @@ class DiagnosedDynamics:
         Args:
             q: (m, k) [rad or m].
             v: (m, k) [rad/s or m/s].
-            loads: (m, 2 k + 2) [N m or N, s].
+            loads: (m, 2 k + 2 + 2 b) [N m or N, s].
         """
         m, k = q.shape
         still = np.zeros((m, k))
@@ -80,7 +84,34 @@ class DiagnosedDynamics:
             M -= np.moveaxis(force[1:] - force[0], 0, 2)
         for remainder in self.remainders:
             drive[:, remainder.joint] += remainder.force(here)
+        for s, z in zip(self.bristles, self._deflections(q, loads), strict=True):
+            drive[:, s.place.joint] -= s.coefficients[0] * z
         return M, drive
+
+    def deflected(self, motion: ObservedMotion, rows: np.ndarray) -> np.ndarray:
+        """Return where friction that creeps is at rows of a recording (m,), (m, 2 b)."""
+        found = [np.zeros((len(rows), 0))]
+        for s in self.bristles:
+            q = motion.position[:, s.place.joint]
+            found.append(np.column_stack([q, bristle(q, float(s.shape[0]))])[rows])
+        return np.concatenate(found, axis=1)
+
+    def creeping(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
+        """Return the loads once states (m, k or more) are reached."""
+        if not self.bristles:
+            return loads
+        after = loads.copy()
+        at = after.shape[1] - 2 * len(self.bristles)
+        after[:, at::2] = q[:, [s.place.joint for s in self.bristles]]
+        after[:, at + 1 :: 2] = np.stack(self._deflections(q, loads), axis=1)
+        return after
+
+    def _deflections(self, q: np.ndarray, loads: np.ndarray) -> list[np.ndarray]:
+        last = loads[:, loads.shape[1] - 2 * len(self.bristles) :]
+        return [
+            deflected(last[:, 2 * i + 1], q[:, s.place.joint] - last[:, 2 * i], float(s.shape[0]))
+            for i, s in enumerate(self.bristles)
+        ]
 
     @cached_property
     def _with_acceleration(self) -> _Forces:
@@ -122,10 +153,11 @@ class DiagnosedDynamics:
         have no finite solution, such as of a body without inertia.
         """
         m, k = q.shape
+        v = np.where(v == 0.0, _SMALL, v)  # a difference never crosses a reversal
         M, drive = self.equations(q, v, loads)
         if not (np.isfinite(M).all() and np.linalg.det(M).all()):
             return np.inf
-        away = np.where(v < 0.0, -1.0, 1.0)  # a difference never crosses a reversal
+        away = np.where(v < 0.0, -1.0, 1.0)
         A = np.zeros((m, 2 * k, 2 * k))
         A[:, :k, k:] = np.eye(k)
         for j in range(k):
@@ -172,7 +204,7 @@ class ServoedDynamics(DiagnosedDynamics):
         """Return dynamics with drives."""
         return cls(
             dynamics.model, dynamics.tree, dynamics.step, dynamics.remainders, dynamics.stated,
-            gains.kp, gains.kd,
+            dynamics.bristles, gains.kp, gains.kd,
         )  # fmt: skip
 
     def equations(
@@ -200,24 +232,29 @@ def dynamics_of(
 ) -> DiagnosedDynamics:
     """Return the dynamics of a model fitted on `equations` for the recording of a motion."""
     tree = equations.with_bodies(motion, model.w).tree
-    local, stated = _part(model, _is_local), _stated(motion, _is_local)
-    return DiagnosedDynamics(local, tree, motion.step, remainders, stated)
+    bristles = tuple(s for s in (*model.effects, *motion.known) if _creeps(s.effect))
+    local, stated = _part(model, _is_local), _chosen(motion.stated, _is_local)
+    return DiagnosedDynamics(local, tree, motion.step, remainders, stated, bristles)
 
 
 def remembered_force(model: Model, motion: ObservedMotion, tree: Tree) -> np.ndarray:
-    """Return the force of the effects with memory along a motion, (n, k) [N m or N]."""
-    stated = _stated(motion, _has_memory)
+    """Return the force of the effects that remember along a motion, (n, k) [N m or N]."""
+    stated = _chosen(motion.stated, _has_memory)
     return extra_force(_part(model, _has_memory), replace(motion, tree=tree, stated=stated))
 
 
 def remembers(model: Model, motion: ObservedMotion) -> bool:
-    """Return whether some effect of a model or of the nominal robot has memory."""
-    stated = _stated(motion, _has_memory)
-    return bool(stated) or any(_has_memory(x.effect) for x in model.effects)
+    """Return whether some effect of a model or of the nominal robot has memory, but no state."""
+    return any(_has_memory(x.effect) for x in (*model.effects, *motion.known))
 
 
 def _has_memory(effect: Effect) -> bool:
-    return effect.has_memory and not isinstance(effect, JointElasticity)  # that has states
+    has_states = isinstance(effect, JointElasticity) or _creeps(effect)
+    return effect.has_memory and not has_states
+
+
+def _creeps(effect: Effect) -> bool:
+    return isinstance(effect, Hysteresis)
 
 
 def _is_local(effect: Effect) -> bool:
@@ -235,11 +272,6 @@ def _sees_no_acceleration(effect: Effect) -> bool:
 def _chosen(stated: tuple[EffectAt, ...], is_in: Callable[[Effect], bool]) -> tuple[EffectAt, ...]:
     """Return some of the effects that the nominal robot has."""
     return tuple(x for x in stated if is_in(x.effect) and not x.effect.is_open)
-
-
-def _stated(motion: ObservedMotion, is_in: Callable[[Effect], bool]) -> tuple[EffectAt, ...]:
-    """Return some of the effects that the nominal robot has, as a simulation has them."""
-    return _chosen(acting_at_once(motion.stated), is_in)
 
 
 def _part(model: Model, is_in: Callable[[Effect], bool]) -> Model:

@@ -42,7 +42,7 @@ class ElasticDynamics(DiagnosedDynamics):
         kp, kd = (none, none) if gains is None else (gains.kp, gains.kd)
         return cls(
             dynamics.model, dynamics.tree, dynamics.step, dynamics.remainders, dynamics.stated,
-            springs, kp, kd,
+            dynamics.bristles, springs, kp, kd,
         )  # fmt: skip
 
     def started(self, motion: ObservedMotion, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -4,10 +4,10 @@ A one-step error says little: the state hardly moves in a step. Windows of 0.3 s
 at once from where they start, and compared with what was measured. The yardstick is the error of
 holding the position at the start of the window: 1 means no knowledge of the robot.
 
-The force of an effect that remembers depends on the motion before. It is taken along the motion
-that was rolled out last, and the windows are rolled out again until nothing changes: the causal
-fixed point of Picard's iteration. Windows start from what was measured, and so do their memories,
-up to the error with which the window before ends.
+The force of an effect that remembers depends on the motion before. Friction that creeps has a
+state; the force of others is taken along the motion that was rolled out last, and the windows are
+rolled out again until nothing changes: the causal fixed point of Picard's iteration. Windows start
+from what was measured, and so do their memories, up to the error that the window before ends with.
 """
 
 from __future__ import annotations
@@ -244,15 +244,20 @@ def _together(
         path[:, :, 0] = start
         paths.append(path)
     q, v = np.concatenate([path[:, :, 0] for path in paths], axis=1)
+    last = np.concatenate([one.dynamics.deflected(one.windows.motion, one.windows.nodes[:, 0])
+                           for one in sets])  # fmt: skip
     ends = np.cumsum([path.shape[1] for path in paths])
     with np.errstate(all='ignore'):  # a roll-out that diverges overflows, and is counted
         for i in range(sets[0].windows.steps):
             moving = sum(one.windows.steps > i for one in sets)
             now = np.concatenate([x[:, i] for x in loads[:moving]])
+            now = np.concatenate([now, last[: len(now)]], axis=1)
             state = q[: len(now)], v[: len(now)]
             for _ in range(substeps):
                 state = advance(dynamics, *state, now, h / substeps)
+                now = dynamics.creeping(state[0], now)
             q, v = state
+            last = now[:, now.shape[1] - last.shape[1] :]
             for path, end in zip(paths[:moving], ends, strict=False):
                 path[:, :, i + 1] = q[end - path.shape[1] : end], v[end - path.shape[1] : end]
     return [(dynamics.shown(path[0]), dynamics.shown(path[1])) for path in paths]
@@ -262,6 +267,7 @@ def _substeps(one: _Set, loads: np.ndarray, h: float) -> int:
     """Return how many substeps the fastest motion along the recording needs."""
     rows = one.windows.nodes[:, :-1:4].ravel()
     some = loads[:, ::4].reshape(-1, loads.shape[2])
+    some = np.concatenate([some, one.dynamics.deflected(one.windows.motion, rows)], axis=1)
     start = one.dynamics.started(one.windows.motion, rows)
     rate = one.dynamics.fastest_rate(*start, some)
     if not math.isfinite(rate):

@@ -123,25 +123,52 @@ def test_what_remembers_commands_needs_no_iteration(equations_for, monkeypatch):
     assert _errors(windows, *roll_out(windows, model, equations)) < 1e-4
 
 
-def test_what_remembers_the_motion_is_iterated_to_a_fixed_point(equations_for, hysteretic):
-    """The bristle along the roll-out, from the one measured before its window."""
+@pytest.mark.parametrize('of_the_file', [False, True])
+def test_friction_that_creeps_answers_the_motion(
+    equations_for, hysteretic, monkeypatch, of_the_file
+):
+    """From the bristle measured before each window, without any iteration."""
     _, equations = equations_for(hysteretic)
     model = _model(equations, _candidate('hysteresis', 0, 0.8 * PRESLIDING))
     assert model.effects[0].coefficients[0] == pytest.approx(LEVEL, rel=0.02)
     windows = cut(equations.motion, TRIM)
     nominal = _errors(windows, *roll_out(windows, _model(equations), equations))
+    if of_the_file:
+        stated = replace(equations.motion, stated=model.effects)
+        windows, model = cut(stated, TRIM), _model(equations)
+    monkeypatch.setattr(rollouts, 'MOST_ROUNDS', 1)
     found = _errors(windows, *roll_out(windows, model, equations))
-    assert found < 1e-3
+    assert found < 1e-4
     assert nominal > 100.0 * found
 
 
-def test_a_window_without_a_fixed_point_is_counted(equations_for, hysteretic, monkeypatch):
-    """One round tells nothing of convergence."""
-    _, equations = equations_for(hysteretic)
-    model = _model(equations, _candidate('hysteresis', 0, PRESLIDING))
+def test_what_remembers_the_motion_is_iterated_to_a_fixed_point(
+    equations_for, perfect, monkeypatch
+):
+    """Play, whose force follows the motion before; one round tells nothing of convergence."""
+    _, equations = equations_for(perfect[1])
+    start, play = np.sqrt((equations.d**2).mean(axis=0)), _candidate('backlash', 0, 0.3, 0.02)
+    model = fit(Columns(equations), (play,), start, is_free=False, still=1)
+    small = with_coefficients(model, np.ones(1))
+    windows = cut(equations.motion, TRIM)
+    _, ends = roll_out(windows, small, equations)
+    assert ends.mean() > 0.5
     monkeypatch.setattr(rollouts, 'MOST_ROUNDS', 1)
-    _, ends = roll_out(cut(equations.motion, TRIM), model, equations)
+    _, ends = roll_out(windows, small, equations)
     assert not ends.any()
+
+
+def test_a_joint_at_rest_asks_for_no_small_steps(equations_for, dry):
+    """Dry friction jumps where a velocity is zero; that is no rate."""
+    _, equations = equations_for(dry)
+    model = _model(equations, _candidate('coulomb_friction', 0))
+    motion = equations.motion
+    dynamics = dynamics_of(model, equations, motion)
+    loads = np.column_stack(
+        [motion.effort, np.zeros_like(motion.effort), motion.time, 0.0 * motion.time]
+    )[:5]
+    q = motion.position[:5]
+    assert dynamics.fastest_rate(q, np.zeros_like(q), loads) < 1.0 / PERIOD
 
 
 def test_a_roll_out_that_runs_away_is_counted(equations_for, viscous):
