@@ -56,12 +56,20 @@ class Columns:
         found = InertiaSlope(self._equations[frozenset()])
         return found if found.joints.size else None
 
-    def corrected(self, w: np.ndarray | None) -> ObservedMotion:
-        """Return the motion of a robot with changed bodies."""
+    def corrected(self, w: np.ndarray | None, within: float = 0.0) -> ObservedMotion:
+        """Return the motion of a robot with changed bodies, or with others that differ so little.
+
+        Args:
+            w: (p,) change of the bodies; None for none.
+            within: difference that may be [standard deviations of the prior].
+        """
         motion = self._equations[frozenset()].motion
         if w is None or not w.any():
             return motion
         key = w.tobytes()
+        if within > 0.0:
+            near = (k for k in self._motions if np.abs(np.frombuffer(k) - w).max() <= within)
+            key = next(near, key)
         if key not in self._motions:
             others, too_many = self._motions.values(), len(self._motions) > 20
             if too_many or sum(o.remembered for o in others) > MOST_SLOPES:

@@ -18,6 +18,8 @@ from sgp_ros.robots.observed_motion import ObservedMotion
 
 TRIALS = 2
 """Shapes per effect and place that are worth a fit."""
+_NEAR = 0.05
+"""Change of the bodies with which columns need not be made anew [standard deviations]."""
 WIDEST = 0.75
 """Widest interval of position, as a share of the range, that is a region."""
 
@@ -56,7 +58,7 @@ def screen(
             dry = held | effect.held_joints(place)
             if dry not in rests:
                 rests[dry] = Rest.of(columns, model, dry)
-            motion = columns.corrected(model.w if effect.uses_bodies else None)
+            motion = columns.corrected(model.w if effect.uses_bodies else None, _NEAR)
             trials = _trials(_Look(columns, rests[dry], before, rows), effect, place, motion)
             if place.number:
                 trials = (t for t in trials if are_apart((*model.effects, t[1]), motion))
