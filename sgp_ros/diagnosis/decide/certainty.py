@@ -175,8 +175,9 @@ def probabilities(
 ) -> Probabilities:
     """Return the tempered probabilities of all effects.
 
-    A richer law whose numbers reduce it to the asserted one is not a rival. An effect is only as
-    certain as its joint is well described; one that acts on all joints, as the worst of them.
+    A richer law whose numbers reduce it to the asserted one is not a rival; bodies that do what an
+    asserted law does, on any motion, are one. An effect is only as certain as its joint is well
+    described; one that acts on all joints, as the worst of them.
     """
     scale, asserted = Scale.of(equations, comparison), decision.model
     if any(s.effect.has_chosen_form for s in asserted.effects):
@@ -187,7 +188,12 @@ def probabilities(
         m
         for m in known
         if scale.counts(m)
-        and not (m.key != asserted.key and scale.worth(m) > least and contrasts.is_same_law(m))
+        and not (
+            m.key != asserted.key
+            and not _has_bodies_for(m, asserted)
+            and scale.worth(m) > least
+            and contrasts.is_same_law(m)
+        )
     ]
     if asserted.effects and all(m.key != asserted.key for m in models):
         models.append(asserted)
@@ -210,6 +216,11 @@ def probabilities(
         asserted,
         scale,
     )
+
+
+def _has_bodies_for(rival: Model, asserted: Model) -> bool:
+    """Return whether a rival has other bodies in place of a law."""
+    return rival.is_free and not asserted.is_free and not asserted.key <= rival.key
 
 
 def certainty_of(
