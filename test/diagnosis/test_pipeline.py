@@ -241,3 +241,22 @@ def test_what_follows_the_clock_alone_is_said_to_depend_on_nothing_beyond_chance
     assert not finding.why.startswith('it depends on')
     (own,) = found.dependences
     assert not any(own.is_significant(name) for name in own.scores)
+
+
+@pytest.mark.parametrize(('rotor', 'least'), [(0.06, 0.9), (0.03, 0.5)])
+def test_a_rotor_is_named_where_bodies_are_nearly_right(robots, rotor, least):
+    """A body of a seventh of its mass would do as well, beside a weak motor.
+
+    A smaller rotor hardly differs from a body of two thirds, and is as uncertain; with that body
+    the two laws of friction may not become one formula.
+    """
+    (link,), (robot, tree) = CHAINS[1], robots[1]
+    true = replace(link, mass=1.015 * link.mass, inertia=link.inertia + rotor)
+    world = simulate((true,), 8, 12.0, force=lambda t, q, v: (-(0.3 + 0.15 * abs(v[0])) * v[0],))
+    found = diagnose(events_of(world), robot, tree, {})
+    named = {f.effect: f for f in found.findings}
+    assert named.keys() == {'armature', 'viscous_friction', 'quadratic_drag'}
+    assert named['armature'].parameters['inertia'].value == pytest.approx(rotor, rel=0.02)
+    assert least <= named['armature'].probability < least + 0.4
+    assert named['quadratic_drag'].probability > 0.9
+    assert not found.parameter_errors

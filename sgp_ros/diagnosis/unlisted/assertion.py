@@ -86,6 +86,9 @@ def _joints(equations: Equations, comparison: Comparison, decision: Decision) ->
 
 def _decided(equations: Equations, found: Explained, searched: Searched) -> Explained:
     """Return what is decided with the laws of one more joint."""
+    is_open = searched.joint in found.decision.unknown
+    if not is_open and _is_listed(equations, found.comparison, searched):
+        return found
     plain = _in_plain_laws(equations, found.comparison, searched)
     if plain is not None:
         comparison = replace(found.comparison, more=(*found.comparison.more, plain))
@@ -109,6 +112,14 @@ def _decided(equations: Equations, found: Explained, searched: Searched) -> Expl
         decision, rivals=(*laws, *decision.rivals), refusals=dict(decision.refusals) | refusals
     )
     return replace(found, decision=decision, why_not=found.why_not | {searched.joint: why})
+
+
+def _is_listed(equations: Equations, comparison: Comparison, searched: Searched) -> bool:
+    """Return whether listed laws, with bodies of any kind, say as much as the best formula."""
+    scale = Scale.of(equations, comparison).of_forms()
+    listed = (*comparison.singles, *comparison.pairs, *comparison.more)
+    most = max((scale.worth(m) for m in listed if scale.counts(m)), default=-np.inf)
+    return bool(searched.laws) and most > scale.worth(searched.laws[0]) - ALIKE
 
 
 def _in_plain_laws(
