@@ -91,7 +91,8 @@ def _creeping(equations: Equations, stated: EffectAt) -> EffectAt | None:
     if gain <= ALIKE or best in {0, _WAYS - 1}:
         return None
     # of friction of any level that acts at once, beside any that creeps
-    found = np.linalg.lstsq(np.column_stack([changes[best], X / scale]), equations.d[:, j])[0]
+    A = np.column_stack([changes[best], X / scale])
+    found = np.linalg.lstsq(A, equations.d[:, j], rcond=None)[0]
     creeps, more = found[0], found[-1] / scale[-1]
     at_once = 1.0 + more - creeps
     return trials[best] if abs(creeps - 1.0) < _UNLIKE and abs(at_once) < _UNLIKE else None
