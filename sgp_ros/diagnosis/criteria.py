@@ -85,6 +85,12 @@ MOST_OPPOSED = 5.0
 
 Or to that of all there is to explain, where this is more.
 """
+BENT_BODIES = 1.0
+"""Strain of bodies from which physics is looked for beside those of the robot file [nats].
+Convention.
+
+It is that of one change of 1.4 prior standard deviations: less is worth no law.
+"""
 NOTHING_EXPLAINED = 1.0 / ADEQUATE_REST
 """Excess of a model that explains nothing [1]. Follows."""
 STRUCTURE_LEAST_SHARE = 0.1

@@ -8,7 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import ADEQUATE_REST, COUNTED_SHARE, PER_EFFECT, SLIGHT_REST
+from sgp_ros.diagnosis.criteria import (
+    ADEQUATE_REST,
+    BENT_BODIES,
+    COUNTED_SHARE,
+    PER_EFFECT,
+    SLIGHT_REST,
+)
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
@@ -24,8 +30,6 @@ FIRST, SECOND, PARENTS = 12, 5, 6
 
 MOST_SINGLES, MOST_PAIRS = 8, 3
 """Of those the best that are fitted to all rows of a long recording, for each base and parent."""
-BENT = 1.0
-"""Strain of bodies from which a model with those of the robot file is looked for [nats]."""
 EXCHANGES = 2
 """Times that an effect of the best pair is exchanged for another."""
 
@@ -132,7 +136,7 @@ def _more(columns: Columns, found: Comparison) -> list[Model]:
     limit = np.clip(ADEQUATE_REST * found.base.left, SLIGHT_REST, COUNTED_SHARE)
     strain = 0.5 * float(best.w @ best.w)
     stated: list[Model] = []
-    if best.is_free and strain > BENT:
+    if best.is_free and strain > BENT_BODIES:
         stated = _as_stated(
             columns, best, next((m for m in sound if not m.is_free), found.nominal)
         )
