@@ -35,11 +35,10 @@ def resting(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) ->
         push = np.abs(motion.acceleration[:, j]) / max(float(pushes[j]), 1e-300)
         noisy, least = _NOISES * float(noise[j]), _SLOW * float(typical[j])
         surely, perhaps = max(noisy, least), max(noisy, _CREEP * typical[j])
-        for part in _slow(speed, surely, shortest):
+        slow = _slow(speed, surely, shortest)
+        slow += [x for x in _slow(speed, perhaps, shortest) if np.ptp(q[x]) < _NARROW * np.ptp(q)]
+        for part in slow:
             rests[_standing(speed, push, part, least), j] = True
-        for part in _slow(speed, perhaps, shortest):
-            if np.ptp(q[part]) < _NARROW * np.ptp(q):
-                rests[_standing(speed, push, part, least), j] = True
     return rests
 
 
