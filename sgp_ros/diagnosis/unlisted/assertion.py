@@ -116,10 +116,12 @@ def _decided(equations: Equations, found: Explained, searched: Searched) -> Expl
 
 def _is_listed(equations: Equations, comparison: Comparison, searched: Searched) -> bool:
     """Return whether listed laws, with bodies of any kind, say as much as the best formula."""
+    if not searched.laws:
+        return False
     scale = Scale.of(equations, comparison).of_forms()
     listed = (*comparison.singles, *comparison.pairs, *comparison.more)
-    most = max((scale.worth(m) for m in listed if scale.counts(m)), default=-np.inf)
-    return bool(searched.laws) and most > scale.worth(searched.laws[0]) - ALIKE
+    least = scale.worth(searched.laws[0]) - ALIKE
+    return any(scale.worth(m) > least and scale.counts(m) for m in listed)
 
 
 def _in_plain_laws(
