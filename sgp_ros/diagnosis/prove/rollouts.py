@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -58,6 +59,11 @@ class RolloutWindows:
     first: np.ndarray
     stride: int
     steps: int
+
+    @property
+    def step(self) -> float:
+        """Length of a step [s]."""
+        return self.stride * self.motion.step
 
     @property
     def nodes(self) -> np.ndarray:
@@ -156,8 +162,7 @@ def substeps(
     remainders: tuple[Remainder, ...] = (),
 ) -> int:  # fmt: skip
     """Return how many substeps a step of a roll-out takes: what is to be integrated is stiff."""
-    one = _Set(windows, model, equations, remainders, None)
-    return _substeps(one, one.loads, windows.stride * windows.motion.step)
+    return _Set(windows, model, equations, remainders, None).substeps
 
 
 class _Set:
@@ -203,6 +208,21 @@ class _Set:
         signals = self._effort, self._force, motion.time[:, None], recording[:, None]
         return np.concatenate([self.windows.means(x) for x in signals], axis=2)
 
+    @cached_property
+    def substeps(self) -> int:
+        """How many substeps the fastest motion along the recording needs.
+
+        The force of what remembers is an offset, and changes no rate from round to round.
+        """
+        windows, loads = self.windows, self.loads[:, ::4]
+        rows = windows.nodes[:, :-1:4].ravel()
+        last = self.dynamics.deflected(windows.motion, rows)
+        some = np.concatenate([loads.reshape(len(rows), -1), last], axis=1)
+        rate = self.dynamics.fastest_rate(*self.dynamics.started(windows.motion, rows), some)
+        if not math.isfinite(rate):
+            return 1
+        return int(np.clip(math.ceil(rate * windows.step / _STABLE), 1, _MOST_SUBSTEPS))
+
     def take(self, q: np.ndarray, v: np.ndarray) -> None:
         """Take positions and velocities (m, n + 1, k) of a round, and what is remembered then."""
         finite = np.isfinite(q).all(axis=(1, 2)) & np.isfinite(v).all(axis=(1, 2))
@@ -219,25 +239,21 @@ class _Set:
 
 def _rolled(sets: Sequence[_Set]) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return positions and velocities (m, n + 1, k) of each set; those of one step go together."""
-    loads = [one.loads for one in sets]
-    steps = [one.windows.stride * one.windows.motion.step for one in sets]
-    substeps = [_substeps(*x) for x in zip(sets, loads, steps, strict=True)]
     alike: dict[tuple[float, float, int], list[int]] = {}
     for i in sorted(range(len(sets)), key=lambda i: -sets[i].windows.steps):
-        alike.setdefault((sets[i].dynamics.step, steps[i], substeps[i]), []).append(i)
+        one = sets[i]
+        alike.setdefault((one.dynamics.step, one.windows.step, one.substeps), []).append(i)
     found: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-    for (_, h, count), which in alike.items():
-        together = _together([sets[i] for i in which], [loads[i] for i in which], h, count)
-        found |= dict(zip(which, together, strict=True))
+    for which in alike.values():
+        found |= dict(zip(which, _together([sets[i] for i in which]), strict=True))
     return [found[i] for i in range(len(sets))]
 
 
-def _together(
-    sets: list[_Set], loads: list[np.ndarray], h: float, substeps: int
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return positions and velocities of sets, longest first, in steps of h [s]."""
-    dynamics, paths = sets[0].dynamics, []
+def _together(sets: list[_Set]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return positions and velocities of sets, longest first, that take the same steps."""
+    dynamics, substeps, loads, paths = sets[0].dynamics, sets[0].substeps, [], []
     for one in sets:
+        loads.append(one.loads)
         nodes = one.windows.nodes
         start = one.dynamics.started(one.windows.motion, nodes[:, 0])
         path = np.full((2, *nodes.shape, start[0].shape[1]), np.nan)
@@ -254,25 +270,13 @@ def _together(
             now = np.concatenate([now, last[: len(now)]], axis=1)
             state = q[: len(now)], v[: len(now)]
             for _ in range(substeps):
-                state = advance(dynamics, *state, now, h / substeps)
+                state = advance(dynamics, *state, now, sets[0].windows.step / substeps)
                 now = dynamics.creeping(state[0], now)
             q, v = state
             last = now[:, now.shape[1] - last.shape[1] :]
             for path, end in zip(paths[:moving], ends, strict=False):
                 path[:, :, i + 1] = q[end - path.shape[1] : end], v[end - path.shape[1] : end]
     return [(dynamics.shown(path[0]), dynamics.shown(path[1])) for path in paths]
-
-
-def _substeps(one: _Set, loads: np.ndarray, h: float) -> int:
-    """Return how many substeps the fastest motion along the recording needs."""
-    rows = one.windows.nodes[:, :-1:4].ravel()
-    some = loads[:, ::4].reshape(-1, loads.shape[2])
-    some = np.concatenate([some, one.dynamics.deflected(one.windows.motion, rows)], axis=1)
-    start = one.dynamics.started(one.windows.motion, rows)
-    rate = one.dynamics.fastest_rate(*start, some)
-    if not math.isfinite(rate):
-        return 1
-    return int(np.clip(math.ceil(rate * h / _STABLE), 1, _MOST_SUBSTEPS))
 
 
 def _moved(
