@@ -36,6 +36,12 @@ def _candidate(name, joint, *shape):
     return EffectAt(EFFECTS[name], Place(joint), np.array(shape))
 
 
+def _loads(motion):
+    """Return the loads of a recording without what remembers, see `DiagnosedDynamics`."""
+    still = np.zeros_like(motion.effort)
+    return np.column_stack([motion.effort, still, motion.time, 0.0 * motion.time])
+
+
 def _errors(windows, q, ends):
     assert ends.all()
     return windows.squared(q).sum(axis=0) / windows.held.sum(axis=0)
@@ -99,10 +105,7 @@ def test_a_joint_that_friction_holds_does_not_creep(equations_for, dry):
     model = _model(equations, _candidate('coulomb_friction', 0), _candidate('viscous_friction', 0))
     motion = equations.motion
     dynamics = dynamics_of(model, equations, motion)
-    loads = np.column_stack(
-        [motion.effort, np.zeros_like(motion.effort), motion.time, 0.0 * motion.time]
-    )
-    level = dynamics.level_of_dry_friction(motion.position, loads)
+    level = dynamics.level_of_dry_friction(motion.position, _loads(motion))
     np.testing.assert_allclose(level, model.effects[0].coefficients[0])
     windows = cut(motion, TRIM, horizon=0.05)
     q, _ = roll_out(windows, model, equations)
@@ -164,11 +167,8 @@ def test_a_joint_at_rest_asks_for_no_small_steps(equations_for, dry):
     model = _model(equations, _candidate('coulomb_friction', 0))
     motion = equations.motion
     dynamics = dynamics_of(model, equations, motion)
-    loads = np.column_stack(
-        [motion.effort, np.zeros_like(motion.effort), motion.time, 0.0 * motion.time]
-    )[:5]
-    q = motion.position[:5]
-    assert dynamics.fastest_rate(q, np.zeros_like(q), loads) < 1.0 / PERIOD
+    q = motion.position
+    assert dynamics.fastest_rate(q, np.zeros_like(q), _loads(motion)) < 1.0 / PERIOD
 
 
 def test_a_roll_out_that_runs_away_is_counted(equations_for, viscous):
