@@ -91,6 +91,12 @@ Convention.
 
 It is that of one change of 1.4 prior standard deviations: less is worth no law.
 """
+STATED_ERROR = 0.2
+"""Standard deviation of errors that bodies of a robot file have, relative to their prior [1].
+Convention.
+
+It is 5 % of masses and radii: a model of a construction leaves out cables, screws and grease.
+"""
 NOTHING_EXPLAINED = 1.0 / ADEQUATE_REST
 """Excess of a model that explains nothing [1]. Follows."""
 STRUCTURE_LEAST_SHARE = 0.1

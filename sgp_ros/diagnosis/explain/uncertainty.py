@@ -3,8 +3,9 @@
 The covariance is that of least squares, `(J^T J)^-1` with J the derivatives of the scaled
 residual by coefficients and shapes after the inertial parameters are projected out, widened by
 the correlation of the residual in time, joint by joint where something is left unknown: as
-`A^-1 J^T F J A^-1` with `A = J^T J` and F by how much (White 1980). Reported values follow by the
-delta method.
+`A^-1 J^T F J A^-1` with `A = J^T J` and F by how much (White 1980). Where bodies are those of the
+robot file, errors that such files have are added, as far as the rows do not exclude them. Reported
+values follow by the delta method.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from sgp_ros.batch.least_squares import correlation_factor
+from sgp_ros.diagnosis.criteria import STATED_ERROR
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.regression import Columns, shape_bounds, shape_scales, with_shapes
@@ -72,10 +74,35 @@ def covariance(model: Model, columns: Columns, unknown: Collection[int] = ()) ->
     scale[~is_seen] = np.inf
     J = J / scale
     inverse = np.linalg.pinv(J.T @ J, rcond=1e-10)
+    C = np.zeros_like(inverse) if model.is_free else _of_stated_bodies(model, J, inverse)
     J *= np.sqrt(_inflation(model, unknown, len(J)))[:, None]
-    C = inverse @ (J.T @ J) @ inverse / scale / scale[:, None]
+    C = (C + inverse @ (J.T @ J) @ inverse) / scale / scale[:, None]
     spans = np.concatenate([np.zeros(len(scale) - len(low)), high - low])
     return np.asarray(C + np.diag(np.where(is_seen, 0.0, spans**2 / 12.0)))
+
+
+def _of_stated_bodies(model: Model, J: np.ndarray, inverse: np.ndarray) -> np.ndarray:
+    """Return expected squares of the errors that those of the robot file make, (c + s, c + s).
+
+    Changes w of its bodies have the prior `N(0, STATED_ERROR^2 I)` and move the parameters by
+    `G w`, `G = A^-1 J^T B`, with B their columns. What is left of B tells w from the residual.
+
+    Args:
+        model: with the bodies of the file.
+        J: (N k + p, c + s) scaled derivatives.
+        inverse: `A^-1`.
+    """
+    equations, N = model.frame.equations, len(model.residual)
+    B = np.zeros((len(J), equations.size - equations.instants))
+    rows = B[: model.residual.size].reshape(N, len(model.sigma), -1)
+    for j, factor in enumerate(equations.factors):
+        rows[:, j] = factor.Q @ factor.R[:, equations.instants :] / model.sigma[j]
+    G = inverse @ (J.T @ B)
+    B -= J @ G
+    known = B.T @ B / model.frame.weight + np.eye(B.shape[1]) / STATED_ERROR**2
+    r = (model.residual / model.sigma).ravel()
+    w = np.linalg.solve(known, B[: len(r)].T @ r / model.frame.weight)
+    return np.asarray(G @ (np.linalg.inv(known) + np.outer(w, w)) @ G.T)
 
 
 def _inflation(model: Model, unknown: Collection[int], rows: int) -> np.ndarray:

@@ -10,6 +10,8 @@ import pytest
 from sgp_ros.batch.least_squares import correlation_factor
 from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import Bandwidth, collect
+from sgp_ros.diagnosis.criteria import STATED_ERROR
+from sgp_ros.diagnosis.explain import uncertainty
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.regression import Columns
@@ -23,6 +25,11 @@ from test.diagnosis.worlds import CHAINS, events_of, simulate
 RUNS = 40
 
 
+def exact(monkeypatch):
+    """Let bodies of robot files have no errors."""
+    monkeypatch.setattr(uncertainty, 'STATED_ERROR', 1e-9)
+
+
 @pytest.mark.parametrize(
     ('name', 'shape', 'force', 'what'),
     [
@@ -31,8 +38,9 @@ RUNS = 40
     ],
     ids=['viscous', 'spring'],
 )
-def test_the_std_is_the_spread_over_noises(robots, name, shape, force, what):
+def test_the_std_is_the_spread_over_noises(robots, monkeypatch, name, shape, force, what):
     """White noise on the residual; 30 % are 2.7 deviations of the spread of 40 runs."""
+    exact(monkeypatch)
     robot, tree = robots[1]
     raw = collect(events_of(simulate(CHAINS[1], 7, 8.0, force=force)), robot)
     equations = make_equations(raw, tree, Bandwidth(10.0, 25.0))
@@ -82,6 +90,31 @@ def test_shapes_have_a_std_and_a_covariance_is_symmetric(equations_for, dry):
     assert all(np.isfinite(x) and x >= 0.0 for x in std.values())
 
 
+@pytest.mark.parametrize(('name', 'depends'), [('spring', True), ('viscous_friction', False)])
+def test_errors_of_stated_bodies_are_in_the_std(robots, monkeypatch, name, depends):
+    """Links as wrong as robot files are: a spring is uncertain by that, friction is not."""
+    robot, tree = robots[1]
+    raw = collect(events_of(simulate(CHAINS[1], 7, 8.0)), robot)
+    equations = make_equations(raw, tree, Bandwidth(10.0, 25.0))
+    (factor,), rng = equations.factors, np.random.default_rng(3)
+    bodies = (factor.Q @ factor.R)[:, equations.instants :]
+
+    def found(w):
+        noise = rng.normal(0.0, 0.2, equations.d.shape)
+        wrong = replace(equations, d=equations.d + (bodies @ w)[:, None] + noise)
+        columns, candidate = Columns(wrong), EffectAt(EFFECTS[name], Place(0))
+        model = fit(columns, (candidate,), np.full(1, 0.2), is_free=False)
+        return float(model.effects[0].coefficients[0]), float(covariance(model, columns)[0, 0])
+
+    errors = STATED_ERROR * rng.normal(size=(RUNS, bodies.shape[1]))
+    values, variances = zip(*(found(w) for w in errors), strict=True)
+    assert 0.8 < np.sqrt(np.mean(variances) / np.var(values)) < 2.0
+    right = [found(np.zeros(bodies.shape[1]))[1]]
+    exact(monkeypatch)
+    right.append(found(np.zeros(bodies.shape[1]))[1])
+    assert (right[1] < 0.5 * right[0]) == depends
+
+
 def test_without_effects_there_is_nothing_to_be_uncertain_of(equations_for, viscous):
     """An empty covariance, an empty list."""
     _, equations = equations_for(viscous)
@@ -103,8 +136,9 @@ def test_a_number_that_nothing_depends_on_may_be_anything(equations_for, viscous
     assert all(np.isfinite(x) for x in std.values())
 
 
-def test_what_is_unknown_at_one_joint_does_not_widen_the_numbers_of_another(robots):
+def test_what_is_unknown_at_one_joint_does_not_widen_the_numbers_of_another(robots, monkeypatch):
     """Slow noise at the second joint, which the model does not describe."""
+    exact(monkeypatch)
     robot, tree = robots[2]
     forces = simulate(CHAINS[2], 7, 8.0, force=lambda t, q, v: (-0.3 * v[0], 0.0))
     equations = make_equations(collect(events_of(forces), robot), tree, Bandwidth(10.0, 25.0))
