@@ -26,13 +26,15 @@ from sgp_ros.physics.formula import read_formula
 from sgp_ros.physics.joint_terms import term_laws
 from sgp_ros.physics.law import NAME as LAW
 from sgp_ros.physics.law import is_online
+from sgp_ros.report.diagnosis_text import taken_off
 from sgp_ros.report.files import write_text
+from sgp_ros.rigid.urdf_writer import write_urdf
 from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.robot import Robot
 from sgp_ros.robots.stated_effects import dry_friction
 from sgp_ros.robots.stated_laws import is_open
-from sgp_ros.robots.stated_values import stated_urdf
+from sgp_ros.robots.stated_values import stated_less, stated_urdf
 from sgp_ros.robots.urdf_robot import DEFAULT_TERMS, nominal_tree, urdf_text
 from sgp_ros.scratch import Scratch
 
@@ -57,16 +59,16 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis, gains: Gains | No
     Raises:
         ConfigError: the URDF is no longer what it was.
     """
-    text = None if found.bodies is None else stated_urdf(robot, found.bodies, {})
-    write_text(out / URDF_NAME, text or urdf_text(robot))
-    stated = robot.source.get('parameters') or {}
-    assert isinstance(stated, dict)
+    off = {(f.effect, f.joint): size for f in found.findings if (size := taken_off(f)) > 0.0}
+    known = stated_less(robot, off)
+    text = None if found.bodies is None else stated_urdf(robot, found.bodies, known.dynamics)
+    write_text(out / URDF_NAME, text or write_urdf(urdf_text(robot), {}, known.dynamics))
+    stated = known.parameters
     if text is not None:  # its bodies are those of the diagnosis
         links = nominal_tree(robot).link_names
         stated = {k: x for k, x in stated.items() if k.rpartition('.')[0] not in links}
-    known = robot.source.get('effects') or []
-    assert isinstance(known, list)
-    known = [item for item in known if not is_open(item)]  # tried, and found or not
+    effects = [item for item in known.effects if not is_open(item)]  # tried, and found or not
+    more = [f for f in (*found.findings, *found.shared) if not taken_off(f)]
     document = {
         'schema': 1,
         'name': robot.name,
@@ -74,7 +76,7 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis, gains: Gains | No
         **robot.source,
         'urdf': URDF_NAME,
         **({} if gains is None or gains.is_recorded else {'gains': _gains(robot, found, gains)}),
-        'effects': [*known, *stated_findings((*found.findings, *found.shared))],
+        'effects': [*effects, *stated_findings(more)],
         'parameters': stated,
     }
     write_text(out / YAML_NAME, yaml.safe_dump(document, sort_keys=False))

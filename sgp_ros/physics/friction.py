@@ -19,6 +19,7 @@ from sgp_ros.physics.parts import (
     Quantity,
     TermForm,
     Value,
+    leaves_some,
     relative_scales,
 )
 
@@ -59,6 +60,9 @@ class ViscousFriction(Effect):
     drawn_over = 'velocity'
     is_usual = True
 
+    def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
+        return leaves_some('damping', at, motion)
+
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (-x.v,)
 
@@ -82,6 +86,9 @@ class CoulombFriction(Effect):
     drawn_over = 'velocity'
     is_dry = True
     is_usual = True
+
+    def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
+        return leaves_some('friction', at, motion)
 
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (-x.s,)
@@ -207,8 +214,9 @@ class AsymmetricCoulomb(Effect):
     is_dry = True
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
-        """Return whether neither direction is driven."""
-        return bool(np.all(at.coefficients > -0.02 * np.max(np.abs(at.coefficients))))
+        """Return whether neither direction is driven, with what the nominal robot states."""
+        stated = motion.stated_number('friction', at.place.joint)
+        return bool(np.all(at.coefficients + stated > -0.02 * np.max(np.abs(at.coefficients))))
 
     def surprise(self, at: Placed) -> float:
         """Return the price of levels that are far apart: a load that is constant does that."""

@@ -16,6 +16,7 @@ from sgp_ros.physics.parts import (
     Quantity,
     TermForm,
     Value,
+    leaves_some,
 )
 from sgp_ros.physics.waves import Wave, most_periods, peak_width, per_turn
 
@@ -104,6 +105,9 @@ class Armature(Effect):
     is_inertial = True
     sees_acceleration = True
     is_usual = True
+
+    def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
+        return leaves_some('armature', at, motion)
 
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (-x.a,)

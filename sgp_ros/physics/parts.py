@@ -19,6 +19,8 @@ PLACES = {'base': -1, 'tool': -2, 'all': -3}
 NOWHERE = -4
 """Place of an effect whose robot is not known."""
 SIDES = {'lower': -1, 'upper': 1}
+_ALL_OFF = 1.1
+"""Part of a stated number that a law may take off: all of it, if its unit is a tenth off."""
 COULOMB, VISCOUS = 'coulomb', 'viscous'
 """Kinds of friction: over the direction of the motion, and over its velocity."""
 
@@ -45,7 +47,7 @@ class Place:
         kind: such as `coulomb` or `viscous`; empty where there is but one.
         source: index of the joint it comes from; -1 where there is none.
         side: 1 or -1 for an effect at one end of the range; 0 elsewhere.
-        number: 0, or 1, 2, ... of further waves of the same law there.
+        number: 0, or 1, 2, ... of further waves, or a second motor, of the same law there.
     """
 
     joint: int
@@ -95,6 +97,20 @@ class Placed(Protocol):
     @property
     def coefficients(self) -> np.ndarray:
         """Coefficients of the columns, (m,)."""
+
+
+def leaves_some(number: str, at: Placed, motion: SeenMotion) -> bool:
+    """Return whether a law of one coefficient is one, beside what the nominal robot states of it.
+
+    That may be too much: the law then takes a part of it off, or all, with an error.
+
+    Args:
+        number: of the joint that states it, see `Quantity.joint_number`.
+        at: the law.
+        motion: with the nominal robot.
+    """
+    stated = motion.stated_number(number, at.place.joint)
+    return bool(at.coefficients[0] > -_ALL_OFF * stated)
 
 
 def side_word(side: int) -> str:

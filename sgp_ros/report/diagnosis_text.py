@@ -18,7 +18,7 @@ from sgp_ros.diagnosis.result import (
     Proof,
 )
 from sgp_ros.gp.scores import INTERVAL_95
-from sgp_ros.physics.catalogue import words_of
+from sgp_ros.physics.catalogue import EFFECTS, words_of
 from sgp_ros.physics.parts import COULOMB
 
 UNKNOWN = 'unknown'
@@ -75,7 +75,16 @@ def gain_text(subject: str, found: Diagnosis) -> str:
 
 def phrase(finding: Finding | Difference) -> str:
     """Return an effect in plain words, with its interval and parameters."""
-    return ', '.join([effect_name(finding), *numbers(finding), *_mixed_up(finding)])
+    less = ['less than the robot file states'] if taken_off(finding) > 0.0 else []
+    return ', '.join([effect_name(finding), *numbers(finding), *less, *_mixed_up(finding)])
+
+
+def taken_off(finding: Finding | Difference) -> float:
+    """Return how much less of a law there is than the robot file states; 0 of any other."""
+    law = EFFECTS.get(finding.effect)
+    if law is None or not law.is_usual or isinstance(finding, Difference):
+        return 0.0
+    return max(-float(finding.parameters[law.linear[0]].value), 0.0)
 
 
 def _mixed_up(finding: Finding | Difference) -> list[str]:

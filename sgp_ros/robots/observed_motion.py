@@ -22,6 +22,8 @@ from sgp_ros.rigid.tree import Tree
 
 _BLOCK = 8000
 """Rows whose regressor is held at a time: that of a long recording would not fit in memory."""
+_DAMPING = 'damping'
+"""Number of a joint that is part of the tree."""
 STILL = 1e-9
 """Range of the position within which a joint does not move [rad or m]."""
 
@@ -144,6 +146,16 @@ class ObservedMotion:
         for effect in self.known:
             force += effect.force(self)
         return force
+
+    def stated_number(self, name: str, joint: int) -> float:
+        """Return what the nominal robot states of a number of a joint, see `joint_number`."""
+        found = float(self.tree.damping[joint]) if name == _DAMPING else 0.0
+        for x in self.known:
+            numbers = x.effect.coefficient_quantities(x.kind)
+            if x.place.joint == joint:
+                found += sum(float(c) for q, c in zip(numbers, x.coefficients, strict=False)
+                             if q.joint_number == name) / len(numbers)  # fmt: skip
+        return found
 
     @property
     def dry_joints(self) -> frozenset[int]:

@@ -11,11 +11,14 @@ and the node read a robot so.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from sgp_ros.errors import ConfigError
+from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.joint_terms import Shape, term_laws
 from sgp_ros.physics.parts import Place
@@ -190,3 +193,50 @@ def stated_urdf(
         return None
     floor = 1e-9 * float(np.abs(bodies).max())
     return text if np.allclose(again.parameters, bodies, rtol=1e-6, atol=floor) else None
+
+
+@dataclass(frozen=True, slots=True)
+class Stated:
+    """Values that a robot states beside its bodies.
+
+    Attributes:
+        effects: as under `effects` of its YAML.
+        parameters: as under `parameters`.
+        dynamics: damping [N m s/rad or N s/m] and friction [N m or N] of joints whose `<dynamics>`
+            are other ones.
+    """
+
+    effects: list[Any]
+    parameters: dict[str, Any]
+    dynamics: dict[str, tuple[float, float]]
+
+
+def stated_less(robot: Robot, off: Mapping[tuple[str, str], float]) -> Stated:
+    """Return what a robot states, less of some laws than it does.
+
+    Args:
+        robot: from a URDF.
+        off: by name of a law of one coefficient, and joint, how much.
+    """
+    effects = deepcopy(robot.source.get('effects') or [])
+    parameters = deepcopy(robot.source.get('parameters') or {})
+    assert isinstance(effects, list)
+    assert isinstance(parameters, dict)
+    tree, dynamics = nominal_tree(robot), dict[str, tuple[float, float]]()
+    for (name, joint), size in off.items():
+        law, j, left = EFFECTS[name], tree.joint_names.index(joint), size
+        entries = [x['parameters'][law.linear[0]] for x in effects
+                   if (x.get('effect'), x.get('joint')) == (name, joint)]  # fmt: skip
+        term = law.term.names[0] if law.term else ''
+        entries += [parameters[key] for key in [f'{joint}.{term}'] if key in parameters]
+        for entry in entries:
+            taken = min(float(entry['value']), left)
+            entry['value'], left = float(entry['value']) - taken, left - taken
+        if law.term and law.term.dynamics:
+            own = {'damping': float(tree.damping[j]), 'friction': float(tree.friction[j])}
+            own |= dict(zip(own, dynamics.get(joint, own.values()), strict=True))
+            own[law.term.dynamics] = max(own[law.term.dynamics] - left, 0.0)
+            dynamics[joint] = own['damping'], own['friction']
+    gone = [x for x in effects if (x.get('effect'), x.get('joint')) in off
+            and not x['parameters'][EFFECTS[x['effect']].linear[0]]['value']]  # fmt: skip
+    return Stated([x for x in effects if x not in gone], parameters, dynamics)

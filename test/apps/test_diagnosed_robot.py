@@ -199,6 +199,36 @@ def test_dry_friction_of_the_urdf_stays_and_is_a_term(tmp_path):
     assert [(c.joint, c.prior_mean) for c in rubbing] == [('elbow', 0.2)]
 
 
+_STATED = (
+    'effects:\n- {{effect: coulomb_friction, joint: elbow, parameters: '
+    '{{level: {{value: {}, unit: N m}}}}}}\n'
+)
+
+
+@pytest.mark.parametrize(
+    ('yaml_text', 'place', 'levels'),
+    [
+        ('', 'urdf', [0.05]),
+        ('parameters: {elbow.coulomb: {value: 0.5}}\n', 'parameters', [0.35]),
+        (_STATED.format(0.5), 'effects', [0.2, 0.35]),
+        (_STATED.format(0.1), 'urdf', [0.15]),
+    ],
+)  # fmt: skip
+def test_what_was_stated_too_much_of_is_less_where_it_was_stated(
+    tmp_path, yaml_text, place, levels
+):
+    """The URDF has 0.2; the rest of it stays, and no effect is negative or zero."""
+    found = [_finding('coulomb_friction', 'elbow', {'level': -0.15})]
+    out = _written(tmp_path, URDF, found, yaml_text=yaml_text)
+    model = nominal_model(load_robot(str(out / YAML_NAME)))
+    known = [x.coefficients[0] for x in model.stated if x.name == 'coulomb_friction']
+    assert sorted(known) == pytest.approx(levels)
+    written = yaml.safe_load((out / YAML_NAME).read_text())
+    assert bool(written['effects']) is (place == 'effects')
+    assert bool(written['parameters']) is (place == 'parameters')
+    assert (out / URDF_NAME).read_text() != URDF or place != 'urdf'
+
+
 def _stream(joints, n=400):
     """States of a robot on a swing, with efforts of their own."""
     t = np.arange(n)[:, None] * 0.01

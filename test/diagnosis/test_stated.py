@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,10 @@ from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.compare.velocity_sensor import lagged, sensor_lags
 from sgp_ros.diagnosis.pipeline import diagnose
-from sgp_ros.robots.stated_effects import read_effects
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
+from sgp_ros.report.diagnosis_text import phrase
+from sgp_ros.robots.stated_effects import read_effects, typical_motion
 from test.diagnosis.worlds import CHAINS, PERIOD, delayed, events_of, simulate
 
 EFFECTS = {
@@ -128,3 +133,29 @@ def test_roll_outs_of_the_nominal_robot_have_what_it_states(named, robots):
     )
     assert after < 0.05 * before
     assert known.proofs['train'].failed == 0
+
+
+@pytest.mark.parametrize('name', ['viscous_friction', 'coulomb_friction'])
+def test_what_the_robot_states_too_much_of_is_taken_off(robots, name):
+    """The sentence says so."""
+    robot, tree = robots[1]
+    ((number, size),) = EFFECTS[name].items()
+    stated = _stated(name, tree, **{number: 1.6 * size})
+    found = diagnose(events_of(_world(name)), robot, tree, {}, stated=stated)
+    assert found.verdict == 'missing_physics'
+    (finding,) = found.findings
+    assert finding.effect == name
+    assert finding.parameters[number].value == pytest.approx(-0.6 * size, rel=0.1)
+    assert phrase(finding).endswith('less than the robot file states')
+
+
+def test_no_more_is_taken_off_than_is_stated(robots):
+    """A tenth more, which a unit may be off; without a statement nothing."""
+    _, tree = robots[1]
+    stated = _stated('coulomb_friction', tree)
+    motion = replace(typical_motion(tree), stated=stated)
+    law = stated[0].effect
+    levels = {x: EffectAt(law, Place(0), coefficients=np.array([x])) for x in (-0.6, -0.52, 0.1)}
+    assert [x.is_possible(motion) for x in levels.values()] == [False, True, True]
+    bare = replace(motion, stated=())
+    assert [x.is_possible(bare) for x in levels.values()] == [False, False, True]
