@@ -86,6 +86,11 @@ class EffectAt:
         return self.effect.key, self.place
 
     @property
+    def is_further_wave(self) -> bool:
+        """Whether it is a further wave of a law at its place, and not a second motor."""
+        return bool(self.place.number) and not self.effect.has_source
+
+    @property
     def kind(self) -> str:
         """Its kind, where the law comes in kinds."""
         return self.place.kind

@@ -86,7 +86,7 @@ class Model:
     @property
     def laws(self) -> int:
         """Number of laws: one of two joints holds its plain ones, waves at one place are one."""
-        return sum((not s.place.number) + _extra_laws(s) for s in self.effects)
+        return sum((not s.is_further_wave) + _extra_laws(s) for s in self.effects)
 
     @property
     def law_price(self) -> float:
@@ -97,7 +97,7 @@ class Model:
         """
         unusual = sum(
             type(e).surprise is Effect.surprise and not (e.is_open or adds_to_usual(e))
-            for e in (s.effect for s in self.effects if not s.place.number)
+            for e in (s.effect for s in self.effects if not s.is_further_wave)
         )
         return PER_EFFECT * self.laws + PER_UNUSUAL * unusual
 

@@ -1,64 +1,43 @@
 """Selection of effects joint by joint, for robots that lack several at every joint.
 
-Bodies are shared by all joints. The effects of one joint after the other are chosen beside those
-of all others (block-coordinate descent): the one that promises most is added as long as that is
-worth its price, then whatever is not, or no longer, is taken out or replaced by a simpler law.
-Candidates are screened for each joint in its own units, so that a light wrist is never ranked
-against a shoulder. Sweeps end when one changes nothing; a joint fit of all effects and bodies
-follows.
+The effects of one joint after the other are chosen beside those of all others (block-coordinate
+descent): what is worth its price is added, see `growth`, then whatever is not, or no longer, is
+taken out or replaced by a simpler law. Sweeps end when one changes nothing; a joint fit of all
+effects and bodies follows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.settled import shows
-from sgp_ros.diagnosis.criteria import (
-    COUNTED_SHARE,
-    PER_EFFECT,
-    SLIGHT_REST,
-)
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, SLIGHT_REST
 from sgp_ros.diagnosis.explain.candidates import fit
-from sgp_ros.diagnosis.explain.credibility import gain, is_credible
-from sgp_ros.diagnosis.explain.fitted_model import Model, adds_to_usual
+from sgp_ros.diagnosis.explain.credibility import is_credible
+from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.growth import (
+    Block,
+    arrangement,
+    best_of,
+    blocks_of,
+    grown,
+    refitted,
+)
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.diagnosis.explain.screening import distinct, screen
+from sgp_ros.diagnosis.explain.screening import distinct, may_be_two, screen
 from sgp_ros.physics.catalogue import EFFECTS
-from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import JOINT, MOTOR, PLACES, Place
+from sgp_ros.physics.parts import PLACES, Place
 
 SWEEPS = 4
 """Most sweeps over the joints."""
+_RATIOS = np.array([[1.0], [-1.0]])
+"""Ratios of a differential of equal gears, from which those of any are searched."""
 _BUILT_UP = 0.3
 """Way over which friction builds up in a gear, of the shortest one that is looked for alone."""
-TRIALS = 3
-"""Screened candidates that are fitted."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Block:
-    """Laws that are chosen together: those of one joint, or those of no joint.
-
-    Attributes:
-        effects: laws.
-        joints: indices of places; None for all.
-    """
-
-    effects: tuple[Effect, ...]
-    joints: tuple[int, ...] | None
-
-    def holds(self, candidate: EffectAt) -> bool:
-        """Return whether a candidate belongs to it."""
-        is_here = self.joints is None or candidate.place.joint in self.joints
-        return is_here and candidate.effect in self.effects
-
-    def left(self, model: Model) -> float:
-        """Return the greatest share of the mean squared effort that a model leaves here."""
-        return float((model.left[list(self.joints)] if self.joints else model.left).max())
 
 
 def by_joint(columns: Columns, model: Model) -> list[Model]:
@@ -71,10 +50,10 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
     start = model
     for _ in range(SWEEPS):
         before = model.key
-        for block in _blocks(model):
-            model = _shrunk(columns, _grown(columns, model, block), block)
+        for block in blocks_of(model):
+            model = _shrunk(columns, grown(columns, model, block), block)
         if model.key == before:
-            better = _best(model, coupled(columns, model))
+            better = best_of(model, coupled(columns, model))
             if better is None:
                 break
             model = better
@@ -82,7 +61,7 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
         return []
     model = fit(columns, model.effects, model.sigma, is_free=model.is_free, w=model.w, rounds=2,
                 steps=6)  # fmt: skip
-    rivals = [t for block in _blocks(model) for t in _changes(columns, model, block)]
+    rivals = [t for block in blocks_of(model) for t in _changes(columns, model, block)]
     return [m for m in (model, _large(columns, model), *rivals) if m.effects and is_credible(m)]
 
 
@@ -94,7 +73,7 @@ def _large(columns: Columns, model: Model) -> Model:
                  and (share <= COUNTED_SHARE or filtered <= SLIGHT_REST)]  # fmt: skip
         if not small:
             return model
-        model = _fitted(columns, model, _arranged(model, _Block((), None), small[-1]))
+        model = refitted(columns, model, arrangement(model, Block((), None), small[-1]))
 
 
 def usual(columns: Columns, base: Model, first: tuple[EffectAt, ...] = ()) -> Model:
@@ -142,77 +121,10 @@ def built_up(columns: Columns, model: Model) -> Model:
     return fit(columns, swapped, model.sigma, is_free=model.is_free, w=model.w)
 
 
-def _blocks(model: Model) -> Iterator[_Block]:
-    laws = model.frame.equations.motion.catalogue.values()
-    own = tuple(e for e in laws if e.site in {JOINT, MOTOR})
-    joints = np.flatnonzero(model.frame.equations.motion.moves)
-    yield from (_Block((*own,), (int(j),)) for j in joints)
-    yield _Block(tuple(e for e in laws if e not in own), None)
-
-
-def _arranged(model: Model, block: _Block, dropped: EffectAt | None = None) -> _Arranged:
-    kept = [s for s in model.effects if s is not dropped]
-    others = [s for s in kept if not block.holds(s)]
-    return tuple(others) + tuple(s for s in kept if block.holds(s)), len(others)
-
-
-_Arranged = tuple[tuple[EffectAt, ...], int]
-"""Effects, those of a block last, and the number of the others."""
-
-
-def _fitted(columns: Columns, model: Model, arranged: _Arranged, *more: EffectAt) -> Model:
-    """Return a model with other effects, in which those of other blocks keep their shapes."""
-    effects, still = arranged
-    return fit(columns, (*effects, *more), model.sigma, is_free=model.is_free, w=model.w,
-               rounds=2, steps=4, still=still)  # fmt: skip
-
-
-def _best(model: Model, trials: Iterable[Model], *, is_whole: bool = True) -> Model | None:
-    """Return the trial that is worth most, if it is worth more than the model."""
-    gains = {t: gain(t, model, is_whole=is_whole) for t in trials if is_credible(t)}
-    best = max(gains, key=lambda t: gains[t], default=None)
-    return best if best is not None and gains[best] > 0.0 else None
-
-
-def _grown(columns: Columns, model: Model, block: _Block) -> Model:
-    """Add the effects of a block that are worth their price, as long as something is left.
-
-    That is a residual, or bodies so unlikely that they may imitate the missing physics; then a law
-    must make them likelier. Laws that nearly every joint has, or that add to these, may be small
-    and are sought in any residual that is not slight.
-    """
-    while True:
-        left, strain = block.left(model), _strain(model)
-        laws = block.effects
-        if left < COUNTED_SHARE and strain < PER_EFFECT:
-            laws = tuple(e for e in laws if adds_to_usual(e))
-        if not laws or (left < SLIGHT_REST and strain < PER_EFFECT):
-            break
-        found = distinct(screen(columns, model, laws, block.joints), TRIALS)
-        arranged = _arranged(model, block)
-        trials = [_fitted(columns, model, arranged, s) for s in found]
-        if left < COUNTED_SHARE:
-            trials = [t for t in trials if adds_to_usual(t.effects[-1].effect)
-                      or strain - _strain(t) > PER_EFFECT]  # fmt: skip
-        counted = [
-            t for t in trials if t.shares[-1] > COUNTED_SHARE or t.effects[-1].effect.is_usual
-        ]
-        better = _best(model, counted, is_whole=False)
-        if better is None:
-            break
-        model = better
-    return model
-
-
-def _strain(model: Model) -> float:
-    """Return how unlikely the bodies of a model are [nats]."""
-    return 0.5 * float(model.w @ model.w)
-
-
-def _shrunk(columns: Columns, model: Model, block: _Block) -> Model:
+def _shrunk(columns: Columns, model: Model, block: Block) -> Model:
     """Remove laws that are not worth their price, or replace them by a law of one number."""
     while any(block.holds(s) for s in model.effects):
-        better = _best(model, _changes(columns, model, block, is_simple=True))
+        better = best_of(model, _changes(columns, model, block, is_simple=True))
         if better is None:
             break
         model = better
@@ -220,7 +132,7 @@ def _shrunk(columns: Columns, model: Model, block: _Block) -> Model:
 
 
 def _changes(
-    columns: Columns, model: Model, block: _Block, *, is_simple: bool = False
+    columns: Columns, model: Model, block: Block, *, is_simple: bool = False
 ) -> Iterator[Model]:
     """Yield the model without each effect of a block, and with the best other law in its place.
 
@@ -229,8 +141,8 @@ def _changes(
     for s in model.effects:
         if not block.holds(s):
             continue
-        arranged = _arranged(model, block, s)
-        without = _fitted(columns, model, arranged)
+        arranged = arrangement(model, block, s)
+        without = refitted(columns, model, arranged)
         yield without
         if s.effect.plain:
             yield from uncoupled(columns, without, s)
@@ -242,7 +154,7 @@ def _changes(
         if others and (is_richer or not is_simple):
             joints = (s.place.joint,) if is_own else None
             found = distinct(screen(columns, without, others, joints), 1)
-            yield from (_fitted(columns, model, arranged, other) for other in found)
+            yield from (refitted(columns, model, arranged, other) for other in found)
 
 
 def uncoupled(columns: Columns, without: Model, coupled: EffectAt) -> Iterator[Model]:
@@ -258,7 +170,7 @@ def uncoupled(columns: Columns, without: Model, coupled: EffectAt) -> Iterator[M
         alone = [s for s in alone if s.key not in without.key]
         motion = without.frame.equations.motion
         while alone:
-            trial = _fitted(columns, without, (without.effects, len(without.effects)), *alone)
+            trial = refitted(columns, without, (without.effects, len(without.effects)), *alone)
             own = list(zip(trial.effects, trial.shares, strict=True))[-len(alone) :]
             kept = [EffectAt(s.effect, s.place) for s, share in own
                     if s.is_possible(motion) and share > COUNTED_SHARE]  # fmt: skip
@@ -271,9 +183,10 @@ def uncoupled(columns: Columns, without: Model, coupled: EffectAt) -> Iterator[M
 def coupled(columns: Columns, model: Model) -> Iterator[Model]:
     """Yield models with a law that couples two joints in place of the laws that imitate it there.
 
-    The inverse of `uncoupled`: several laws, none of which could go alone, make room for one.
+    The inverse of `uncoupled`: several laws, none of which could go alone, make room for one. Or
+    for the two motors of a differential.
     """
-    blocks = [b for b in _blocks(model) if b.joints]
+    blocks = [b for b in blocks_of(model) if b.joints]
     for block in blocks:
         laws = [e for e in block.effects if e.plain and e.has_source]
         for s in distinct(screen(columns, model, laws, block.joints), 1):
@@ -283,11 +196,12 @@ def coupled(columns: Columns, model: Model) -> Iterator[Model]:
                         still=len(kept))  # fmt: skip
             found = screen(columns, trial, [s.effect], block.joints)
             for best in distinct([t for t in found if t[1].place == s.place], 1):
-                trial = _fitted(columns, trial, (kept, len(kept)), best)
+                trial = refitted(columns, trial, (kept, len(kept)), best)
                 for other in blocks:
                     if ends & set(other.joints or ()):
-                        trial = _grown(columns, trial, other)
+                        trial = grown(columns, trial, other)
                 yield trial
+    yield from _differentials(columns, model)
 
 
 def _is_part(other: EffectAt, coupled: EffectAt, ends: set[int]) -> bool:
@@ -298,3 +212,27 @@ def _is_part(other: EffectAt, coupled: EffectAt, ends: set[int]) -> bool:
     """
     is_own = other.name in coupled.effect.plain and other.place.joint == coupled.place.joint
     return is_own or {other.place.joint, other.place.source} == ends
+
+
+def _differentials(columns: Columns, model: Model) -> Iterator[Model]:
+    """Yield models with two motors that turn with the sum of two joints and their difference.
+
+    Neither motor would be found alone. Laws of the two joints go; those that nearly every joint
+    has may stay.
+    """
+    motion = model.frame.equations.motion
+    places = [(law, place) for law in motion.catalogue.values() if may_be_two(law)
+              for place in law.places(motion)]  # fmt: skip
+    for law, place in places:
+        ends = place.joint, place.source
+        if model.left[list(ends)].max() < COUNTED_SHARE:
+            continue
+        others = tuple(s for s in model.effects if not {s.place.joint, s.place.source} & {*ends})
+        plain = tuple(s for s in model.effects if s.place.joint in ends and s.effect.is_usual)
+        motors = [EffectAt(law, replace(place, number=i), x) for i, x in enumerate(_RATIOS)]
+        for kept in dict.fromkeys((others, others + plain)):
+            trial = refitted(columns, model, (kept, len(kept)), *motors)
+            for block in blocks_of(trial):
+                if {*ends} & {*(block.joints or ())}:
+                    trial = grown(columns, trial, block)
+            yield trial

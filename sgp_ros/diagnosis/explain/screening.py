@@ -75,12 +75,15 @@ def distinct(found: Iterable[Trial], count: int | None = None) -> list[EffectAt]
 
 
 def _free_places(effect: Effect, model: Model, motion: ObservedMotion) -> Iterator[Place]:
-    """Yield the places of a law that the model does not have yet; further ones too for a wave."""
+    """Yield the places of a law that the model does not have yet; further ones too for a wave.
+
+    And a second one for friction of two joints: a differential has two motors.
+    """
     for place in effect.places(motion):
         here = [s.place.number for s in model.effects if _is_like(s, effect, place)]
         if not here:
             yield place
-        elif effect.wave(motion, place) is not None:
+        elif effect.wave(motion, place) is not None or (may_be_two(effect) and len(here) == 1):
             yield replace(place, number=1 + max(here))
 
 
@@ -89,12 +92,22 @@ def _is_like(s: EffectAt, effect: Effect, place: Place) -> bool:
     return s.effect is effect and replace(s.place, number=0) == place
 
 
+def may_be_two(effect: Effect) -> bool:
+    """Return whether a place may have two of a law: dry friction of the motors of two joints."""
+    return effect.has_source and effect.is_dry
+
+
 def are_apart(effects: Sequence[EffectAt], motion: ObservedMotion) -> bool:
-    """Return whether waves of one law at one place differ by one period or more in the motion."""
+    """Return whether waves of one law at one place differ by one period or more in the motion.
+
+    The two motors of a differential turn with the sum of its joints, and with their difference.
+    """
     for i, s in enumerate(effects):
         first = replace(s.place, number=0)
         others = [o for o in effects[:i] if _is_like(o, s.effect, first)]
         wave = s.effect.wave(motion, s.place) if others else None
+        if may_be_two(s.effect) and any(o.shape[0] * s.shape[0] > 0.0 for o in others):
+            return False
         if wave and any(abs(o.shape[0] - s.shape[0]) < wave.width for o in others):
             return False
     return True

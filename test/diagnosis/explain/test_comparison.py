@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE
-from sgp_ros.diagnosis.explain import comparison, joint_search
+from sgp_ros.diagnosis.explain import comparison, growth, joint_search
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
+from sgp_ros.diagnosis.explain.credibility import gain
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
@@ -85,8 +86,8 @@ def test_a_law_of_one_number_is_tried_in_place_of_a_richer_one(equations_for):
     )  # fmt: skip
     _, equations = equations_for(world)
     rich = fitted(equations, 'asymmetric_coulomb', 'viscous_friction')
-    (block, *_) = joint_search._blocks(rich)
+    (block, *_) = growth.blocks_of(rich)
     found = joint_search._shrunk(Columns(equations), rich, block)
     assert _names(found) == {'coulomb_friction', 'viscous_friction'}
-    assert joint_search.gain(found, rich) > 0.0
+    assert gain(found, rich) > 0.0
     assert joint_search._shrunk(Columns(equations), found, block) is found

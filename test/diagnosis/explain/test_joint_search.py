@@ -22,9 +22,8 @@ from sgp_ros.diagnosis.explain.candidates import fit, split
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import beyond_plain, floors
 from sgp_ros.diagnosis.explain.frame import Frame
+from sgp_ros.diagnosis.explain.growth import Block, grown
 from sgp_ros.diagnosis.explain.joint_search import (
-    _Block,
-    _grown,
     _large,
     built_up,
     by_joint,
@@ -251,6 +250,27 @@ def test_a_coupling_law_takes_the_place_of_all_that_stands_for_it(equations_for)
     assert _keys(found) in ({('coupled_friction', j), ('viscous_friction', 0)} for j in (0, 1))
 
 
+def test_both_motors_of_a_differential_are_found(equations_for):
+    """One turns with the sum of the joints, one with the difference; each has its friction."""
+
+    def force(_t, q, v):
+        own, other = (
+            level * np.tanh(w / 1e-3) + b * w
+            for level, b, w in ((0.2, 0.15, v[1] + v[0]), (0.5, 0.3, v[1] - v[0]))
+        )
+        return -own + other, -own - other
+
+    _, equations = equations_for(simulate(CHAINS[2], 7, 10.0, force=force))
+    columns, base = _start(equations)
+    found, *_ = by_joint(columns, base)
+    assert [s.name for s in found.effects] == ['coupled_friction'] * 2
+    levels = {float(s.shape[0]): s.coefficients.tolist() for s in found.effects}
+    assert sorted(levels) == pytest.approx([-1.0, 1.0], abs=0.05)
+    assert levels[min(levels)] == pytest.approx([0.5, 0.3], rel=0.1)
+    assert levels[max(levels)] == pytest.approx([0.2, 0.15], rel=0.1)
+    assert found.laws == 2 * (1 + len(EFFECTS['coupled_friction'].plain))
+
+
 def test_a_rotor_is_found_where_bodies_could_stand_for_it(equations_for):
     """A link of ten times its inertia would leave as little, but is unlikely."""
     first, second = CHAINS[2]
@@ -298,12 +318,12 @@ def test_unlikely_bodies_make_room_only_for_a_law_that_makes_them_likelier(
     columns, model = _start(equations)
     assert model.left.max() < COUNTED_SHARE
     assert 0.5 * float(model.w @ model.w) > PER_EFFECT
-    rare = _Block((EFFECTS['backlash'],), (0,))
+    rare = Block((EFFECTS['backlash'],), (0,))
     monkeypatch.setattr(
-        'sgp_ros.diagnosis.explain.joint_search._best',
+        'sgp_ros.diagnosis.explain.growth.best_of',
         lambda _model, trials, **_: next(iter(trials), None),
     )
-    assert _grown(columns, model, rare) is model
+    assert grown(columns, model, rare) is model
 
 
 def test_laws_that_few_joints_have_cost_more_once(equations):

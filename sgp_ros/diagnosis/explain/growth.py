@@ -1,0 +1,117 @@
+"""Growth of a model by the effects of one joint, beside those of all others.
+
+Bodies are shared by all joints. The effect of a joint that promises most is added as long as that
+is worth its price. Candidates are screened for each joint in its own units, so that a light wrist
+is never ranked against a shoulder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, PER_EFFECT, SLIGHT_REST
+from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.credibility import gain, is_credible
+from sgp_ros.diagnosis.explain.fitted_model import Model, adds_to_usual
+from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.diagnosis.explain.screening import distinct, screen
+from sgp_ros.physics.effect import Effect
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import JOINT, MOTOR
+
+TRIALS = 3
+"""Screened candidates that are fitted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Laws that are chosen together: those of one joint, or those of no joint.
+
+    Attributes:
+        effects: laws.
+        joints: indices of places; None for all.
+    """
+
+    effects: tuple[Effect, ...]
+    joints: tuple[int, ...] | None
+
+    def holds(self, candidate: EffectAt) -> bool:
+        """Return whether a candidate belongs to it."""
+        is_here = self.joints is None or candidate.place.joint in self.joints
+        return is_here and candidate.effect in self.effects
+
+    def left(self, model: Model) -> float:
+        """Return the greatest share of the mean squared effort that a model leaves here."""
+        return float((model.left[list(self.joints)] if self.joints else model.left).max())
+
+
+def blocks_of(model: Model) -> Iterator[Block]:
+    """Yield the laws of each joint that moves, then those of no joint."""
+    laws = model.frame.equations.motion.catalogue.values()
+    own = tuple(e for e in laws if e.site in {JOINT, MOTOR})
+    joints = np.flatnonzero(model.frame.equations.motion.moves)
+    yield from (Block((*own,), (int(j),)) for j in joints)
+    yield Block(tuple(e for e in laws if e not in own), None)
+
+
+def arrangement(model: Model, block: Block, dropped: EffectAt | None = None) -> Arranged:
+    """Return the effects of a model but one, those of a block last."""
+    kept = [s for s in model.effects if s is not dropped]
+    others = [s for s in kept if not block.holds(s)]
+    return tuple(others) + tuple(s for s in kept if block.holds(s)), len(others)
+
+
+Arranged = tuple[tuple[EffectAt, ...], int]
+"""Effects, those of a block last, and the number of the others."""
+
+
+def refitted(columns: Columns, model: Model, arranged: Arranged, *more: EffectAt) -> Model:
+    """Return a model with other effects, in which those of other blocks keep their shapes."""
+    effects, still = arranged
+    return fit(columns, (*effects, *more), model.sigma, is_free=model.is_free, w=model.w,
+               rounds=2, steps=4, still=still)  # fmt: skip
+
+
+def best_of(model: Model, trials: Iterable[Model], *, is_whole: bool = True) -> Model | None:
+    """Return the trial that is worth most, if it is worth more than the model."""
+    gains = {t: gain(t, model, is_whole=is_whole) for t in trials if is_credible(t)}
+    best = max(gains, key=lambda t: gains[t], default=None)
+    return best if best is not None and gains[best] > 0.0 else None
+
+
+def grown(columns: Columns, model: Model, block: Block) -> Model:
+    """Add the effects of a block that are worth their price, as long as something is left.
+
+    That is a residual, or bodies so unlikely that they may imitate the missing physics; then a law
+    must make them likelier. Laws that nearly every joint has, or that add to these, may be small
+    and are sought in any residual that is not slight.
+    """
+    while True:
+        left, strain = block.left(model), strain_of(model)
+        laws = block.effects
+        if left < COUNTED_SHARE and strain < PER_EFFECT:
+            laws = tuple(e for e in laws if adds_to_usual(e))
+        if not laws or (left < SLIGHT_REST and strain < PER_EFFECT):
+            break
+        found = distinct(screen(columns, model, laws, block.joints), TRIALS)
+        arranged = arrangement(model, block)
+        trials = [refitted(columns, model, arranged, s) for s in found]
+        if left < COUNTED_SHARE:
+            trials = [t for t in trials if adds_to_usual(t.effects[-1].effect)
+                      or strain - strain_of(t) > PER_EFFECT]  # fmt: skip
+        counted = [
+            t for t in trials if t.shares[-1] > COUNTED_SHARE or t.effects[-1].effect.is_usual
+        ]
+        better = best_of(model, counted, is_whole=False)
+        if better is None:
+            break
+        model = better
+    return model
+
+
+def strain_of(model: Model) -> float:
+    """Return how unlikely the bodies of a model are [nats]."""
+    return 0.5 * float(model.w @ model.w)
