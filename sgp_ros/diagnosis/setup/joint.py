@@ -32,6 +32,8 @@ _IMPOSSIBLE = 1e9
 _SLOPE = 0.02
 """Difference from which slopes are taken [steps]."""
 _ROUNDS, _POLISH = 25, 10
+_TRIED = 6
+"""Steps along one direction: at the top of the evidence, rounding lets none be good enough."""
 _ENOUGH = 0.002
 """Gain below which a search ends [nats]."""
 _STUCK = 1e6
@@ -155,8 +157,8 @@ class Together:
             return -evidence if np.isfinite(evidence) else _IMPOSSIBLE
 
         found = optimize.minimize(
-            missing, np.zeros(len(steps)), method='BFGS',
-            options={'eps': _SLOPE, 'gtol': _SLOPE, 'maxiter': _POLISH},
+            missing, np.zeros(len(steps)), method='L-BFGS-B',
+            options={'eps': _SLOPE, 'gtol': _SLOPE, 'maxiter': _POLISH, 'maxls': _TRIED},
         )  # fmt: skip
         moved = self._moved(steps * found.x)
         moved = moved if moved.evidence > self.evidence else self
