@@ -25,6 +25,7 @@ from sgp_ros.report.diagnosis_text import (
     place,
     plain_name,
     sure_phrase,
+    taken_off,
     worst_joint,
 )
 
@@ -85,7 +86,8 @@ def _missing(found: Diagnosis) -> str:
             f'{"; ".join(differences_text(found))}.'
         )
     first = found.findings[0]
-    text = f'Missing {place(first)}: {sure_phrase(first)}'
+    text = 'Too much is stated' if taken_off(first) else 'Missing'
+    text += f' {place(first)}: {sure_phrase(first)}'
     for previous, f in pairwise(found.findings):
         where = '' if f.joint == previous.joint else f'{place(f)}: '
         text += f'; and {where}{sure_phrase(f)}'

@@ -14,6 +14,7 @@ from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 from sgp_ros.report.diagnosis_text import phrase
+from sgp_ros.report.verdict import verdict_sentence
 from sgp_ros.robots.stated_effects import read_effects, typical_motion
 from test.diagnosis.worlds import CHAINS, PERIOD, delayed, events_of, simulate
 
@@ -147,6 +148,7 @@ def test_what_the_robot_states_too_much_of_is_taken_off(robots, name):
     assert finding.effect == name
     assert finding.parameters[number].value == pytest.approx(-0.6 * size, rel=0.1)
     assert phrase(finding).endswith('less than the robot file states')
+    assert verdict_sentence(found).startswith('Too much is stated on joint0: ')
 
 
 def test_no_more_is_taken_off_than_is_stated(robots):
