@@ -57,6 +57,7 @@ from sgp_ros.diagnosis.reference import (
     none_in_simulation,
 )
 from sgp_ros.diagnosis.result import Diagnosis, Proof
+from sgp_ros.diagnosis.setup.said import doubted_scales
 from sgp_ros.diagnosis.shown import Predictions, Traces
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
@@ -131,6 +132,8 @@ def diagnose(
     )  # fmt: skip
     try:
         connected = with_laws(connect(recordings, tree, lambda x: progress(0.05 + 0.85 * x)))
+        said = doubted_scales(connected.findings, connected.several.decision.model)
+        connected = replace(connected, findings=said)
         found = _diagnosed(connected, robot.name, progress, replays=has_overlays)
         if simulated is not None:
             reference = against_model(connected.equations, connected.several, simulated)

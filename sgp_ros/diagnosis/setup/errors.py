@@ -32,12 +32,13 @@ _CLOCKS = (-0.3, -0.1, -0.03, -0.008, 0.008, 0.03, 0.1, 0.3)
 _DELAYS = np.geomspace(0.002, 0.12, 24)
 _TURNS = (-0.1, 0.1, 0.5 * math.pi, -0.5 * math.pi, math.pi)
 
+EFFORT_SCALE = 'effort_scale'
 _REMEDIES = {
     'encoder_offset': 'Re-zero {joint}, or subtract {offset:.4g} from its positions.',
     'position_scale': 'Divide the positions of {joint} by {scale:.5g}: check unit and gear ratio.',
     'joint_sign': 'Reverse the sign of {joint} ({channels}).',
     'swapped_joints': 'Exchange {joint} and {other_joint} ({channels}).',
-    'effort_scale': 'Divide the efforts of {joint} by {scale:.4g}: check unit, gear ratio and '
+    EFFORT_SCALE: 'Divide the efforts of {joint} by {scale:.4g}: check unit, gear ratio and '
     'torque constant.',
     'clock_offset': 'Stamp the efforts or commands {offset:.4g} s earlier.',
     'base_orientation': 'State how the base is mounted: roll {roll:.3g}, pitch {pitch:.3g} rad.',
@@ -176,7 +177,7 @@ def _position_scale(joints: Sequence[int], name: str, starts: Sequence[float]) -
 
 def _effort_scale(joints: Sequence[int], name: str) -> Hypothesis:
     return Hypothesis(
-        'effort_scale', name, ('scale',), ('1',), _column(np.array([*_SCALES, *_UNITS])),
+        EFFORT_SCALE, name, ('scale',), ('1',), _column(np.array([*_SCALES, *_UNITS])),
         np.array([0.02]),
         lambda c, x: replace(c, effort_scale=_times(c.effort_scale, joints, x[0])),
         is_possible=_is_positive, exact=_UNITS,

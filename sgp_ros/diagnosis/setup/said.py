@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
+from sgp_ros.diagnosis.compare.equations import joint_name
 from sgp_ros.diagnosis.criteria import (
     ALIKE,
+    DOUBTED,
     MOST_CERTAIN,
     PER_EFFECT,
     PER_PARAMETER,
     PER_UNUSUAL,
     TEMPER,
 )
+from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.result import Equivalent, Finding, Location, Parameter
+from sgp_ros.diagnosis.setup.errors import EFFORT_SCALE
 from sgp_ros.diagnosis.setup.search import Connection
+from sgp_ros.physics.catalogue import TORQUE_GAIN
+
+_UNDONE = 'a law of the same effort may undo it; together they may be right'
 
 
 def price_of(found: Connection) -> tuple[float, float]:
@@ -58,3 +66,20 @@ def equal_errors(found: Connection) -> tuple[Equivalent, ...]:
         for r in rivals
         if e.worth - r.worth < ALIKE and math.isfinite(r.worth)
     )
+
+
+def doubted_scales(findings: tuple[Finding, ...], model: Model) -> tuple[Finding, ...]:
+    """Return errors of the connection, doubted where physics takes the same effort times a number.
+
+    A gain is in both, and neither alone need be right.
+    """
+    motion = model.frame.equations.motion
+    scaled = {
+        joint_name(motion, s.place.joint) for s in model.effects
+        if s.effect.effort_columns(s.kind) and (s.effect.is_open or s.effect is TORQUE_GAIN)
+    }  # fmt: skip
+    return tuple(
+        replace(f, probability=min(f.probability, DOUBTED), why=_UNDONE)
+        if f.joint in scaled and f.effect == EFFORT_SCALE else f
+        for f in findings
+    )  # fmt: skip

@@ -8,11 +8,17 @@ import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.criteria import DOUBTED
+from sgp_ros.diagnosis.result import Finding, Location
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.errors import hypotheses
 from sgp_ros.diagnosis.setup.evidence import SUDDEN, Probe
 from sgp_ros.diagnosis.setup.joint import Together
+from sgp_ros.diagnosis.setup.said import doubted_scales
 from sgp_ros.diagnosis.setup.search import _gain, _refined, search
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.gains import read_gains
 from sgp_ros.robots.nominal import nominal_model
@@ -189,3 +195,23 @@ def test_a_number_of_which_bodies_make_up_is_that_of_a_unit(evidence, number, is
     found = _refined(probe, None, scale, start)
     assert np.isfinite(found.std[0]) == is_known
     assert found.numbers[0] == pytest.approx(number, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ('effect', 'joint', 'law', 'is_doubted'),
+    [
+        ('effort_scale', 'elbow', 'torque_gain', True),
+        ('effort_scale', 'elbow', 'coulomb_friction', False),
+        ('effort_scale', 'shoulder', 'torque_gain', False),
+        ('joint_sign', 'elbow', 'torque_gain', False),
+    ],
+)
+def test_a_scale_of_an_effort_is_doubted_beside_a_gain_of_it(effect, joint, law, is_doubted):
+    """What they make together may be right, neither alone need be."""
+    names = SimpleNamespace(moving_names=('shoulder', 'elbow'), joint_names=('shoulder', 'elbow'))
+    frame = SimpleNamespace(equations=SimpleNamespace(motion=SimpleNamespace(tree=names)))
+    model = SimpleNamespace(frame=frame, effects=[EffectAt(EFFECTS[law], Place(1))])
+    found = Finding(joint, effect, {}, Location(), 50.0, 0.98, 1.0)
+    (said,) = doubted_scales((found,), model)
+    assert said.probability == (DOUBTED if is_doubted else 0.98)
+    assert bool(said.why) is is_doubted
