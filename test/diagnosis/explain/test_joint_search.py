@@ -32,7 +32,7 @@ from sgp_ros.diagnosis.explain.joint_search import (
     usual,
 )
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.diagnosis.explain.screening import screen
+from sgp_ros.diagnosis.explain.screening import are_apart, screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
@@ -269,6 +269,15 @@ def test_both_motors_of_a_differential_are_found(equations_for):
     assert levels[min(levels)] == pytest.approx([0.5, 0.3], rel=0.1)
     assert levels[max(levels)] == pytest.approx([0.2, 0.15], rel=0.1)
     assert found.laws == 2 * (1 + len(EFFECTS['coupled_friction'].plain))
+
+
+@pytest.mark.parametrize(('ratio', 'is_one'), [(-0.5, True), (0.5, False)])
+def test_the_motors_of_a_differential_turn_against_each_other(ratio, is_one):
+    """Two that turn with nearly the same sum are one."""
+    law, place = EFFECTS['coupled_friction'], Place(1, source=0)
+    motors = [EffectAt(law, replace(place, number=i), np.array([x]))
+              for i, x in enumerate((1.0, ratio))]  # fmt: skip
+    assert are_apart(motors, motion=None) is is_one
 
 
 def test_a_rotor_is_found_where_bodies_could_stand_for_it(equations_for):

@@ -115,6 +115,27 @@ def test_errors_of_stated_bodies_are_in_the_std(robots, monkeypatch, name, depen
     assert (right[1] < 0.5 * right[0]) == depends
 
 
+def test_a_residual_that_other_bodies_would_explain_adds_to_that(robots, monkeypatch):
+    """Beyond what it adds as noise: the numbers would be others beside those bodies."""
+    robot, tree = robots[1]
+    raw = collect(events_of(simulate(CHAINS[1], 7, 8.0)), robot)
+    equations = make_equations(raw, tree, Bandwidth(10.0, 25.0))
+    (factor,), rng = equations.factors, np.random.default_rng(3)
+    bodies = (factor.Q @ factor.R)[:, equations.instants :]
+    noise = rng.normal(0.0, 0.2, equations.d.shape)
+    candidate = EffectAt(EFFECTS['spring'], Place(0))
+    added = []
+    for size in (0.0, 3.0 * STATED_ERROR):
+        wrong = bodies @ (size * rng.normal(size=bodies.shape[1]))
+        columns = Columns(replace(equations, d=equations.d + wrong[:, None] + noise))
+        model = fit(columns, (candidate,), np.full(1, 0.2), is_free=False)
+        with monkeypatch.context() as changed:
+            exact(changed)
+            alone = covariance(model, columns)[0, 0]
+        added.append(float(covariance(model, columns)[0, 0] - alone))
+    assert added[1] > 1.5 * added[0]
+
+
 def test_without_effects_there_is_nothing_to_be_uncertain_of(equations_for, viscous):
     """An empty covariance, an empty list."""
     _, equations = equations_for(viscous)
