@@ -132,7 +132,7 @@ def diagnose(
     )  # fmt: skip
     try:
         connected = with_laws(connect(recordings, tree, lambda x: progress(0.05 + 0.85 * x)))
-        said = doubted_scales(connected.findings, connected.several.decision.model)
+        said = doubted_scales(connected.findings, connected.several.decision.model.effects, tree)
         connected = replace(connected, findings=said)
         found = _diagnosed(connected, robot.name, progress, replays=has_overlays)
         if simulated is not None:

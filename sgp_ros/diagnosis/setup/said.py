@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 
-from sgp_ros.diagnosis.compare.equations import joint_name
 from sgp_ros.diagnosis.criteria import (
     ALIKE,
     DOUBTED,
@@ -15,11 +15,12 @@ from sgp_ros.diagnosis.criteria import (
     PER_UNUSUAL,
     TEMPER,
 )
-from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.result import Equivalent, Finding, Location, Parameter
 from sgp_ros.diagnosis.setup.errors import EFFORT_SCALE
 from sgp_ros.diagnosis.setup.search import Connection
 from sgp_ros.physics.catalogue import TORQUE_GAIN
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.motion import Structure
 
 _UNDONE = 'a law of the same effort may undo it; together they may be right'
 
@@ -68,14 +69,20 @@ def equal_errors(found: Connection) -> tuple[Equivalent, ...]:
     )
 
 
-def doubted_scales(findings: tuple[Finding, ...], model: Model) -> tuple[Finding, ...]:
+def doubted_scales(
+    findings: tuple[Finding, ...], effects: Iterable[EffectAt], tree: Structure
+) -> tuple[Finding, ...]:
     """Return errors of the connection, doubted where physics takes the same effort times a number.
 
     A gain is in both, and neither alone need be right.
+
+    Args:
+        findings: errors of the connection.
+        effects: that are asserted beside them.
+        tree: nominal robot.
     """
-    motion = model.frame.equations.motion
     scaled = {
-        joint_name(motion, s.place.joint) for s in model.effects
+        tree.moving_names[s.place.joint] for s in effects
         if s.effect.effort_columns(s.kind) and (s.effect.is_open or s.effect is TORQUE_GAIN)
     }  # fmt: skip
     return tuple(

@@ -207,11 +207,9 @@ def test_a_number_of_which_bodies_make_up_is_that_of_a_unit(evidence, number, is
     ],
 )
 def test_a_scale_of_an_effort_is_doubted_beside_a_gain_of_it(effect, joint, law, is_doubted):
-    """What they make together may be right, neither alone need be."""
-    names = SimpleNamespace(moving_names=('shoulder', 'elbow'), joint_names=('shoulder', 'elbow'))
-    frame = SimpleNamespace(equations=SimpleNamespace(motion=SimpleNamespace(tree=names)))
-    model = SimpleNamespace(frame=frame, effects=[EffectAt(EFFECTS[law], Place(1))])
+    """Together they may be right, neither alone need be."""
+    tree = SimpleNamespace(moving_names=('shoulder', 'elbow'))
     found = Finding(joint, effect, {}, Location(), 50.0, 0.98, 1.0)
-    (said,) = doubted_scales((found,), model)
+    (said,) = doubted_scales((found,), [EffectAt(EFFECTS[law], Place(1))], tree)
     assert said.probability == (DOUBTED if is_doubted else 0.98)
     assert bool(said.why) is is_doubted
