@@ -92,16 +92,19 @@ def _of_stated_bodies(model: Model, J: np.ndarray, inverse: np.ndarray) -> np.nd
         J: (N k + p, c + s) scaled derivatives.
         inverse: `A^-1`.
     """
-    equations, N = model.frame.equations, len(model.residual)
-    B = np.zeros((len(J), equations.size - equations.instants))
-    rows = B[: model.residual.size].reshape(N, len(model.sigma), -1)
+    equations, (N, k) = model.frame.equations, model.residual.shape
+    rows, p = J[: N * k].reshape(N, k, -1), equations.size - equations.instants
+    BB, JB, Br = np.zeros((p, p)), np.zeros((J.shape[1], p)), np.zeros(p)
+    residual = model.residual / model.sigma
     for j, factor in enumerate(equations.factors):
-        rows[:, j] = factor.Q @ factor.R[:, equations.instants :] / model.sigma[j]
-    G = inverse @ (J.T @ B)
-    B -= J @ G
-    known = B.T @ B / model.frame.weight + np.eye(B.shape[1]) / STATED_ERROR**2
-    r = (model.residual / model.sigma).ravel()
-    w = np.linalg.solve(known, B[: len(r)].T @ r / model.frame.weight)
+        R = factor.R[:, equations.instants :] / model.sigma[j]
+        BB += R.T @ R
+        JB += (rows[:, j].T @ factor.Q) @ R
+        Br += R.T @ (factor.Q.T @ residual[:, j])
+    G = inverse @ JB
+    known = (BB - JB.T @ G) / model.frame.weight + np.eye(p) / STATED_ERROR**2
+    left = Br - G.T @ (J[: N * k].T @ residual.ravel())
+    w = np.linalg.solve(known, left / model.frame.weight)
     return np.asarray(G @ (np.linalg.inv(known) + np.outer(w, w)) @ G.T)
 
 
