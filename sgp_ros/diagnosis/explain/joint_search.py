@@ -186,8 +186,7 @@ def coupled(columns: Columns, model: Model) -> Iterator[Model]:
     The inverse of `uncoupled`: several laws, none of which could go alone, make room for one. Or
     for the two motors of a differential.
     """
-    blocks = [b for b in blocks_of(model) if b.joints]
-    for block in blocks:
+    for block in (b for b in blocks_of(model) if b.joints):
         laws = [e for e in block.effects if e.plain and e.has_source]
         for s in distinct(screen(columns, model, laws, block.joints), 1):
             ends = {s.place.joint, s.place.source}
@@ -197,11 +196,16 @@ def coupled(columns: Columns, model: Model) -> Iterator[Model]:
             found = screen(columns, trial, [s.effect], block.joints)
             for best in distinct([t for t in found if t[1].place == s.place], 1):
                 trial = refitted(columns, trial, (kept, len(kept)), best)
-                for other in blocks:
-                    if ends & set(other.joints or ()):
-                        trial = grown(columns, trial, other)
-                yield trial
+                yield _grown_at(columns, trial, ends)
     yield from _differentials(columns, model)
+
+
+def _grown_at(columns: Columns, model: Model, joints: set[int]) -> Model:
+    """Add the effects of some joints that are worth their price."""
+    for block in blocks_of(model):
+        if joints & set(block.joints or ()):
+            model = grown(columns, model, block)
+    return model
 
 
 def _is_part(other: EffectAt, coupled: EffectAt, ends: set[int]) -> bool:
@@ -224,15 +228,12 @@ def _differentials(columns: Columns, model: Model) -> Iterator[Model]:
     places = [(law, place) for law in motion.catalogue.values() if may_be_two(law)
               for place in law.places(motion)]  # fmt: skip
     for law, place in places:
-        ends = place.joint, place.source
+        ends = {place.joint, place.source}
         if model.left[list(ends)].max() < COUNTED_SHARE:
             continue
-        others = tuple(s for s in model.effects if not {s.place.joint, s.place.source} & {*ends})
+        others = tuple(s for s in model.effects if not {s.place.joint, s.place.source} & ends)
         plain = tuple(s for s in model.effects if s.place.joint in ends and s.effect.is_usual)
         motors = [EffectAt(law, replace(place, number=i), x) for i, x in enumerate(_RATIOS)]
         for kept in dict.fromkeys((others, others + plain)):
             trial = refitted(columns, model, (kept, len(kept)), *motors)
-            for block in blocks_of(trial):
-                if {*ends} & {*(block.joints or ())}:
-                    trial = grown(columns, trial, block)
-            yield trial
+            yield _grown_at(columns, trial, ends)
