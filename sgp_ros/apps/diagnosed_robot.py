@@ -59,7 +59,8 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis, gains: Gains | No
     Raises:
         ConfigError: the URDF is no longer what it was.
     """
-    off = {(f.effect, f.joint): size for f in found.findings if (size := taken_off(f)) > 0.0}
+    every = *found.findings, *found.shared
+    off = {(f.effect, f.joint): size for f in every if (size := taken_off(f)) > 0.0}
     known = stated_less(robot, off)
     text = None if found.bodies is None else stated_urdf(robot, found.bodies, known.dynamics)
     write_text(out / URDF_NAME, text or write_urdf(urdf_text(robot), {}, known.dynamics))
@@ -68,7 +69,6 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis, gains: Gains | No
         links = nominal_tree(robot).link_names
         stated = {k: x for k, x in stated.items() if k.rpartition('.')[0] not in links}
     effects = [item for item in known.effects if not is_open(item)]  # tried, and found or not
-    more = [f for f in (*found.findings, *found.shared) if not taken_off(f)]
     document = {
         'schema': 1,
         'name': robot.name,
@@ -76,7 +76,7 @@ def write_diagnosed(out: Path, robot: Robot, found: Diagnosis, gains: Gains | No
         **robot.source,
         'urdf': URDF_NAME,
         **({} if gains is None or gains.is_recorded else {'gains': _gains(robot, found, gains)}),
-        'effects': [*effects, *stated_findings(more)],
+        'effects': [*effects, *stated_findings(f for f in every if not taken_off(f))],
         'parameters': stated,
     }
     write_text(out / YAML_NAME, yaml.safe_dump(document, sort_keys=False))

@@ -61,7 +61,7 @@ class ViscousFriction(Effect):
     is_usual = True
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
-        return leaves_some('damping', at, motion)
+        return leaves_some(self.quantities[0], at, motion)
 
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (-x.v,)
@@ -88,7 +88,7 @@ class CoulombFriction(Effect):
     is_usual = True
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
-        return leaves_some('friction', at, motion)
+        return leaves_some(self.quantities[0], at, motion)
 
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (-x.s,)
@@ -215,7 +215,7 @@ class AsymmetricCoulomb(Effect):
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
         """Return whether neither direction is driven, with what the nominal robot states."""
-        stated = motion.stated_number('friction', at.place.joint)
+        stated = motion.stated_number(self.quantities[0].joint_number, at.place.joint)
         return bool(np.all(at.coefficients + stated > -0.02 * np.max(np.abs(at.coefficients))))
 
     def surprise(self, at: Placed) -> float:

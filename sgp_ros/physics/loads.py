@@ -107,7 +107,7 @@ class Armature(Effect):
     is_usual = True
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
-        return leaves_some('armature', at, motion)
+        return leaves_some(self.quantities[0], at, motion)
 
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return (-x.a,)

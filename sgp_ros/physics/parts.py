@@ -99,17 +99,17 @@ class Placed(Protocol):
         """Coefficients of the columns, (m,)."""
 
 
-def leaves_some(number: str, at: Placed, motion: SeenMotion) -> bool:
+def leaves_some(quantity: Quantity, at: Placed, motion: SeenMotion) -> bool:
     """Return whether a law of one coefficient is one, beside what the nominal robot states of it.
 
     That may be too much: the law then takes a part of it off, or all, with an error.
 
     Args:
-        number: of the joint that states it, see `Quantity.joint_number`.
+        quantity: its number, which a joint may state.
         at: the law.
         motion: with the nominal robot.
     """
-    stated = motion.stated_number(number, at.place.joint)
+    stated = motion.stated_number(quantity.joint_number, at.place.joint)
     return bool(at.coefficients[0] > -_ALL_OFF * stated)
 
 

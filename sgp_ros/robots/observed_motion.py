@@ -151,10 +151,10 @@ class ObservedMotion:
         """Return what the nominal robot states of a number of a joint, see `joint_number`."""
         found = float(self.tree.damping[joint]) if name == _DAMPING else 0.0
         for x in self.known:
-            numbers = x.effect.coefficient_quantities(x.kind)
             if x.place.joint == joint:
-                found += sum(float(c) for q, c in zip(numbers, x.coefficients, strict=False)
-                             if q.joint_number == name) / len(numbers)  # fmt: skip
+                named = zip(x.effect.coefficient_quantities(x.kind), x.coefficients, strict=False)
+                sizes = [float(c) for q, c in named if q.joint_number == name]
+                found += sum(sizes) / max(len(sizes), 1)  # of either direction, their mean
         return found
 
     @property

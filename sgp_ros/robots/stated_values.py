@@ -232,9 +232,9 @@ def stated_less(robot: Robot, off: Mapping[tuple[str, str], float]) -> Stated:
         for entry in entries:
             taken = min(float(entry['value']), left)
             entry['value'], left = float(entry['value']) - taken, left - taken
-        if law.term and law.term.dynamics:
-            own = {'damping': float(tree.damping[j]), 'friction': float(tree.friction[j])}
-            own |= dict(zip(own, dynamics.get(joint, own.values()), strict=True))
+        if law.term and law.term.dynamics and left > 0.0:
+            damping, friction = dynamics.get(joint, (tree.damping[j], tree.friction[j]))
+            own = {'damping': float(damping), 'friction': float(friction)}
             own[law.term.dynamics] = max(own[law.term.dynamics] - left, 0.0)
             dynamics[joint] = own['damping'], own['friction']
     gone = [x for x in effects if (x.get('effect'), x.get('joint')) in off

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -227,6 +227,17 @@ def test_what_was_stated_too_much_of_is_less_where_it_was_stated(
     assert bool(written['effects']) is (place == 'effects')
     assert bool(written['parameters']) is (place == 'parameters')
     assert (out / URDF_NAME).read_text() != URDF or place != 'urdf'
+
+
+def test_what_a_simulation_has_less_of_too_is_less(tmp_path):
+    """Shared by simulation and machine, and still not in the robot file."""
+    (tmp_path / 'nominal.urdf').write_text(URDF)
+    shared = (_finding('coulomb_friction', 'elbow', {'level': -0.15}),)
+    robot = load_robot(str(tmp_path / 'nominal.urdf'))
+    write_diagnosed(tmp_path, robot, replace(_diagnosis(), shared=shared))
+    model = nominal_model(load_robot(str(tmp_path / YAML_NAME)))
+    known = [x.coefficients[0] for x in model.stated if x.name == 'coulomb_friction']
+    assert known == pytest.approx([0.05])
 
 
 def _stream(joints, n=400):

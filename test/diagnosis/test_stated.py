@@ -11,6 +11,7 @@ from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.compare.velocity_sensor import lagged, sensor_lags
 from sgp_ros.diagnosis.pipeline import diagnose
+from sgp_ros.physics.catalogue import EFFECTS as LAWS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 from sgp_ros.report.diagnosis_text import phrase
@@ -161,3 +162,6 @@ def test_no_more_is_taken_off_than_is_stated(robots):
     assert [x.is_possible(motion) for x in levels.values()] == [False, True, True]
     bare = replace(motion, stated=())
     assert [x.is_possible(bare) for x in levels.values()] == [False, False, True]
+    either = EffectAt(LAWS['asymmetric_coulomb'], Place(0), coefficients=np.array([-0.1, -0.3]))
+    assert either.is_possible(motion)
+    assert not either.is_possible(bare)
