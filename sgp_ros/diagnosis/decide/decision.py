@@ -105,7 +105,7 @@ def decide(equations: Equations, comparison: Comparison) -> Decision:
     scale, base = Scale.of(equations, comparison), comparison.base
     ranked = _ranked(comparison, scale)
     likely = [m for m in ranked if scale.worth(m) > scale.worth(base)]
-    if scale.base.max() < SLIGHT_REST and 0.5 * float(base.w @ base.w) < PER_EFFECT:
+    if scale.base.max() < SLIGHT_REST and base.strain < PER_EFFECT:
         likely = []
     best = supported(equations, scale, likely)
     rivals = tuple(m for m in ranked if m is not best)

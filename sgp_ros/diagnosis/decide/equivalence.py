@@ -172,7 +172,7 @@ def equivalents(
     for rival in (unlikely, *sorted(others, key=scale.worth, reverse=True)):
         if len(found) == MOST:
             break
-        prior = 0.5 * float(rival.w @ rival.w) if rival is unlikely else 0.0
+        prior = rival.strain if rival is unlikely else 0.0
         is_other = not any(_contains(rival, m) for m in known)
         if is_other and scale.fit(rival) + prior > least:
             known.append(rival)

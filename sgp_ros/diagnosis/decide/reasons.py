@@ -84,8 +84,8 @@ def _losses(model: Model, against: Model, scale: Scale) -> dict[str, float]:
     justified = ' than the improvement justifies' if fit < 0.0 else ''
     return {
         _FIT: fit,
-        'it needs inertial parameters further from the nominal ones': 0.5
-        * float(model.w @ model.w - against.w @ against.w),
+        'it needs inertial parameters further from the nominal ones': model.strain
+        - against.strain,
         f'{more} parameters{justified}': PER_PARAMETER * (model.freedom - against.freedom),
         f'{more}, or rarer, effects{justified}': model.law_price - against.law_price,
         'it needs effects of an unlikely size': next(unlikely) - next(unlikely),

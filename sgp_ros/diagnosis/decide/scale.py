@@ -121,7 +121,7 @@ class Scale:
         It is one of the motion, which is what was measured: a residual of effort, and what a
         perfect model would leave of it beside noise of efforts, grows with the inertia of a model.
         """
-        return self.likelihood(model) - 0.5 * float(model.w @ model.w)
+        return self.likelihood(model) - model.strain
 
     def likelihood(self, model: Model) -> float:
         """Return the fit without that prior [nats]."""

@@ -134,13 +134,12 @@ def _more(columns: Columns, found: Comparison) -> list[Model]:
     sound = [m for m in by_score if not m.effects or is_credible(m)]
     best = next(iter(sound), found.base)
     limit = np.clip(ADEQUATE_REST * found.base.left, SLIGHT_REST, COUNTED_SHARE)
-    strain = 0.5 * float(best.w @ best.w)
     stated: list[Model] = []
-    if best.is_free and strain > BENT_BODIES:
+    if best.is_free and best.strain > BENT_BODIES:
         stated = _as_stated(
             columns, best, next((m for m in sound if not m.is_free), found.nominal)
         )
-    if (best.left < limit).all() and strain < PER_EFFECT:
+    if (best.left < limit).all() and best.strain < PER_EFFECT:
         return _ranked(stated)
     everyday = usual(columns, fit(columns, (), best.sigma, is_free=True))
     loaded = _loaded(columns, everyday)

@@ -39,7 +39,7 @@ def gain(trial: Model, model: Model, *, is_whole: bool = True) -> float:
     factors = np.array([correlation_factor(r, x) if is_whole else 1.0
                         for r, x in zip(of.residual.T, apart, strict=True)])  # (k,)  # fmt: skip
     rows = np.minimum(len(of.residual) / factors, INDEPENDENT_ROWS)
-    prior = 0.5 * float(model.w @ model.w - trial.w @ trial.w)
+    prior = model.strain - trial.strain
     inertia = float(rows.mean()) * (trial.log_inertia - model.log_inertia)
     price = trial.law_price - model.law_price + PER_PARAMETER * (trial.size - model.size)
     return float(rows @ np.log(model.sigma / trial.sigma)) + inertia + prior - price

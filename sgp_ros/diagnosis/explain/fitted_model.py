@@ -57,6 +57,11 @@ class Model:
         return self.frame.is_free
 
     @property
+    def strain(self) -> float:
+        """Prior that its bodies cost [nats]."""
+        return 0.5 * float(self.w @ self.w)
+
+    @property
     def delivered(self) -> np.ndarray:
         """Logs of what motors deliver of recorded efforts, (k,): of half of one, half can err."""
         found = np.zeros(len(self.inertia))

@@ -90,7 +90,7 @@ def grown(columns: Columns, model: Model, block: Block) -> Model:
     and are sought in any residual that is not slight.
     """
     while True:
-        left, strain = block.left(model), strain_of(model)
+        left, strain = block.left(model), model.strain
         laws = block.effects
         if left < COUNTED_SHARE and strain < PER_EFFECT:
             laws = tuple(e for e in laws if adds_to_usual(e))
@@ -101,7 +101,7 @@ def grown(columns: Columns, model: Model, block: Block) -> Model:
         trials = [refitted(columns, model, arranged, s) for s in found]
         if left < COUNTED_SHARE:
             trials = [t for t in trials if adds_to_usual(t.effects[-1].effect)
-                      or strain - strain_of(t) > PER_EFFECT]  # fmt: skip
+                      or strain - t.strain > PER_EFFECT]  # fmt: skip
         counted = [
             t for t in trials if t.shares[-1] > COUNTED_SHARE or t.effects[-1].effect.is_usual
         ]
@@ -110,8 +110,3 @@ def grown(columns: Columns, model: Model, block: Block) -> Model:
             break
         model = better
     return model
-
-
-def strain_of(model: Model) -> float:
-    """Return how unlikely the bodies of a model are [nats]."""
-    return 0.5 * float(model.w @ model.w)
