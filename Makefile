@@ -1,6 +1,6 @@
 # Two commands do everything on a machine with Python 3.10-3.13, make and git:
 #   make demo    identify a simulated robot over DDS and prove that a replay agrees
-#   make test    run the whole suite
+#   make test    run the suite
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -15,7 +15,7 @@ unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 endif
 
-.PHONY: demo test busy lint format coverage oldest bench reproduce docs site venv clean
+.PHONY: demo test proofs busy lint format coverage oldest bench reproduce docs site venv clean
 
 demo: venv
 	$(BIN)/sgp demo
@@ -25,6 +25,11 @@ demo: venv
 # With MEASURE=1 it fails where less than 95 % of the branches of the layers below are entered.
 test: $(VENV)/.test
 	$(BIN)/python $(PYTEST) -n auto --dist loadfile --max-worker-restart 0 $(if $(MEASURE),$(COVERAGE))
+
+# The tests that take long, with their results in docs/long_tests.md.
+proofs: $(VENV)/.test
+	$(BIN)/python -m sgp_proof.long_tests
+	$(BIN)/python docs/generate_long_tests.py
 
 lint: $(VENV)/.lint
 	$(BIN)/ruff format --check .

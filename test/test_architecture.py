@@ -76,6 +76,7 @@ PROOF_ROOMS = {
     'columns': set(),
     'commands': set(),
     'unchanged': {'result_files'},
+    'long_tests': {'result_files'},
     'bench': {'result_files', 'concealed', 'campaign'},
     'paper': {'columns'},
     'real': {'result_files', 'columns'},

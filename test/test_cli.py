@@ -411,7 +411,7 @@ def test_a_file_name_that_is_no_text_is_shown_escaped(tmp_path, capfd):
     path = str(tmp_path / 'swing\udcff.mcap')
     with RecordingWriter(tmp_path / 'x.mcap') as writer:
         for i in range(300):
-            x = frozen_array(np.sin(0.05 * i + np.arange(2.0)))
+            x = frozen_array(np.zeros(2))
             stamp = 10**18 + i * 10**7
             writer.write_event(JointSample(stamp, ('pole', 'wheel'), x, effort=x))
     shutil.move(tmp_path / 'x.mcap', path)

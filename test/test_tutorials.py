@@ -51,6 +51,7 @@ def test_a_pendulum_in_a_csv_file():
     assert level == pytest.approx(0.3, rel=0.1)
 
 
+@pytest.mark.long
 def test_an_arm_with_urdf_and_bag():
     """The fault of its elbow is found, proved on the other recording, and handed back."""
     run('arm_bag')
@@ -63,6 +64,7 @@ def test_an_arm_with_urdf_and_bag():
     assert max(friction) == pytest.approx(0.25, rel=0.1)
 
 
+@pytest.mark.long
 def test_a_mujoco_model_and_a_log_of_its_drives():
     """The damping that MuJoCo had beyond that of the file, and its sum in the corrected file."""
     run('mujoco')
@@ -87,6 +89,7 @@ def test_a_robot_of_formulas():
     assert abs(mass['value'] - 20.0) < 4.0 * mass['std']
 
 
+@pytest.mark.long
 def test_the_notebook_runs_from_top_to_bottom():
     """Cell by cell; the last one has written the report."""
     cells = json.loads((DOCS / 'notebook.ipynb').read_text('utf-8'))['cells']

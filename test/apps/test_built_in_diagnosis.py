@@ -54,6 +54,7 @@ def test_a_simulated_robot_is_the_one_of_its_name(tmp_path, robot):
     assert _diagnosed(tmp_path, robot, robot)['verdict'] == 'no_mismatch'
 
 
+@pytest.mark.long
 def test_friction_that_is_added_to_the_wheel_is_found_with_its_number(tmp_path):
     """And what is written then moves as the truth under the same voltages."""
     effect = 'viscous_friction:joint=wheel,b=0.001'
@@ -65,6 +66,7 @@ def test_friction_that_is_added_to_the_wheel_is_found_with_its_number(tmp_path):
     assert np.all(np.mean((moved - true) ** 2, axis=0) < 0.01 * np.var(true, axis=0))
 
 
+@pytest.mark.long
 def test_the_friction_that_equation_28_leaves_out_is_found(tmp_path):
     """Bearing and back-EMF of the wheel; the pole's is too small to count as physics."""
     found = _diagnosed(tmp_path, 'reaction_wheel', 'reaction_wheel_6')
@@ -75,6 +77,7 @@ def test_the_friction_that_equation_28_leaves_out_is_found(tmp_path):
     assert _values(finding) == pytest.approx({'b': 0.002}, rel=0.05)
 
 
+@pytest.mark.long
 def test_the_irregularity_of_the_toy_pendulum_is_found_without_a_motor(tmp_path):
     """The written robot moves as the truth and diagnoses the same recording without a finding."""
     found = _diagnosed(tmp_path, 'toy_pendulum', 'toy_pendulum')

@@ -168,6 +168,7 @@ def test_gains_of_the_model_are_used_where_positions_are_commanded(tmp_path, cap
     assert said.count('\n') == 1
 
 
+@pytest.mark.long
 def test_given_gains_are_refused_where_wrong_and_kept_for_the_next_command(tmp_path, capsys):
     """The next command has them too; without, it would refuse the targets."""
     t = np.arange(0.0, 4.0, 0.01)

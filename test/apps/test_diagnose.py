@@ -51,7 +51,9 @@ def folders(tmp_path_factory):
     return {}, tmp_path_factory.mktemp('diagnose')
 
 
-@pytest.fixture(params=CASES)
+@pytest.fixture(
+    params=[pytest.param(x, marks=pytest.mark.long) if x == '33' else x for x in CASES]
+)
 def finished(request, folders, capsys):
     """Number, folder of the results and what was printed."""
     done, folder = folders
@@ -218,6 +220,7 @@ def test_bad_arguments_end_in_one_line(tmp_path, capsys, bag, robot, more, said)
     assert '\n' not in error
 
 
+@pytest.mark.long
 def test_without_a_test_a_part_is_held_out_and_a_wrong_simulation_is_reported(tmp_path, capsys):
     """An entry of its own in the file, intervals, roll-outs, and remarks with numbers."""
     case, out = _case('05'), tmp_path / 'out'

@@ -93,6 +93,7 @@ def test_corrected_bodies_take_the_place_of_a_diagonal_inertia(tmp_path):
     assert sorted(found.body_inertia[1]) == pytest.approx([0.02, 0.04, 0.05], rel=1e-5)
 
 
+@pytest.mark.long
 def test_exported_mjcf_moves_in_mujoco_as_our_simulation(tmp_path):
     """Under the recorded commands, within 1 % of the motion, over the whole recording."""
     robot = _robot(tmp_path)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+import pytest
 
 from sgp_ros.cli import main
 
@@ -62,6 +63,7 @@ def _followed(path, targets):
     return found
 
 
+@pytest.mark.long
 def test_the_page_leads_from_model_and_log_to_a_corrected_model(tmp_path, monkeypatch, capsys):
     """In three commands; the corrected file follows the logged targets as the machine did."""
     (tmp_path / 'arm.xml').write_text(ARM.format(shoulder='', elbow=''))

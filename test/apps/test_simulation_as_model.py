@@ -58,6 +58,7 @@ def test_machine_and_model_stand_side_by_side(machine, tmp_path):
     assert stated['viscous_friction']['b'] == pytest.approx(0.2, abs=0.03)
 
 
+@pytest.mark.long
 def test_the_motions_of_both_models_lie_over_the_measured_one(machine, tmp_path):
     """In the order of their errors; the series are those of the file's rows."""
     _diagnosed(machine, tmp_path, 0.03)

@@ -135,6 +135,7 @@ def test_wrong_parameters_are_no_missing_physics(robots, seed):
         assert abs(error.value - error.nominal) > 2.0 * error.std
 
 
+@pytest.mark.long
 def test_what_no_effect_describes_is_unexplained_at_its_joint(robots):
     """Friction of joint 1 that follows the position of joint 0 is in no catalogue."""
     world = simulate(
@@ -230,6 +231,7 @@ def test_measured_efforts_do_in_place_of_commands(tmp_path):
     assert not drive & {f.effect for f in found.alternatives}
 
 
+@pytest.mark.long
 def test_what_follows_the_clock_alone_is_said_to_depend_on_nothing_beyond_chance(robots):
     """Z may follow the motion by chance; no variable is named as a cause for that."""
     world = simulate(
@@ -243,6 +245,7 @@ def test_what_follows_the_clock_alone_is_said_to_depend_on_nothing_beyond_chance
     assert not any(own.is_significant(name) for name in own.scores)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(('rotor', 'least'), [(0.06, 0.9), (0.03, 0.5)])
 def test_a_rotor_is_named_where_bodies_are_nearly_right(robots, rotor, least):
     """A body of a seventh of its mass would do as well, beside a weak motor.

@@ -87,6 +87,7 @@ def test_two_recordings_of_one_machine_give_one_answer(found):
     assert np.all(np.diff(one.traces.time) > 0.0)
 
 
+@pytest.mark.long
 def test_a_load_taken_up_differs_and_what_is_common_stays(found):
     one = found('payload')
     _require_common_friction(one, 0.4, 0.05)
@@ -99,6 +100,7 @@ def test_a_load_taken_up_differs_and_what_is_common_stays(found):
     assert entry.keys() >= {'recording', 'effect', 'joint', 'parameters', 'probability'}
 
 
+@pytest.mark.long
 def test_friction_that_is_lower_in_the_second_differs(found):
     """The first recording stands for what is common."""
     one = found('friction')

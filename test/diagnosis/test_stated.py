@@ -86,7 +86,9 @@ def test_a_joint_that_stated_friction_holds_asks_nothing(robots, dry):
     np.testing.assert_allclose(equations.d, found.d - force, atol=1e-9)
 
 
-@pytest.mark.parametrize('name', ['coulomb_friction', 'command_delay'])
+@pytest.mark.parametrize(
+    'name', ['coulomb_friction', pytest.param('command_delay', marks=pytest.mark.long)]
+)
 def test_a_robot_that_states_what_it_has_shows_no_mismatch(robots, name):
     """And predicts, before any finding, as well as one of which the effect was found."""
     robot, tree = robots[1]
@@ -121,6 +123,7 @@ def test_a_stated_lag_of_the_velocity_is_not_found_again(robots, perfect):
         assert [lag.is_physics for lag in sensor_lags(raw, equations)] == [is_physics]
 
 
+@pytest.mark.long
 def test_roll_outs_of_the_nominal_robot_have_what_it_states(named, robots):
     """A robot whose truth is stated ends where it did; without, it does not."""
     name, events = named

@@ -21,7 +21,7 @@ from sgp_ros.robots.registry import load_robot
 from sgp_ros.simulation.effects import Action, Law
 from sgp_ros.simulation.registry import LAWS
 
-NAME, SEED = 'cubic_drag', 3
+NAME, SEED = 'cubic_drag', 307
 ROOT = Path(__file__).parents[2]
 
 

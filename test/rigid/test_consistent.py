@@ -69,6 +69,7 @@ def test_projection_never_moves_away_from_the_truth(seed):
     assert angle <= 1e-5 * (1.0 + before**2), 'no consistent point lies nearer in that direction'
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('seed', range(4))
 def test_projection_is_the_optimum_of_a_brute_force_search(seed):
     """One link, parametrised by a Cholesky factor of J, from many starts."""

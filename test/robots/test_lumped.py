@@ -56,6 +56,7 @@ def test_one_file_more_is_one_robot_more(folder):
     assert [c.joint for c in robot.coefficients] == ['drum-1'] * 3
 
 
+@pytest.mark.long
 def test_a_robot_of_one_file_is_simulated_and_diagnosed_by_its_name(folder, tmp_path):
     bag = tmp_path / 'bag'
     effect = 'coulomb_friction:joint=drum-1,level=0.1'

@@ -99,6 +99,7 @@ def test_a_machine_whose_stated_friction_creeps_shows_no_mismatch(creeps, robots
     assert any('builds up over a way' in said for said in found.remarks)
 
 
+@pytest.mark.long
 def test_simulations_hold_where_friction_takes_most_of_the_effort(robots):
     """A force along the motion before answers too late: nearly all of its windows diverge."""
     robot, tree = robots[1]

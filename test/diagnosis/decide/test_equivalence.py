@@ -117,6 +117,7 @@ def test_one_law_of_two_names_is_one(narrow):
         assert contrasts.stands_for(replace(dry, effects=(other,)), dry.effects[0]) == is_same
 
 
+@pytest.mark.long
 def test_noise_does_not_hide_that_bodies_may_be_heavier(tmp_path):
     """Their residual of effort is larger because their inertia is: the motion fits as well."""
     (link,) = CHAINS[1]

@@ -52,6 +52,7 @@ def test_the_effects_of_the_schema_are_stated_with_their_units(stated):
     assert all(0.0 < p.value < math.inf for p in stated.values())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('effect', [VISCOUS_FRICTION, COMMAND_DELAY])
 def test_twice_the_stated_size_is_found_and_half_of_it_is_not(stated, equations_for, effect):
     """In the same motion, by the whole search."""

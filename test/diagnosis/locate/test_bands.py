@@ -124,6 +124,7 @@ def _fields(equations, residual):
     return found
 
 
+@pytest.mark.long
 def test_the_band_is_left_by_chance_in_one_recording_of_twenty_at_most(equations):
     """Anywhere, on any joint, over any variable; white noise and red. Before any p-value."""
     false = 0

@@ -25,6 +25,7 @@ def equations(equations_for):
     return equations_for(simulate(CHAINS[2], 7, 12.0))[1]
 
 
+@pytest.mark.long
 def test_the_least_p_value_is_uniform_where_the_motion_has_no_part(equations):
     """Of all joints and variables together, beside white noise and red; within three errors."""
     least = []

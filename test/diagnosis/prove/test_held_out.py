@@ -118,6 +118,7 @@ def test_nothing_is_learned_from_what_is_held_out(robots, world, kept):
     )
 
 
+@pytest.mark.long
 def test_the_proof_shows_blocks_only_where_nothing_else_was_given(robots, world, kept):
     """And says so; the node asks for none."""
     assert list(kept.proofs) == ['train', HELD_OUT]

@@ -78,9 +78,14 @@ def _found(equations_for, links, **what):
          'a*dq[joint0]/(1 + (dq[joint0]/v0)**2) + d*tanh(dq[joint0]/v_s)',
          {'a': -0.8, 'v0': 1.5, 'd': -0.3}),
         (_contact, 1, 'a*(max(q[joint0] - x0, 0)/r)**p0', {'p0': 1.5, 'x0': 0.3}),
-        (_Play(), 1, 'a*play(q[joint0], T)', {'a': -1.2, 'T': 0.5}),
+        pytest.param(
+            _Play(), 1, 'a*play(q[joint0], T)', {'a': -1.2, 'T': 0.5}, marks=pytest.mark.long
+        ),
         (_spring_between, 2, 'a*(q[joint0] - q[joint1])**3', {'a': -0.8}),
-        (_hose, 2, 'a*(q[joint0] + R*q[joint1])**3', {'a': -0.8, 'R': 0.6}),
+        pytest.param(
+            _hose, 2, 'a*(q[joint0] + R*q[joint1])**3', {'a': -0.8, 'R': 0.6},
+            marks=pytest.mark.long,
+        ),
         (_cushion, 1, 'a*max(q[joint0] - x0, 0)*max(dq[joint0], 0)', {'a': -1.5, 'x0': 0.3}),
     ],
     ids=['log friction', 'brake and friction', 'contact', 'play', 'spring between', 'hose',

@@ -100,7 +100,7 @@ def test_the_shape_is_described_in_words_and_numbers(braked):
     assert len(written[0]['shape']['mean']) == len(search.x)
 
 
-@pytest.mark.parametrize('name', ['noise', 'time'])
+@pytest.mark.parametrize('name', ['noise', pytest.param('time', marks=pytest.mark.long)])
 def test_what_is_no_function_of_the_motion_has_no_law(equations_for, name):
     """Neither a disturbance that wanders, nor one that comes and goes by the clock."""
     rng = np.random.default_rng(5)
@@ -188,6 +188,7 @@ def test_a_listed_effect_keeps_its_name(equations_for, viscous):
     assert Scale.of(equations, comparison).worth(decision.model) > 0.0
 
 
+@pytest.mark.long
 def test_friction_that_is_hardly_different_keeps_its_name(equations_for):
     """A force without form says it better, but by less than counts."""
 
@@ -202,6 +203,7 @@ def test_friction_that_is_hardly_different_keeps_its_name(equations_for):
     assert with_laws(equations, comparison, decision).decision is decision
 
 
+@pytest.mark.long
 def test_a_listed_law_is_not_bent_to_stand_for_another(equations_for):
     """Friction at a place says most of what friction behind a cardan joint does, not all."""
 
@@ -218,6 +220,7 @@ def test_a_listed_law_is_not_bent_to_stand_for_another(equations_for):
     assert not is_bent(listed, replace(listed, residual=0.99 * listed.residual), 0)
 
 
+@pytest.mark.long
 def test_a_formula_is_held_against_any_form(equations_for):
     """A shaft that shakes at one speed: no text says so, and splines are too coarse to show it."""
 
@@ -304,6 +307,7 @@ def _middle(text, seen):
     return {name: 0.4 * low + 0.6 * high for name, (low, high) in ends.items()}
 
 
+@pytest.mark.long
 def test_every_formula_has_the_unit_of_a_force(equations_for, perfect):
     """As a user's own would be checked, and each is read again as it is written."""
     _, equations = equations_for(perfect[2])

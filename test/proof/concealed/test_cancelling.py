@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
 from sgp_proof.concealed.cancelling import KINDS, drawn
 from sgp_proof.result_files import RESULTS
 
 
+@pytest.mark.long
 def test_dry_friction_of_a_drawn_pendulum_is_named_for_the_accuracy_of_its_forces():
     world = drawn(KINDS.index('dry friction'))
     assert world['is_right']

@@ -9,6 +9,8 @@ from sgp_proof.paper import arm
 from sgp_proof.paper.figure_eight import ARM
 from sgp_proof.paper.protocol import run_method
 
+pytestmark = pytest.mark.long
+
 SEED = 1
 
 

@@ -12,6 +12,8 @@ from sgp_ros.batch.rollout import Windows, cut_windows, joined, roll_out
 from sgp_ros.errors import ConfigError, NumericalError
 from sgp_ros.robots.registry import load_robot
 
+pytestmark = pytest.mark.long
+
 STEP = 0.01
 PENDULUM, DOUBLE = load_robot('simple_pendulum'), load_robot('double_pendulum')
 W = np.array([0.15, 3.0, 0.05, 0.1, 0.05])

@@ -16,6 +16,7 @@ EACH = 5
 """One of so many is tried; a prime, so that all kinds are."""
 
 
+@pytest.mark.long
 def test_a_crafted_model_is_refused_in_one_line_or_goes_on(tmp_path):
     model, path, used = taught(), tmp_path / 'model.npz', 0
     restored(load_robot(ROBOT), model)
