@@ -18,6 +18,7 @@ from sgp_ros.diagnosis.criteria import (
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model, floors
+from sgp_ros.diagnosis.explain.growth import crossed
 from sgp_ros.diagnosis.explain.joint_search import built_up, by_joint, uncoupled, usual
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
@@ -149,8 +150,23 @@ def _more(columns: Columns, found: Comparison) -> list[Model]:
         starts.append(built)
     if isinstance(best.frame.equations.motion.drive, Servo):
         starts += _late(columns, best.sigma)
-    models = [*stated, *loaded, *(model for start in starts for model in by_joint(columns, start))]
+    ends = [stated, loaded, *(by_joint(columns, start) for start in starts)]
+    models = _crossed(columns, [end for end in ends if end])
     return _ranked(m for m in models if len(m.effects) > 2)
+
+
+def _crossed(columns: Columns, ends: list[list[Model]]) -> list[Model]:
+    """Return the models of all searches, and the best one with laws of a joint from the others.
+
+    Its rivals of one change follow, for which it was not the end of a search.
+    """
+    models = [model for end in ends for model in end]
+    if len(ends) > 1:
+        first = [end[0] for end in ends]
+        best = max(first, key=lambda m: gain(m, first[0]))
+        better = crossed(columns, best, first)
+        models += by_joint(columns, better) if better is not best else []
+    return models
 
 
 def _as_stated(columns: Columns, best: Model, stated: Model) -> list[Model]:

@@ -82,6 +82,23 @@ def best_of(model: Model, trials: Iterable[Model], *, is_whole: bool = True) -> 
     return best if best is not None and gains[best] > 0.0 else None
 
 
+def crossed(columns: Columns, model: Model, others: Iterable[Model]) -> Model:
+    """Return a model with laws of a joint as another one has them, where that is worth more.
+
+    A search joint by joint ends at the best model near its start. Of two such models one may
+    describe one joint better, and one another joint.
+    """
+    for block in blocks_of(model):
+        kept, still = arrangement(model, block)
+        own = {s.key for s in kept[still:]}
+        found = [tuple(s for s in other.effects if block.holds(s)) for other in others]
+        unique = {frozenset(s.key for s in laws): laws for laws in found}
+        trials = [refitted(columns, model, (kept[:still], still), *laws)
+                  for keys, laws in unique.items() if keys != own]  # fmt: skip
+        model = best_of(model, trials) or model
+    return model
+
+
 def grown(columns: Columns, model: Model, block: Block) -> Model:
     """Add the effects of a block that are worth their price, as long as something is left.
 

@@ -22,7 +22,7 @@ from sgp_ros.diagnosis.explain.candidates import fit, split
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import beyond_plain, floors
 from sgp_ros.diagnosis.explain.frame import Frame
-from sgp_ros.diagnosis.explain.growth import Block, grown
+from sgp_ros.diagnosis.explain.growth import Block, crossed, grown
 from sgp_ros.diagnosis.explain.joint_search import (
     _large,
     built_up,
@@ -75,6 +75,21 @@ def test_every_joint_gets_the_laws_that_it_lacks(equations):
     assert _keys(found) == TRUTH
     assert all(gain(rival, found) <= 0.0 for rival in rivals)
     assert any(len(rival.effects) < len(found.effects) for rival in rivals)
+
+
+def test_each_joint_takes_its_laws_from_the_model_that_describes_it_best(equations):
+    """Of two models, each right at one joint; and nothing from one that is nowhere better."""
+    columns, base = _start(equations)
+
+    def model(*laws):
+        effects = tuple(EffectAt(EFFECTS[n], Place(j)) for n, j in laws)
+        return fit(columns, effects, base.sigma, is_free=True)
+
+    first = model(('spring', 0), ('viscous_friction', 0), ('spring', 1))
+    second = model(('coulomb_friction', 0), ('viscous_friction', 1))
+    right = crossed(columns, first, [first, second])
+    assert _keys(right) == TRUTH
+    assert crossed(columns, right, [first, second, right]) is right
 
 
 def test_what_is_not_worth_its_price_is_taken_out(equations):
@@ -210,6 +225,7 @@ def test_the_usual_laws_of_every_joint_are_those_that_can_be_there(equations):
     assert min(found.filtered_shares) > COUNTED_SHARE
 
 
+@pytest.mark.long
 def test_friction_that_builds_up_at_every_joint_is_found_at_once(tmp_path):
     """At one joint after the other a play or a lag would first imitate it."""
     truth = {'shoulder': (2.0, 0.004), 'elbow': (1.0, 0.006)}
