@@ -126,13 +126,12 @@ def diagnose(
     creeping = creeping_friction(recordings.learned, tree)
     recordings = replace(
         recordings.changed(lambda raw: with_creeping(raw, creeping)), unstated=unstated,
-        remarks=(
-            *recordings.remarks, *open_remark(tree, unstated), *creeping_remark(creeping)
-        ),
+        remarks=(*recordings.remarks, *open_remark(tree, unstated), *creeping_remark(creeping)),
     )  # fmt: skip
     try:
         connected = with_laws(connect(recordings, tree, lambda x: progress(0.05 + 0.85 * x)))
-        said = doubted_scales(connected.findings, connected.several.decision.model.effects, tree)
+        model = connected.several.decision.model
+        said = doubted_scales(connected.findings, model.effects, model.left, tree)
         connected = replace(connected, findings=said)
         found = _diagnosed(connected, robot.name, progress, replays=has_overlays)
         if simulated is not None:

@@ -6,10 +6,13 @@ import math
 from collections.abc import Iterable
 from dataclasses import replace
 
+import numpy as np
+
 from sgp_ros.diagnosis.criteria import (
     ALIKE,
     DOUBTED,
     MOST_CERTAIN,
+    NEARLY,
     PER_EFFECT,
     PER_PARAMETER,
     PER_UNUSUAL,
@@ -23,6 +26,7 @@ from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.motion import Structure
 
 _UNDONE = 'a law of the same effort may undo it; together they may be right'
+_NEARLY = 'much of what it explains is left at this joint'
 
 
 def price_of(found: Connection) -> tuple[float, float]:
@@ -70,23 +74,34 @@ def equal_errors(found: Connection) -> tuple[Equivalent, ...]:
 
 
 def doubted_scales(
-    findings: tuple[Finding, ...], effects: Iterable[EffectAt], tree: Structure
+    findings: tuple[Finding, ...], effects: Iterable[EffectAt], left: np.ndarray, tree: Structure
 ) -> tuple[Finding, ...]:
-    """Return errors of the connection, doubted where physics takes the same effort times a number.
+    """Return errors of the connection, with scales of efforts doubted that are not all there is.
 
-    A gain is in both, and neither alone need be right.
+    Where physics takes the same effort times a number, a gain is in both, and neither alone need
+    be right. Where much of what a scale explains is left, it says only nearly what there is, such
+    as a transmission whose ratio changes with the position.
 
     Args:
         findings: errors of the connection.
         effects: that are asserted beside them.
+        left: (k,) share of the mean squared effort that is left with all of them.
         tree: nominal robot.
     """
     scaled = {
         tree.moving_names[s.place.joint] for s in effects
         if s.effect.effort_columns(s.kind) and (s.effect.is_open or s.effect is TORQUE_GAIN)
     }  # fmt: skip
+    rest = dict(zip(tree.moving_names, left, strict=True))
+
+    def doubt(f: Finding) -> str:
+        if f.effect != EFFORT_SCALE or f.joint not in rest:
+            return ''
+        explained = (float(f.parameters['scale'].value) - 1.0) ** 2
+        nearly = _NEARLY if rest[f.joint] > NEARLY * explained else ''
+        return _UNDONE if f.joint in scaled else nearly
+
     return tuple(
-        replace(f, probability=min(f.probability, DOUBTED), why=_UNDONE)
-        if f.joint in scaled and f.effect == EFFORT_SCALE else f
+        replace(f, probability=min(f.probability, DOUBTED), why=doubt(f)) if doubt(f) else f
         for f in findings
-    )  # fmt: skip
+    )

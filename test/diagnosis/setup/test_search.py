@@ -9,7 +9,7 @@ import pytest
 
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.criteria import DOUBTED
-from sgp_ros.diagnosis.result import Finding, Location
+from sgp_ros.diagnosis.result import Finding, Location, Parameter
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.errors import hypotheses
 from sgp_ros.diagnosis.setup.evidence import SUDDEN, Probe
@@ -49,10 +49,12 @@ def _found(raw, tree, *, knows_bodies=False):
 @pytest.mark.parametrize(
     ('case', 'key', 'numbers'),
     [
-        ('case_02', ('position_scale', 'elbow', ()), [1.06]),
-        ('case_03', ('clock_offset', 'all', ()), [0.03]),
+        pytest.param('case_02', ('position_scale', 'elbow', ()), [1.06], marks=pytest.mark.long),
+        pytest.param('case_03', ('clock_offset', 'all', ()), [0.03], marks=pytest.mark.long),
         ('case_04', ('base_orientation', 'base', ()), [0.0, np.pi / 2]),
-        ('case_08', ('gain_scale', 'shoulder', ()), [0.8, 1.0]),
+        pytest.param(
+            'case_08', ('gain_scale', 'shoulder', ()), [0.8, 1.0], marks=pytest.mark.long
+        ),
     ],
 )
 def test_an_error_of_the_connection_is_found_with_its_numbers(case, key, numbers):
@@ -67,7 +69,7 @@ def test_friction_is_no_error_of_the_connection(folder):
     assert not _found(*_raw(SHARED / folder))
 
 
-@pytest.mark.parametrize('presliding', [0.005, 0.02])
+@pytest.mark.parametrize('presliding', [0.005, pytest.param(0.02, marks=pytest.mark.long)])
 def test_friction_that_builds_up_is_no_late_clock(tmp_path, presliding):
     """After each reversal it lags as late efforts would."""
     effects = [f'hysteresis:joint={joint},level={level},presliding={presliding}'
@@ -88,10 +90,12 @@ def test_another_clock_is_worth_it_beside_either_kind_of_friction(clock, gain):
     assert _gain(probe, tried, none, now) == pytest.approx(gain)
 
 
+@pytest.mark.long
 def test_a_delay_of_targets_is_physics_and_not_a_clock():
     assert not _found(*_raw(CASES / 'case_09'))
 
 
+@pytest.mark.long
 def test_gains_are_found_beside_a_delay_of_the_targets():
     """The delay stays: it is physics, but every gain looks wrong as long as it is there."""
     raw, tree = _raw(CASES / 'case_08')
@@ -209,7 +213,18 @@ def test_a_number_of_which_bodies_make_up_is_that_of_a_unit(evidence, number, is
 def test_a_scale_of_an_effort_is_doubted_beside_a_gain_of_it(effect, joint, law, is_doubted):
     """Together they may be right, neither alone need be."""
     tree = SimpleNamespace(moving_names=('shoulder', 'elbow'))
-    found = Finding(joint, effect, {}, Location(), 50.0, 0.98, 1.0)
-    (said,) = doubted_scales((found,), [EffectAt(EFFECTS[law], Place(1))], tree)
+    found = Finding(joint, effect, {'scale': Parameter(0.9)}, Location(), 50.0, 0.98, 1.0)
+    (said,) = doubted_scales((found,), [EffectAt(EFFECTS[law], Place(1))], np.zeros(2), tree)
     assert said.probability == (DOUBTED if is_doubted else 0.98)
     assert bool(said.why) is is_doubted
+
+
+@pytest.mark.parametrize(('left', 'is_doubted'), [(0.003, False), (0.004, True)])
+def test_a_scale_of_an_effort_is_doubted_that_leaves_much_of_what_it_explains(left, is_doubted):
+    """A scale of 0.9 explains a hundredth of the mean square; a third of that is left, or more."""
+    tree = SimpleNamespace(moving_names=('shoulder', 'elbow'))
+    found = Finding(
+        'elbow', 'effort_scale', {'scale': Parameter(0.9)}, Location(), 50.0, 0.98, 1.0
+    )
+    (said,) = doubted_scales((found,), [], np.array([1.0, left]), tree)
+    assert said.probability == (DOUBTED if is_doubted else 0.98)
