@@ -111,6 +111,8 @@ there is [1]. Convention."""
 LACKING = 1.5
 """Greatest ratio of what a formula leaves to what a spline that follows any law does, if it is
 not chance at `SIGNIFICANT` [1]. Convention."""
+BLURRED = 0.25
+"""Speed, of the mean square one, below which dry friction may be blurred [1]. Convention."""
 LEAST_LAW = 0.7
 """Probability from which a formula that was searched for is asserted [1]. Unlisted worlds."""
 

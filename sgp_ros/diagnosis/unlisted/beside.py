@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import ADEQUATE_REST, COUNTED_SHARE
+from sgp_ros.diagnosis.criteria import ADEQUATE_REST, BLURRED, COUNTED_SHARE, REGION_ENERGY
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import is_credible
@@ -146,22 +146,36 @@ def is_slight(listed: Model, smooth: Model, joint: int) -> bool:
 
 
 def is_creep(columns: Columns, scale: Scale, listed: Model, smooth: Model, joint: int) -> bool:
-    """Return whether a smooth force of the joint's own speed in the past refines its friction.
+    """Return whether a smooth force of the joint's own speed refines its friction.
 
     Friction that creeps before it slides, is larger at rest and differs with direction follows an
-    earlier speed a little better than plain laws do, or laws that say one of these. Where they are
-    adequate, that is no law of its own.
+    earlier speed a little better than plain laws do, or laws that say one of these; friction that
+    grows within a small speed follows the speed. Where plain laws are adequate, neither is a law
+    of its own.
     """
-    law = law_of(smooth, joint)
+    law, own = law_of(smooth, joint), own_effects(listed, joint)
     variable = law.effect.variable if law and isinstance(law.effect, SmoothForce) else None
-    if variable is None or not variable.memory or (variable.kind, variable.index) != ('dq', joint):
+    if variable is None or (variable.kind, variable.index) != ('dq', joint):
         return False
-    own = own_effects(listed, joint)
+    if not variable.memory and not _is_slow(listed, smooth, joint):
+        return False
     usual = tuple(s for s in listed.effects if s not in own or _is_friction(s.effect))
     if len(usual) < len(listed.effects):
         listed = fit(columns, usual, listed.sigma, is_free=listed.is_free, w=listed.w,
                      still=len(usual))  # fmt: skip
     return bool(scale.excess(listed)[joint] < 1.0)
+
+
+def _is_slow(listed: Model, smooth: Model, joint: int) -> bool:
+    """Return whether the forces of two models at a joint differ only while it is slow."""
+    motion = listed.frame.equations.motion
+    first, second = (
+        sum((s.force(motion)[:, joint] for s in own_effects(m, joint)), np.zeros(1))
+        for m in (listed, smooth)
+    )
+    apart, speed = (first - second) ** 2, motion.velocity[:, joint] ** 2
+    slow = apart[speed < BLURRED**2 * speed.mean()].sum()
+    return bool(slow > REGION_ENERGY * apart.sum())
 
 
 def _is_friction(law: Effect) -> bool:

@@ -14,10 +14,12 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.unlisted.beside import is_bent, is_creep, is_slight
+from sgp_ros.diagnosis.unlisted.shapes import FINE, SmoothForce, Variable
 from sgp_ros.diagnosis.unlisted.tried import smooth_forces
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 from test.diagnosis.fitted_models import fitted
+from test.diagnosis.worlds import CHAINS, simulate
 
 
 @pytest.fixture(scope='module')
@@ -39,6 +41,33 @@ def test_only_laws_whose_place_a_smooth_force_takes_are_in_question(damped):
     assert not is_slight(listed, replace(without, residual=smooth.residual), 0)
     assert not is_slight(_with_rest(smooth, 2.0 * COUNTED_SHARE), smooth, 0)
     assert not is_bent(listed, smooth, 0)
+
+
+def _brake(_t, _q, v):
+    return (-0.4 * v[0] / (1.0 + (v[0] / 1.5) ** 2),)
+
+
+def _blurred(_t, _q, v):
+    return (-0.3 * np.tanh(v[0] / 0.1),)
+
+
+@pytest.mark.parametrize(
+    ('force', 'law', 'is_refined'),
+    [(_blurred, 'coulomb_friction', True), (_brake, 'viscous_friction', False)],
+)
+def test_friction_that_grows_within_a_small_speed_keeps_its_name(
+    equations_for, force, law, is_refined
+):
+    """Not a brake, which plain friction says as little at great speeds as at small ones."""
+    _, equations = equations_for(simulate(CHAINS[1], 4, 10.0, force=force))
+    columns, listed = Columns(equations), fitted(equations, law)
+    speed = Variable('dq', 0, 'joint0')
+    form = SmoothForce(0, speed, '', speed.knots(equations.motion, FINE), 'joint0')
+    candidate = EffectAt(form, Place(0), form.starts(equations.motion, Place(0))[0])
+    smooth = fit(columns, (candidate,), listed.sigma, is_free=False)
+    adequate = SimpleNamespace(excess=lambda _: np.zeros(1))
+    assert smooth.mean_square[0] < 0.5 * listed.mean_square[0]
+    assert is_creep(columns, adequate, listed, smooth, 0) is is_refined
 
 
 def test_adequate_friction_keeps_its_name_against_an_earlier_speed(damped):
