@@ -23,6 +23,7 @@ from sgp_ros.diagnosis.criteria import (
     LEAST_ODDS,
     LEAST_SHARE,
     MOST_CERTAIN,
+    PER_EFFECT,
     TEMPER,
 )
 from sgp_ros.diagnosis.decide.cross_validation import without
@@ -177,7 +178,8 @@ def probabilities(
 
     A richer law whose numbers reduce it to the asserted one is not a rival; bodies that do what an
     asserted law does, on any motion, are one. An effect is only as certain as its joint is well
-    described; one that acts on all joints, as the worst of them.
+    described; one that acts on all joints, as the worst of them. Unlikely numbers are
+    doubted.
     """
     scale, asserted = Scale.of(equations, comparison), decision.model
     if any(s.effect.has_chosen_form for s in asserted.effects):
@@ -210,12 +212,21 @@ def probabilities(
             is_own = s.effect.site in {JOINT, MOTOR} and s.place.joint >= 0
             a = adequate[s.place.joint] if is_own else min(described, default=0.0)
             by_key[s.key] = by_key.get(s.key, 0.0) + float(p * a)
+    far = {s.key for s in asserted.effects if _is_far(s)}
     return Probabilities(
-        {key: min(p, MOST_CERTAIN) for key, p in by_key.items()},
+        {key: min(p, DOUBTED if key in far else MOST_CERTAIN) for key, p in by_key.items()},
         np.clip(decision.excess / (decision.excess + 1.0), 0.05, 0.97),
         asserted,
         scale,
     )
+
+
+def _is_far(s: EffectAt) -> bool:
+    """Return whether a listed law has numbers so unlikely that another law may hide in them.
+
+    Such as a torque constant that is a quarter of what is stated.
+    """
+    return not s.effect.has_chosen_form and s.effect.surprise(s) > PER_EFFECT
 
 
 def _has_bodies_for(rival: Model, asserted: Model) -> bool:

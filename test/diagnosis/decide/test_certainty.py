@@ -33,7 +33,7 @@ from sgp_ros.diagnosis.result import Finding, Location, Parameter
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
-from test.diagnosis.fitted_models import fitted
+from test.diagnosis.fitted_models import fitted, with_coefficients
 from test.diagnosis.worlds import CHAINS, simulate
 
 
@@ -57,6 +57,22 @@ def test_what_is_improbable_is_not_asserted_beside_others(equations_for, viscous
     assert [s.key for s in kept.model.effects] == names[:1]
     assert kept.rivals[0] is pair
     assert 'a simpler model is nearly as good' in why_not(pair, kept, scale)
+
+
+@pytest.mark.parametrize(('gain', 'is_doubted'), [(0.5, False), (0.23, True)])
+def test_numbers_that_no_machine_has_are_doubted(equations_for, viscous, gain, is_doubted):
+    """A torque constant that is half of what is stated happens; less than a quarter does not."""
+    _, equations = equations_for(viscous)
+    model = with_coefficients(fitted(equations, 'torque_gain'), np.array([gain - 1.0]))
+    comparison = _comparison(equations, model)
+    scale = Scale.of(equations, comparison)
+    bodies = replace(comparison.base, residual=10.0 * comparison.base.residual)
+    comparison = replace(comparison, nominal=bodies, parameters=bodies)
+    decision = replace(decide(equations, comparison), model=model, excess=np.zeros(1), unknown=())
+    contrasts = certainty.Contrasts(equations, model)
+    chances = certainty.probabilities(equations, comparison, decision, contrasts)
+    assert scale.counts(model)
+    assert (chances.of(model, 0) <= DOUBTED) is is_doubted
 
 
 def test_a_rotor_takes_the_place_of_a_gain_that_is_worth_as_much(equations_for):
