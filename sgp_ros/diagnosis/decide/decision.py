@@ -22,6 +22,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import (
+    ADEQUATE_REST,
     COUNTED_SHARE,
     EVIDENCE,
     LEAST_SHARE,
@@ -100,7 +101,8 @@ def _size(model: Model) -> float:
 def decide(equations: Equations, comparison: Comparison) -> Decision:
     """Return the verdict on a recording.
 
-    Nothing is missing where plausible bodies leave no more than any adequate model may.
+    Nothing is missing where plausible bodies leave no more than any adequate model may: the least
+    share of physics, or a small part of what they explain, for signals have errors in proportion.
     """
     scale, base = Scale.of(equations, comparison), comparison.base
     ranked = _ranked(comparison, scale)
@@ -109,15 +111,15 @@ def decide(equations: Equations, comparison: Comparison) -> Decision:
         likely = []
     best = supported(equations, scale, likely)
     rivals = tuple(m for m in ranked if m is not best)
-    left = comparison.parameters.left
     if best is not None:
         return _judged(equations, scale, comparison, best, rivals)
-    nothing = np.where(left > LEAST_SHARE, NOTHING_EXPLAINED, 0.0)
+    left, most = comparison.parameters.left, np.maximum(LEAST_SHARE, ADEQUATE_REST * scale.nominal)
+    nothing = np.where(left > most, NOTHING_EXPLAINED, 0.0)
     if nothing.any():
         left = left * structure(equations, comparison.parameters.residual)
-    if left.max() > LEAST_SHARE:
-        worst = int(np.argmax(scale.base))
-        unknown = _ordered(np.where(left > LEAST_SHARE, scale.base, 0.0), worst)
+    if (left > most).any():
+        worst = int(np.argmax(np.where(left > most, scale.base, 0.0)))
+        unknown = _ordered(np.where(left > most, scale.base, 0.0), worst)
         return Decision('unexplained', base, rivals, nothing, worst, unknown, None, base.score)
     return calm(base, rivals, scale)
 

@@ -152,6 +152,7 @@ def test_more_than_two_effects_are_found_where_joints_lack_several(equations_for
     assert asserted == truth
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('mass', [1.0, 2.0])
 def test_a_load_is_found_beside_friction_of_all_joints(equations_for, mass):
     """More than the last link weighs: bodies that may differ would stand for it, or for a part.
@@ -296,6 +297,19 @@ def test_what_nearly_every_joint_has_may_be_small_beside_others(damped):
     assert large(('viscous_friction', much), ('armature', little))
     assert not large(('viscous_friction', much), ('quadratic_drag', little))
     assert not large(('viscous_friction', little), ('armature', little))
+
+
+@pytest.mark.parametrize(('part', 'verdict'), [(0.02, 'parameters_only'), (0.04, 'unexplained')])
+def test_bodies_may_leave_a_small_part_of_what_they_explain(damped, part, verdict):
+    """More than counts as physics where they explain little; signals err in proportion."""
+    nominal, bodies = (fitted(damped, is_free=f) for f in (False, True))
+    q = damped.motion.position[damped.filter.rows]
+    wave = np.sin(5.0 * q) / np.sin(5.0 * q).std()
+    discrepancy = np.sqrt(damped.power) * np.ones_like(wave)
+    nominal = replace(nominal, residual=discrepancy)
+    left = replace(bodies, residual=np.sqrt(part * damped.power) * wave)
+    assert left.left.max() > LEAST_SHARE
+    assert decide(damped, Comparison(nominal, left, (), ())).verdict == verdict
 
 
 def test_bodies_that_leave_next_to_nothing_leave_no_law(damped):
