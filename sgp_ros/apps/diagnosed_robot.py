@@ -43,7 +43,7 @@ SPREAD = 0.05
 """Relative prior spread of bodies and damping: the diagnosis kept or corrected them. On three
 practice recordings any from 0.01 to 0.2 gives the same scores within a tenth."""
 
-_REPLAYED_S = 60.0
+_REPLAYED_S = 30.0
 """Most of a recording that is replayed for what a node does not model [s]."""
 
 
