@@ -130,8 +130,9 @@ def diagnose(
     )  # fmt: skip
     try:
         connected = with_laws(connect(recordings, tree, lambda x: progress(0.05 + 0.85 * x)))
-        model = connected.several.decision.model
-        said = doubted_scales(connected.findings, model.effects, model.left, tree)
+        model, before = connected.several.decision.model, connected.uncorrected or connected
+        shares = before.nominal, model.left
+        said = doubted_scales(connected.findings, model.effects, shares, tree)
         connected = replace(connected, findings=said)
         found = _diagnosed(connected, robot.name, progress, replays=has_overlays)
         if simulated is not None:

@@ -74,31 +74,36 @@ def equal_errors(found: Connection) -> tuple[Equivalent, ...]:
 
 
 def doubted_scales(
-    findings: tuple[Finding, ...], effects: Iterable[EffectAt], left: np.ndarray, tree: Structure
+    findings: tuple[Finding, ...],
+    effects: Iterable[EffectAt],
+    shares: tuple[np.ndarray, np.ndarray],
+    tree: Structure,
 ) -> tuple[Finding, ...]:
     """Return errors of the connection, with scales of efforts doubted that are not all there is.
 
     Where physics takes the same effort times a number, a gain is in both, and neither alone need
-    be right. Where much of what a scale explains is left, it says only nearly what there is, such
-    as a transmission whose ratio changes with the position.
+    be right. Where much of what a scale explains is left, or of all there is, it says only nearly
+    what there is, such as a transmission whose ratio changes with the position.
 
     Args:
         findings: errors of the connection.
         effects: that are asserted beside them.
-        left: (k,) share of the mean squared effort that is left with all of them.
+        shares: (k,) of the mean squared effort, left by the nominal robot and the recording
+            as it is, and with all of them.
         tree: nominal robot.
     """
     scaled = {
         tree.moving_names[s.place.joint] for s in effects
         if s.effect.effort_columns(s.kind) and (s.effect.is_open or s.effect is TORQUE_GAIN)
     }  # fmt: skip
-    rest = dict(zip(tree.moving_names, left, strict=True))
+    rest = dict(zip(tree.moving_names, zip(*shares, strict=True), strict=True))
 
     def doubt(f: Finding) -> str:
         if f.effect != EFFORT_SCALE or f.joint not in rest:
             return ''
         explained = (float(f.parameters['scale'].value) - 1.0) ** 2
-        nearly = _NEARLY if rest[f.joint] > NEARLY * explained else ''
+        before, after = rest[f.joint]
+        nearly = _NEARLY if after > NEARLY * min(explained, before) else ''
         return _UNDONE if f.joint in scaled else nearly
 
     return tuple(

@@ -201,6 +201,10 @@ def test_a_number_of_which_bodies_make_up_is_that_of_a_unit(evidence, number, is
     assert found.numbers[0] == pytest.approx(number, rel=1e-4)
 
 
+def _shares(left, nominal=1.0):
+    return np.array([1.0, nominal]), np.array([0.0, left])
+
+
 @pytest.mark.parametrize(
     ('effect', 'joint', 'law', 'is_doubted'),
     [
@@ -214,17 +218,22 @@ def test_a_scale_of_an_effort_is_doubted_beside_a_gain_of_it(effect, joint, law,
     """Together they may be right, neither alone need be."""
     tree = SimpleNamespace(moving_names=('shoulder', 'elbow'))
     found = Finding(joint, effect, {'scale': Parameter(0.9)}, Location(), 50.0, 0.98, 1.0)
-    (said,) = doubted_scales((found,), [EffectAt(EFFECTS[law], Place(1))], np.zeros(2), tree)
+    (said,) = doubted_scales((found,), [EffectAt(EFFECTS[law], Place(1))], _shares(0.0), tree)
     assert said.probability == (DOUBTED if is_doubted else 0.98)
     assert bool(said.why) is is_doubted
 
 
-@pytest.mark.parametrize(('left', 'is_doubted'), [(0.003, False), (0.004, True)])
-def test_a_scale_of_an_effort_is_doubted_that_leaves_much_of_what_it_explains(left, is_doubted):
-    """A scale of 0.9 explains a hundredth of the mean square; a third of that is left, or more."""
+@pytest.mark.parametrize(
+    ('left', 'nominal', 'is_doubted'),
+    [(0.003, 1.0, False), (0.004, 1.0, True), (0.003, 0.008, True), (0.002, 0.008, False)],
+)
+def test_a_scale_of_an_effort_is_doubted_that_leaves_much_of_what_it_explains(
+    left, nominal, is_doubted
+):
+    """Of the hundredth of the mean square that a scale of 0.9 explains, or of all there is."""
     tree = SimpleNamespace(moving_names=('shoulder', 'elbow'))
     found = Finding(
         'elbow', 'effort_scale', {'scale': Parameter(0.9)}, Location(), 50.0, 0.98, 1.0
     )
-    (said,) = doubted_scales((found,), [], np.array([1.0, left]), tree)
+    (said,) = doubted_scales((found,), [], _shares(left, nominal), tree)
     assert said.probability == (DOUBTED if is_doubted else 0.98)
