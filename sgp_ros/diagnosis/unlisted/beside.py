@@ -146,18 +146,18 @@ def is_slight(listed: Model, smooth: Model, joint: int) -> bool:
 
 
 def is_creep(columns: Columns, scale: Scale, listed: Model, smooth: Model, joint: int) -> bool:
-    """Return whether a smooth force of the joint's own speed refines its friction.
+    """Return whether a smooth force refines the friction of a joint.
 
     Friction that creeps before it slides, is larger at rest and differs with direction follows an
     earlier speed a little better than plain laws do, or laws that say one of these; friction that
-    grows within a small speed follows the speed. Where plain laws are adequate, neither is a law
-    of its own.
+    grows within a small speed differs from them only there. Where plain laws are adequate, neither
+    is a law of its own.
     """
     law, own = law_of(smooth, joint), own_effects(listed, joint)
     variable = law.effect.variable if law and isinstance(law.effect, SmoothForce) else None
-    if variable is None or (variable.kind, variable.index) != ('dq', joint):
-        return False
-    if not variable.memory and not _is_slow(listed, smooth, joint):
+    is_own = variable is not None and (variable.kind, variable.index) == ('dq', joint)
+    is_past = variable is not None and is_own and bool(variable.memory)
+    if not is_past and not _is_slow(listed, smooth, joint):
         return False
     usual = tuple(s for s in listed.effects if s not in own or _is_friction(s.effect))
     if len(usual) < len(listed.effects):
