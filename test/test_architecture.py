@@ -92,7 +92,8 @@ PROOF_ROOMS = {
 SUB_ROOMS = {
     'diagnosis': (
         'criteria', 'shown', 'result', 'compare', 'setup', 'explain', 'locate', 'decide',
-        'unlisted', 'findings', 'prove', 'mapping', 'gathered', 'connected', 'reference',
+        'unlisted', 'findings', 'prove', 'mapping', 'gathered', 'connected', 'disturbed',
+        'reference',
         'pipeline',
     ),
     'robots': (

@@ -85,6 +85,12 @@ MOST_OPPOSED = 5.0
 
 Or to that of all there is to explain, where this is more.
 """
+DISTURBED = 25.0
+"""Mean square, of what usual laws leave at other times, from which something else acts [1].
+Convention. It is five deviations, over a hundredth of the recording.
+"""
+MOST_DISTURBED = 0.2
+"""Greatest share of a recording that is left out because something else acts [1]. Convention."""
 BENT_BODIES = 1.0
 """Strain of bodies from which physics is looked for beside those of the robot file [nats].
 Convention.

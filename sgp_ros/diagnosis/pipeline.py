@@ -9,17 +9,13 @@ from itertools import chain
 import numpy as np
 
 from sgp_ros.batch.acceptance import USUAL
-from sgp_ros.diagnosis.compare.creeping import (
-    creeping_friction,
-    creeping_remark,
-    with_creeping,
-)
+from sgp_ros.diagnosis.compare.creeping import creeping_friction, creeping_remark, with_creeping
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies, open_remark, with_open_bodies
 from sgp_ros.diagnosis.compare.sufficiency import require_signed
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.diagnosis.compare.velocity_sensor import sensor_lags
-from sgp_ros.diagnosis.connected import Connected, compared, connect, with_laws
+from sgp_ros.diagnosis.connected import Connected, compared, with_laws
 from sgp_ros.diagnosis.decide.certainty import (
     Probabilities,
     certainty_of,
@@ -30,6 +26,7 @@ from sgp_ros.diagnosis.decide.certainty import (
 from sgp_ros.diagnosis.decide.differences import Several, without_laws_of
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, equivalents
 from sgp_ros.diagnosis.decide.visibility import visibility
+from sgp_ros.diagnosis.disturbed import undisturbed
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.findings import (
@@ -129,7 +126,7 @@ def diagnose(
         remarks=(*recordings.remarks, *open_remark(tree, unstated), *creeping_remark(creeping)),
     )  # fmt: skip
     try:
-        connected = with_laws(connect(recordings, tree, lambda x: progress(0.05 + 0.85 * x)))
+        connected = with_laws(undisturbed(recordings, tree, lambda x: progress(0.05 + 0.85 * x)))
         model, before = connected.several.decision.model, connected.uncorrected or connected
         shares = before.nominal, model.left
         said = doubted_scales(connected.findings, model.effects, shares, tree)

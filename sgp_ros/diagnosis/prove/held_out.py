@@ -82,7 +82,12 @@ def split(raw: RawTrajectory) -> tuple[RawTrajectory, RawTrajectory]:
     if not blocks:
         raise ValueError(f'{n * raw.step:g} s are too short to hold out a block')
     place = np.arange(n) * blocks / n  # (n,) in parts
-    is_held = place % 1.0 >= 1.0 - SHARE
+    return divided(raw, place % 1.0 >= 1.0 - SHARE)
+
+
+def divided(raw: RawTrajectory, is_held: np.ndarray) -> tuple[RawTrajectory, RawTrajectory]:
+    """Return the rows of a trajectory that are not held out (n,), and those that are."""
+    n = len(raw.time)
     segment = np.zeros(n, dtype=int)
     for i, s in enumerate(raw.segments):
         segment[s] = i

@@ -1,0 +1,56 @@
+"""Stretches of time in which something else acts on the robot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.disturbed import disturbance
+from sgp_ros.diagnosis.pipeline import diagnose
+from test.diagnosis.worlds import CHAINS, events_of, simulate
+
+
+def _pushed(start, end):
+    """A hand that pushes between two times, beside dry and viscous friction."""
+    return lambda t, q, v: (
+        -0.3 * np.tanh(v[0] / 0.02) - 0.2 * v[0] + 3.0 * (start < t < end) * np.sin(3.0 * t),
+    )
+
+
+def _detent(_t, q, v):
+    """A strong force at one position, passed in little time."""
+    d = (q[0] - 0.3) / 0.03
+    return (-0.2 * v[0] - 5.0 * d * np.exp(-0.5 * d**2),)
+
+
+@pytest.mark.parametrize(
+    ('force', 'found'),
+    [
+        (_pushed(5.0, 5.8), [(5.0, 5.8)]),
+        (_pushed(0.0, 0.0), []),
+        (_pushed(2.0, 8.0), []),
+        (_detent, []),
+    ],
+    ids=['a push', 'friction alone', 'a push half of the time', 'a force at one place'],
+)
+def test_only_what_states_of_other_times_lack_is_a_disturbance(equations_for, force, found):
+    """Its ends are found to a hundredth of the recording and the length of the filter."""
+    _, equations = equations_for(simulate(CHAINS[1], 4, 12.0, force=force))
+    spans = disturbance(equations)
+    assert len(spans) == len(found)
+    for (a, b), (start, end) in zip(spans, found, strict=True):
+        assert start - 0.5 < a < start + 0.12
+        assert end - 0.12 < b < end + 0.5
+
+
+def test_physics_is_named_without_the_time_in_which_a_hand_pushes(robots):
+    """With that time it was unexplained."""
+    robot, tree = robots[1]
+    events = events_of(simulate(CHAINS[1], 4, 12.0, force=_pushed(5.0, 5.8)))
+    found = diagnose(events, robot, tree, {})
+    assert found.verdict == 'missing_physics'
+    numbers = {f.effect: f.parameters for f in found.findings}
+    assert numbers['coulomb_friction']['level'].value == pytest.approx(0.3, rel=0.05)
+    assert numbers['viscous_friction']['b'].value == pytest.approx(0.2, rel=0.05)
+    (said,) = (r for r in found.remarks if 'Something else acted' in r)
+    assert 'from 4.' in said
