@@ -144,6 +144,23 @@ def test_generated_pages_are_those_of_code_and_results(name):
         assert target.read_text(encoding='utf-8') == text, target.name
 
 
+def test_the_tests_that_take_long_have_passed():
+    """Each that is marked stands in the committed result of `make proofs`."""
+    path = ROOT / 'sgp_proof' / 'results' / 'long_tests.json'
+    tests = json.loads(path.read_text(encoding='utf-8'))['tests']
+    assert {test['outcome'] for test in tests} == {'passed'}
+    ran = {(test['file'], test['test'].split('[')[0]) for test in tests}
+    marked = set()
+    for file in (ROOT / 'test').rglob('test_*.py'):
+        text = file.read_text(encoding='utf-8')
+        is_whole = re.search(r'^pytestmark = pytest\.mark\.long$', text, re.MULTILINE)
+        mark = '' if is_whole else r'^@pytest\.mark\.long\n(?:[@ )].*\n)*'
+        names = re.findall(rf'{mark}^def (test_\w+)', text, re.MULTILINE)
+        marked |= {(str(file.relative_to(ROOT)), name) for name in names}
+    assert len(marked) > 30
+    assert marked <= ran
+
+
 def test_each_real_machine_has_a_page_with_every_picture_of_its_report():
     """No picture is taken that nobody sees, and none is shown of a report that lacked it."""
     path = ROOT / 'sgp_proof' / 'results' / 'real_diagnosis.json'
