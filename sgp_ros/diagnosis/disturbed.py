@@ -21,7 +21,8 @@ from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.joint_search import usual
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.gathered import Recordings
-from sgp_ros.diagnosis.prove.held_out import divided
+from sgp_ros.diagnosis.prove.held_out import part_of
+from sgp_ros.errors import RecordingError
 from sgp_ros.rigid.tree import Tree
 
 _BLOCKS = 100
@@ -45,19 +46,22 @@ def undisturbed(
     is_one = raw.recording is None and raw.approach is None
     if not is_one or not decision.unknown or connected.correction is not None:
         return connected
-    blocks = disturbance(connected.equations)
-    if not blocks:
+    spans = disturbance(connected.equations)
+    if not spans:
         return connected
     is_out = np.zeros(len(raw.time), dtype=bool)
-    for start, end in blocks:
+    for start, end in spans:
         is_out |= (raw.time >= start) & (raw.time <= end)
-    left, _ = divided(raw, is_out)
-    again = connect(replace(recordings, learned=left), tree, lambda _: None)
+    try:
+        calm = replace(recordings, learned=part_of(raw, ~is_out))
+        again = connect(calm, tree, lambda _: None)
+    except (RecordingError, ValueError):  # too little is left to decide
+        return connected
     if len(again.several.decision.unknown) >= len(decision.unknown):
         return connected
-    spans = ', '.join(f'{start:.1f} to {end:.1f} s' for start, end in blocks)
+    times = ', '.join(f'{start:.1f} to {end:.1f} s' for start, end in spans)
     said = (
-        f'Something else acted on the robot from {spans}, such as a hand or a contact: the same '
+        f'Something else acted on the robot from {times}, such as a hand or a contact: the same '
         'states come at other times without its force. This time was left out.'
     )
     return replace(again, remarks=(said, *again.remarks))

@@ -82,23 +82,25 @@ def split(raw: RawTrajectory) -> tuple[RawTrajectory, RawTrajectory]:
     if not blocks:
         raise ValueError(f'{n * raw.step:g} s are too short to hold out a block')
     place = np.arange(n) * blocks / n  # (n,) in parts
-    return divided(raw, place % 1.0 >= 1.0 - SHARE)
+    is_held = place % 1.0 >= 1.0 - SHARE
+    return part_of(raw, ~is_held), part_of(raw, is_held)
 
 
-def divided(raw: RawTrajectory, is_held: np.ndarray) -> tuple[RawTrajectory, RawTrajectory]:
-    """Return the rows of a trajectory that are not held out (n,), and those that are."""
+def part_of(raw: RawTrajectory, is_kept: np.ndarray) -> RawTrajectory:
+    """Return the stretches of some rows (n,) that are long enough, on the clock of the whole.
+
+    Raises:
+        ValueError: none is.
+    """
     n = len(raw.time)
     segment = np.zeros(n, dtype=int)
     for i, s in enumerate(raw.segments):
         segment[s] = i
-    edges = np.flatnonzero((np.diff(segment) != 0) | np.diff(is_held)) + 1
-    runs = [run for run in np.split(np.arange(n), edges) if len(run) >= SHORTEST_ROWS]
-    learned = [run for run in runs if not is_held[run[0]]]
-    return _part(raw, learned), _part(raw, [run for run in runs if is_held[run[0]]])
-
-
-def _part(raw: RawTrajectory, runs: list[np.ndarray]) -> RawTrajectory:
-    """Return some stretches of a trajectory, on the clock of the whole."""
+    edges = np.flatnonzero((np.diff(segment) != 0) | np.diff(is_kept)) + 1
+    long = [run for run in np.split(np.arange(n), edges) if len(run) >= SHORTEST_ROWS]
+    runs = [run for run in long if is_kept[run[0]]]
+    if not runs:
+        raise ValueError(f'no {SHORTEST_ROWS} rows in a row are kept')
     rows = np.concatenate(runs)
     ends = np.cumsum([len(run) for run in runs])
     segments = tuple(slice(end - len(run), end) for run, end in zip(runs, ends, strict=True))

@@ -15,6 +15,7 @@ from sgp_ros.diagnosis.prove.held_out import (
     MOST_BLOCKS,
     SHARE,
     block_count,
+    part_of,
     split,
     split_sentence,
 )
@@ -60,6 +61,17 @@ def test_every_sample_is_on_one_side_with_all_that_belongs_to_it(robots, world):
         np.testing.assert_allclose(
             part.drive.effort(0, delay=0.02), raw.drive.effort(0, delay=0.02)[at], atol=1e-6
         )
+
+
+def test_what_is_left_out_may_be_shorter_than_any_stretch_that_is_kept(robots, world):
+    raw = _seen(world, robots[1][0])
+    is_kept = np.ones(len(raw.time), dtype=bool)
+    is_kept[1000:1010] = False
+    part = part_of(raw, is_kept)
+    np.testing.assert_array_equal(part.time, raw.time[is_kept])
+    assert [s.start for s in part.segments] == [0, 1000]
+    with pytest.raises(ValueError, match='rows in a row are kept'):
+        part_of(raw, ~is_kept)
 
 
 def test_blocks_are_spread_and_the_last_one_is_the_end(robots, world):
