@@ -35,11 +35,9 @@ from sgp_ros.diagnosis.criteria import (
 from sgp_ros.diagnosis.decide.cancelling import within_accuracy
 from sgp_ros.diagnosis.decide.cross_validation import repeatable, structure, supported, without
 from sgp_ros.diagnosis.decide.scale import Scale
-from sgp_ros.diagnosis.explain.candidates import loosened
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.credibility import is_credible, is_sound
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.physics.parts import JOINT, MOTOR
 
 UNKNOWN = 'unknown'
@@ -105,7 +103,6 @@ def decide(equations: Equations, comparison: Comparison) -> Decision:
 
     Nothing is missing where plausible bodies leave no more than any adequate model may: the least
     share of physics, or a small part of what they explain, for signals have errors in proportion.
-    Where no law helps, no number of the bodies need be so unlikely that a law would be likelier.
     """
     scale, base = Scale.of(equations, comparison), comparison.base
     ranked = _ranked(comparison, scale)
@@ -121,11 +118,9 @@ def decide(equations: Equations, comparison: Comparison) -> Decision:
     if nothing.any():
         left = left * structure(equations, comparison.parameters.residual)
     if (left > most).any():
-        loose = loosened(Columns(equations), comparison.parameters)
-        if (loose.left <= most).all() and (0.5 * loose.w**2 < PER_EFFECT).all():
-            return calm(loose, rivals, scale)
-        worst = int(np.argmax(np.where(left > most, scale.base, 0.0)))
-        unknown = _ordered(np.where(left > most, scale.base, 0.0), worst)
+        open_ = np.where(left > most, scale.base, 0.0)
+        worst = int(np.argmax(open_))
+        unknown = _ordered(open_, worst)
         return Decision('unexplained', base, rivals, nothing, worst, unknown, None, base.score)
     return calm(base, rivals, scale)
 

@@ -61,17 +61,6 @@ def fit(
     return model if one == model.effects else _solved(frame, columns, one, w)
 
 
-def loosened(columns: Columns, bodies: Model) -> Model:
-    """Return a model of the bodies alone with their prior once, not once for a hundred rows.
-
-    It holds bodies against laws that these may imitate. Bodies that differ by three deviations,
-    as those of a heavy tool do, would leave much of what only they explain.
-    """
-    equations = bodies.frame.equations
-    frame = Frame.of(equations, bodies.sigma, is_free=True, weight=1.0)
-    return _solved(frame, columns, (), bodies.w)
-
-
 def _held(
     frame: Frame, slope: InertiaSlope, model: Model, w: np.ndarray, sigma: np.ndarray
 ) -> Frame:
