@@ -13,7 +13,7 @@ from sgp_ros.apps.recorded import checked, gains_of, read_events
 from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory, choose_bandwidth
 from sgp_ros.diagnosis.explain.candidates import fit
-from sgp_ros.diagnosis.explain.fitted_model import floors
+from sgp_ros.diagnosis.explain.fitted_model import first_scale
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.gathered import Knowledge
 from sgp_ros.diagnosis.prove.overlay import overlays
@@ -87,7 +87,7 @@ def _replayed(
     known = Knowledge(nominal.robot, nominal.stated, EngineConfig(), gains)
     raw = known.collected(events)
     equations = make_equations(raw, nominal.tree, choose_bandwidth(raw, nominal.tree))
-    start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
+    start = first_scale(equations)
     plain = fit(Columns(equations), (), start, is_free=False, steps=1)
     final = FinalModel(plain, plain, equations, ())
     found = overlays(final, {name: raw}, nominal.tree, (name,)).get(name)

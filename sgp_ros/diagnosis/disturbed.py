@@ -17,7 +17,7 @@ from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.connected import Connected, connect
 from sgp_ros.diagnosis.criteria import DISTURBED, MOST_DISTURBED
 from sgp_ros.diagnosis.explain.candidates import fit
-from sgp_ros.diagnosis.explain.fitted_model import floors
+from sgp_ros.diagnosis.explain.fitted_model import first_scale, floors
 from sgp_ros.diagnosis.explain.joint_search import usual
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.gathered import Recordings
@@ -92,7 +92,7 @@ def _unusual(equations: Equations) -> np.ndarray:
     Rows that leave much count for less (Huber 1964), so that the laws are those of the others.
     """
     columns = Columns(equations)
-    start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
+    start = first_scale(equations)
     model = usual(columns, fit(columns, (), start, is_free=True))
     equations = model.frame.equations
     N, k = equations.d.shape

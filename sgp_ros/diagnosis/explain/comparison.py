@@ -17,7 +17,7 @@ from sgp_ros.diagnosis.criteria import (
 )
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible
-from sgp_ros.diagnosis.explain.fitted_model import Model, floors
+from sgp_ros.diagnosis.explain.fitted_model import Model, first_scale
 from sgp_ros.diagnosis.explain.growth import crossed
 from sgp_ros.diagnosis.explain.joint_search import built_up, by_joint, uncoupled, usual
 from sgp_ros.diagnosis.explain.regression import Columns
@@ -65,7 +65,7 @@ def compare_models(equations: Equations, progress: Callable[[float], None]) -> C
     that may differ. The freedom of the second has its price in evidence.
     """
     columns = Columns(equations)
-    start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
+    start = first_scale(equations)
     bases = [fit(columns, (), start, is_free=is_free) for is_free in (False, True)]
     progress(0.05)
     effects = tuple(equations.motion.catalogue.values())
@@ -156,10 +156,7 @@ def _more(columns: Columns, found: Comparison) -> list[Model]:
 
 
 def _crossed(columns: Columns, ends: list[list[Model]]) -> list[Model]:
-    """Return the models of all searches, and the best one with laws of a joint from the others.
-
-    Its rivals of one change follow, for which it was not the end of a search.
-    """
+    """Return the models of all searches, and of one from the best with laws from the others."""
     models = [model for end in ends for model in end]
     if len(ends) > 1:
         first = [end[0] for end in ends]

@@ -188,6 +188,11 @@ def beyond_plain(s: EffectAt, force: np.ndarray, equations: Equations) -> np.nda
     return left
 
 
+def first_scale(equations: Equations) -> np.ndarray:
+    """Return the scale of the rows of each joint from which models are fitted, (k,) [N m or N]."""
+    return np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
+
+
 def floors(equations: Equations, inertia: np.ndarray | None = None) -> np.ndarray:
     """Return the least variance of a residual, (k,), of a model with this log of inertia (k,).
 

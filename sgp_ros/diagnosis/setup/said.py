@@ -107,6 +107,6 @@ def doubted_scales(
         return _UNDONE if f.joint in scaled else nearly
 
     return tuple(
-        replace(f, probability=min(f.probability, DOUBTED), why=doubt(f)) if doubt(f) else f
-        for f in findings
+        replace(f, probability=min(f.probability, DOUBTED), why=why) if why else f
+        for f, why in zip(findings, map(doubt, findings), strict=True)
     )
