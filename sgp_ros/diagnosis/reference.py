@@ -23,7 +23,7 @@ from sgp_ros.diagnosis.criteria import COUNTED_SHARE, LEAST_SHARE, MOST_CERTAIN,
 from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
-from sgp_ros.diagnosis.explain.fitted_model import Model, floors
+from sgp_ros.diagnosis.explain.fitted_model import Model, first_scale
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.findings import stated_parameters
@@ -68,8 +68,7 @@ class _Side:
         return cls(equations, scale, Columns(equations), model.effects)
 
     def fitted(self, effects: tuple[EffectAt, ...], *, is_free: bool) -> Model:
-        d = self.equations.d
-        start = np.sqrt((d**2).mean(axis=0) + floors(self.equations))
+        start = first_scale(self.equations)
         return fit(self.columns, effects, start, is_free=is_free, steps=_STEPS)
 
 
