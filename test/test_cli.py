@@ -317,6 +317,7 @@ def test_a_file_instead_of_a_command_is_told_what_to_do_with_it(tmp_path, capsys
     assert 'sgp import' in _refused(_replay(tmp_path / 'table.csv', tmp_path), capsys)
 
 
+@pytest.mark.long
 def test_files_of_somebody_else_are_not_mixed_with_results(wheel, tmp_path, capsys):
     """But by force; a folder that a command of ours wrote to is ours."""
     out = tmp_path / 'out'
@@ -512,6 +513,7 @@ def test_progress_is_silent_where_nobody_watches(capsys):
     assert capsys.readouterr().err == ''
 
 
+@pytest.mark.long
 def test_split_directories_replay_like_one_file(wheel, tmp_path):
     """A rosbag2 folder of several files is one recording."""
     folder = tmp_path / 'split'

@@ -128,6 +128,7 @@ def test_a_moving_base_is_refused(tmp_path, way):
         read_events(str(path), None, None, [])
 
 
+@pytest.mark.long
 def test_the_command_writes_json_with_the_set_up(tmp_path, capsys):
     """A pendulum whose encoder is turned by 0.2 rad cannot be told from one on a tilted base."""
     robot = _robot(tmp_path)

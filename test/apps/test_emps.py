@@ -91,6 +91,7 @@ def test_the_report_is_one_self_contained_page(replayed):
     assert 'data:image/png;base64,' in page
 
 
+@pytest.mark.long
 def test_what_was_identified_is_the_prior_of_the_next_run(replayed, tmp_path):
     """robot_identified.yaml loads as a robot; a saved model predicts without learning."""
     metrics, out = replayed

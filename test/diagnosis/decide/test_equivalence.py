@@ -86,6 +86,7 @@ def test_a_moved_motion_is_consistent(narrow, how):
     np.testing.assert_allclose(np.diff(motion.time), motion.step)
 
 
+@pytest.mark.long
 def test_a_weak_motor_may_be_heavy_bodies_that_the_prior_thinks_unlikely(tmp_path):
     """With one joint without damping `gain u = J a + G sin q`: no motion separates the two."""
     (link,) = CHAINS[1]

@@ -108,6 +108,7 @@ def test_blocks_are_never_too_short_for_roll_outs(robots, world, seconds):
             split(longer)
 
 
+@pytest.mark.long
 def test_nothing_is_learned_from_what_is_held_out(robots, world, kept):
     """Another motion there changes the proof, and no parameter, evidence or probability."""
     at = (world.time % 10.0 >= 7.5) & (world.time % 10.0 < 10.0 - 0.5 * PERIOD)

@@ -81,12 +81,18 @@ def _found(equations_for, links, **what):
         pytest.param(
             _Play(), 1, 'a*play(q[joint0], T)', {'a': -1.2, 'T': 0.5}, marks=pytest.mark.long
         ),
-        (_spring_between, 2, 'a*(q[joint0] - q[joint1])**3', {'a': -0.8}),
+        pytest.param(
+            _spring_between, 2, 'a*(q[joint0] - q[joint1])**3', {'a': -0.8},
+            marks=pytest.mark.long,
+        ),
         pytest.param(
             _hose, 2, 'a*(q[joint0] + R*q[joint1])**3', {'a': -0.8, 'R': 0.6},
             marks=pytest.mark.long,
         ),
-        (_cushion, 1, 'a*max(q[joint0] - x0, 0)*max(dq[joint0], 0)', {'a': -1.5, 'x0': 0.3}),
+        pytest.param(
+            _cushion, 1, 'a*max(q[joint0] - x0, 0)*max(dq[joint0], 0)', {'a': -1.5, 'x0': 0.3},
+            marks=pytest.mark.long,
+        ),
     ],
     ids=['log friction', 'brake and friction', 'contact', 'play', 'spring between', 'hose',
          'cushion'],

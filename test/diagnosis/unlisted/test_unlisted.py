@@ -256,6 +256,7 @@ def test_a_law_is_found_beside_friction_that_was_not_named(equations_for):
     assert found.laws[0].left[0] < 0.1 * COUNTED_SHARE
 
 
+@pytest.mark.long
 def test_a_law_in_a_narrow_region_is_found_beside_friction(equations_for):
     """A magnet that holds near one pose: too narrow for the spline that is compared first."""
     a, x0, w0 = -19.0, 0.4, 0.15

@@ -200,6 +200,7 @@ def test_the_true_structure_finds_the_true_numbers_and_predicts_what_was_held_ou
         assert left < 0.02 * nominal_error(answer, stem) + 1e-3
 
 
+@pytest.mark.long
 def test_where_the_fit_of_the_true_structure_starts_does_not_show(drawn):
     """It is a fit: started from half the true way before a bristle slides, it finds the same."""
     folder = drawn('hysteresis')
