@@ -25,7 +25,7 @@ from sgp_ros.physics.catalogue import TORQUE_GAIN
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.motion import Structure
 
-_UNDONE = 'a law of the same effort may undo it; together they may be right'
+_UNDONE = 'a law of the same joint may undo it; together they may be right'
 _NEARLY = 'much of what it explains is left at this joint'
 
 
@@ -82,8 +82,9 @@ def doubted_scales(
     """Return errors of the connection, with scales of efforts doubted that are not all there is.
 
     Where physics takes the same effort times a number, a gain is in both, and neither alone need
-    be right. Where much of what a scale explains is left, or of all there is, it says only nearly
-    what there is, such as a transmission whose ratio changes with the position.
+    be right; a formula that was found, whatever it takes, fills what a wrong scale opens. Where
+    much of what a scale explains is left, or of all there is, it says only nearly what there is,
+    such as a transmission whose ratio changes with the position.
 
     Args:
         findings: errors of the connection.
@@ -94,7 +95,7 @@ def doubted_scales(
     """
     scaled = {
         tree.moving_names[s.place.joint] for s in effects
-        if s.effect.effort_columns(s.kind) and (s.effect.is_open or s.effect is TORQUE_GAIN)
+        if s.effect.is_open or s.effect is TORQUE_GAIN
     }  # fmt: skip
     rest = dict(zip(tree.moving_names, zip(*shares, strict=True), strict=True))
 

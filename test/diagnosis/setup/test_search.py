@@ -18,6 +18,8 @@ from sgp_ros.diagnosis.setup.said import doubted_scales
 from sgp_ros.diagnosis.setup.search import _gain, _refined, search
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.formula import read_formula
+from sgp_ros.physics.law import FormulaLaw
 from sgp_ros.physics.parts import Place
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.gains import read_gains
@@ -237,3 +239,15 @@ def test_a_scale_of_an_effort_is_doubted_that_leaves_much_of_what_it_explains(
     )
     (said,) = doubted_scales((found,), [], _shares(left, nominal), tree)
     assert said.probability == (DOUBTED if is_doubted else 0.98)
+
+
+@pytest.mark.parametrize('is_open', [True, False])
+def test_a_scale_of_an_effort_is_doubted_beside_a_formula_that_was_found(is_open):
+    """A law of the position fills what a wrong scale opens; one that is stated is known."""
+    tree = SimpleNamespace(moving_names=('shoulder', 'elbow'))
+    found = Finding(
+        'elbow', 'effort_scale', {'scale': Parameter(0.9)}, Location(), 50.0, 0.98, 1.0
+    )
+    law = FormulaLaw(read_formula('q[elbow]**2', is_law=True), 'elbow', (), is_open=is_open)
+    (said,) = doubted_scales((found,), [EffectAt(law, Place(1))], _shares(0.0), tree)
+    assert said.probability == (DOUBTED if is_open else 0.98)
