@@ -26,6 +26,7 @@ from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.unlisted.beside import PLAIN, law_of, own_effects, says_less
 from sgp_ros.diagnosis.unlisted.search import Searched, search
+from sgp_ros.diagnosis.unlisted.tried import promises
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 
@@ -64,6 +65,8 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
     for joint in _joints(equations, comparison, decision):
         listed = found.decision.tentative or found.decision.model
         scale, is_open = Scale.of(equations, comparison), joint in decision.unknown
+        if not is_open and not promises(equations, listed, joint):
+            continue
         searched = search(equations, scale, listed, joint, is_open=is_open)
         if searched is None:
             continue

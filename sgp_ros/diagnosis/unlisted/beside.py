@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -42,6 +42,12 @@ def own_effects(model: Model, joint: int) -> tuple[EffectAt, ...]:
     return tuple(s for s in model.effects if s.place.joint == joint and s.effect.site in own)
 
 
+def acts_at(s: EffectAt, joint: int) -> bool:
+    """Return whether an effect acts at a joint, alone or among others."""
+    is_own = s.effect.site in {JOINT, MOTOR} and s.place.joint >= 0
+    return not is_own or joint in {s.place.joint, s.place.source}
+
+
 def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
     """Return a model without the listed effects that are not worth their price beside its formula.
 
@@ -57,8 +63,8 @@ def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
         joint: index.
     """
     law, trials = law_of(model, joint), []
-    elsewhere = tuple(s for s in model.effects if not _acts_at(s, joint))
-    here = tuple(s for s in model.effects if _acts_at(s, joint))
+    elsewhere = tuple(s for s in model.effects if not acts_at(s, joint))
+    here = tuple(s for s in model.effects if acts_at(s, joint))
     for out in (*elsewhere, *here):
         far, near = (tuple(s for s in x if s is not out) for x in (elsewhere, here))
         still = len(far) if out in here else len(far) + len(near)
@@ -73,12 +79,6 @@ def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
     if scale.worth(best) <= scale.worth(model):
         return model
     return earned(columns, scale, best, joint)
-
-
-def _acts_at(s: EffectAt, joint: int) -> bool:
-    """Return whether an effect acts at a joint, alone or among others."""
-    is_own = s.effect.site in {JOINT, MOTOR} and s.place.joint >= 0
-    return not is_own or joint in {s.place.joint, s.place.source}
 
 
 def refined(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
@@ -191,7 +191,12 @@ def is_bent(listed: Model, smooth: Model, joint: int) -> bool:
     an adequate model may leave of the part that this law adds.
     """
     apart = float(listed.mean_square[joint] - smooth.mean_square[joint])
-    own, power = _replaced(listed, smooth, joint), listed.frame.equations.power[joint]
+    return exceeds(listed, _replaced(listed, smooth, joint), apart, joint)
+
+
+def exceeds(listed: Model, own: Sequence[EffectAt], apart: float, joint: int) -> bool:
+    """Return whether a mean square is more than may be left of a law with a shape of its own."""
+    power = listed.frame.equations.power[joint]
     added = [
         share for s, share in zip(listed.effects, listed.filtered_shares, strict=True)
         if s in own and len(s.shape) and not s.effect.is_usual

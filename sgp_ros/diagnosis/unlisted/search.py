@@ -25,6 +25,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import distinct, screen
 from sgp_ros.diagnosis.locate.remainder import parts_of
 from sgp_ros.diagnosis.unlisted.beside import (
+    acts_at,
     beside,
     earned,
     is_bent,
@@ -271,10 +272,12 @@ class _Look:
     def _fitted(
         self, base: Model, effects: list[SmoothForce] | list[FoundLaw], count: int | None
     ) -> Iterator[Model]:
-        """Yield the best of some effects beside a model, fitted."""
+        """Yield the best of some effects beside a model, fitted; shapes elsewhere are kept."""
+        far = tuple(s for s in base.effects if not acts_at(s, self.joint))
+        near = tuple(s for s in base.effects if acts_at(s, self.joint))
         for trial in distinct(screen(self.columns, base, effects, (self.joint,)), count):
-            model = fit(self.columns, (*base.effects, trial), base.sigma, is_free=base.is_free,
-                        w=base.w, rounds=2, steps=10)  # fmt: skip
+            model = fit(self.columns, (*far, *near, trial), base.sigma, is_free=base.is_free,
+                        w=base.w, rounds=2, steps=10, still=len(far))  # fmt: skip
             if model.is_possible() and np.isfinite(model.score):
                 yield model
 

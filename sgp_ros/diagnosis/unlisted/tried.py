@@ -1,4 +1,4 @@
-"""Smooth forces that are tried at a joint, and those that are tried where these leave much."""
+"""Smooth forces that are tried at a joint, if they promise much, and where these leave much."""
 
 from __future__ import annotations
 
@@ -7,6 +7,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.criteria import NEARLY
+from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.diagnosis.explain.screening import screen
+from sgp_ros.diagnosis.unlisted.beside import exceeds, own_effects
 from sgp_ros.diagnosis.unlisted.shapes import (
     GATES,
     LEAST_PLAY,
@@ -18,6 +24,8 @@ from sgp_ros.diagnosis.unlisted.shapes import (
 )
 from sgp_ros.robots.observed_motion import ObservedMotion
 
+SPARED = 2.0
+"""Times what a force beside all effects explains: the most that one in their place may [1]."""
 _WEIGHTS = np.geomspace(0.17, 6.0, 9)
 """Of another joint in a sum, relative to what makes both parts equally large."""
 
@@ -41,6 +49,27 @@ def smooth_forces(motion: ObservedMotion, joint: int) -> Iterator[SmoothForce]:
             yield SmoothForce(joint, variable, gate, knots, names[joint])
     for variable in (*_of_two(motion, joint), *_remembering(motion, joint)):
         yield SmoothForce(joint, variable, '', variable.knots(motion, PIECES), names[joint])
+
+
+def promises(equations: Equations, listed: Model, joint: int) -> bool:
+    """Return whether a smooth force beside the listed effects of a joint leaves much less.
+
+    A force in their place seldom explains more than one beside all of them; where even `SPARED`
+    times what the best one explains would not decide, no fit is needed to know that none will.
+
+    Args:
+        equations: of the recording.
+        listed: best model of listed effects, which is adequate.
+        joint: index.
+    """
+    rows, columns = len(equations.d), Columns(equations)
+    gains = [
+        gain + 0.5 * (len(s.effect.coefficient_quantities(s.kind)) + len(s.shape)) * np.log(rows)
+        for gain, s in screen(columns, listed, smooth_forces(equations.motion, joint), (joint,))
+    ]
+    left = np.exp(-2.0 * SPARED * max(gains, default=0.0) / rows)
+    apart = float((1.0 - left) * listed.mean_square[joint])
+    return bool(left <= NEARLY) or exceeds(listed, own_effects(listed, joint), apart, joint)
 
 
 def more_forces(motion: ObservedMotion, joint: int) -> Iterator[SmoothForce]:
