@@ -46,8 +46,9 @@ def torque_regressor(
 
 
 def inverse_dynamics(
-    tree: Tree, parameters: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray
-) -> np.ndarray:
+    tree: Tree, parameters: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray,
+    gravity: np.ndarray | None = None,
+) -> np.ndarray:  # fmt: skip
     """Return the torques that a motion takes, (n, k) [N m or N]. O(b) per sample.
 
     Args:
@@ -56,10 +57,12 @@ def inverse_dynamics(
         q: positions, (n, k) [rad or m].
         v: velocities, (n, k) [rad/s or m/s].
         a: accelerations, (n, k) [rad/s^2 or m/s^2].
+        gravity: (3,) in the axes of the root [m/s^2]; None for that of the tree.
     """
     full = full_motion(tree, q, v, a)
     tau = np.zeros((len(full[0]), geometry(tree).size))
-    fill_torque(geometry(tree), tree.gravity.copy(), *full, _table(tree, parameters), tau)
+    pull = tree.gravity if gravity is None else gravity
+    fill_torque(geometry(tree), pull.copy(), *full, _table(tree, parameters), tau)
     return tau
 
 

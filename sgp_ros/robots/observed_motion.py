@@ -165,12 +165,7 @@ class ObservedMotion:
     @cached_property
     def gravity_columns(self) -> np.ndarray:
         """Efforts that hold the robot against a unit of gravity along each root axis (n, k, 3)."""
-        still = np.zeros_like(self.position)
-        fields = (replace(self.tree, gravity=axis) for axis in np.eye(3))
-        return np.stack(
-            [inverse_dynamics(t, t.parameters, self.position, still, still) for t in fields],
-            axis=2,
-        )
+        return self._held(self.tree.parameters)
 
     @cached_property
     def tool_columns(self) -> np.ndarray:
@@ -182,10 +177,13 @@ class ObservedMotion:
         mass = np.zeros_like(self.tree.parameters)
         mass[frame.body, 0] = 1.0
         mass[frame.body, 1:4] = frame.translation
-        still = np.zeros((n, k))
-        fields = (replace(self.tree, gravity=axis) for axis in np.eye(3))
+        return -self._held(mass)
+
+    def _held(self, parameters: np.ndarray) -> np.ndarray:
+        q, still = self.position, np.zeros_like(self.position)
         return np.stack(
-            [-inverse_dynamics(t, mass, self.position, still, still) for t in fields], axis=2
+            [inverse_dynamics(self.tree, parameters, q, still, still, axis) for axis in np.eye(3)],
+            axis=2,
         )
 
     @cached_property

@@ -8,7 +8,7 @@ is handed in with the efforts: it belongs to a trajectory, not to a state.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,7 @@ from sgp_ros.physics.elasticity import JointElasticity
 from sgp_ros.physics.memory import Hysteresis, bristle, deflected
 from sgp_ros.rigid.rigid_body import mass_and_bias
 from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.effect_terms import changed_tree
 from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -41,8 +42,10 @@ class DiagnosedDynamics:
     where each friction that creeps was last, with its deflection there (2 each).
 
     Attributes:
-        model: effects without memory.
-        tree: with the bodies of the model.
+        model: effects without memory, but for those in `rigid` and `rotors`.
+        tree: with the bodies of the model, as effects see it.
+        rigid: the same with the payload and the gravity of the model.
+        rotors: (k,) inertias that are added [kg m^2 or kg].
         step: of the recording [s].
         remainders: processes beside the model.
         stated: effects without memory that the nominal robot has, beside those of its tree.
@@ -51,6 +54,8 @@ class DiagnosedDynamics:
 
     model: Model
     tree: Tree
+    rigid: Tree
+    rotors: np.ndarray
     step: float
     remainders: tuple[Remainder, ...] = ()
     stated: tuple[EffectAt, ...] = ()
@@ -70,7 +75,8 @@ class DiagnosedDynamics:
         """
         m, k = q.shape
         still = np.zeros((m, k))
-        M, bias = mass_and_bias(self.tree, self.tree.parameters, q, v)
+        M, bias = mass_and_bias(self.rigid, self.rigid.parameters, q, v)
+        M[:, range(k), range(k)] += self.rotors
         others, stated = self._beside_acceleration
         here = self._motion(q, v, still, loads, stated)
         drive = loads[:, k : 2 * k] + here.effort - (bias + self.tree.damping[:k] * v)
@@ -203,8 +209,8 @@ class ServoedDynamics(DiagnosedDynamics):
     def of(cls, dynamics: DiagnosedDynamics, gains: Gains) -> ServoedDynamics:
         """Return dynamics with drives."""
         return cls(
-            dynamics.model, dynamics.tree, dynamics.step, dynamics.remainders, dynamics.stated,
-            dynamics.bristles, gains.kp, gains.kd,
+            **{f.name: getattr(dynamics, f.name) for f in fields(DiagnosedDynamics)},
+            kp=gains.kp, kd=gains.kd,
         )  # fmt: skip
 
     def equations(
@@ -233,8 +239,13 @@ def dynamics_of(
     """Return the dynamics of a model fitted on `equations` for the recording of a motion."""
     tree = equations.with_bodies(motion, model.w).tree
     bristles = tuple(s for s in (*model.effects, *motion.known) if _creeps(s.effect))
-    local, stated = _part(model, _is_local), _chosen(motion.stated, _is_local)
-    return DiagnosedDynamics(local, tree, motion.step, remainders, stated, bristles)
+    rotors, inertial = np.zeros(tree.size), (*model.effects, *motion.known)
+    for s in (s for s in inertial if s.effect.is_inertial):
+        rotors[s.place.joint] += s.coefficients[0]
+    return DiagnosedDynamics(
+        _part(model, _is_local), tree, changed_tree(tree, model.effects), rotors, motion.step,
+        remainders, _chosen(motion.stated, _is_local), bristles,
+    )  # fmt: skip
 
 
 def remembered_force(model: Model, motion: ObservedMotion, tree: Tree) -> np.ndarray:
@@ -258,7 +269,8 @@ def _creeps(effect: Effect) -> bool:
 
 
 def _is_local(effect: Effect) -> bool:
-    return not effect.has_memory
+    is_rigid = effect.is_on_tree or effect.is_inertial
+    return not (effect.has_memory or is_rigid)
 
 
 def _sees_acceleration(effect: Effect) -> bool:

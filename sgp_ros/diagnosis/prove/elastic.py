@@ -7,7 +7,7 @@ of the links, then those of such motors; what is shown is that of the encoder.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -41,8 +41,8 @@ class ElasticDynamics(DiagnosedDynamics):
         none = np.zeros(dynamics.tree.size)
         kp, kd = (none, none) if gains is None else (gains.kp, gains.kd)
         return cls(
-            dynamics.model, dynamics.tree, dynamics.step, dynamics.remainders, dynamics.stated,
-            dynamics.bristles, springs, kp, kd,
+            **{f.name: getattr(dynamics, f.name) for f in fields(DiagnosedDynamics)},
+            springs=springs, kp=kp, kd=kd,
         )  # fmt: skip
 
     def started(self, motion: ObservedMotion, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

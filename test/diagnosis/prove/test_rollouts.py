@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.explain.candidates import fit
-from sgp_ros.diagnosis.explain.fitted_model import floors
+from sgp_ros.diagnosis.explain.fitted_model import floors, imbalance
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.prove import rollouts
 from sgp_ros.diagnosis.prove.dynamics import dynamics_of
@@ -66,6 +66,27 @@ def hysteretic():
             z = sign + (z - sign) * math.exp(-abs(v) * h / PRESLIDING)
     at, speed, rise = (np.array(x)[:, None] for x in zip(*kept, strict=True))
     return World(PERIOD * np.arange(len(kept)), at, speed, rise, np.array(commands))
+
+
+@pytest.mark.parametrize(
+    ('name', 'shape', 'coefficient'),
+    [
+        ('payload', (0.4, 0.1, 0.05, -0.2), 1.0), ('gravity_tilt', (0.1, -0.2), 1.0),
+        ('armature', (), 0.3), ('constant_load', (), 0.5),
+    ],
+)  # fmt: skip
+def test_the_dynamics_are_the_equations_of_the_model(
+    equations_for, perfect, name, shape, coefficient
+):
+    """`M a` less the drive is what the motion takes beyond efforts and effects."""
+    _, equations = equations_for(perfect[2])
+    candidate = _candidate(name, -1 if name == 'gravity_tilt' else 1, *shape)
+    model = with_coefficients(_model(equations, candidate), np.array([coefficient]))
+    motion = equations.motion
+    dynamics = dynamics_of(model, equations, motion)
+    M, drive = dynamics.equations(motion.position, motion.velocity, _loads(motion))
+    left = np.einsum('nij,nj->ni', M, motion.acceleration) - drive
+    np.testing.assert_allclose(left, imbalance(model, equations, motion), atol=1e-9)
 
 
 @pytest.mark.parametrize('k', [1, 2])
