@@ -25,6 +25,7 @@ from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import COMMAND_DELAY
 from sgp_ros.physics.drive import Servo
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 FIRST, SECOND, PARENTS = 12, 5, 6
 """Screened candidates that are fitted alone, as a second effect; effects that get a second."""
@@ -152,7 +153,27 @@ def _more(columns: Columns, found: Comparison) -> list[Model]:
         starts += _late(columns, best.sigma)
     ends = [stated, loaded, *(by_joint(columns, start) for start in starts)]
     models = _crossed(columns, [end for end in ends if end])
+    models += _carrying(columns, max(models, key=lambda m: gain(m, best), default=best))
     return _ranked(m for m in models if len(m.effects) > 2)
+
+
+def _carrying(columns: Columns, best: Model) -> list[Model]:
+    """Return models with a load in place of the changed bodies of the best one."""
+    motion = columns.equations(frozenset()).motion
+    if not best.is_free:
+        return []
+    return [
+        fit(columns, (*best.effects, load), best.sigma, is_free=False) for load in _loads(motion)
+    ]
+
+
+def _loads(motion: ObservedMotion) -> list[EffectAt]:
+    return [
+        EffectAt(law, place, shape)
+        for law in motion.catalogue.values() if law.is_body
+        for place in law.places(motion)
+        for shape in law.starts(motion, place)
+    ]  # fmt: skip
 
 
 def _crossed(columns: Columns, ends: list[list[Model]]) -> list[Model]:
@@ -191,12 +212,7 @@ def _loaded(columns: Columns, everyday: Model) -> list[Model]:
     """
     motion = columns.equations(frozenset()).motion
     base = fit(columns, (), everyday.sigma, is_free=False)
-    starts = [
-        usual(columns, base, (EffectAt(law, place, shape),))
-        for law in motion.catalogue.values() if law.is_body
-        for place in law.places(motion)
-        for shape in law.starts(motion, place)
-    ]  # fmt: skip
+    starts = [usual(columns, base, (load,)) for load in _loads(motion)]
     best = max(starts, key=lambda m: m.score, default=everyday)
     found = by_joint(columns, best) if gain(best, everyday) > PER_EFFECT else []
     return [m for m in found if any(s.effect.is_body for s in m.effects)]
