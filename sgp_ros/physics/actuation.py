@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from sgp_ros.physics.effect import EMPTY, Effect, Numbers
 from sgp_ros.physics.motion import Commands, SeenMotion
 from sgp_ros.physics.parts import MOTOR, PLACES, Place, Placed, Quantity, Value, relative_scales
 
+Characteristic = Callable[[np.ndarray], np.ndarray]
 _MECHATRONICS = 'Isermann 2005, Mechatronic Systems'
 _ALL = PLACES['all']
 CONNECTED = 0.05
@@ -41,13 +43,21 @@ def _instead(motion: SeenMotion, joint: int, effort: np.ndarray) -> np.ndarray:
     return effort - motion.effort[:, joint]
 
 
-class _Drive(Effect):
+class Drive(Effect):
     """A drive whose shape says all."""
 
     source = _MECHATRONICS
     site = MOTOR
     is_of_command = True
     has_memory = True
+
+    def characteristic(self, shape: np.ndarray) -> Characteristic | None:
+        """Return what it gives of a command of the same time; None for the command."""
+        return None
+
+    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        given = _commands(motion).effort(place.joint, characteristic=self.characteristic(shape))
+        return _instead(motion, place.joint, given)[:, None]
 
 
 class TorqueGain(Effect):
@@ -64,6 +74,7 @@ class TorqueGain(Effect):
         'armature',
     )  # where no gravity acts: a motor of half the torque, or twice the inertia
     site = MOTOR
+    stage = 6
     drawn_over = 'effort'
 
     def model(self, numbers: Numbers, kind: str = '') -> tuple[np.ndarray, np.ndarray]:
@@ -90,7 +101,7 @@ class TorqueGain(Effect):
         return Drawn(0.25, lambda s: {'gain': 1.0 + x.sign * s}, 0.6)
 
 
-class DeadZone(_Drive):
+class DeadZone(Drive):
     """A motor that does not answer to small commands."""
 
     name = 'dead_zone'
@@ -98,14 +109,12 @@ class DeadZone(_Drive):
     formula = 'motor torque = u - clip(u, -width, width)'
     appearance = 'small commands have no effect; large ones lose a constant amount'
     quantities = (Quantity('width', 'N m', low=0.0, is_positive=True),)
+    stage = 2
     drawn_over = 'effort'
 
-    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+    def characteristic(self, shape: np.ndarray) -> Characteristic | None:
         w = abs(shape[0])
-        given = _commands(motion).effort(
-            place.joint, characteristic=lambda u: u - np.clip(u, -w, w)
-        )
-        return _instead(motion, place.joint, given)[:, None]
+        return lambda u: u - np.clip(u, -w, w)
 
     def effort_columns(self, kind: str) -> tuple[int, ...]:
         return (0,)
@@ -122,7 +131,7 @@ class DeadZone(_Drive):
         return Drawn(0.3 * x.force, lambda s: {'width': s})
 
 
-class Saturation(_Drive):
+class Saturation(Drive):
     """A motor that gives no more than a limit."""
 
     name = 'saturation'
@@ -130,14 +139,12 @@ class Saturation(_Drive):
     formula = 'motor torque = clip(u, -limit, limit)'
     appearance = 'the largest commands have less effect than they should'
     quantities = (Quantity('limit', 'N m', low=0.0, is_positive=True),)
+    stage = 3
     drawn_over = 'effort'
 
-    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+    def characteristic(self, shape: np.ndarray) -> Characteristic | None:
         limit = abs(shape[0])
-        given = _commands(motion).effort(
-            place.joint, characteristic=lambda u: np.clip(u, -limit, limit)
-        )
-        return _instead(motion, place.joint, given)[:, None]
+        return lambda u: np.clip(u, -limit, limit)
 
     def effort_columns(self, kind: str) -> tuple[int, ...]:
         return (0,)
@@ -173,6 +180,7 @@ class MotorSpeedLimit(Effect):
         Quantity('no_load_speed', 'rad/s', low=0.0, is_positive=True),
     )  # fmt: skip
     site = MOTOR
+    stage = 5
     drawn_over = 'velocity'
     is_of_command = True
 
@@ -216,7 +224,7 @@ class MotorSpeedLimit(Effect):
         )
 
 
-class _Late(_Drive):
+class _Late(Drive):
     """A drive whose torque comes late; the shape is a time [s]."""
 
     drawn_over = 'seconds'
@@ -250,6 +258,7 @@ class ActuatorLag(_Late):
     formula = 'time_constant d tau/dt + tau = command'
     appearance = 'the torque follows fast commands late and smoothed'
     quantities = (Quantity('time_constant', 's', low=1e-4, is_positive=True, joint_number='lag'),)
+    stage = 4
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         given = _commands(motion).effort(place.joint, time_constant=max(shape[0], 0.0))
@@ -270,6 +279,7 @@ class CommandDelay(_Late):
         Quantity('delay', 's', low=0.0, is_positive=True, is_sought=True, joint_number='delay'),
     )
     takes_all = True
+    stage = 1
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         drive = _commands(motion)

@@ -65,10 +65,9 @@ class Effect:
         quantities: the parameters that are stated and reported.
         linear: names of those that are coefficients, by column; without any the coefficient is 1.
         kinds: the variants it comes in; `kind_word` is the parameter that says which.
-        has_source: whether it comes from another joint.
         plain, alike: laws it becomes without coupling, drift or way (least shape); usual ones
             that leave as little where only bodies tell them apart.
-        site: what it sits on.
+        site, has_source: what it sits on; whether it comes from another joint.
         edge: quantity that says where it begins, of an effect at one end of the range.
         needs_limits, takes_all: whether joints must have limits; whether it may act on all motors.
         size: stated number in which an effect without linear ones is linear nevertheless.
@@ -77,14 +76,14 @@ class Effect:
         drawn_over: a variable of the motion, `effort`, `time` (its size) or `seconds` (a few).
         is_force: it exerts a force; else it only changes what a sensor shows.
         is_online: a model that sees one time of the motion at once can hold it.
-        is_late: it answers to commands of the past; the stated number is a time [s].
         is_dry: it holds a joint at rest; where there are kinds, only `coulomb` does.
         is_inertial, sees_acceleration: proportional to the acceleration; dependent on it.
         uses_bodies: its columns depend on the inertial parameters of the robot.
         is_body: it changes a body; where bodies may differ, it adds nothing.
         is_on_tree: it changes gravity or bodies, see `gravity` and `added_body`.
         is_of_command: it lies before the motor's current: a measured effort is behind it.
-        has_memory: its force depends on other times too, of the motion or the commands.
+        has_memory, is_late: it depends on other times too; on commands of the past, by a time [s].
+        stage: of a drive, from 1 for the one next to the command; 0 of what is none.
         is_open: a robot may have it or not, and its numbers are not known.
         is_usual, has_chosen_form: nearly every joint with a motor has it; the data chose its form.
     """
@@ -120,6 +119,7 @@ class Effect:
     is_on_tree: bool = False
     is_of_command: bool = False
     has_memory: bool = False
+    stage: int = 0
     is_open: bool = False
     is_usual: bool = False
     has_chosen_form: bool = False

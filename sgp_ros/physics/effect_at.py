@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from sgp_ros.physics.actuation import Characteristic, Drive
 from sgp_ros.physics.effect import EMPTY, Effect, Numbers
+from sgp_ros.physics.in_series import behind
 from sgp_ros.physics.motion import SeenMotion, Structure
 from sgp_ros.physics.parts import NOWHERE, PLACES, Place, Quantity, Value
 
@@ -30,6 +32,7 @@ class EffectAt:
         joint: name of the place, as stated; empty where it was not stated.
         parameters: stated numbers (SI) and words by name; empty where they were not stated.
         std: (m,) standard deviations of the coefficients; infinite where not known.
+        before: drives that stand before it on its motor, see `in_series`.
     """
 
     effect: Effect
@@ -39,6 +42,7 @@ class EffectAt:
     joint: str = ''
     parameters: Mapping[str, Value] = field(default_factory=dict)
     std: np.ndarray = field(default_factory=lambda: EMPTY)
+    before: tuple[EffectAt, ...] = ()
 
     @classmethod
     def stated(
@@ -117,7 +121,24 @@ class EffectAt:
 
     def columns(self, motion: SeenMotion) -> np.ndarray:
         """Return the force per coefficient, (n, m) on the joint of the place or (n, k, m)."""
-        return self.effect.columns(motion, self.place, self.shape)
+        seen = behind(motion, self.place.joint, self.before)
+        return self.effect.columns(seen, self.place, self.shape)
+
+    @property
+    def form(self) -> tuple[object, ...]:
+        """What its columns depend on, beside the motion."""
+        return *self.key, self.shape.tobytes(), *(s.form for s in self.before)
+
+    @property
+    def delay(self) -> float:
+        """Time by which it delays the command of its motor [s]."""
+        return float(self.shape[0]) if self.effect.stage == 1 else 0.0
+
+    @property
+    def characteristic(self) -> Characteristic | None:
+        """What it gives of a command of the same time; None for no change, or none of its own."""
+        law = self.effect
+        return law.characteristic(self.shape) if isinstance(law, Drive) else None
 
     def force(self, motion: SeenMotion) -> np.ndarray:
         """Return what it exerts in a motion, (n, k) [N m or N]; zeros where it is not a force."""
@@ -179,3 +200,27 @@ class EffectAt:
     def with_shape(self, shape: np.ndarray) -> EffectAt:
         """Return the same with another shape."""
         return replace(self, shape=shape)
+
+
+def in_series(effects: Sequence[EffectAt], known: Sequence[EffectAt] = ()) -> tuple[EffectAt, ...]:
+    """Return effects, each drive behind those that stand before it on its motor.
+
+    Args:
+        effects: at their places.
+        known: those that the robot has beside them, which stand before others of their stage.
+    """
+    drives = [(i - len(known), s) for i, s in enumerate((*known, *effects)) if s.effect.stage]
+    found = list(effects)
+    placed: list[tuple[bool, EffectAt]] = []
+    for i, s in sorted(drives, key=lambda x: x[1].effect.stage):
+        j, stage = s.place.joint, s.effect.stage
+        before = tuple(
+            d for was_known, d in placed
+            if j >= 0 and d.place.joint in {j, PLACES['all']}
+            and (d.effect.stage < stage or (was_known and i >= 0))
+        )  # fmt: skip
+        chained = replace(s, before=before)
+        placed.append((i < 0, chained))
+        if i >= 0:
+            found[i] = chained
+    return tuple(found)

@@ -182,6 +182,9 @@ class SeenMotion(Protocol):
     def nominal_effort(self) -> np.ndarray:
         """Efforts that the nominal robot takes for this motion, (n, k) [N m or N]."""
 
+    def driven(self, effort: np.ndarray, drive: Commands) -> SeenMotion:
+        """Return the same motion of other efforts (n, k) by other commands."""
+
     def stated_number(self, name: str, joint: int) -> float:
         """Return what the nominal robot states of a number of a joint, such as its friction."""
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.effect_at import EffectAt, in_series
 from sgp_ros.physics.motion import Commands
 from sgp_ros.physics.parts import Place
 from sgp_ros.physics.term import Coefficient, Motion, Term
@@ -97,7 +97,7 @@ def effort_map(tree: Tree, effects: Sequence[EffectAt], coulomb_width: float) ->
     """
     chosen = [e for e in effects if e.effect.is_online and e.effect.effort_columns(e.kind)]
     late = [each for e in chosen if e.effect.is_late for each in _on_motors(tree, e)]
-    instant = tuple(e for e in chosen if not e.effect.is_late)
+    instant = in_series([e for e in chosen if not e.effect.is_late])
     return EffortMap(tree, instant, tuple(late), coulomb_width) if chosen else None
 
 
@@ -137,10 +137,10 @@ class EffortMap:
         """
         still = np.zeros_like(velocity)
         motion = Motion(still, velocity, still, effort)
-        acting = effort.copy()
-        for stated in self.effects:
-            if is_measured and stated.effect.is_of_command:
-                continue
+        acting, effects = effort.copy(), self.effects
+        if is_measured:
+            effects = in_series([e for e in effects if not e.effect.is_of_command])
+        for stated in effects:
             columns = list(stated.effect.effort_columns(stated.kind))
             force = _forces(self.tree, stated, motion, _smooth(self.coulomb_width))[:, :, columns]
             acting += force @ stated.coefficients[columns]
@@ -163,8 +163,12 @@ class EffortMap:
         still = np.zeros_like(now)
         added = np.zeros_like(now)
         motion = Motion(still, still, still, now)
-        for stated in self.late:
-            added += _forces(self.tree, stated, motion, np.sign, drive) @ stated.coefficients
+        instant = [e for e in self.effects if e.effect.stage]
+        late = in_series((*self.late, *instant))
+        for sign, effects in ((1.0, late), (-1.0, in_series(instant))):
+            for stated in effects:
+                force = _forces(self.tree, stated, motion, np.sign, drive) @ stated.coefficients
+                added += sign * force
         return added
 
 

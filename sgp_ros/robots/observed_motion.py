@@ -147,6 +147,10 @@ class ObservedMotion:
             force += effect.force(self)
         return force
 
+    def driven(self, effort: np.ndarray, drive: Commands) -> ObservedMotion:
+        """Return the same motion of other efforts (n, k) by other commands."""
+        return replace(self, effort=effort, drive=drive)
+
     def stated_number(self, name: str, joint: int) -> float:
         """Return what the nominal robot states of a number of a joint, see `joint_number`."""
         found = float(self.tree.damping[joint]) if name == _DAMPING else 0.0

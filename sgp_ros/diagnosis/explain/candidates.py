@@ -13,7 +13,7 @@ from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.inertia_slope import InertiaSlope
 from sgp_ros.diagnosis.explain.regression import Columns, dry_joints
 from sgp_ros.diagnosis.explain.shape_search import UNSEEN, searched
-from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.effect_at import EffectAt, in_series
 from sgp_ros.physics.elasticity import with_rotors
 
 
@@ -40,6 +40,7 @@ def fit(
         steps: of the search in the first.
         still: so many of the first candidates keep their shapes.
     """
+    candidates = in_series(candidates, columns.equations(frozenset()).motion.known)
     equations = columns.equations(dry_joints(candidates))
     frame = Frame.of(equations, sigma, is_free=is_free)
     slope = columns.inertia_slope if is_free else None

@@ -97,7 +97,7 @@ class Columns:
     def seen(self, candidate: EffectAt, equations: Equations, motion: ObservedMotion) -> Seen:
         """Return the filtered columns of the place in a motion, with their products."""
         is_inertial, joint = candidate.effect.is_inertial, candidate.place.joint
-        key = (*candidate.key, candidate.shape.tobytes(), motion)
+        key = (*candidate.form, motion)
         return self._kept(
             key, equations, joint, lambda: candidate.columns(motion), is_inertial=is_inertial
         )
@@ -120,7 +120,7 @@ class Columns:
             assert len({x.shape for x in made}) == 1
             return np.concatenate(made, axis=-1)
 
-        key = (*starts[0].key, np.stack([s.shape for s in starts]).tobytes(), motion, 'bank')
+        key = (*starts[0].form, np.stack([s.shape for s in starts]).tobytes(), motion, 'bank')
         is_inertial = effect.is_inertial and small is None
         return self._kept(
             key, equations, place.joint, columns, is_inertial=is_inertial, count=len(starts)

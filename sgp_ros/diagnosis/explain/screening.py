@@ -12,7 +12,7 @@ from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.products import Products, Rest
 from sgp_ros.diagnosis.explain.regression import Columns, Seen, dry_joints
 from sgp_ros.physics.effect import Effect
-from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.effect_at import EffectAt, in_series
 from sgp_ros.physics.parts import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -59,7 +59,8 @@ def screen(
             if dry not in rests:
                 rests[dry] = Rest.of(columns, model, dry)
             motion = columns.corrected(model.w if effect.uses_bodies else None, _NEAR)
-            trials = _trials(_Look(columns, rests[dry], before, rows), effect, place, motion)
+            look = _Look(columns, rests[dry], before, rows, (*motion.known, *model.effects))
+            trials = _trials(look, effect, place, motion)
             if place.number:
                 trials = (t for t in trials if are_apart((*model.effects, t[1]), motion))
             found += sorted(trials, key=lambda t: -t[0])[:TRIALS]
@@ -122,12 +123,14 @@ class _Look:
         rest: what the model leaves there.
         before: (k,) mean squares that it leaves.
         rows: number of all rows, which those stand for.
+        known: effects that the model and the nominal robot have.
     """
 
     columns: Columns
     rest: Rest
     before: np.ndarray
     rows: int
+    known: tuple[EffectAt, ...]
 
     def gains(self, found: Products, c: np.ndarray, size: int) -> np.ndarray:
         """Return how much better candidates with coefficients c (S, m) leave it, (S,) [nats]."""
@@ -145,7 +148,8 @@ def _trials(look: _Look, effect: Effect, place: Place, motion: ObservedMotion) -
     if bins is not None:
         yield from _intervals(look, EffectAt(effect, place), *bins)
         return
-    starts = [EffectAt(effect, place, shape) for shape in _starts(look.rest, effect, place)]
+    alike = (EffectAt(effect, place, shape) for shape in _starts(look.rest, effect, place))
+    starts = [x for s in alike for x in in_series((s,), look.known)]
     if starts:
         yield from _shaped(look, starts, motion)
 

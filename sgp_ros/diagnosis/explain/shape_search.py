@@ -22,7 +22,7 @@ from sgp_ros.diagnosis.explain.regression import (
     shape_scales,
     with_shapes,
 )
-from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.effect_at import EffectAt, in_series
 
 UNSEEN = 1e-12
 """A column that is this much smaller than the largest acts on nothing; its coefficient is zero."""
@@ -66,7 +66,7 @@ class Bench:
         self._u = frame.explained(self._target[:, :, None])
         self._wanted = frame.wanted
         self._u[:, 0] += frame.S[-1].T @ self._wanted
-        self._known: dict[tuple[object, bytes], _Part] = {}
+        self._known: dict[object, _Part] = {}
 
     def cost(self, candidates: Sequence[EffectAt]) -> float:
         """Return the squares of the scaled residual; at least what rounding makes of them."""
@@ -76,24 +76,22 @@ class Bench:
         return max(float(weights @ G @ weights), _ROUNDING * float(G[0, 0]))
 
     def slopes(
-        self, candidates: Sequence[EffectAt], moved: Sequence[tuple[int, EffectAt, float]]
+        self, candidates: Sequence[EffectAt], moved: Sequence[tuple[Sequence[EffectAt], float]]
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return products of the slopes of the residual with themselves (s, s), with it (s,).
 
         Args:
             candidates: as they are.
-            moved: for each shape the index of the candidate that has it, this one with the shape
-                moved, and how far.
+            moved: for each shape the candidates with the shape moved, and how far.
         """
-        parts, others = self._parts(candidates), self._parts([s for _, s, _ in moved])
-        G = self._products([*parts, *others])
-        places = _places([*parts, *others])
-        own, shifted = places[: len(parts)], places[len(parts) :]
-        r = _weights(G, *_split(parts, own))
+        parts = self._parts([s for some in (candidates, *(m for m, _ in moved)) for s in some])
+        unique = list(dict.fromkeys(parts))
+        G, places = self._products(unique), dict(zip(unique, _places(unique), strict=True))
+        all_ = [parts[i : i + len(candidates)] for i in range(0, len(parts), len(candidates))]
+        r, *found = (_weights(G, *_split(some, [places[p] for p in some])) for some in all_)
         J = np.empty((len(G), len(moved)))
-        for i, (which, _, h) in enumerate(moved):
-            changed = [shifted[i] if n == which else at for n, at in enumerate(own)]
-            J[:, i] = (_weights(G, *_split(parts, changed)) - r) / h
+        for i, (x, (_, h)) in enumerate(zip(found, moved, strict=True)):
+            J[:, i] = (x - r) / h
         return J.T @ G @ J, J.T @ G @ r
 
     def _parts(self, candidates: Sequence[EffectAt]) -> list[_Part]:
@@ -103,7 +101,7 @@ class Bench:
         return [self._part(s) for s in candidates]
 
     def _part(self, s: EffectAt) -> _Part:
-        key = s.key, s.shape.tobytes()
+        key = s.form
         if key not in self._known:
             frame = self._frame
             motion = self._columns.corrected(self._w if s.effect.uses_bodies else None)
@@ -207,18 +205,21 @@ def _descended(
 ) -> tuple[float, tuple[EffectAt, ...]]:
     """Return the cost and the candidates to which a search leads from their shapes."""
     fixed, free = candidates[:still], candidates[still:]
+    known = frame.equations.motion.known
+
+    def at(x: np.ndarray) -> tuple[EffectAt, ...]:
+        return in_series((*fixed, *with_shapes(free, x)), known)
+
     low, high = shape_bounds(frame.equations, free)
     x = np.clip(np.concatenate([s.shape for s in free]), low, high)
     span = np.maximum(shape_scales(frame.equations, free), 1e-12)
-    owner = np.repeat(np.arange(len(free)), [len(s.shape) for s in free])
-    candidates = *fixed, *with_shapes(free, x)
+    candidates = at(x)
     cost, damping = bench.cost(candidates), 1e-2
     for _ in range(steps):
         moved = []
-        for i, which in enumerate(owner):
+        for i in range(len(x)):
             h = _STEP if x[i] + _STEP * span[i] <= high[i] else -_STEP
-            shifted = with_shapes(free, x + h * span * (np.arange(len(x)) == i))[which]
-            moved.append((still + int(which), shifted, h))
+            moved.append((at(x + h * span * (np.arange(len(x)) == i)), h))
         H, g = bench.slopes(candidates, moved)
         improved = False
         for _ in range(6):
@@ -226,7 +227,7 @@ def _descended(
                 H + damping * (np.diag(np.diag(H)) + 1e-12 * np.eye(len(x))), g
             )
             trial = np.clip(x + np.clip(step, -_LARGEST, _LARGEST) * span, low, high)
-            tried = *fixed, *with_shapes(free, trial)
+            tried = at(trial)
             after = bench.cost(tried)
             if after < cost:
                 gain = (cost - after) / cost

@@ -16,7 +16,6 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.fitted_model import Model, extra_force
 from sgp_ros.diagnosis.locate.remainder import Remainder
-from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.elasticity import JointElasticity
 from sgp_ros.physics.memory import Hysteresis, bristle, deflected
@@ -238,7 +237,7 @@ def dynamics_of(
 ) -> DiagnosedDynamics:
     """Return the dynamics of a model fitted on `equations` for the recording of a motion."""
     tree = equations.with_bodies(motion, model.w).tree
-    bristles = tuple(s for s in (*model.effects, *motion.known) if _creeps(s.effect))
+    bristles = tuple(filter(_creeps, (*model.effects, *motion.known)))
     rotors, inertial = np.zeros(tree.size), (*model.effects, *motion.known)
     for s in (s for s in inertial if s.effect.is_inertial):
         rotors[s.place.joint] += s.coefficients[0]
@@ -250,42 +249,45 @@ def dynamics_of(
 
 def remembered_force(model: Model, motion: ObservedMotion, tree: Tree) -> np.ndarray:
     """Return the force of the effects that remember along a motion, (n, k) [N m or N]."""
-    stated = _chosen(motion.stated, _has_memory)
+    stated = _chosen(motion.known, _has_memory)
     return extra_force(_part(model, _has_memory), replace(motion, tree=tree, stated=stated))
 
 
 def remembers(model: Model, motion: ObservedMotion) -> bool:
     """Return whether some effect of a model or of the nominal robot has memory, but no state."""
-    return any(_has_memory(x.effect) for x in (*model.effects, *motion.known))
+    return any(map(_has_memory, (*model.effects, *motion.known)))
 
 
-def _has_memory(effect: Effect) -> bool:
-    has_states = isinstance(effect, JointElasticity) or _creeps(effect)
-    return effect.has_memory and not has_states
+def _has_memory(s: EffectAt) -> bool:
+    """Return whether an effect, or a drive before it, has memory, but no state."""
+    has_states = isinstance(s.effect, JointElasticity) or _creeps(s)
+    return (s.effect.has_memory or bool(s.before)) and not has_states
 
 
-def _creeps(effect: Effect) -> bool:
-    return isinstance(effect, Hysteresis)
+def _creeps(s: EffectAt) -> bool:
+    return isinstance(s.effect, Hysteresis)
 
 
-def _is_local(effect: Effect) -> bool:
-    is_rigid = effect.is_on_tree or effect.is_inertial
-    return not (effect.has_memory or is_rigid)
+def _is_local(s: EffectAt) -> bool:
+    is_rigid = s.effect.is_on_tree or s.effect.is_inertial
+    return not (s.effect.has_memory or s.before or is_rigid)
 
 
-def _sees_acceleration(effect: Effect) -> bool:
-    return effect.sees_acceleration
+def _sees_acceleration(s: EffectAt) -> bool:
+    return s.effect.sees_acceleration
 
 
-def _sees_no_acceleration(effect: Effect) -> bool:
-    return not effect.sees_acceleration
+def _sees_no_acceleration(s: EffectAt) -> bool:
+    return not s.effect.sees_acceleration
 
 
-def _chosen(stated: tuple[EffectAt, ...], is_in: Callable[[Effect], bool]) -> tuple[EffectAt, ...]:
+def _chosen(
+    stated: tuple[EffectAt, ...], is_in: Callable[[EffectAt], bool]
+) -> tuple[EffectAt, ...]:
     """Return some of the effects that the nominal robot has."""
-    return tuple(x for x in stated if is_in(x.effect) and not x.effect.is_open)
+    return tuple(x for x in stated if is_in(x) and not x.effect.is_open)
 
 
-def _part(model: Model, is_in: Callable[[Effect], bool]) -> Model:
+def _part(model: Model, is_in: Callable[[EffectAt], bool]) -> Model:
     """Return a model of some of the effects."""
-    return replace(model, effects=tuple(s for s in model.effects if is_in(s.effect)))
+    return replace(model, effects=tuple(filter(is_in, model.effects)))

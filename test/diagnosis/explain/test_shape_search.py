@@ -68,11 +68,12 @@ def test_squares_and_slopes_are_those_of_all_rows(equations, names, is_free):
     r = _residual(frame, columns, candidates)
     assert bench.cost(candidates) == pytest.approx(r @ r, rel=1e-8)
     moved = _moved(candidates)
-    J = np.zeros((len(r), len(moved)))
+    J, tried = np.zeros((len(r), len(moved))), []
     for i, (n, s, h) in enumerate(moved):
         changed = (*candidates[:n], s, *candidates[n + 1 :])
+        tried.append((changed, h))
         J[:, i] = (_residual(frame, columns, changed) - r) / h
-    H, g = bench.slopes(candidates, moved)
+    H, g = bench.slopes(candidates, tried)
     np.testing.assert_allclose(H, J.T @ J, rtol=1e-5, atol=1e-7 * (r @ r))
     np.testing.assert_allclose(g, J.T @ r, rtol=1e-5, atol=1e-7 * (r @ r))
 
