@@ -74,6 +74,8 @@ def disturbance(equations: Equations) -> tuple[tuple[float, float], ...]:
     square = _unusual(equations) ** 2
     found = np.array([len(b) and square[b].max(axis=1).mean() > DISTURBED for b in blocks])
     found = np.convolve(found, np.ones(3), 'same') > 0  # it begins and ends within a block
+    inside = np.logical_or.accumulate(~found) & np.logical_or.accumulate(~found[::-1])[::-1]
+    found &= inside  # how a recording starts and ends is no contact
     is_out = np.concatenate([np.full(len(b), x) for b, x in zip(blocks, found, strict=True)])
     if not 0.0 < is_out.mean() < MOST_DISTURBED:
         return ()

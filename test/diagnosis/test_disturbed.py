@@ -28,10 +28,17 @@ def _detent(_t, q, v):
     [
         (_pushed(5.0, 5.8), [(5.0, 5.8)]),
         (_pushed(0.0, 0.0), []),
+        (_pushed(-1.0, 0.7), []),
         (_pushed(2.0, 8.0), []),
         (_detent, []),
     ],
-    ids=['a push', 'friction alone', 'a push half of the time', 'a force at one place'],
+    ids=[
+        'a push',
+        'friction alone',
+        'at the start',
+        'a push half of the time',
+        'a force at one place',
+    ],
 )
 def test_only_what_states_of_other_times_lack_is_a_disturbance(equations_for, force, found):
     """Its ends are found to a hundredth of the recording and the length of the filter."""
