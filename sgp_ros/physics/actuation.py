@@ -52,8 +52,7 @@ class Drive(Effect):
     has_memory = True
 
     def characteristic(self, shape: np.ndarray) -> Characteristic | None:
-        """Return what it gives of a command of the same time; None for the command."""
-        return None
+        """Return what it gives of a command of the same time; None for the command itself."""
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         given = _commands(motion).effort(place.joint, characteristic=self.characteristic(shape))
@@ -70,9 +69,7 @@ class TorqueGain(Effect):
     appearance = 'the residual effort is proportional to the effort'
     quantities = (Quantity('gain', '1', is_positive=True, neutral=1.0, joint_number='gain'),)
     linear = ('gain',)
-    alike = (
-        'armature',
-    )  # where no gravity acts: a motor of half the torque, or twice the inertia
+    alike = ('armature',)  # half the torque, or twice the inertia, where no gravity acts
     site = MOTOR
     stage = 6
     drawn_over = 'effort'

@@ -34,6 +34,8 @@ MOST_SINGLES, MOST_PAIRS = 8, 3
 """Of those the best that are fitted to all rows of a long recording, for each base and parent."""
 EXCHANGES = 2
 """Times that an effect of the best pair is exchanged for another."""
+_CARRYING = 3
+"""Best models with other bodies for which a load is tried in place of these."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,17 +155,18 @@ def _more(columns: Columns, found: Comparison) -> list[Model]:
         starts += _late(columns, best.sigma)
     ends = [stated, loaded, *(by_joint(columns, start) for start in starts)]
     models = _crossed(columns, [end for end in ends if end])
-    models += _carrying(columns, max(models, key=lambda m: gain(m, best), default=best))
+    models += _carrying(columns, models)
     return _ranked(m for m in models if len(m.effects) > 2)
 
 
-def _carrying(columns: Columns, best: Model) -> list[Model]:
-    """Return models with a load in place of the changed bodies of the best one."""
-    motion = columns.equations(frozenset()).motion
-    if not best.is_free:
-        return []
+def _carrying(columns: Columns, models: list[Model]) -> list[Model]:
+    """Return the best models with other bodies, with a load in place of these."""
+    free = sorted((m for m in models if m.is_free), key=lambda m: -gain(m, models[0]))
+    loads = [(x,) for x in _loads(columns.equations(frozenset()).motion)]
     return [
-        fit(columns, (*best.effects, load), best.sigma, is_free=False) for load in _loads(motion)
+        fit(columns, (*model.effects, *load), model.sigma, is_free=False)
+        for model in free[:_CARRYING]
+        for load in ([()] if any(s.effect.is_body for s in model.effects) else loads)
     ]
 
 
