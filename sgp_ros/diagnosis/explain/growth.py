@@ -22,8 +22,8 @@ from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import JOINT, MOTOR
 
-TRIALS = 3
-"""Screened candidates that are fitted."""
+TRIALS, MOST_TRIALS = 3, 12
+"""Screened candidates that are fitted; where none is credible."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +99,18 @@ def crossed(columns: Columns, model: Model, others: Iterable[Model]) -> Model:
     return model
 
 
+def _tried(columns: Columns, model: Model, block: Block, found: list[EffectAt]) -> list[Model]:
+    """Return the models with each of the best candidates, and of the next where none is credible.
+
+    Laws that take the command away, where the bodies may vanish too, promise most and say nothing.
+    """
+    arranged, trials = arrangement(model, block), list[Model]()
+    while len(trials) < min(MOST_TRIALS, len(found)) and not any(map(is_credible, trials)):
+        some = found[len(trials) : len(trials) + TRIALS]
+        trials += [refitted(columns, model, arranged, s) for s in some]
+    return trials
+
+
 def grown(columns: Columns, model: Model, block: Block) -> Model:
     """Add the effects of a block that are worth their price, as long as something is left.
 
@@ -113,9 +125,9 @@ def grown(columns: Columns, model: Model, block: Block) -> Model:
             laws = tuple(e for e in laws if adds_to_usual(e))
         if not laws or (left < SLIGHT_REST and strain < PER_EFFECT):
             break
-        found = distinct(screen(columns, model, laws, block.joints), TRIALS)
-        arranged = arrangement(model, block)
-        trials = [refitted(columns, model, arranged, s) for s in found]
+        trials = _tried(
+            columns, model, block, distinct(screen(columns, model, laws, block.joints))
+        )
         if left < COUNTED_SHARE:
             trials = [t for t in trials if adds_to_usual(t.effects[-1].effect)
                       or strain - t.strain > PER_EFFECT]  # fmt: skip
