@@ -270,6 +270,23 @@ def test_late_drives_take_the_commands_alone(tmp_path):
         assert np.abs(found[:, joint] - found[:, joint - 1]).max() > 0.1
 
 
+def test_a_limit_acts_on_the_command_that_comes_late(tmp_path):
+    """The node's effort is that of commands that were limited and came later."""
+    rng = np.random.default_rng(3)
+    stamps = 10**9 + np.concatenate([[-(10**8)], np.sort(rng.integers(0, 10**9, size=60))])
+    values = rng.normal(size=(61, 3))
+    late, _ = _entry('command_delay', '')
+    limit, _ = _entry('saturation', '')
+    late |= {'joint': 'elbow', 'parameters': {'delay': {'value': 0.023}}}
+    limit |= {'joint': 'elbow', 'parameters': {'limit': {'value': 0.6}}}
+    (tmp_path / 'plain').mkdir()
+    plain = _robot(tmp_path / 'plain', [])
+    found = _efforts(_robot(tmp_path, [limit, late]), stamps, values)
+    expected = _efforts(plain, stamps + 23_000_000, np.clip(values, -0.6, 0.6))
+    elbow = plain.joint_names.index('elbow')
+    np.testing.assert_allclose(found[:, elbow], expected[:, elbow], atol=1e-9)
+
+
 BAD = [
     (7, 'is 7, not a list'),
     ([3], 'effects[0] is 3'),
