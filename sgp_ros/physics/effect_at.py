@@ -126,7 +126,7 @@ class EffectAt:
 
     @property
     def form(self) -> tuple[object, ...]:
-        """What its columns depend on, beside the motion."""
+        """All that its columns depend on, beside the motion."""
         return *self.key, self.shape.tobytes(), *(s.form for s in self.before)
 
     @property
@@ -136,7 +136,7 @@ class EffectAt:
 
     @property
     def characteristic(self) -> Characteristic | None:
-        """What it gives of a command of the same time; None for no change, or none of its own."""
+        """From commands to what it gives at the same time; None for no change, or none of its own."""
         law = self.effect
         return law.characteristic(self.shape) if isinstance(law, Drive) else None
 
