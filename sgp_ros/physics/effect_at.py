@@ -136,7 +136,7 @@ class EffectAt:
 
     @property
     def characteristic(self) -> Characteristic | None:
-        """From commands to what it gives at the same time; None for no change, or none of its own."""
+        """From commands to what it gives at the same time; None where it changes none."""
         law = self.effect
         return law.characteristic(self.shape) if isinstance(law, Drive) else None
 

@@ -12,7 +12,7 @@ from sgp_ros.diagnosis.explain.fitted_model import Model, floors, price_of
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.inertia_slope import InertiaSlope
 from sgp_ros.diagnosis.explain.regression import Columns, dry_joints
-from sgp_ros.diagnosis.explain.shape_search import UNSEEN, searched
+from sgp_ros.diagnosis.explain.shape_search import Bench, searched
 from sgp_ros.physics.effect_at import EffectAt, in_series
 from sgp_ros.physics.elasticity import with_rotors
 
@@ -45,21 +45,23 @@ def fit(
     frame = Frame.of(equations, sigma, is_free=is_free)
     slope = columns.inertia_slope if is_free else None
     if slope is not None:
-        free = _solved(frame, columns, candidates, w)
+        free = _solved(Bench(frame, columns, w), columns, candidates, w)
         frame = _held(frame, slope, free, np.zeros(equations.size) if w is None else w, sigma)
     model = None
     for _ in range(rounds):
-        candidates = searched(frame, columns, candidates, steps, w, still)
-        model = _solved(frame, columns, candidates, w)
+        bench = Bench(frame, columns, w)
+        candidates = searched(bench, candidates, steps, still)
+        model = _solved(bench, columns, candidates, w)
         w = model.w if is_free else None
         frame = Frame.of(equations, model.sigma, is_free=is_free)
         if slope is not None:
             frame = _held(frame, slope, model, model.w, model.sigma)
         steps = max(steps // 2, 4)
     assert model is not None
-    model = _solved(frame, columns, candidates, w)
+    bench = Bench(frame, columns, w)
+    model = _solved(bench, columns, candidates, w)
     one = with_rotors(model.effects)
-    return model if one == model.effects else _solved(frame, columns, one, w)
+    return model if one == model.effects else _solved(bench, columns, one, w)
 
 
 def _held(
@@ -88,15 +90,6 @@ def split(
     return y, A, widths
 
 
-def _least(A: np.ndarray, y: np.ndarray) -> np.ndarray:
-    if not A.shape[1]:
-        return np.zeros(0)
-    scale = np.sqrt((A * A).sum(axis=0))
-    scale[scale <= UNSEEN * scale.max()] = np.inf
-    c = np.linalg.lstsq(A / scale, y, rcond=1e-7)[0]
-    return np.asarray(c / scale)
-
-
 def added_inertia(candidates: Sequence[EffectAt], equations: Equations) -> np.ndarray:
     """Return what rotors and loads add to the mass matrix, (`POSES`, k, k) [kg m^2 or kg]."""
     still, *pushed = equations.poses
@@ -112,16 +105,15 @@ def added_inertia(candidates: Sequence[EffectAt], equations: Equations) -> np.nd
 
 
 def _solved(
-    frame: Frame, columns: Columns, candidates: tuple[EffectAt, ...], w_before: np.ndarray | None
+    bench: Bench, columns: Columns, candidates: tuple[EffectAt, ...], w_before: np.ndarray | None
 ) -> Model:
-    equations = frame.equations
-    y, A, widths = split(frame, columns, candidates, w_before)
-    c = _least(A, y)
+    frame, equations = bench.frame, bench.frame.equations
+    c = bench.coefficients(candidates)
     placed, forces, at = [], [], 0
-    for s, m in zip(candidates, widths, strict=True):
+    for s in candidates:
         x = columns.of(s, equations, w_before)
-        own = np.ones(1) if s.effect.is_given else c[at : at + m]
-        at += m
+        own = np.ones(1) if s.effect.is_given else c[at : at + x.shape[2]]
+        at += 0 if s.effect.is_given else len(own)
         placed.append(replace(s, coefficients=own))
         forces.append(x @ own)
     left = equations.d - sum(forces, np.zeros_like(equations.d))

@@ -61,7 +61,7 @@ class Bench:
     """
 
     def __init__(self, frame: Frame, columns: Columns, w: np.ndarray | None) -> None:
-        self._frame, self._columns, self._w = frame, columns, w
+        self.frame, self._columns, self._w = frame, columns, w
         self._target = frame.equations.d / frame.sigma
         self._u = frame.explained(self._target[:, :, None])
         self._wanted = frame.wanted
@@ -74,6 +74,12 @@ class Bench:
         G = self._products(parts)
         weights = _weights(G, *_split(parts, _places(parts)))
         return max(float(weights @ G @ weights), _ROUNDING * float(G[0, 0]))
+
+    def coefficients(self, candidates: Sequence[EffectAt]) -> np.ndarray:
+        """Return the coefficients of all candidates that have some, one after the other."""
+        parts = self._parts(candidates)
+        free, given = _split(parts, _places(parts))
+        return -_weights(self._products(parts), free, given)[free]
 
     def slopes(
         self, candidates: Sequence[EffectAt], moved: Sequence[tuple[Sequence[EffectAt], float]]
@@ -103,7 +109,7 @@ class Bench:
     def _part(self, s: EffectAt) -> _Part:
         key = s.form
         if key not in self._known:
-            frame = self._frame
+            frame = self.frame
             motion = self._columns.corrected(self._w if s.effect.uses_bodies else None)
             seen = self._columns.seen(s, frame.equations, motion)
             u = np.zeros((frame.R.shape[1], seen.x.shape[-1]))
@@ -115,7 +121,7 @@ class Bench:
 
     def _products(self, parts: Sequence[_Part]) -> np.ndarray:
         """Return the products of the target and all columns with one another, (1 + m, 1 + m)."""
-        frame = self._frame
+        frame = self.frame
         u = np.concatenate([self._u, *(part.u for part in parts)], axis=1)
         G = np.zeros((u.shape[1], u.shape[1]))
         places = _places(parts)
@@ -169,23 +175,16 @@ def _split(parts: Sequence[_Part], places: Sequence[np.ndarray]) -> tuple[np.nda
 
 
 def searched(
-    frame: Frame,
-    columns: Columns,
-    candidates: tuple[EffectAt, ...],
-    steps: int,
-    w: np.ndarray | None,
-    still: int,
+    bench: Bench, candidates: tuple[EffectAt, ...], steps: int, still: int
 ) -> tuple[EffectAt, ...]:
     """Return candidates with better shapes, by Levenberg-Marquardt in bounds.
 
     A law that has a second start beside its shape, see `SmallEffect`, is searched from both.
 
     Args:
-        frame: scaled equations.
-        columns: of the recording.
+        bench: of the recording.
         candidates: with the shapes to start from.
         steps: of the search.
-        w: (p,) change of the bodies to start from; None for none.
         still: so many of the first candidates keep their shapes.
     """
     if not sum(len(s.shape) for s in candidates[still:]):
@@ -195,24 +194,24 @@ def searched(
         turned = None if s.effect.small is None else s.effect.small.turned(s)
         if turned is not None:
             starts.append((*candidates[:i], s.with_shape(turned), *candidates[i + 1 :]))
-    bench = Bench(frame, columns, w)
-    found = [_descended(bench, frame, start, steps, still) for start in starts]
+    found = [_descended(bench, start, steps, still) for start in starts]
     return min(found, key=lambda x: x[0])[1]
 
 
 def _descended(
-    bench: Bench, frame: Frame, candidates: tuple[EffectAt, ...], steps: int, still: int
+    bench: Bench, candidates: tuple[EffectAt, ...], steps: int, still: int
 ) -> tuple[float, tuple[EffectAt, ...]]:
     """Return the cost and the candidates to which a search leads from their shapes."""
     fixed, free = candidates[:still], candidates[still:]
-    known = frame.equations.motion.known
+    known = bench.frame.equations.motion.known
 
     def at(x: np.ndarray) -> tuple[EffectAt, ...]:
         return in_series((*fixed, *with_shapes(free, x)), known)
 
-    low, high = shape_bounds(frame.equations, free)
+    equations = bench.frame.equations
+    low, high = shape_bounds(equations, free)
     x = np.clip(np.concatenate([s.shape for s in free]), low, high)
-    span = np.maximum(shape_scales(frame.equations, free), 1e-12)
+    span = np.maximum(shape_scales(equations, free), 1e-12)
     candidates = at(x)
     cost, damping = bench.cost(candidates), 1e-2
     for _ in range(steps):

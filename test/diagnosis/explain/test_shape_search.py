@@ -109,7 +109,7 @@ def test_a_search_without_a_residual_ends(equations, size):
     d[:, place.joint] = size * columns.local(s, equations, equations.motion)[:, 0]
     exact = replace(equations, d=d)
     frame = Frame.of(exact, np.array([0.3, 0.1]), is_free=False)
-    (found,) = searched(frame, Columns(exact), (s,), 4, None, 0)
+    (found,) = searched(Bench(frame, Columns(exact), None), (s,), 4, 0)
     np.testing.assert_allclose(found.shape, s.shape, rtol=1e-4)
     cost = Bench(frame, Columns(exact), None).cost((s,))
     assert cost == pytest.approx(1e-14 * ((d / frame.sigma) ** 2).sum())
