@@ -18,7 +18,9 @@ from sgp_ros.diagnosis.criteria import (
     SLIGHT_REST,
 )
 from sgp_ros.diagnosis.decide.cross_validation import support
+from sgp_ros.diagnosis.explain import growth
 from sgp_ros.diagnosis.explain.candidates import fit, split
+from sgp_ros.diagnosis.explain.comparison import _carrying
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import beyond_plain, floors
 from sgp_ros.diagnosis.explain.frame import Frame
@@ -32,7 +34,7 @@ from sgp_ros.diagnosis.explain.joint_search import (
     usual,
 )
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.diagnosis.explain.screening import are_apart, screen
+from sgp_ros.diagnosis.explain.screening import are_apart, distinct, screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
@@ -382,3 +384,37 @@ def test_joints_that_move_in_turn_show_no_motor_that_turns_with_both(equations):
         force = law.columns(known.motion) @ law.coefficients
         left = beyond_plain(law, force, known)
         assert ((left**2).mean() > 1e-3 * (force**2).mean()) == is_shown
+
+
+def test_the_next_candidates_are_fitted_where_none_is_credible(equations_for, dry, monkeypatch):
+    """Laws that promise most and cannot be do not end the search."""
+    _, equations = equations_for(dry)
+    columns = Columns(equations)
+    base = fit(columns, (), np.sqrt((equations.d**2).mean(axis=0)), is_free=False)
+    laws = tuple(e for e in EFFECTS.values() if e.is_force and not e.is_on_tree)
+    block = Block(laws, (0,))
+    promised = distinct(screen(columns, base, laws, (0,)))
+    first = {s.key for s in promised[: growth.TRIALS]}
+
+    def others(model):
+        return is_credible(model) and not first & model.key
+
+    monkeypatch.setattr(growth, 'is_credible', others)
+    found = grown(columns, base, block)
+    assert found.effects
+    assert not first & found.key
+
+
+def test_a_load_is_tried_in_place_of_changed_bodies(equations_for, heavy):
+    """Beside the laws of the best such models; not a second one."""
+    _, equations = equations_for(heavy[2])
+    columns, start = Columns(equations), np.sqrt((equations.d**2).mean(axis=0))
+    law = EffectAt(EFFECTS['viscous_friction'], Place(0))
+    free = fit(columns, (law,), start, is_free=True)
+    found = _carrying(columns, [free])
+    assert found
+    for model in found:
+        assert not model.is_free
+        assert [s.name for s in model.effects] == ['viscous_friction', 'payload']
+    again = _carrying(columns, [replace(found[0], frame=free.frame)])
+    assert [len(m.effects) for m in again] == [2]

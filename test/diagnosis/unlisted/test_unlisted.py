@@ -33,7 +33,7 @@ from sgp_ros.diagnosis.unlisted.shapes import (
     SmoothForce,
     Variable,
 )
-from sgp_ros.diagnosis.unlisted.tried import more_forces, smooth_forces
+from sgp_ros.diagnosis.unlisted.tried import more_forces, promises, smooth_forces
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.formula import read_formula
@@ -328,3 +328,20 @@ def test_every_formula_has_the_unit_of_a_force(equations_for, perfect):
             assert np.isfinite(columns).all()
     assert {gate for gate, _, _ in seen} == {*GATES, *MORE_GATES}
     assert ('', 'q', 0) in seen
+
+
+@pytest.mark.parametrize(
+    ('force', 'is_promised'),
+    [
+        (lambda t, q, v: (-0.4 * v[0],), False),
+        (lambda t, q, v: (-0.4 * v[0] - 0.5 * math.sin(2.0 * q[0]) ** 3,), True),
+    ],
+    ids=['viscous friction alone', 'a force of the position beside it'],
+)
+def test_a_law_is_looked_for_where_a_force_of_any_form_promises_one(
+    equations_for, force, is_promised
+):
+    """Beside what listed effects explain already."""
+    _, equations = equations_for(simulate(CHAINS[1], 5, 8.0, force=force))
+    listed = fitted(equations, 'viscous_friction')
+    assert promises(equations, listed, 0) is is_promised
