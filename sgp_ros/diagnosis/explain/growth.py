@@ -23,7 +23,7 @@ from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import JOINT, MOTOR
 
 TRIALS, MOST_TRIALS = 3, 12
-"""Screened candidates that are fitted; where none is credible."""
+"""Screened candidates that are fitted; at most, with drives that take the command away."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,14 +100,17 @@ def crossed(columns: Columns, model: Model, others: Iterable[Model]) -> Model:
 
 
 def _tried(columns: Columns, model: Model, block: Block, found: list[EffectAt]) -> list[Model]:
-    """Return the models with each of the best candidates, and of the next where none is credible.
+    """Return the models with each of the best candidates.
 
-    Laws that take the command away, where the bodies may vanish too, promise most and say nothing.
+    Laws that take the command away, where the bodies may vanish too, promise most and say nothing:
+    they take no other candidate's turn.
     """
-    arranged, trials = arrangement(model, block), list[Model]()
-    while len(trials) < min(MOST_TRIALS, len(found)) and not any(map(is_credible, trials)):
-        some = found[len(trials) : len(trials) + TRIALS]
-        trials += [refitted(columns, model, arranged, s) for s in some]
+    arranged, trials, turns = arrangement(model, block), list[Model](), 0
+    for s in found[:MOST_TRIALS]:
+        trials.append(refitted(columns, model, arranged, s))
+        turns += not s.effect.effort_columns(s.kind) or is_credible(trials[-1])
+        if turns == TRIALS:
+            break
     return trials
 
 

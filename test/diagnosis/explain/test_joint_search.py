@@ -386,8 +386,11 @@ def test_joints_that_move_in_turn_show_no_motor_that_turns_with_both(equations):
         assert ((left**2).mean() > 1e-3 * (force**2).mean()) == is_shown
 
 
-def test_the_next_candidates_are_fitted_where_none_is_credible(equations_for, dry, monkeypatch):
-    """Laws that promise most and cannot be do not end the search."""
+@pytest.mark.parametrize('takes_command', [True, False])
+def test_drives_that_take_the_command_away_take_no_turn(
+    equations_for, dry, monkeypatch, takes_command
+):
+    """They promise most where bodies may vanish; other laws that cannot be end the search."""
     _, equations = equations_for(dry)
     columns = Columns(equations)
     base = fit(columns, (), np.sqrt((equations.d**2).mean(axis=0)), is_free=False)
@@ -395,13 +398,17 @@ def test_the_next_candidates_are_fitted_where_none_is_credible(equations_for, dr
     block = Block(laws, (0,))
     promised = distinct(screen(columns, base, laws, (0,)))
     first = {s.key for s in promised[: growth.TRIALS]}
+    for s in promised[: growth.TRIALS]:
+        monkeypatch.setattr(
+            type(s.effect), 'effort_columns', lambda _self, _kind: (0,) * takes_command
+        )
 
     def others(model):
         return is_credible(model) and not first & model.key
 
     monkeypatch.setattr(growth, 'is_credible', others)
     found = grown(columns, base, block)
-    assert found.effects
+    assert bool(found.effects) is takes_command
     assert not first & found.key
 
 
