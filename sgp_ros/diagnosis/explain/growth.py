@@ -108,10 +108,14 @@ def _tried(columns: Columns, model: Model, block: Block, found: list[EffectAt]) 
     arranged, trials, turns = arrangement(model, block), list[Model](), 0
     for s in found[:MOST_TRIALS]:
         trials.append(refitted(columns, model, arranged, s))
-        turns += not s.effect.effort_columns(s.kind) or is_credible(trials[-1])
+        turns += not _takes_commands(model, s) or is_credible(trials[-1])
         if turns == TRIALS:
             break
     return trials
+
+
+def _takes_commands(model: Model, s: EffectAt) -> bool:
+    return model.frame.equations.motion.drive is not None and s.effect.stage > 0
 
 
 def grown(columns: Columns, model: Model, block: Block) -> Model:

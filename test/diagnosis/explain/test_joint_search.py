@@ -398,10 +398,7 @@ def test_drives_that_take_the_command_away_take_no_turn(
     block = Block(laws, (0,))
     promised = distinct(screen(columns, base, laws, (0,)))
     first = {s.key for s in promised[: growth.TRIALS]}
-    for s in promised[: growth.TRIALS]:
-        monkeypatch.setattr(
-            type(s.effect), 'effort_columns', lambda _self, _kind: (0,) * takes_command
-        )
+    monkeypatch.setattr(growth, '_takes_commands', lambda _m, s: takes_command and s.key in first)
 
     def others(model):
         return is_credible(model) and not first & model.key
