@@ -59,7 +59,7 @@ from sgp_ros.diagnosis.shown import Predictions, Traces
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import NumericalError
-from sgp_ros.physics.effect_at import EffectAt, in_series
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.robot import Robot
@@ -115,7 +115,7 @@ def diagnose(
     """
     unstated = open_bodies(robot.name, tree)
     several = dict(events) if isinstance(events, Mapping) else {'': events}
-    known = Knowledge(robot, in_series(stated), config, gains, is_static=is_static)
+    known = Knowledge(robot, stated, config, gains, is_static=is_static)
     recordings = gather(several, tests, tree, known, holds_out=holds_out)
     require_signed(recordings.learned, tree.moving_names)
     recordings = recordings.thinned() if is_thinned else recordings

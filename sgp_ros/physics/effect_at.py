@@ -124,6 +124,10 @@ class EffectAt:
         seen = behind(motion, self.place.joint, self.before)
         return self.effect.columns(seen, self.place, self.shape)
 
+    def whole(self, motion: SeenMotion) -> np.ndarray:
+        """Return the force also above the bandwidth of the equations, (n,) or (n, k)."""
+        return self.effect.whole(behind(motion, self.place.joint, self.before), self)
+
     @property
     def form(self) -> tuple[object, ...]:
         """All that its columns depend on, beside the motion."""

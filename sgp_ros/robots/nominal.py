@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sgp_ros.errors import ConfigError
-from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.effect_at import EffectAt, in_series
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.effect_terms import changed_tree
 from sgp_ros.robots.robot import Robot
@@ -49,10 +49,10 @@ class Nominal:
     def stated(self) -> tuple[EffectAt, ...]:
         """The effects that are not part of the tree, dry friction of joints among them.
 
-        And laws that the robot may have or not.
+        And laws that the robot may have or not. Drives of a motor stand in series.
         """
         known = (*self.effects, *dry_friction(self.tree))
-        return tuple(e for e in known if e.is_complete and not e.effect.is_on_tree)
+        return in_series([e for e in known if e.is_complete and not e.effect.is_on_tree])
 
     @property
     def remarks(self) -> tuple[str, ...]:

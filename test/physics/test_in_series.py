@@ -34,6 +34,8 @@ def test_the_changes_of_drives_add_up_to_what_is_behind_all(joint):
         characteristic=lambda u: np.clip(u - np.clip(u, -WIDTH, WIDTH), -LIMIT, LIMIT),
     )  # fmt: skip
     np.testing.assert_allclose(found, GAIN * behind - MOTION.effort[:, 0], atol=1e-12)
+    whole = sum(s.whole(MOTION).reshape(len(behind), -1)[:, 0] for s in in_series(drives))
+    np.testing.assert_allclose(whole, found, atol=1e-12)
     alone = sum(s.force(MOTION)[:, 0] for s in drives)
     assert np.abs(alone - found).max() > 0.1
 

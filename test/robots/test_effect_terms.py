@@ -19,6 +19,7 @@ from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.term import Motion
 from sgp_ros.rigid.rigid_body import inverse_dynamics
 from sgp_ros.rigid.tree import read_urdf
+from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.observed_motion import ObservedMotion
 from sgp_ros.robots.registry import load_robot
 from test.physics.test_stated import URDF
@@ -268,6 +269,15 @@ def test_late_drives_take_the_commands_alone(tmp_path):
         joint = robot.joint_names.index('elbow')
         assert 0.1 < np.ptp(found[:, joint]) < 3.0
         assert np.abs(found[:, joint] - found[:, joint - 1]).max() > 0.1
+
+
+def test_drives_that_a_robot_states_stand_in_series(tmp_path):
+    """In the order of a drive, not of the file; that of another motor stands alone."""
+    limit, late = _entry('saturation', '')[0], _entry('command_delay', '')[0]
+    other = _entry('dead_zone', '')[0] | {'joint': 'shoulder'}
+    stated = nominal_model(_robot(tmp_path, [limit, other, late])).stated
+    before = {s.name: [d.name for d in s.before] for s in stated if s.effect.stage}
+    assert before == {'saturation': ['command_delay'], 'dead_zone': [], 'command_delay': []}
 
 
 def test_a_limit_acts_on_the_command_that_comes_late(tmp_path):

@@ -152,7 +152,7 @@ class Model:
             if s.effect.sees_acceleration and not s.effect.has_memory:
                 found.append(filtered)
                 continue
-            force = s.effect.whole(equations.motion, s)
+            force = s.whole(equations.motion)
             if s.place.source >= 0:
                 force = beyond_plain(s, force, equations)
             power = equations.power if force.ndim == 2 else equations.power[s.place.joint]
