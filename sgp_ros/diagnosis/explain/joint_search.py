@@ -16,7 +16,7 @@ import numpy as np
 from sgp_ros.diagnosis.compare.settled import shows
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, SLIGHT_REST
 from sgp_ros.diagnosis.explain.candidates import fit
-from sgp_ros.diagnosis.explain.credibility import is_credible
+from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.growth import (
     Block,
@@ -222,7 +222,7 @@ def _differentials(columns: Columns, model: Model) -> Iterator[Model]:
     """Yield models with two motors that turn with the sum of two joints and their difference.
 
     Neither motor would be found alone. Laws of the two joints go; those that nearly every joint
-    has may stay.
+    has may stay, and are what both motors must be worth more than.
     """
     motion = model.frame.equations.motion
     places = [(law, place) for law in motion.catalogue.values() if may_be_two(law)
@@ -234,6 +234,8 @@ def _differentials(columns: Columns, model: Model) -> Iterator[Model]:
         others = tuple(s for s in model.effects if not {s.place.joint, s.place.source} & ends)
         plain = tuple(s for s in model.effects if s.place.joint in ends and s.effect.is_usual)
         motors = [EffectAt(law, replace(place, number=i), x) for i, x in enumerate(_RATIOS)]
+        usually = refitted(columns, model, (others + plain, len(others + plain)))
         for kept in dict.fromkeys((others, others + plain)):
             trial = refitted(columns, model, (kept, len(kept)), *motors)
-            yield _grown_at(columns, trial, ends)
+            if gain(trial, usually, is_whole=False) > 0.0:
+                yield _grown_at(columns, trial, ends)
