@@ -36,6 +36,7 @@ def test_a_limit_behind_a_delay_is_fitted_with_both_numbers(limited):
     columns, start = Columns(limited), first_scale(limited)
     late = fit(columns, (_at('command_delay', 0.03),), start, is_free=False)
     (_, found), *_ = screen(columns, late, [EFFECTS['saturation']])
+    assert [s.name for s in found.before] == ['command_delay']
     model = fit(columns, (*late.effects, found), late.sigma, is_free=False, steps=30)
     numbers = {s.name: s.shape[0] for s in model.effects}
     assert numbers['command_delay'] == pytest.approx(0.04, rel=0.01)
