@@ -28,8 +28,12 @@ class Stage(Protocol):
     def characteristic(self) -> Callable[[np.ndarray], np.ndarray] | None:
         """From commands to what it gives at the same time; None for no change."""
 
+    @property
+    def coefficients(self) -> np.ndarray:
+        """Of its columns, (1,); empty of a candidate, whose coefficient is 1."""
+
     def columns(self, motion: SeenMotion) -> np.ndarray:
-        """Return what it changes, (n, 1) of one motor or (n, k, 1)."""
+        """Return what it changes per coefficient, (n, 1) of one motor or (n, k, 1)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,6 +84,6 @@ def behind(motion: SeenMotion, joint: int, stages: Sequence[Stage]) -> SeenMotio
         return motion
     effort = motion.effort.copy()
     for s in stages:
-        change = s.columns(motion)[..., 0]
+        change = s.columns(motion)[..., 0] * (s.coefficients[0] if len(s.coefficients) else 1.0)
         effort[:, joint] += change if change.ndim == 1 else change[:, joint]
     return motion.driven(effort, InSeries(motion.drive, joint, tuple(stages)))

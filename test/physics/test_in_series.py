@@ -48,3 +48,11 @@ def test_what_the_robot_states_stands_before_what_is_found():
     np.testing.assert_allclose(
         total[:, 0], MOTION.drive.effort(0, delay=DELAY + 0.01) - MOTION.effort[:, 0], atol=1e-12
     )
+
+
+def test_a_torque_constant_is_found_beside_the_one_that_is_stated():
+    """Their gains multiply."""
+    stated = _at('torque_gain', coefficient=GAIN - 1.0)
+    (found,) = in_series((_at('torque_gain', coefficient=0.5),), (stated,))
+    total = stated.force(MOTION) + found.force(MOTION)
+    np.testing.assert_allclose(total[:, 0], (1.5 * GAIN - 1.0) * MOTION.effort[:, 0], atol=1e-12)
