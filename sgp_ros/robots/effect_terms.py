@@ -98,7 +98,11 @@ def effort_map(tree: Tree, effects: Sequence[EffectAt], coulomb_width: float) ->
     chosen = [e for e in effects if e.effect.is_online and e.effect.effort_columns(e.kind)]
     late = [each for e in chosen if e.effect.is_late for each in _on_motors(tree, e)]
     instant = in_series([e for e in chosen if not e.effect.is_late])
-    return EffortMap(tree, instant, tuple(late), coulomb_width) if chosen else None
+    measured = in_series([e for e in instant if not e.effect.is_of_command])
+    chain = in_series([*late, *(e for e in instant if e.effect.stage)]) if late else ()
+    return (
+        EffortMap(tree, instant, measured, tuple(late), chain, coulomb_width) if chosen else None
+    )
 
 
 def _on_motors(tree: Tree, stated: EffectAt) -> list[EffectAt]:
@@ -116,13 +120,17 @@ class EffortMap:
     Attributes:
         tree: nominal robot.
         effects: those that depend on the effort of the same time.
+        measured: those of them that a measured effort does not show.
         late: those that depend on commands of the past, on one joint each.
+        chain: these in series with the drives among the others.
         coulomb_width: velocity over which dry friction changes its sign [rad/s or m/s].
     """
 
     tree: Tree
     effects: tuple[EffectAt, ...]
+    measured: tuple[EffectAt, ...]
     late: tuple[EffectAt, ...]
+    chain: tuple[EffectAt, ...]
     coulomb_width: float
 
     def __call__(
@@ -137,10 +145,8 @@ class EffortMap:
         """
         still = np.zeros_like(velocity)
         motion = Motion(still, velocity, still, effort)
-        acting, effects = effort.copy(), self.effects
-        if is_measured:
-            effects = in_series([e for e in effects if not e.effect.is_of_command])
-        for stated in effects:
+        acting = effort.copy()
+        for stated in self.measured if is_measured else self.effects:
             columns = list(stated.effect.effort_columns(stated.kind))
             force = _forces(self.tree, stated, motion, _smooth(self.coulomb_width))[:, :, columns]
             acting += force @ stated.coefficients[columns]
@@ -163,9 +169,8 @@ class EffortMap:
         still = np.zeros_like(now)
         added = np.zeros_like(now)
         motion = Motion(still, still, still, now)
-        instant = [e for e in self.effects if e.effect.stage]
-        late = in_series((*self.late, *instant))
-        for sign, effects in ((1.0, late), (-1.0, in_series(instant))):
+        now_too = (e for e in self.effects if e.effect.stage)
+        for sign, effects in ((1.0, self.chain), (-1.0, now_too)):
             for stated in effects:
                 force = _forces(self.tree, stated, motion, np.sign, drive) @ stated.coefficients
                 added += sign * force
