@@ -120,12 +120,14 @@ class DiagnosedDynamics:
 
     @cached_property
     def _with_acceleration(self) -> _Forces:
-        return _part(self.model, _sees_acceleration), _chosen(self.stated, _sees_acceleration)
+        return _part(self.model, _sees_acceleration), tuple(
+            filter(_sees_acceleration, self.stated)
+        )
 
     @cached_property
     def _beside_acceleration(self) -> _Forces:
         no = _sees_no_acceleration
-        return _part(self.model, no), _chosen(self.stated, no)
+        return _part(self.model, no), tuple(filter(no, self.stated))
 
     def started(self, motion: ObservedMotion, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return positions and velocities at rows of a recording (m,), (m, k) each."""
@@ -243,13 +245,13 @@ def dynamics_of(
         rotors[s.place.joint] += s.coefficients[0]
     return DiagnosedDynamics(
         _part(model, _is_local), tree, changed_tree(tree, model.effects), rotors, motion.step,
-        remainders, _chosen(motion.stated, _is_local), bristles,
+        remainders, tuple(filter(_is_local, motion.known)), bristles,
     )  # fmt: skip
 
 
 def remembered_force(model: Model, motion: ObservedMotion, tree: Tree) -> np.ndarray:
     """Return the force of the effects that remember along a motion, (n, k) [N m or N]."""
-    stated = _chosen(motion.known, _has_memory)
+    stated = tuple(filter(_has_memory, motion.known))
     return extra_force(_part(model, _has_memory), replace(motion, tree=tree, stated=stated))
 
 
@@ -279,13 +281,6 @@ def _sees_acceleration(s: EffectAt) -> bool:
 
 def _sees_no_acceleration(s: EffectAt) -> bool:
     return not s.effect.sees_acceleration
-
-
-def _chosen(
-    stated: tuple[EffectAt, ...], is_in: Callable[[EffectAt], bool]
-) -> tuple[EffectAt, ...]:
-    """Return some of the effects that the nominal robot has."""
-    return tuple(x for x in stated if is_in(x) and not x.effect.is_open)
 
 
 def _part(model: Model, is_in: Callable[[EffectAt], bool]) -> Model:

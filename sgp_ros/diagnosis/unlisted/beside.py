@@ -42,10 +42,14 @@ def own_effects(model: Model, joint: int) -> tuple[EffectAt, ...]:
     return tuple(s for s in model.effects if s.place.joint == joint and s.effect.site in own)
 
 
-def acts_at(s: EffectAt, joint: int) -> bool:
-    """Return whether an effect acts at a joint, alone or among others."""
-    is_own = s.effect.site in {JOINT, MOTOR} and s.place.joint >= 0
-    return not is_own or joint in {s.place.joint, s.place.source}
+def far_and_near(model: Model, joint: int) -> tuple[tuple[EffectAt, ...], tuple[EffectAt, ...]]:
+    """Return the effects of a model that act at other joints alone, and all others."""
+    far = tuple(
+        s for s in model.effects
+        if s.effect.site in {JOINT, MOTOR} and s.place.joint >= 0
+        and joint not in {s.place.joint, s.place.source}
+    )  # fmt: skip
+    return far, tuple(s for s in model.effects if s not in far)
 
 
 def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
@@ -63,8 +67,7 @@ def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
         joint: index.
     """
     law, trials = law_of(model, joint), []
-    elsewhere = tuple(s for s in model.effects if not acts_at(s, joint))
-    here = tuple(s for s in model.effects if acts_at(s, joint))
+    elsewhere, here = far_and_near(model, joint)
     for out in (*elsewhere, *here):
         far, near = (tuple(s for s in x if s is not out) for x in (elsewhere, here))
         still = len(far) if out in here else len(far) + len(near)

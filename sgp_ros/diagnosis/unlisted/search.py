@@ -25,9 +25,9 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import distinct, screen
 from sgp_ros.diagnosis.locate.remainder import parts_of
 from sgp_ros.diagnosis.unlisted.beside import (
-    acts_at,
     beside,
     earned,
+    far_and_near,
     is_bent,
     is_creep,
     is_slight,
@@ -273,8 +273,7 @@ class _Look:
         self, base: Model, effects: list[SmoothForce] | list[FoundLaw], count: int | None
     ) -> Iterator[Model]:
         """Yield the best of some effects beside a model, fitted; shapes elsewhere are kept."""
-        far = tuple(s for s in base.effects if not acts_at(s, self.joint))
-        near = tuple(s for s in base.effects if acts_at(s, self.joint))
+        far, near = far_and_near(base, self.joint)
         for trial in distinct(screen(self.columns, base, effects, (self.joint,)), count):
             model = fit(self.columns, (*far, *near, trial), base.sigma, is_free=base.is_free,
                         w=base.w, rounds=2, steps=10, still=len(far))  # fmt: skip
