@@ -61,13 +61,13 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
         comparison: of listed effects.
         decision: on these.
     """
-    found = Explained(comparison, decision, (), {})
+    found, columns = Explained(comparison, decision, (), {}), Columns(equations)
     for joint in _joints(equations, comparison, decision):
         listed = found.decision.tentative or found.decision.model
         scale, is_open = Scale.of(equations, comparison), joint in decision.unknown
-        if not is_open and not promises(equations, listed, joint):
+        if not is_open and not promises(columns, listed, joint):
             continue
-        searched = search(equations, scale, listed, joint, is_open=is_open)
+        searched = search(columns, scale, listed, joint, is_open=is_open)
         if searched is None:
             continue
         more = replace(found, searched=(*found.searched, searched))
@@ -158,7 +158,7 @@ def _in_plain_laws(
     plain = fit(columns, most.effects, most.sigma, is_free=most.is_free, w=most.w, steps=_STEPS)
     is_near = best.mean_square[joint] > NEARLY * plain.mean_square[joint]
     is_as_good = is_near or scale.worth(best) < scale.worth(plain) + ALIKE
-    return plain if is_as_good or says_less(equations, best, joint) else None
+    return plain if is_as_good or says_less(columns, best, joint) else None
 
 
 def _objection(equations: Equations, comparison: Comparison, searched: Searched) -> str:

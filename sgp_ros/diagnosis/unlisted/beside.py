@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import ADEQUATE_REST, BLURRED, COUNTED_SHARE, REGION_ENERGY
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
@@ -114,7 +113,7 @@ def refined(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
     return best if scale.worth(best) > scale.worth(model) else model
 
 
-def says_less(equations: Equations, model: Model, joint: int) -> bool:
+def says_less(columns: Columns, model: Model, joint: int) -> bool:
     """Return whether a formula has a coefficient that is not distinguished from zero.
 
     A shorter formula would then do.
@@ -122,8 +121,8 @@ def says_less(equations: Equations, model: Model, joint: int) -> bool:
     law = law_of(model, joint)
     assert law is not None
     index = [s is law for s in model.effects].index(True)
-    std = reported_std(model, Columns(equations))[index]
-    numbers = law.report(equations.motion)
+    std = reported_std(model, columns)[index]
+    numbers = law.report(columns.equations(frozenset()).motion)
     names = [q.name for q in law.effect.coefficient_quantities(law.kind)]
     return any(
         abs(float(numbers[name])) < _NONE * std[name]

@@ -16,7 +16,6 @@ import numpy as np
 from scipy import stats
 
 from sgp_ros.batch.least_squares import correlation_factor
-from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import ALIKE, CLEARER, NEARLY, PER_PARAMETER
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
@@ -100,19 +99,19 @@ class Searched:
 
 
 def search(
-    equations: Equations, scale: Scale, listed: Model, joint: int, *, is_open: bool = False
+    columns: Columns, scale: Scale, listed: Model, joint: int, *, is_open: bool = False
 ) -> Searched | None:
     """Return the laws that explain a joint better than listed effects, at their price, or None.
 
     Args:
-        equations: of the recording.
+        columns: of the recording.
         scale: of mean squares.
         listed: best model of listed effects, adequate or not.
         joint: index.
         is_open: whether listed effects leave it unexplained.
     """
     scale = scale.of_forms()
-    look = _Look(Columns(equations), scale, listed, joint, is_open)
+    look = _Look(columns, scale, listed, joint, is_open)
     smooth = look.ranked()
     if not smooth or scale.worth(smooth[0]) < scale.worth(listed) + ALIKE:
         return None
@@ -136,7 +135,7 @@ def search(
     ranked = sorted(laws.values(), key=lambda m: -scale.worth(m))
     again = [earned(look.columns, scale, m, joint) for m in ranked[:EARNED]]
     ranked = sorted([*again, *ranked[EARNED:]], key=lambda m: -scale.worth(m))
-    first = (i for i, m in enumerate(ranked) if not says_less(equations, m, joint))
+    first = (i for i, m in enumerate(ranked) if not says_less(columns, m, joint))
     ranked = ranked[next(first, 0) :]
     ranked[:1] = [refined(look.columns, scale, m, joint) for m in ranked[:1]]
     free = look.free(ranked[0]) if ranked else np.zeros(0)

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import NEARLY
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
@@ -51,21 +50,21 @@ def smooth_forces(motion: ObservedMotion, joint: int) -> Iterator[SmoothForce]:
         yield SmoothForce(joint, variable, '', variable.knots(motion, PIECES), names[joint])
 
 
-def promises(equations: Equations, listed: Model, joint: int) -> bool:
+def promises(columns: Columns, listed: Model, joint: int) -> bool:
     """Return whether a smooth force beside the listed effects of a joint leaves much less.
 
     A force in their place seldom explains more than one beside all of them; where even `SPARED`
     times what the best one explains would not decide, no fit is needed to know that none will.
 
     Args:
-        equations: of the recording.
+        columns: of the recording.
         listed: best model of listed effects, which is adequate.
         joint: index.
     """
-    rows, columns = len(equations.d), Columns(equations)
+    rows, motion = columns.rows, columns.equations(frozenset()).motion
     gains = [
         gain + 0.5 * (len(s.effect.coefficient_quantities(s.kind)) + len(s.shape)) * np.log(rows)
-        for gain, s in screen(columns, listed, smooth_forces(equations.motion, joint), (joint,))
+        for gain, s in screen(columns, listed, smooth_forces(motion, joint), (joint,))
     ]
     left = np.exp(-2.0 * SPARED * max(gains, default=0.0) / rows)
     apart = float((1.0 - left) * listed.mean_square[joint])

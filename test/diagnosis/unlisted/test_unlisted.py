@@ -199,7 +199,7 @@ def test_friction_that_is_hardly_different_keeps_its_name(equations_for):
     comparison = compare_models(equations, lambda _share: None)
     decision = decide(equations, comparison)
     assert [s.name for s in decision.model.effects] == ['coulomb_friction']
-    assert search(equations, Scale.of(equations, comparison), decision.model, 0) is None
+    assert search(Columns(equations), Scale.of(equations, comparison), decision.model, 0) is None
     assert with_laws(equations, comparison, decision).decision is decision
 
 
@@ -214,7 +214,7 @@ def test_a_listed_law_is_not_bent_to_stand_for_another(equations_for):
     comparison = compare_models(equations, lambda _share: None)
     listed = decide(equations, comparison).model
     assert {s.name for s in listed.effects} == {'coulomb_friction', 'position_friction'}
-    found = search(equations, Scale.of(equations, comparison), listed, 0)
+    found = search(Columns(equations), Scale.of(equations, comparison), listed, 0)
     assert found is not None
     assert is_bent(listed, found.smooth, 0)
     assert not is_bent(listed, replace(listed, residual=0.99 * listed.residual), 0)
@@ -232,7 +232,7 @@ def test_a_formula_is_held_against_any_form(equations_for):
     comparison = compare_models(equations, lambda _share: None)
     decision = decide(equations, comparison)
     scale, listed = Scale.of(equations, comparison), decision.tentative or decision.model
-    found = search(equations, scale, listed, 0, is_open=True)
+    found = search(Columns(equations), scale, listed, 0, is_open=True)
     assert found is not None
     assert found.free @ found.free < 0.3 * (found.smooth.residual[:, 0] ** 2).sum()
     ratio, chance = found.lack_of_fit
@@ -248,7 +248,9 @@ def test_a_law_is_found_beside_friction_that_was_not_named(equations_for):
     )  # fmt: skip
     _, equations = equations_for(world)
     comparison = compare_models(equations, lambda _share: None)
-    found = search(equations, Scale.of(equations, comparison), fitted(equations), 0, is_open=True)
+    found = search(
+        Columns(equations), Scale.of(equations, comparison), fitted(equations), 0, is_open=True
+    )
     assert found is not None
     assert found.laws
     names = {s.effect.name for s in found.laws[0].effects}
@@ -268,7 +270,7 @@ def test_a_law_in_a_narrow_region_is_found_beside_friction(equations_for):
     _, equations = equations_for(world)
     comparison = compare_models(equations, lambda _share: None)
     listed = fitted(equations, 'torque_gain')  # stands for friction as long as the well is there
-    found = search(equations, Scale.of(equations, comparison), listed, 0, is_open=True)
+    found = search(Columns(equations), Scale.of(equations, comparison), listed, 0, is_open=True)
     assert found is not None
     (friction,) = (s for s in found.laws[0].effects if s.name == 'coulomb_friction')
     assert friction.coefficients[0] == pytest.approx(0.3, rel=0.03)
@@ -344,4 +346,4 @@ def test_a_law_is_looked_for_where_a_force_of_any_form_promises_one(
     """Beside what listed effects explain already."""
     _, equations = equations_for(simulate(CHAINS[1], 5, 8.0, force=force))
     listed = fitted(equations, 'viscous_friction')
-    assert promises(equations, listed, 0) is is_promised
+    assert promises(Columns(equations), listed, 0) is is_promised
