@@ -13,6 +13,7 @@ import math
 
 import numpy as np
 
+from sgp_ros.physics.carried import GRAVITY
 from sgp_ros.physics.drawing import Drawn, Scene, UnsuitableError
 from sgp_ros.physics.effect import Effect, Numbers
 from sgp_ros.physics.hidden_states import derivatives, resonator, smooth
@@ -28,6 +29,11 @@ _STIFFEST = 3.0
 _DAMPING, _USUAL_RATIO = (1e-3, 1.0), 0.1
 _DECAYS = 3.0
 """Times of decay after which nothing is left of a ring at a start."""
+_MOST_GIVE = 0.25
+"""Most that a mount gives way under the weight that it carries, along its axis [m].
+
+What swings more slowly is as well a load that hangs on a rope of this length.
+"""
 _LARGEST_RING = 3.0
 """Largest ring at a start over the largest one that the motion causes."""
 _LIGHTEST = 0.75
@@ -126,9 +132,13 @@ class MountElasticity(Effect):
         return bool(0.0 < at.coefficients[0] * _LIGHTEST * arm <= 1.0)
 
     def is_inside(self, at: Placed, motion: SeenMotion) -> bool:
-        """Return whether it rings in the band; a fit at its ends is a mass or nothing."""
+        """Return whether it rings in the band; a fit at its ends is a mass or nothing.
+
+        A mount that gives way more than `_MOST_GIVE` is none.
+        """
         low, high = (x[0] for x in self.bounds(motion, at.place))
-        return bool(1.02 * low < at.shape[0] < 0.98 * high)
+        softest = math.sqrt(GRAVITY / _MOST_GIVE) / (2.0 * math.pi)
+        return bool(max(1.02 * low, softest) < at.shape[0] < 0.98 * high)
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         """Return the force per 1/m, (n, k, 1), see `_ring` for how each stretch begins."""

@@ -70,6 +70,15 @@ def test_frequency_damping_and_mass_follow_from_a_motion(axis):
         assert numbers[name] == pytest.approx(truth, rel=0.02), name
 
 
+@pytest.mark.parametrize(('frequency', 'is_one'), [(0.6, False), (1.3, True)])
+def test_a_base_that_would_sink_by_its_weight_is_no_mount(frequency, is_one):
+    """It is as well a load that hangs on a rope of 0.7 m."""
+    found = equations('x').motion
+    motion = replace(found, time=np.arange(4000) * found.step)
+    truth = EffectAt.stated(LAW, 'base', NUMBERS | {'axis': 'x'}, found.tree)
+    assert LAW.is_inside(truth.with_shape(np.array([frequency, 0.05])), motion) is is_one
+
+
 def test_a_joint_without_effort_does_no_harm():
     """A passive joint has a nominal effort alone; a roll-out that diverged has no numbers."""
     found = equations('x').motion
