@@ -12,6 +12,7 @@ candidate.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -30,10 +31,15 @@ from sgp_ros.robots.robot import Robot
 
 LEAST_POSES = 64
 """Poses below which nothing is decided, as rows of a stretch."""
-COUNTS_BACK = 2.5
-"""Counts of the encoder that a position must turn back by for a change of direction."""
+COUNTS_BACK, NOISES_BACK = 2.5, 6.0
+"""Counts of the encoder, and standard deviations of the noise of positions, that a position must
+turn back by for a change of direction."""
+FINE = 0.01
+"""Noise of the positions of a sweep over its range; what varies more are poses here and there."""
 HELD_BACK = 4
 """Without another recording each of so many poses proves what the others say."""
+_OF_SECOND_DIFFERENCES = 0.6745 * math.sqrt(6.0)
+"""Median size of the second differences of normal noise, over its standard deviation."""
 _FASTER = 1e3
 _ALIKE = 1e-6
 _ROW_NS = 10**8
@@ -80,13 +86,16 @@ def approaches(position: np.ndarray) -> np.ndarray:
     """Return the direction from which each position was approached, (n,) of -1 and 1.
 
     A flicker of the encoder is not a change of direction: the position must turn back by
-    `COUNTS_BACK` of its least steps.
+    `COUNTS_BACK` of its least steps, and by `NOISES_BACK` of the noise about a sweep.
 
     Args:
         position: (n,) in the order in which they were taken [rad or m].
     """
     steps = np.abs(np.diff(position))
     least = COUNTS_BACK * float(steps[steps > 0.0].min(initial=0.0 if not steps.any() else np.inf))
+    noise = float(np.median(np.abs(np.diff(position, 2)))) / _OF_SECOND_DIFFERENCES
+    if noise < FINE * np.ptp(position):
+        least = max(least, NOISES_BACK * noise)
     moved = np.flatnonzero(np.abs(position - position[0]) >= least)
     direction = 1.0 if not len(moved) or position[moved[0]] >= position[0] else -1.0
     furthest, found = position[0], np.empty(len(position))

@@ -141,7 +141,7 @@ def _plainer(equations: Equations, model: Model, scale: Scale) -> Model | None:
     With its plain law in its place, where there is one, or a usual one that looks alike.
     """
     for s in model.effects:
-        if not s.effect.is_usual:
+        if not (s.effect.is_usual or s.is_further_wave):
             for plainer in (_without(equations, model, s), *_exchanged(equations, model, s)):
                 is_alike = scale.worth(plainer) > scale.worth(model) - ALIKE
                 if plainer.effects and is_credible(plainer) and is_alike:

@@ -48,6 +48,17 @@ def test_directions_of_approach_ignore_the_flicker_of_an_encoder():
     np.testing.assert_array_equal(approaches(q), [1] * 10 + [-1] * 6)
 
 
+def test_directions_of_approach_ignore_the_noise_about_a_slow_sweep():
+    """The encoder resolves the noise, which is many steps of the sweep; poses have no noise."""
+    rng = np.random.default_rng(3)
+    way = np.concatenate([np.linspace(0.0, 6.0, 5000), np.linspace(6.0, 0.0, 5000)])
+    found = approaches(way + 1e-3 * rng.normal(size=len(way)))
+    assert (found == np.repeat([1.0, -1.0], 5000)).mean() > 0.995
+    here_and_there = rng.uniform(-2.0, 2.0, 300)
+    moves = np.sign(np.diff(here_and_there))
+    assert (approaches(here_and_there)[1:] == moves).mean() > 0.98
+
+
 def test_statics_of_a_link_names_friction_and_a_spring_without_a_clock(robots):
     """Gravity is known; what holds the rest is found in the same equations as of a motion."""
     found = diagnose(_points(), *robots[1], {}, holds_out=True, is_static=True)
@@ -61,11 +72,33 @@ def test_statics_of_a_link_names_friction_and_a_spring_without_a_clock(robots):
     assert {effect for _, effect, _ in found.visibility} == {'coulomb_friction'}
 
 
-def test_efforts_of_an_axis_without_gravity_are_compared_by_their_size(tmp_path):
-    """Two levels that are nearly equal are no other law, though the nominal robot needs none."""
+@pytest.fixture
+def upright(tmp_path):
+    """The link on an axis without gravity."""
     path = tmp_path / 'upright.urdf'
     path.write_text(urdf(CHAINS[1]).replace('axis xyz="0 1 0"', 'axis xyz="0 0 1"'))
-    robot = load_robot(str(path))
+    return load_robot(str(path))
+
+
+def test_all_waves_of_a_cogging_are_named(upright):
+    """Beside a wave that stands, a smaller one of the same law is nothing unusual."""
+    sizes, rng = {12.0: 1.0, 24.0: 0.6, 36.0: 0.16}, np.random.default_rng(2)
+    points = [
+        replace(p, effort=frozen_array(
+            p.effort + 0.2 * rng.normal(size=1)
+            + sum(a * np.sin(n * p.position + n) for n, a in sizes.items())
+        ))
+        for p in map(_with_friction_alone, _points(1500))
+    ]  # fmt: skip
+    found = diagnose(points, upright, nominal_tree(upright), {}, holds_out=True, is_static=True)
+    waves = {round(f.parameters['periods'].value): f.parameters['amplitude'].value
+             for f in found.findings if f.effect == 'cogging'}  # fmt: skip
+    assert waves == pytest.approx(sizes, rel=0.1)
+
+
+def test_efforts_of_an_axis_without_gravity_are_compared_by_their_size(upright):
+    """Two levels that are nearly equal are no other law, though the nominal robot needs none."""
+    robot = upright
     points = [_with_friction_alone(point) for point in _points()]
     found = diagnose(points, robot, nominal_tree(robot), {}, holds_out=True, is_static=True)
     assert [f.effect for f in found.findings] == ['coulomb_friction']
