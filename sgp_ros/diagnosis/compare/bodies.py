@@ -18,6 +18,8 @@ SPREAD = 0.25
 OPEN_SPREAD = 1.0
 """The same of bodies that the robot file leaves open."""
 
+_SMALLEST = 1e-3
+"""Of the nominal size, the least that bodies are taken for."""
 LOAD = 0.25
 """Prior standard deviation of the mass of a load at a tip, relative to all that moves."""
 _TOOL = 0.15
@@ -82,6 +84,24 @@ def body_directions(tree: Tree, unstated: Collection[int] = ()) -> np.ndarray:
         full[:, 10 * body : 10 * body + 10] = changes
         rows.append(full)
     return np.concatenate(rows)
+
+
+def shrinkage(directions: np.ndarray, tree: Tree, w: np.ndarray) -> float:
+    """Return what bodies cost that are much smaller than those of the robot [nats].
+
+    The normal prior of their change reaches bodies of no size within a few deviations. Size is a
+    scale: this is by how much the same prior of its logarithm costs more.
+
+    Args:
+        directions: (p, 10 b) of `body_directions`.
+        tree: nominal robot.
+        w: (p,) change in these directions.
+    """
+    mass = tree.parameters[:, 0]
+    spread = np.diagonal(directions)[::10] / np.maximum(mass, 1e-300)
+    spread = np.where(spread > 0.0, spread, 1.0)
+    size = np.clip(1.0 + spread * w[::10], _SMALLEST, 1.0)
+    return 0.5 * float(((np.log(size) ** 2 - (1.0 - size) ** 2) / spread**2).sum())
 
 
 def load_precision(directions: np.ndarray, tree: Tree) -> np.ndarray:

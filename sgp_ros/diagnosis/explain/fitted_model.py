@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.bodies import shrinkage
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import FLOOR_SHARE, PER_EFFECT, PER_UNUSUAL
 from sgp_ros.diagnosis.explain.frame import Frame
@@ -56,10 +57,13 @@ class Model:
         """Whether inertial parameters may differ from the nominal ones."""
         return self.frame.is_free
 
-    @property
+    @cached_property
     def strain(self) -> float:
         """Prior that its bodies cost [nats]."""
-        return 0.5 * float(self.w @ self.w)
+        equations = self.frame.equations
+        bodies = self.w[equations.instants :]
+        smaller = shrinkage(equations.directions, equations.motion.tree, bodies)
+        return 0.5 * float(self.w @ self.w) + smaller
 
     @property
     def delivered(self) -> np.ndarray:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.compare.bodies import body_directions, load_precision
+from sgp_ros.diagnosis.compare.bodies import SPREAD, body_directions, load_precision, shrinkage
 from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.grid import INSTANT_SPREAD
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
@@ -68,6 +68,19 @@ def test_directions_are_one_deviation_of_mass_centre_and_inertia(robots):
         step = centre[2] - before[2]
         assert about + moved[0] * step**2 == pytest.approx(size, rel=1e-9)
         assert np.linalg.matrix_rank(own) == 10
+
+
+@pytest.mark.parametrize('size', [1.4, 0.9, 0.1, -0.2])
+def test_a_body_that_is_nearly_gone_costs_as_a_logarithm(perfect, equations_for, size):
+    """The normal prior alone has bodies of no size at four deviations; more costs as before."""
+    tree = equations_for(perfect[2])[1].motion.tree
+    w = np.zeros(10 * len(tree.parameters))
+    w[10] = (size - 1.0) / SPREAD  # of the second body
+    total = 0.5 * w @ w + shrinkage(body_directions(tree), tree, w)
+    least = 0.5 * (np.log(np.clip(size, 1e-3, None)) / SPREAD) ** 2
+    assert total == pytest.approx(least if 0.0 < size < 1.0 else max(total, 0.5 * w @ w))
+    assert (total > 1.01 * 0.5 * w @ w) == (size < 1.0)
+    assert total > 40.0 or size > 0.5
 
 
 def test_a_load_widens_the_last_body_alone(robots):
