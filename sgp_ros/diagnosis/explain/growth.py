@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sgp_ros.diagnosis.criteria import COUNTED_SHARE, PER_EFFECT, SLIGHT_REST
+from sgp_ros.diagnosis.criteria import ADEQUATE_REST, COUNTED_SHARE, PER_EFFECT, SLIGHT_REST
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model, adds_to_usual
@@ -22,6 +22,8 @@ from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import JOINT, MOTOR
 
+AHEAD = 2
+"""Candidates that are taken for as long as a second one beside them is looked for."""
 TRIALS, MOST_TRIALS = 3, 12
 """Screened candidates that are fitted; at most, with drives that take the command away."""
 
@@ -42,6 +44,14 @@ class Block:
         """Return whether a candidate belongs to it."""
         is_here = self.joints is None or candidate.place.joint in self.joints
         return is_here and candidate.effect in self.effects
+
+    def is_open(self, model: Model) -> bool:
+        """Return whether it is a joint of which much of the discrepancy is left."""
+        if self.joints is None:
+            return False
+        equations, j = model.frame.equations, list(self.joints)
+        nominal = (equations.d[:, j] ** 2).mean(axis=0) / equations.power[j]
+        return bool((model.left[j] > np.maximum(COUNTED_SHARE, ADEQUATE_REST * nominal)).any())
 
     def left(self, model: Model) -> float:
         """Return the greatest share of the mean squared effort that a model leaves here."""
@@ -126,23 +136,41 @@ def grown(columns: Columns, model: Model, block: Block) -> Model:
     and are sought in any residual that is not slight.
     """
     while True:
-        left, strain = block.left(model), model.strain
-        laws = block.effects
-        if left < COUNTED_SHARE and strain < PER_EFFECT:
-            laws = tuple(e for e in laws if adds_to_usual(e))
-        if not laws or (left < SLIGHT_REST and strain < PER_EFFECT):
-            break
-        trials = _tried(
-            columns, model, block, distinct(screen(columns, model, laws, block.joints))
-        )
-        if left < COUNTED_SHARE:
-            trials = [t for t in trials if adds_to_usual(t.effects[-1].effect)
-                      or strain - t.strain > PER_EFFECT]  # fmt: skip
-        counted = [
-            t for t in trials if t.shares[-1] > COUNTED_SHARE or t.effects[-1].effect.is_usual
-        ]
-        better = best_of(model, counted, is_whole=False)
+        trials = _counted(columns, model, block)
+        better = best_of(model, trials, is_whole=False)
+        if better is None or gain(better, model, is_whole=False) < PER_EFFECT:
+            better = best_of(
+                model, [*trials, *_with_two(columns, model, block, trials)], is_whole=False
+            )
         if better is None:
-            break
+            return model
         model = better
-    return model
+
+
+def _counted(columns: Columns, model: Model, block: Block) -> list[Model]:
+    """Return the models with each of the best candidates that are large enough to count."""
+    left, strain = block.left(model), model.strain
+    laws = block.effects
+    if left < COUNTED_SHARE and strain < PER_EFFECT:
+        laws = tuple(e for e in laws if adds_to_usual(e))
+    if not laws or (left < SLIGHT_REST and strain < PER_EFFECT):
+        return []
+    trials = _tried(columns, model, block, distinct(screen(columns, model, laws, block.joints)))
+    if left < COUNTED_SHARE:
+        trials = [t for t in trials if adds_to_usual(t.effects[-1].effect)
+                  or strain - t.strain > PER_EFFECT]  # fmt: skip
+    return [t for t in trials if t.shares[-1] > COUNTED_SHARE or t.effects[-1].effect.is_usual]
+
+
+def _with_two(
+    columns: Columns, model: Model, block: Block, trials: Iterable[Model]
+) -> list[Model]:
+    """Return the models with two effects of a joint of which much is left.
+
+    A law explains little while a larger one hides what it does. So the best candidates are taken,
+    though they are hardly worth their price, for as long as a second one is looked for.
+    """
+    if not block.is_open(model):
+        return []
+    ranked = sorted(filter(is_credible, trials), key=lambda t: -gain(t, model, is_whole=False))
+    return [t for first in ranked[:AHEAD] for t in _counted(columns, first, block)]

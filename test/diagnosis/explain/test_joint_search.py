@@ -422,3 +422,35 @@ def test_a_load_is_tried_in_place_of_changed_bodies(equations_for, heavy):
         assert [s.name for s in model.effects] == ['viscous_friction', 'payload']
     again = _carrying(columns, [replace(found[0], frame=free.frame)])
     assert [len(m.effects) for m in again] == [2]
+
+
+@pytest.mark.parametrize(
+    ('is_open', 'worth', 'found'),
+    [
+        (True, {'a': -3.0, 'b': -4.0, 'c': -9.0, 'ab': -1.0, 'bc': 8.0}, 'bc'),
+        (True, {'a': 5.0, 'b': -4.0, 'c': -9.0, 'ab': 2.0, 'bc': 8.0}, 'bc'),
+        (True, {'a': 15.0, 'b': -4.0, 'c': -9.0, 'ab': 2.0, 'bc': 18.0}, 'a'),
+        (True, {'a': -3.0, 'b': -4.0, 'c': -9.0, 'ab': -1.0, 'bc': -2.0}, ''),
+        (False, {'a': -3.0, 'b': -4.0, 'c': -9.0, 'ab': -1.0, 'bc': 8.0}, ''),
+    ],
+    ids=['two', 'better than one', 'one that is clear', 'none', 'a joint that is explained'],
+)
+def test_two_laws_are_found_that_hide_each_other(monkeypatch, is_open, worth, found):
+    """One that is hardly worth its price is taken for as long as a second one is looked for."""
+    after = {'': 'abc', 'a': 'b', 'b': 'ac'}
+    worth = {'': 0.0, **worth}
+    monkeypatch.setattr(growth, '_counted', lambda _c, m, _b: [
+        ''.join(sorted(m + more)) for more in after.get(m, '')])  # fmt: skip
+    monkeypatch.setattr(growth, 'gain', lambda t, m, **_: worth[t] - worth[m])
+    monkeypatch.setattr(growth, 'is_credible', lambda _: True)
+    monkeypatch.setattr(Block, 'is_open', lambda *_: is_open)
+    assert grown(None, '', Block((), (0,))) == found
+
+
+def test_a_joint_is_open_while_much_of_its_discrepancy_is_left(equations):
+    """Laws of no joint are not looked for two at a time."""
+    _, base = _start(equations)
+    left = replace(base, residual=equations.d)
+    assert Block((), (0,)).is_open(left)
+    assert not Block((), (0,)).is_open(replace(base, residual=0.1 * equations.d))
+    assert not Block((), None).is_open(left)
