@@ -145,7 +145,7 @@ def _more(columns: Columns, found: Comparison) -> list[Model]:
         )
     if (best.left < limit).all() and best.strain < PER_EFFECT:
         return _ranked(stated)
-    everyday = usual(columns, fit(columns, (), best.sigma, is_free=True))
+    everyday = usual(columns, fit(columns, (), found.nominal.sigma, is_free=True))
     loaded = _loaded(columns, everyday)
     starts = [best] if loaded else [best, everyday]
     built = built_up(columns, everyday)
