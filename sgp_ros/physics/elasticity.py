@@ -209,8 +209,12 @@ class JointElasticity(Effect):
         return bool(at.shape[0] > 0.0 and at.shape[1] > 0.0 and at.shape[2] >= 0.0)
 
     def is_inside(self, at: Placed, motion: SeenMotion) -> bool:
-        """Return whether it is a spring; a fit that ends at the softest one is something else."""
-        return bool(at.shape[1] < _SOFT * self.bounds(motion, at.place)[1][1])
+        """Return whether it is a spring that can ring.
+
+        A fit that ends at the softest one is something else, and one that ends at the most damping
+        a lag or a delay of the drive.
+        """
+        return bool((at.shape[1:3] < _SOFT * self.bounds(motion, at.place)[1][1:3]).all())
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         return np.asarray(shape[1] * _of_softness(motion, place, shape))

@@ -144,6 +144,18 @@ def test_a_rotor_that_the_robot_file_lacks_is_told_from_the_link():
     assert left[BARE] < left['motor']
 
 
+@pytest.mark.parametrize('entry', [1, 2])
+def test_a_spring_that_is_softest_or_most_damped_is_something_else(entry):
+    """Such as a load on its own, a lag or a delay of the drive."""
+    motion, place = equations('motor').motion, Place(ELBOW, 'link')
+    high = LAW.bounds(motion, place)[1]
+    at = EffectAt(LAW, place, 0.5 * high, np.ones(1))
+    assert LAW.is_inside(at, motion)
+    ends = at.shape.copy()
+    ends[entry] = high[entry]
+    assert not LAW.is_inside(at.with_shape(ends), motion)
+
+
 def test_a_motor_on_a_spring_has_its_own_equation():
     """`J theta'' = u - K (theta - q) - D (dtheta - dq)`, theta being what the encoder shows."""
     recording = recorded('motor')
