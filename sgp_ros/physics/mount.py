@@ -27,6 +27,8 @@ _PERIODS = 5.0
 _STIFFEST = 3.0
 """Stiffest mount over the bandwidth."""
 _DAMPING, _USUAL_RATIO = (1e-3, 1.0), 0.1
+_MOST_DAMPED = 0.5
+"""Damping ratio from which on a resonance amplifies nothing."""
 _DECAYS = 3.0
 """Times of decay after which nothing is left of a ring at a start."""
 _MOST_GIVE = 0.25
@@ -127,18 +129,20 @@ class MountElasticity(Effect):
         }  # fmt: skip
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
-        """Return whether the mount moves at least the arm."""
-        arm = float(motion.tree.parameters[:, 0].sum())
-        return bool(0.0 < at.coefficients[0] * _LIGHTEST * arm <= 1.0)
+        """Return whether the mount moves a mass."""
+        return bool(at.coefficients[0] > 0.0)
 
     def is_inside(self, at: Placed, motion: SeenMotion) -> bool:
-        """Return whether it rings in the band; a fit at its ends is a mass or nothing.
+        """Return whether it moves at least the arm, and rings in the band.
 
-        A mount that gives way more than `_MOST_GIVE` is none.
+        A fit at the ends of the band is a mass or nothing, a mount that gives way more than
+        `_MOST_GIVE` or that amplifies nothing is none.
         """
+        arm = float(motion.tree.parameters[:, 0].sum())
         low, high = (x[0] for x in self.bounds(motion, at.place))
         softest = math.sqrt(GRAVITY / _MOST_GIVE) / (2.0 * math.pi)
-        return bool(max(1.02 * low, softest) < at.shape[0] < 0.98 * high)
+        is_mount = at.coefficients[0] * _LIGHTEST * arm <= 1.0 and at.shape[1] < _MOST_DAMPED
+        return bool(is_mount and max(1.02 * low, softest) < at.shape[0] < 0.98 * high)
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         """Return the force per 1/m, (n, k, 1), see `_ring` for how each stretch begins."""
