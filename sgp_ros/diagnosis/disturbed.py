@@ -35,6 +35,8 @@ _NEAR = 0.25
 """Distance of states of a joint that are the same, in standard deviations."""
 _REVISITED = 0.5
 """Share of a stretch whose states a joint passes at other times."""
+_UNLIKE = 0.25
+"""Mean square, over that of both, by which what comes back may differ."""
 
 
 def undisturbed(
@@ -71,7 +73,8 @@ def disturbance(equations: Equations) -> tuple[tuple[float, float], ...]:
     """Return times between which something else acts [s]; none if it acts for too long."""
     rows = equations.filter.rows
     time, blocks = equations.motion.time[rows], np.array_split(np.arange(len(rows)), _BLOCKS)
-    square = _unusual(equations) ** 2
+    rest = _unusual(equations)
+    square = rest**2
     found = np.array([len(b) and square[b].max(axis=1).mean() > DISTURBED for b in blocks])
     found = np.convolve(found, np.ones(3), 'same') > 0  # it begins and ends within a block
     inside = np.logical_or.accumulate(~found) & np.logical_or.accumulate(~found[::-1])[::-1]
@@ -81,6 +84,8 @@ def disturbance(equations: Equations) -> tuple[tuple[float, float], ...]:
         return ()
     joints = np.flatnonzero(square[is_out].mean(axis=0) > DISTURBED)
     if not all(_is_revisited(equations, int(j), is_out) for j in joints):
+        return ()
+    if any(_is_of_load(equations, int(j), rest[:, j], is_out) for j in joints):
         return ()
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_out, [False]]).astype(int)))
     return tuple(
@@ -114,7 +119,30 @@ def _unusual(equations: Equations) -> np.ndarray:
 def _is_revisited(equations: Equations, j: int, is_out: np.ndarray) -> bool:
     """Return whether most states of a joint in some rows (N,) are those of other rows, too."""
     motion, rows = equations.motion, equations.filter.rows
-    x = np.column_stack([motion.wrapped[rows, j], motion.velocity[rows, j]])
-    x /= np.maximum(x.std(axis=0), 1e-300)
+    x = _scaled(motion.wrapped[rows, j], motion.velocity[rows, j])
     distance = cKDTree(x[~is_out]).query(x[is_out])[0]
     return bool(np.mean(distance < _NEAR) > _REVISITED)
+
+
+def _is_of_load(equations: Equations, j: int, r: np.ndarray, is_out: np.ndarray) -> bool:
+    """Return whether the rest r (N,) of a joint is the same under the same load in all stretches.
+
+    That of a motor which fails under a large load is, and that of a hand is not.
+    """
+    load = _scaled(equations.motion.nominal_effort[equations.filter.rows, j])[is_out]
+    r, stretch = r[is_out], np.cumsum(np.diff(is_out.astype(int), prepend=0) > 0)[is_out]
+    other = np.full(len(r), np.nan)
+    for i in np.unique(stretch):
+        elsewhere = stretch != i
+        if elsewhere.any():
+            distance, at = cKDTree(load[elsewhere]).query(load[~elsewhere])
+            other[~elsewhere] = np.where(distance < _NEAR, r[elsewhere][at], np.nan)
+    is_near = np.isfinite(other)
+    unlike = ((r - other)[is_near] ** 2).sum() > _UNLIKE * (r[is_near] ** 2).sum()
+    return bool(is_near.mean() > _REVISITED and not unlike)
+
+
+def _scaled(*signals: np.ndarray) -> np.ndarray:
+    """Return signals (N,) in their standard deviations, (N, signals)."""
+    x = np.column_stack(signals)
+    return x / np.maximum(x.std(axis=0), 1e-300)

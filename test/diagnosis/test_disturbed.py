@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.disturbed import disturbance
+from sgp_ros.diagnosis.disturbed import _is_of_load, disturbance
 from sgp_ros.diagnosis.pipeline import diagnose
 from test.diagnosis.worlds import CHAINS, events_of, simulate
 
@@ -21,6 +23,22 @@ def _detent(_t, q, v):
     """A strong force at one position, passed in little time."""
     d = (q[0] - 0.3) / 0.03
     return (-0.2 * v[0] - 5.0 * d * np.exp(-0.5 * d**2),)
+
+
+@pytest.mark.parametrize(
+    ('second', 'is_law'),
+    [(1.0, True), (-1.0, False), (None, False)],
+    ids=['the same twice', 'another the second time', 'once'],
+)
+def test_what_is_the_same_under_the_same_load_is_a_law(second, is_law):
+    """A motor that fails under a large load does so each time, a hand pushes as it likes."""
+    t = np.arange(2000) % 1000 / 1000.0
+    load, rest = np.sin(12.0 * t), 20.0 * np.sin(60.0 * t)
+    rest[1000:] *= second or 1.0
+    is_out = (t > 0.4) & (t < 0.5) & ((np.arange(2000) < 1000) | (second is not None))
+    motion = SimpleNamespace(nominal_effort=load[:, None])
+    equations = SimpleNamespace(motion=motion, filter=SimpleNamespace(rows=slice(None)))
+    assert _is_of_load(equations, 0, rest, is_out) is is_law
 
 
 @pytest.mark.parametrize(
