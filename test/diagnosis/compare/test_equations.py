@@ -83,6 +83,14 @@ def test_a_body_that_is_nearly_gone_costs_as_a_logarithm(perfect, equations_for,
     assert total > 40.0 or size > 0.5
 
 
+def test_a_model_pays_for_bodies_that_are_nearly_gone(equations_for, perfect):
+    _, equations = equations_for(perfect[2])
+    model = fit(Columns(equations), (), start(equations))
+    w = np.zeros(equations.size)
+    w[equations.instants + 10] = -0.9 / SPREAD
+    assert replace(model, w=w).strain > 2.0 * 0.5 * w @ w
+
+
 def test_a_load_widens_the_last_body_alone(robots):
     """By a quarter of all that moves, beyond the link; a link without inertia carries none."""
     _, tree = robots[2]
