@@ -139,9 +139,8 @@ def grown(columns: Columns, model: Model, block: Block) -> Model:
         trials = _counted(columns, model, block)
         better = best_of(model, trials, is_whole=False)
         if better is None or gain(better, model, is_whole=False) < PER_EFFECT:
-            better = best_of(
-                model, [*trials, *_with_two(columns, model, block, trials)], is_whole=False
-            )
+            two = _with_two(columns, model, block, trials)
+            better = best_of(model, two if better is None else [better, *two], is_whole=False)
         if better is None:
             return model
         model = better
