@@ -36,7 +36,7 @@ _NEAR = 0.25
 _REVISITED = 0.5
 """Share of a stretch whose states a joint passes at other times."""
 _UNLIKE = 0.25
-"""Mean square, over that of both, by which what comes back may differ."""
+"""Mean square, over that of the rest, by which what comes back may differ."""
 
 
 def undisturbed(

@@ -68,6 +68,13 @@ def test_only_what_states_of_other_times_lack_is_a_disturbance(equations_for, fo
         assert end - 0.12 < b < end + 0.5
 
 
+def test_what_follows_the_load_is_no_disturbance(equations_for, monkeypatch):
+    _, equations = equations_for(simulate(CHAINS[1], 4, 12.0, force=_pushed(5.0, 5.8)))
+    assert disturbance(equations)
+    monkeypatch.setattr('sgp_ros.diagnosis.disturbed._is_of_load', lambda *_: True)
+    assert disturbance(equations) == ()
+
+
 def test_physics_is_named_without_the_time_in_which_a_hand_pushes(robots):
     """With that time it was unexplained."""
     robot, tree = robots[1]
