@@ -140,6 +140,8 @@ def search(
     ranked[:1] = [refined(look.columns, scale, m, joint) for m in ranked[:1]]
     free = look.free(ranked[0]) if ranked else np.zeros(0)
     floor = float(scale.power[joint] * scale.floor[joint])
+    if any(scale.worth(m) > scale.worth(listed) + ALIKE for m in ranked[:1]):
+        slight = slight and is_slight(listed, ranked[0], joint)
     return Searched(joint, listed, smooth[0], tuple(ranked), free, floor, slight)
 
 

@@ -19,6 +19,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.unlisted import assertion, shapes
+from sgp_ros.diagnosis.unlisted import search as searching
 from sgp_ros.diagnosis.unlisted.assertion import _in_plain_laws, with_laws
 from sgp_ros.diagnosis.unlisted.beside import earned, is_bent, law_of
 from sgp_ros.diagnosis.unlisted.formulas import Range, texts
@@ -37,6 +38,7 @@ from sgp_ros.diagnosis.unlisted.tried import more_forces, promises, smooth_force
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.formula import read_formula
+from sgp_ros.physics.law import FormulaLaw
 from sgp_ros.physics.parts import Place
 from sgp_ros.physics.units import read_unit, unit_of
 from test.diagnosis.fitted_models import fitted
@@ -256,6 +258,22 @@ def test_a_law_is_found_beside_friction_that_was_not_named(equations_for):
     names = {s.effect.name for s in found.laws[0].effects}
     assert {'coulomb_friction', 'viscous_friction'} < names
     assert found.laws[0].left[0] < 0.1 * COUNTED_SHARE
+
+
+@pytest.mark.parametrize('is_kept', [True, False])
+def test_names_stay_only_beside_a_formula_that_differs_little_too(
+    equations_for, monkeypatch, is_kept
+):
+    """A better formula without them says that the listed laws were bent to imitate it."""
+    monkeypatch.setattr(
+        searching, 'is_slight',
+        lambda _listed, m, _joint: is_kept or not isinstance(m.effects[-1].effect, FormulaLaw),
+    )  # fmt: skip
+    _, equations = equations_for(simulate(CHAINS[1], 11, 10.0, force=_brake))
+    comparison, listed = compare_models(equations, lambda _share: None), fitted(equations)
+    found = search(Columns(equations), Scale.of(equations, comparison), listed, 0)
+    assert found is not None
+    assert found.is_slight is is_kept
 
 
 @pytest.mark.long
