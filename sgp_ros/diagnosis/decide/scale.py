@@ -81,8 +81,7 @@ class Scale:
 
     def found(self, model: Model) -> np.ndarray:
         """Return the force to explain at each joint, (k,) shares, as in `explained`."""
-        net = sum(model.forces, np.zeros_like(model.residual))
-        effects = np.minimum((net**2).mean(axis=0) / self.power, self.nominal)
+        effects = np.minimum((model.net_force**2).mean(axis=0) / self.power, self.nominal)
         return np.asarray(np.maximum(self.base, effects))
 
     def excess(self, model: Model, predictable: np.ndarray | None = None) -> np.ndarray:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.explain.fitted_model import Model, floors, price_of
+from sgp_ros.diagnosis.explain.fitted_model import Model, add_force, floors, price_of
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.inertia_slope import InertiaSlope
 from sgp_ros.diagnosis.explain.regression import Columns, dry_joints
@@ -109,14 +109,16 @@ def _solved(
 ) -> Model:
     frame, equations = bench.frame, bench.frame.equations
     c = bench.coefficients(candidates)
-    placed, forces, at = [], [], 0
+    placed, parts, at, left = list[EffectAt](), list[np.ndarray](), 0, -equations.d
     for s in candidates:
-        x = columns.of(s, equations, w_before)
-        own = np.ones(1) if s.effect.is_given else c[at : at + x.shape[2]]
+        motion = columns.corrected(w_before if s.effect.uses_bodies else None)
+        x = columns.local(s, equations, motion)
+        own = np.ones(1) if s.effect.is_given else c[at : at + x.shape[-1]]
         at += 0 if s.effect.is_given else len(own)
         placed.append(replace(s, coefficients=own))
-        forces.append(x @ own)
-    left = equations.d - sum(forces, np.zeros_like(equations.d))
+        parts.append(x @ own)
+        add_force(left, s.place.joint, parts[-1])
+    left = -left
     w = frame.parameters(left)
     residual = left - equations.force_of(w)
     mean = (residual**2).mean(axis=0)
@@ -132,5 +134,5 @@ def _solved(
     )
     return Model(
         tuple(placed), w, np.sqrt(variance), inertia, score, residual,
-        tuple(forces), frame,
+        tuple(parts), frame,
     )  # fmt: skip

@@ -13,7 +13,7 @@ from sgp_ros.diagnosis.criteria import (
     PER_PARAMETER,
     SLIGHT_REST,
 )
-from sgp_ros.diagnosis.explain.fitted_model import Model, beyond_plain
+from sgp_ros.diagnosis.explain.fitted_model import Model, add_force, beyond_plain
 from sgp_ros.diagnosis.explain.screening import WIDEST, are_apart
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.elasticity import have_rotors
@@ -79,10 +79,10 @@ def _delivers(model: Model) -> bool:
     laws = [s.place.joint for s in model.effects if s.effect.site == MOTOR and s.place.joint >= 0]
     if not laws:
         return True
-    acting = equations.effort
-    for s, force in zip(model.effects, model.forces, strict=True):
+    acting = equations.effort.copy()
+    for s, part in zip(model.effects, model.parts, strict=True):
         if s.effect.site == MOTOR:
-            acting = acting + force
+            add_force(acting, s.place.joint, part)
     return bool(((acting**2).mean(axis=0) > COUNTED_SHARE * equations.power)[laws].all())
 
 

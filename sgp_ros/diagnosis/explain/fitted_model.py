@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -30,7 +31,7 @@ class Model:
         inertia: (k,) log of that of its bodies and rotors, see `Equations.inertia`.
         score: log likelihood less penalties [nats].
         residual: (N, k) [N m or N].
-        forces: filtered force of each effect, (N, k).
+        parts: filtered force of each effect, (N, k), or (N,) on its joint.
     """
 
     effects: tuple[EffectAt, ...]
@@ -39,7 +40,7 @@ class Model:
     inertia: np.ndarray
     score: float
     residual: np.ndarray
-    forces: tuple[np.ndarray, ...]
+    parts: tuple[np.ndarray, ...]
     frame: Frame = field(repr=False)
 
     @property
@@ -131,16 +132,34 @@ class Model:
         return self.size + self.frame.determined
 
     @property
+    def forces(self) -> tuple[np.ndarray, ...]:
+        """Filtered force of each effect, (N, k) [N m or N]."""
+        return tuple(self._force([i]) for i in range(len(self.parts)))
+
+    @property
+    def net_force(self) -> np.ndarray:
+        """Filtered force of all effects, (N, k) [N m or N]."""
+        return self._force(range(len(self.parts)))
+
+    def _force(self, effects: Iterable[int]) -> np.ndarray:
+        force = np.zeros_like(self.residual)
+        for i in effects:
+            add_force(force, self.effects[i].place.joint, self.parts[i])
+        return force
+
+    @property
     def net_share(self) -> float:
         """Share that all effects together have of the mean squared effort, over all joints."""
-        net = sum(self.forces, np.zeros_like(self.residual))
-        return float(((net**2).mean(axis=0) / self.frame.equations.power).sum())
+        net = (self.net_force**2).mean(axis=0)
+        return float((net / self.frame.equations.power).sum())
 
     @property
     def filtered_shares(self) -> list[float]:
         """Greatest shares that the filtered effects have of the mean squared effort of a joint."""
         power = self.frame.equations.power
-        return [float(((force**2).mean(axis=0) / power).max()) for force in self.forces]
+        pairs = zip(self.effects, self.parts, strict=True)
+        own = ((x, power if x.ndim == 2 else power[s.place.joint]) for s, x in pairs)
+        return [float(((x**2).mean(axis=0) / size).max()) for x, size in own]
 
     @cached_property
     def shares(self) -> list[float]:
@@ -229,13 +248,17 @@ def price_of(frame: Frame, size: int) -> float:
 def extra_force(model: Model, motion: ObservedMotion) -> np.ndarray:
     """Return the force of all effects at the full rate, (n, k) [N m or N]."""
     force = motion.stated_force.copy()
-    for effect in model.effects:
-        x = effect.columns(motion) @ effect.coefficients
-        if x.ndim == 2:
-            force += x
-        else:
-            force[:, effect.place.joint] += x
+    for s in model.effects:
+        add_force(force, s.place.joint, s.columns(motion) @ s.coefficients)
     return force
+
+
+def add_force(force: np.ndarray, joint: int, part: np.ndarray) -> None:
+    """Add to forces (n, k) that of an effect, (n, k), or (n,) on its joint."""
+    if part.ndim == 2:
+        force += part
+    else:
+        force[:, joint] += part
 
 
 def held_joints(model: Model, motion: ObservedMotion) -> frozenset[int]:

@@ -120,7 +120,7 @@ def test_few_rows_let_nothing_stand(rubbed):
     equations = _swinging(rubbed, 0.5 * FORCE_ACCURACY)
     model = fitted(equations, 'coulomb_friction')
     few = replace(equations, d=equations.d[:4], bases=(equations.bases[0][:4],))
-    short = replace(model, residual=model.residual[:4], forces=(model.forces[0][:4],))
+    short = replace(model, residual=model.residual[:4], parts=(model.parts[0][:4],))
     found, excess, _ = within_accuracy(few, short, np.array([3.0]))
     assert found is short
     assert excess[0] == 3.0

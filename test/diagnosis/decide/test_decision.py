@@ -63,7 +63,7 @@ def test_a_force_above_the_band_counts_only_as_far_as_it_is_seen(damped, seen, c
     """A ripple that is filtered away but for what is adequate in any case (2 and half of it)."""
     model = fitted(damped, 'cogging')
     part = np.sqrt(seen * SLIGHT_REST / model.filtered_shares[0])
-    model = replace(model, forces=tuple(part * force for force in model.forces))
+    model = replace(model, parts=tuple(part * x for x in model.parts))
     model.__dict__['shares'] = [2.0 * COUNTED_SHARE]
     assert Scale.is_large(model) is counts
 
@@ -115,8 +115,8 @@ def test_noise_alone_is_not_unexplained(equations_for, perfect):
 def test_effects_that_cancel_each_other_do_not_count(damped):
     model = fitted(damped, 'viscous_friction', 'quadratic_drag')
     (net,) = [sum(model.forces)]
-    opposed = replace(model, forces=(10.0 * net, -9.0 * net))
-    agreeing = replace(model, forces=(0.5 * net, 0.5 * net))
+    opposed = replace(model, parts=(10.0 * net, -9.0 * net))
+    agreeing = replace(model, parts=(0.5 * net, 0.5 * net))
     opposed.__dict__['shares'] = agreeing.__dict__['shares'] = [1.0, 1.0]
     assert opposed.net_share == pytest.approx(agreeing.net_share)
     assert is_sound(agreeing)

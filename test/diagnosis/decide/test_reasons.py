@@ -55,7 +55,7 @@ def test_a_rival_beside_what_is_asserted_is_told_from_one_in_its_place(damped, m
 def test_a_rival_that_leaves_less_gets_its_reason(damped, models):
     """Its price, the size of its effects, or bodies that are not likely."""
     right, more, _, _ = models
-    more = replace(more, residual=0.9 * right.residual, forces=2 * right.forces)
+    more = replace(more, residual=0.9 * right.residual, parts=2 * right.parts)
     more.__dict__['shares'] = [1.0, 1e-6]
     assert 'too small' in _said(more, right, damped)
     more.__dict__['shares'] = [1.0, 1.0]
@@ -95,7 +95,7 @@ def test_what_bodies_explain_much_worse_is_not_explained_by_them(
     right = models[0]
     if size < 1.0:
         part = np.sqrt(size * COUNTED_SHARE / right.filtered_shares[0])
-        right = replace(right, forces=tuple(part * force for force in right.forces))
+        right = replace(right, parts=tuple(part * x for x in right.parts))
     comparison = _comparison(damped, right)
     decision = decide(damped, comparison)
     bodies = comparison.parameters
