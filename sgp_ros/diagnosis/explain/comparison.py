@@ -18,8 +18,15 @@ from sgp_ros.diagnosis.criteria import (
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model, first_scale
-from sgp_ros.diagnosis.explain.growth import crossed
-from sgp_ros.diagnosis.explain.joint_search import built_up, by_joint, uncoupled, usual
+from sgp_ros.diagnosis.explain.growth import blocks_of, crossed
+from sgp_ros.diagnosis.explain.joint_search import (
+    built_up,
+    by_joint,
+    large,
+    shrunk,
+    uncoupled,
+    usual,
+)
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import COMMAND_DELAY
@@ -138,11 +145,9 @@ def _more(columns: Columns, found: Comparison) -> list[Model]:
     sound = [m for m in by_score if not m.effects or is_credible(m)]
     best = next(iter(sound), found.base)
     limit = np.clip(ADEQUATE_REST * found.base.left, SLIGHT_REST, COUNTED_SHARE)
-    stated: list[Model] = []
-    if best.is_free and best.strain > BENT_BODIES:
-        stated = _as_stated(
-            columns, best, next((m for m in sound if not m.is_free), found.nominal)
-        )
+    of_file = next((m for m in sound if not m.is_free), found.nominal)
+    is_bent = best.is_free and best.strain > BENT_BODIES
+    stated = _as_stated(columns, best, of_file) if is_bent else []
     if (best.left < limit).all() and best.strain < PER_EFFECT:
         return _ranked(stated)
     everyday = usual(columns, fit(columns, (), found.nominal.sigma, is_free=True))
@@ -155,7 +160,7 @@ def _more(columns: Columns, found: Comparison) -> list[Model]:
         starts += _late(columns, best.sigma)
     ends = [stated, loaded, *(by_joint(columns, start) for start in starts)]
     models = _crossed(columns, [end for end in ends if end])
-    models += _carrying(columns, models)
+    models += [*_carrying(columns, models), *_freed(columns, models)]
     return _ranked(m for m in models if len(m.effects) > 2)
 
 
@@ -168,6 +173,20 @@ def _carrying(columns: Columns, models: list[Model]) -> list[Model]:
         for model in free[:_CARRYING]
         for load in ([()] if any(s.effect.is_body for s in model.effects) else loads)
     ]
+
+
+def _freed(columns: Columns, models: list[Model]) -> Iterator[Model]:
+    """Yield the best model with the bodies of the file, with others in place of some laws.
+
+    A torque constant, a rotor, a spring may have stood for bodies that are a little different.
+    """
+    stated = [m for m in models if not m.is_free]
+    for best in sorted(stated, key=lambda m: -gain(m, stated[0]))[:1]:
+        laws = tuple(s for s in best.effects if not s.effect.is_body)
+        free = fit(columns, laws, best.sigma, is_free=True)
+        for block in blocks_of(free):
+            free = shrunk(columns, free, block)
+        yield from filter(is_credible, (free, large(columns, free)))
 
 
 def _loads(motion: ObservedMotion) -> list[EffectAt]:
@@ -260,19 +279,13 @@ def _exchanged(columns: Columns, ranked: list[Model]) -> list[Model]:
 
 def _varied(singles: list[Model]) -> list[Model]:
     """Return the first effects that get a second one: the best of each variant."""
-    chosen = []
-    for is_free in (False, True):
-        chosen += [m for m in singles if m.is_free == is_free][: PARENTS // 2]
-    return chosen
+    variants = [[m for m in singles if m.is_free == is_free] for is_free in (False, True)]
+    return [m for some in variants for m in some[: PARENTS // 2]]
 
 
 def _distinct(found: list[tuple[float, EffectAt]], count: int) -> list[EffectAt]:
     """Return the best `count` effects at places, with both of their shapes."""
-    keys: list[object] = []
-    for _, candidate in found:
-        if candidate.key not in keys:
-            keys.append(candidate.key)
-    kept = set(keys[:count])
+    kept = list(dict.fromkeys(candidate.key for _, candidate in found))[:count]
     return [candidate for _, candidate in found if candidate.key in kept]
 
 

@@ -51,7 +51,7 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
     for _ in range(SWEEPS):
         before = model.key
         for block in blocks_of(model):
-            model = _shrunk(columns, grown(columns, model, block), block)
+            model = shrunk(columns, grown(columns, model, block), block)
         if model.key == before:
             better = best_of(model, coupled(columns, model))
             if better is None:
@@ -62,10 +62,10 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
     model = fit(columns, model.effects, model.sigma, is_free=model.is_free, w=model.w, rounds=2,
                 steps=6)  # fmt: skip
     rivals = [t for block in blocks_of(model) for t in _changes(columns, model, block)]
-    return [m for m in (model, _large(columns, model), *rivals) if m.effects and is_credible(m)]
+    return [m for m in (model, large(columns, model), *rivals) if m.effects and is_credible(m)]
 
 
-def _large(columns: Columns, model: Model) -> Model:
+def large(columns: Columns, model: Model) -> Model:
     """Return a model without its rare laws that turned out too small beside the others."""
     while True:
         seen = zip(model.effects, model.shares, model.filtered_shares, strict=True)
@@ -121,7 +121,7 @@ def built_up(columns: Columns, model: Model) -> Model:
     return fit(columns, swapped, model.sigma, is_free=model.is_free, w=model.w)
 
 
-def _shrunk(columns: Columns, model: Model, block: Block) -> Model:
+def shrunk(columns: Columns, model: Model, block: Block) -> Model:
     """Remove laws that are not worth their price, or replace them by a law of one number."""
     while any(block.holds(s) for s in model.effects):
         better = best_of(model, _changes(columns, model, block, is_simple=True))

@@ -24,7 +24,7 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.diagnosis.unlisted.beside import PLAIN, law_of, own_effects, says_less
+from sgp_ros.diagnosis.unlisted.beside import PLAIN, acts_as_bodies, law_of, own_effects, says_less
 from sgp_ros.diagnosis.unlisted.search import Searched, search
 from sgp_ros.diagnosis.unlisted.tried import promises
 from sgp_ros.physics.effect_at import EffectAt
@@ -176,6 +176,8 @@ def _objection(equations: Equations, comparison: Comparison, searched: Searched)
     motion = equations.motion
     if law.at_bounds(motion):
         return 'a parameter of the best formula is at the limit of what this motion determines'
+    if acts_as_bodies(equations, best.parts[best.effects.index(law)], searched.joint):
+        return 'other bodies, or other lengths, than those of the robot file would act much alike'
     wide = law.force(moved(motion, np.inf, 1.0, 0.0))
     return '' if np.isfinite(wide).all() else 'the best formula is not finite over the range'
 

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from sgp_ros.diagnosis.criteria import ADEQUATE_REST, BLURRED, COUNTED_SHARE, REGION_ENERGY
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.criteria import (
+    ADEQUATE_REST,
+    BLURRED,
+    COUNTED_SHARE,
+    INDEPENDENT_ROWS,
+    NEARLY,
+    PER_EFFECT,
+    REGION_ENERGY,
+)
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import is_credible
@@ -166,6 +176,27 @@ def is_creep(columns: Columns, scale: Scale, listed: Model, smooth: Model, joint
         listed = fit(columns, usual, listed.sigma, is_free=listed.is_free, w=listed.w,
                      still=len(usual))  # fmt: skip
     return bool(scale.excess(listed)[joint] < 1.0)
+
+
+def acts_as_bodies(equations: Equations, force: np.ndarray, joint: int) -> bool:
+    """Return whether other bodies, not much less likely, would act on a joint as a force does.
+
+    Bodies that could do so and yet were not found contradict other joints, as they do where the
+    lengths of the robot file are wrong; that a law acts like a weight would be a coincidence.
+
+    Args:
+        equations: of the recording.
+        force: filtered, (N,) [N m or N].
+        joint: index.
+    """
+    base = equations.bases[joint][:, equations.instants :]
+    size = float((force**2).mean())
+    scale = math.sqrt(len(force) * NEARLY * size / INDEPENDENT_ROWS)
+    A = np.concatenate([base / scale, np.eye(base.shape[1])])
+    y = np.concatenate([force / scale, np.zeros(base.shape[1])])
+    w = np.linalg.lstsq(A, y, rcond=None)[0]
+    rest = float(((force - base @ w) ** 2).mean())
+    return rest < NEARLY * size and 0.5 * float(w @ w) < PER_EFFECT
 
 
 def _is_slow(listed: Model, smooth: Model, joint: int) -> bool:

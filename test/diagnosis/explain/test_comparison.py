@@ -16,7 +16,7 @@ from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 from test.diagnosis.fitted_models import fitted
-from test.diagnosis.worlds import CHAINS, simulate
+from test.diagnosis.worlds import CHAINS, heavier, simulate
 
 
 def _falling_friction(t, q, v):
@@ -87,7 +87,24 @@ def test_a_law_of_one_number_is_tried_in_place_of_a_richer_one(equations_for):
     _, equations = equations_for(world)
     rich = fitted(equations, 'asymmetric_coulomb', 'viscous_friction')
     (block, *_) = growth.blocks_of(rich)
-    found = joint_search._shrunk(Columns(equations), rich, block)
+    found = joint_search.shrunk(Columns(equations), rich, block)
     assert _names(found) == {'coulomb_friction', 'viscous_friction'}
     assert gain(found, rich) > 0.0
-    assert joint_search._shrunk(Columns(equations), found, block) is found
+    assert joint_search.shrunk(Columns(equations), found, block) is found
+
+
+@pytest.mark.parametrize('is_load', [False, True])
+def test_laws_beside_the_bodies_of_the_file_may_have_stood_for_others(equations_for, is_load):
+    """A torque constant of a link that is a little heavier goes; its friction stays."""
+    world = simulate(
+        heavier(CHAINS[2], 0, 1.1), 7, 10.0, force=lambda t, q, v: (-0.3 * v[0], 0.0)
+    )  # fmt: skip
+    _, equations = equations_for(world)
+    names = ('torque_gain', 'viscous_friction', *(['payload'] if is_load else []))
+    stated = fitted(equations, *names)
+    found = list(comparison._freed(Columns(equations), [stated]))
+    assert found
+    for model in found:
+        assert model.is_free
+        assert _names(model) == {'viscous_friction'}
+    assert list(comparison._freed(Columns(equations), found)) == []

@@ -26,10 +26,10 @@ from sgp_ros.diagnosis.explain.fitted_model import beyond_plain, floors
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.growth import Block, crossed, grown
 from sgp_ros.diagnosis.explain.joint_search import (
-    _large,
     built_up,
     by_joint,
     coupled,
+    large,
     uncoupled,
     usual,
 )
@@ -107,9 +107,9 @@ def test_a_rare_law_that_is_too_small_goes_and_takes_nothing_with_it(equations):
     wave = next(c for _, c in screen(columns, pair, [EFFECTS['cogging']], (0,)))
     rich = fit(columns, (*pair.effects, wave), pair.sigma, is_free=True)
     assert rich.shares[-1] < COUNTED_SHARE
-    found = _large(columns, rich)
+    found = large(columns, rich)
     assert found.key == pair.key
-    assert _large(columns, found) is found
+    assert large(columns, found) is found
 
 
 def test_a_gain_is_what_the_other_way_loses(equations):

@@ -13,7 +13,7 @@ from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.diagnosis.unlisted.beside import is_bent, is_creep, is_slight
+from sgp_ros.diagnosis.unlisted.beside import acts_as_bodies, is_bent, is_creep, is_slight
 from sgp_ros.diagnosis.unlisted.shapes import FINE, SmoothForce, Variable
 from sgp_ros.diagnosis.unlisted.tried import smooth_forces
 from sgp_ros.physics.effect_at import EffectAt
@@ -98,3 +98,13 @@ def test_adequate_friction_keeps_its_name_against_an_earlier_speed(damped):
     creeps = fitted(damped, 'hysteresis', 'cogging', 'constant_load')
     assert not is_creep(columns, SimpleNamespace(excess=excess), creeps, late, 0)
     assert asked == [['hysteresis', 'constant_load']]
+
+
+def test_a_force_that_other_bodies_would_have_is_told_from_one_that_no_body_has(equations_for):
+    """A link a third heavier would; one twenty times as heavy is not likely, a wave no body."""
+    _, equations = equations_for(simulate(CHAINS[2], 4, 10.0))
+    weight = equations.bases[1][:, equations.instants + 10]
+    q = equations.filter(equations.motion.position[:, 1:])[:, 0]
+    assert acts_as_bodies(equations, 1.3 * weight, 1)
+    assert not acts_as_bodies(equations, 80.0 * weight, 1)
+    assert not acts_as_bodies(equations, weight.std() * np.sin(9.0 * q), 1)
