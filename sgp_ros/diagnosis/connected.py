@@ -18,7 +18,7 @@ from sgp_ros.diagnosis.compare.sufficiency import require_rows
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth
 from sgp_ros.diagnosis.compare.volume import noisy_volume
 from sgp_ros.diagnosis.criteria import ALIKE, NEARLY, PER_EFFECT, TEMPER
-from sgp_ros.diagnosis.decide.differences import Several, decide_several
+from sgp_ros.diagnosis.decide.differences import Several, decide_several, in_halves
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.gathered import Recordings
 from sgp_ros.diagnosis.result import Equivalent, Finding
@@ -88,6 +88,11 @@ class Connected:
         if not self.rivals or is_common or (self.rivals == (finding.joint,) and is_one_law):
             return finding
         return replace(finding, probability=finding.probability * self.trust)
+
+    @property
+    def verdict(self) -> str:
+        """Verdict on what is compared."""
+        return self.several.decision.verdict
 
     @property
     def nominal(self) -> np.ndarray:
@@ -164,7 +169,7 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
     plain = compared(recordings, tree, next(each))
     # known inertia is what tells units and signs apart
     is_open = recordings.learned.approach is not None or bool(recordings.unstated)
-    if is_open or plain.several.decision.verdict == 'no_mismatch':
+    if is_open or plain.verdict == 'no_mismatch':
         return plain
     bandwidth = choose_bandwidth(recordings.learned, tree)
     known = plain
@@ -172,7 +177,7 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
         # gains can be separated from bodies only where these are known
         by_gains = search(Probe(recordings.learned, tree, bandwidth, knows_bodies=True))
         known = _connected(plain, by_gains, tree, each)
-        is_body = plain.several.decision.verdict == 'parameters_only'
+        is_body = plain.verdict == 'parameters_only'
         if by_gains.is_enough or (known.findings and not is_body):
             return known
     found = search(Probe(recordings.learned, tree, bandwidth))
@@ -199,17 +204,6 @@ def _extended(connected: Connected) -> Connected:
     return replace(connected, several=several, laws=laws)
 
 
-def in_halves(progress: Callable[[float], None]) -> Iterator[Callable[[float], None]]:
-    """Yield the progress of one comparison after the other; how many come is not known ahead.
-
-    Each of them is half of what is left, so that the whole goes on and never back.
-    """
-    left = 1.0
-    while True:
-        left *= 0.5
-        yield lambda share, left=left: progress(1.0 - left * (2.0 - share))  # type: ignore[misc]
-
-
 def _connected(
     plain: Connected, found: Connection, tree: Tree, each: Iterator[Callable[[float], None]]
 ) -> Connected:
@@ -222,12 +216,12 @@ def _connected(
         correction=correction,
     )
     is_free = any(len(e.numbers) for e in found.errors)  # and may imitate a law
-    if is_free and corrected.several.decision.verdict == 'unexplained':
-        said = (setup_advice(found),) * (plain.several.decision.verdict == 'unexplained')
+    if is_free and corrected.verdict == 'unexplained':
+        said = (setup_advice(found),) * (plain.verdict == 'unexplained')
         return replace(plain, remarks=(*said, *plain.remarks))
     price, rare = price_of(found)
     gain = _gain(plain, corrected, price)
-    if gain >= PER_EFFECT and plain.several.decision.verdict != 'unexplained':
+    if gain >= PER_EFFECT and plain.verdict != 'unexplained':
         # on the same band: what is slower has less noise
         cutoff = corrected.equations.filter.cutoff
         if plain.equations.filter.cutoff > cutoff:
@@ -257,13 +251,17 @@ def _stands_for_gains(plain: Connected, found: Connection) -> bool:
 def _gain(plain: Connected, corrected: Connected, price: float) -> float:
     """Return by how much the corrected recording is better explained, less a price [nats].
 
-    Efforts, given the motion, and the motion must both be; 0 where only one of them clearly is.
+    Efforts, given the motion, and the motion must both be; 0 where only one of them clearly is,
+    unless nothing explains the recording as it is: the models of it then are no explanations.
     """
     nominal, recorded = np.minimum(plain.nominal, corrected.nominal), plain.equations.power
     worth = [[c.worth(nominal, recorded, is_of_motion=m) for m in (False, True)]
              for c in (corrected, plain)]  # fmt: skip
     gains = [a - b - price for a, b in zip(*worth, strict=True)]
-    return max(min(gains), 0.0) if max(gains) >= PER_EFFECT else min(gains)
+    if max(gains) < PER_EFFECT:
+        return min(gains)
+    is_solved = plain.verdict == 'unexplained' != corrected.verdict
+    return max(gains) if is_solved and min(gains) >= 0.0 else max(min(gains), 0.0)
 
 
 def _named(connected: Connected) -> frozenset[tuple[str, str]]:

@@ -19,6 +19,11 @@ COUNTED_SHARE = SHARE_TOLERANCE * LEAST_SHARE
 EVIDENCE = 10.0
 """Evidence that an effect must have, on the recording and on parts left out [nats]. Nulls."""
 
+LEAST_FREE = 0.2
+"""Part of the inertial force that a robot without any effort may miss where nothing drives it [1].
+
+Guards. A motor that is not recorded supplies what moves the joint, and more where it carries load.
+"""
 LEAST_MOTION = 25.0
 """Range of a joint's positions, in units of their noise, from which it moves [1]. Guards.
 

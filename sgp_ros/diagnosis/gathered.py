@@ -7,9 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.creeping import creeping_friction, creeping_remark, with_creeping
+from sgp_ros.diagnosis.compare.open_bodies import open_remark, with_open_bodies
 from sgp_ros.diagnosis.compare.settled import collect_settled
 from sgp_ros.diagnosis.compare.several import join
-from sgp_ros.diagnosis.compare.sufficiency import at_rest, require_motion, require_rows
+from sgp_ros.diagnosis.compare.sufficiency import (
+    at_rest,
+    require_motion,
+    require_rows,
+    without_motors,
+)
 from sgp_ros.diagnosis.compare.thinning import thinned
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
@@ -158,6 +165,25 @@ def _kept_back(
     said = dict.fromkeys(remark for _, _, remarks in parts for remark in remarks)
     learned = join([part for part, _, _ in parts])
     return learned, {HELD_OUT: join(kept)} if kept else {}, tuple(said)
+
+
+def prepared(
+    recordings: Recordings, tree: Tree, unstated: tuple[int, ...]
+) -> tuple[Recordings, Tree]:
+    """Return recordings and robot with what they show of its motors, bodies and friction.
+
+    Args:
+        recordings: gathered.
+        tree: nominal robot.
+        unstated: bodies that its file leaves open.
+    """
+    tree, passive = without_motors(recordings.learned, tree)
+    tree = with_open_bodies(recordings.learned, tree, unstated)
+    creeping = creeping_friction(recordings.learned, tree)
+    remarks = (*passive, *open_remark(tree, unstated), *creeping_remark(creeping))
+    recordings = recordings.changed(lambda raw: with_creeping(raw, creeping))
+    remarks = recordings.remarks + remarks
+    return replace(recordings, unstated=unstated, remarks=remarks), tree
 
 
 def driven(events: Iterable[Event], tree: Tree, known: Knowledge) -> list[Event]:

@@ -9,9 +9,8 @@ from itertools import chain
 import numpy as np
 
 from sgp_ros.batch.acceptance import USUAL
-from sgp_ros.diagnosis.compare.creeping import creeping_friction, creeping_remark, with_creeping
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.compare.open_bodies import open_bodies, open_remark, with_open_bodies
+from sgp_ros.diagnosis.compare.open_bodies import open_bodies
 from sgp_ros.diagnosis.compare.sufficiency import require_signed
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.diagnosis.compare.velocity_sensor import sensor_lags
@@ -37,7 +36,7 @@ from sgp_ros.diagnosis.findings import (
     parameter_errors,
     verdict_of,
 )
-from sgp_ros.diagnosis.gathered import Knowledge, Recordings, gather
+from sgp_ros.diagnosis.gathered import Knowledge, Recordings, gather, prepared
 from sgp_ros.diagnosis.locate.bands import bands
 from sgp_ros.diagnosis.locate.dependence import dependences
 from sgp_ros.diagnosis.locate.remainder import Remainder
@@ -96,16 +95,14 @@ def diagnose(
         tree: nominal robot.
         tests: events of held-out recordings, by stem.
         stated: effects that the nominal robot has, beside those of its tree.
-        holds_out: whether blocks of the training recording are kept for the proof, as
-            `held_out`; everything is then learned from the rest.
+        holds_out: whether blocks are learned from no more, and kept for the proof as `held_out`.
         is_static: whether the recordings hold settled points, one row a pose.
         config: settings of the intake.
         gains: of drives that hold position targets; None where commands are efforts.
         simulation: events of the simulation to compare with; None for the robot alone.
         simulated: physics of a simulation that is known by its model, whose bodies `tree` has.
         has_overlays: whether motions of both models are replayed over the measured ones.
-        is_thinned: whether rows are left out that the band of the equations does not need: at
-            high rates that is faster.
+        is_thinned: whether rows are left out that the band of the equations does not need.
         progress: called with the share that is done.
 
     Raises:
@@ -119,12 +116,7 @@ def diagnose(
     recordings = gather(several, tests, tree, known, holds_out=holds_out)
     require_signed(recordings.learned, tree.moving_names)
     recordings = recordings.thinned() if is_thinned else recordings
-    tree = with_open_bodies(recordings.learned, tree, unstated)
-    creeping = creeping_friction(recordings.learned, tree)
-    recordings = replace(
-        recordings.changed(lambda raw: with_creeping(raw, creeping)), unstated=unstated,
-        remarks=(*recordings.remarks, *open_remark(tree, unstated), *creeping_remark(creeping)),
-    )  # fmt: skip
+    recordings, tree = prepared(recordings, tree, unstated)
     try:
         connected = with_laws(undisturbed(recordings, tree, lambda x: progress(0.05 + 0.85 * x)))
         model, before = connected.several.decision.model, connected.uncorrected or connected

@@ -10,6 +10,7 @@ import pytest
 
 from sgp_ros.diagnosis import connected
 from sgp_ros.diagnosis.connected import Connected
+from sgp_ros.diagnosis.decide.differences import in_halves
 from sgp_ros.diagnosis.result import Finding, Location
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.unknowns import Agreement
@@ -47,7 +48,7 @@ def test_something_unknown_beside_it_hides_no_error_without_numbers(
 ):
     """A reversed joint imitates no unknown law; an offset may, and is advice beside it."""
     found = _found(monkeypatch, lambda *_: _of(10.0, 'unexplained'), numbers)
-    each = connected.in_halves(lambda _: None)
+    each = in_halves(lambda _: None)
     said = connected._connected(_of(10.0, verdict), found, None, each)
     assert len(said.findings) == is_asserted
     assert ('advice' in said.remarks) is (verdict == 'unexplained' and not is_asserted)
@@ -63,7 +64,7 @@ def test_a_band_is_compared_once(monkeypatch, plain, corrected, times):
         return _of(most_hz)
 
     found = _found(monkeypatch, compare, ())
-    each = connected.in_halves(lambda _: None)
+    each = in_halves(lambda _: None)
     correction = found.errors[0].correction
     assert connected._connected(_of(plain), found, None, each).correction is correction
     assert len(compared) == times
@@ -171,15 +172,23 @@ def test_recorded_efforts_in_any_unit_are_explained_alike(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ('of_efforts', 'of_motion', 'gain'),
-    [(60.0, 40.0, 30.0), (60.0, -50.0, 0.0), (-50.0, 60.0, 0.0), (12.0, -50.0, -60.0)],
-)
-def test_efforts_and_motion_must_both_be_better_explained(of_efforts, of_motion, gain):
-    """Where one clearly is and the other is not, neither side is believed."""
+    ('of_efforts', 'of_motion', 'is_open', 'gain'),
+    [
+        (60.0, 40.0, False, 30.0), (60.0, -50.0, False, 0.0), (-50.0, 60.0, False, 0.0),
+        (12.0, -50.0, False, -60.0), (60.0, 11.0, False, 1.0), (60.0, 11.0, True, 50.0),
+        (60.0, 9.0, True, 0.0), (15.0, 12.0, True, 2.0),
+    ],
+)  # fmt: skip
+def test_efforts_and_motion_must_both_be_better_explained(of_efforts, of_motion, is_open, gain):
+    """Where one clearly is and the other is not, neither side is believed.
+
+    Unless nothing explains the recording as it is, and the other is no worse.
+    """
 
     def side(*worth):
+        verdict = 'missing_physics' if any(worth) or not is_open else 'unexplained'
         return SimpleNamespace(
-            nominal=np.zeros(1), equations=SimpleNamespace(power=np.ones(1)),
+            nominal=np.zeros(1), equations=SimpleNamespace(power=np.ones(1)), verdict=verdict,
             worth=lambda _n, _r, is_of_motion: worth[is_of_motion],
         )  # fmt: skip
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.compare.equations import make_equations
+from sgp_ros.diagnosis.compare.sufficiency import without_motors
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.engine.samples import frozen_array
@@ -46,6 +47,27 @@ def test_a_free_swing_without_efforts_is_diagnosed(passive):
     events = events_of(_swing(), commands=False)
     assert all(event.effort is None for event in events)
     assert diagnose(events, *passive, {}).verdict == 'no_mismatch'
+
+
+@pytest.mark.parametrize(('force', 'is_passive'), [(0.0, True), (4.0, False)])
+def test_efforts_of_zero_are_of_a_link_that_nothing_drives(robots, force, is_passive):
+    """Not where the motion needs some, that were not recorded."""
+    robot, tree = robots[1]
+    world = _swing(
+        dry=lambda _t, _q, _s: LEVEL,
+        force=lambda t, _q, _v: (force * np.sin(7.0 * t) * np.cos(2.3 * t),),
+    )  # fmt: skip
+    events = events_of(world, effort=np.zeros_like(world.command), commands=False)
+    raw = collect(events, robot)
+    found, said = without_motors(raw, tree)
+    assert found.is_actuated.tolist() == [not is_passive]
+    assert [text.startswith('The recorded effort of joint0 is zero') for text in said] == (
+        [True] if is_passive else []
+    )
+    if is_passive:
+        diagnosed = diagnose(events, robot, tree, {})
+        assert [f.effect for f in diagnosed.findings] == ['coulomb_friction']
+        assert said[0] in diagnosed.remarks
 
 
 def test_a_driven_link_without_efforts_is_refused(robots):

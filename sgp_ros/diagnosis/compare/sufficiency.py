@@ -17,9 +17,12 @@ from sgp_ros.diagnosis.compare.grid import noise_density
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
     RawTrajectory,
+    choose_bandwidth,
+    observe,
     parallel_filter,
 )
 from sgp_ros.diagnosis.criteria import (
+    LEAST_FREE,
     LEAST_MOTION,
     LEAST_ROWS,
     UNSIGNED_LOW,
@@ -28,6 +31,7 @@ from sgp_ros.diagnosis.criteria import (
 )
 from sgp_ros.engine.samples import Event, JointSample
 from sgp_ros.errors import RecordingError
+from sgp_ros.rigid.tree import Tree
 
 _FEW = 16
 """Positions below which no spectrum is taken."""
@@ -140,6 +144,38 @@ def require_signed(raw: RawTrajectory, names: Sequence[str]) -> None:
             'signed efforts',
             'record signed efforts, or lock these joints in a robot YAML',
         )  # fmt: skip
+
+
+def without_motors(raw: RawTrajectory, tree: Tree) -> tuple[Tree, tuple[str, ...]]:
+    """Return the robot with joints as passive that nothing drives, and a remark if there are some.
+
+    Their recorded effort is zero throughout, and their motion is mostly that of the robot without
+    any effort. It is not where efforts were not recorded: then nothing is changed.
+
+    Args:
+        raw: the recording.
+        tree: nominal robot.
+    """
+    if raw.effort is None or raw.drive is not None or raw.approach is not None:
+        return tree, ()
+    driven = tree.is_actuated.copy()
+    driven[: tree.size] &= raw.effort.any(axis=0)
+    idle = replace(tree, is_actuated=driven)
+    bandwidth = choose_bandwidth(raw, idle)
+    motion, low = observe(raw, idle, bandwidth), parallel_filter(raw, bandwidth)
+    needed = low(motion.nominal_effort - motion.effort - motion.stated_force)
+    inertial = low(motion.mass_diagonal * motion.acceleration)
+    is_free = (needed**2).mean(axis=0) < LEAST_FREE * (inertial**2).mean(axis=0)
+    driven[: tree.size] |= tree.is_actuated[: tree.size] & ~(is_free & motion.moves)
+    names = [n for j, n in enumerate(tree.moving_names) if driven[j] != tree.is_actuated[j]]
+    if not names:
+        return tree, ()
+    said = (
+        f'The recorded effort of {", ".join(names)} is zero throughout, and the motion is nearly '
+        'that of a robot without motors there: taken as passive. All forces are then relative to '
+        'the bodies of the robot file.'
+    )
+    return replace(tree, is_actuated=driven), (said,)
 
 
 def require_rows(raw: RawTrajectory, bandwidth: Bandwidth) -> None:

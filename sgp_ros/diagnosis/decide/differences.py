@@ -15,7 +15,7 @@ common models are compared anew, and differences are looked for again beside the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -90,6 +90,17 @@ def decide_several(equations: Equations, count: int, progress: Callable[[float],
     if decision.verdict == 'unexplained':  # what is unknown may differ by chance
         chances = {key: min(p, DOUBTED) for key, p in chances.items()}
     return Several(left, comparison, decision, model, chances)
+
+
+def in_halves(progress: Callable[[float], None]) -> Iterator[Callable[[float], None]]:
+    """Yield the progress of one comparison after the other; how many come is not known ahead.
+
+    Each of them is half of what is left, so that the whole goes on and never back.
+    """
+    left = 1.0
+    while True:
+        left *= 0.5
+        yield lambda share, left=left: progress(1.0 - left * (2.0 - share))  # type: ignore[misc]
 
 
 def _start(comparison: Comparison, decision: Decision, scale: Scale) -> Model:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from sgp_ros.batch.least_squares import correlation_factor
@@ -128,3 +130,15 @@ def _is_confined(s: EffectAt, motion: ObservedMotion) -> bool:
         return True
     q = motion.wrapped[:, s.place.joint]
     return float(sum(((q >= a) & (q <= b)).mean() for a, b in inside[1])) < WIDEST
+
+
+def ranked(models: Iterable[Model]) -> list[Model]:
+    """Return the models that are possible, the better of those that are alike, best first."""
+    best: dict[object, Model] = {}
+    for model in models:
+        if not model.is_possible() or not np.isfinite(model.score):
+            continue
+        key = model.key, model.is_free
+        if key not in best or model.score > best[key].score:
+            best[key] = model
+    return sorted(best.values(), key=lambda model: -model.score)

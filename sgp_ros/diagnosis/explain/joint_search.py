@@ -76,7 +76,9 @@ def large(columns: Columns, model: Model) -> Model:
         model = refitted(columns, model, arrangement(model, Block((), None), small[-1]))
 
 
-def usual(columns: Columns, base: Model, first: tuple[EffectAt, ...] = ()) -> Model:
+def usual(
+    columns: Columns, base: Model, first: tuple[EffectAt, ...] = (), least: float = COUNTED_SHARE
+) -> Model:
     """Return the model with the laws that nearly every joint has, where they can be seen.
 
     A search that starts from nothing would first add the law that best imitates all of them.
@@ -85,6 +87,7 @@ def usual(columns: Columns, base: Model, first: tuple[EffectAt, ...] = ()) -> Mo
         columns: of the recording.
         base: without effects.
         first: effects beside them.
+        least: share of the mean squared effort that each must have.
     """
     motion = base.frame.equations.motion
     effects = first + tuple(
@@ -99,7 +102,7 @@ def usual(columns: Columns, base: Model, first: tuple[EffectAt, ...] = ()) -> Mo
         pairs = list(zip(model.effects, model.filtered_shares, strict=True))
         kept = [s for s, _ in pairs if s.is_possible(motion)]
         if len(kept) == len(pairs):
-            kept = [s for s, share in pairs if share > COUNTED_SHARE]
+            kept = [s for s, share in pairs if share > least]
         if len(kept) == len(pairs):
             return model
         effects = tuple(EffectAt(s.effect, s.place, s.shape) for s in kept)

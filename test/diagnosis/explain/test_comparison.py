@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE
-from sgp_ros.diagnosis.explain import comparison, growth, joint_search
+from sgp_ros.diagnosis.explain import comparison, growth, joint_search, more_effects
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.credibility import gain
@@ -72,9 +72,10 @@ def test_what_is_not_adequate_is_searched_joint_by_joint(
     best = fit(columns, (wave,), nominal.sigma)
     assert best.left.max() < COUNTED_SHARE
     starts = []
-    monkeypatch.setattr(comparison, 'is_credible', lambda _: is_credible)
-    monkeypatch.setattr(comparison, 'by_joint', lambda _, start: starts.append(start) or [])
-    comparison._more(columns, Comparison(nominal, bodies, (best,), ()))
+    monkeypatch.setattr(more_effects, 'is_credible', lambda _: is_credible)
+    monkeypatch.setattr(more_effects, 'by_joint', lambda _, start: starts.append(start) or [])
+    base = Comparison(nominal, bodies, (best,), ()).base
+    more_effects.more(columns, nominal, base, (best,))
     assert bool(starts) is is_searched
     assert not starts or (starts[0] is best) is is_credible
 
@@ -102,9 +103,24 @@ def test_laws_beside_the_bodies_of_the_file_may_have_stood_for_others(equations_
     _, equations = equations_for(world)
     names = ('torque_gain', 'viscous_friction', *(['payload'] if is_load else []))
     stated = fitted(equations, *names)
-    found = list(comparison._freed(Columns(equations), [stated]))
+    found = list(more_effects._freed(Columns(equations), [stated]))
     assert found
     for model in found:
         assert model.is_free
         assert _names(model) == {'viscous_friction'}
-    assert list(comparison._freed(Columns(equations), found)) == []
+    assert list(more_effects._freed(Columns(equations), found)) == []
+
+
+def test_small_everyday_laws_are_compared_with_a_rarer_one(equations_for):
+    """Too small to count, but together likelier than friction that drifts within a second."""
+    world = simulate(
+        CHAINS[1], 4, 12.0, force=lambda t, q, v: (-0.015 * v[0],), dry=lambda t, q, s: 0.3
+    )  # fmt: skip
+    _, equations = equations_for(world)
+    columns, nominal = Columns(equations), fitted(equations)
+    rare, plain = (fitted(equations, x) for x in ('friction_drift', 'coulomb_friction'))
+    found = list(more_effects._everyday(columns, rare, nominal.sigma))
+    assert [m.is_free for m in found] == [False, True]
+    assert {'viscous_friction', 'coulomb_friction'} <= _names(found[0])
+    assert min(found[0].shares) < COUNTED_SHARE
+    assert list(more_effects._everyday(columns, plain, nominal.sigma)) == []

@@ -20,7 +20,6 @@ from sgp_ros.diagnosis.criteria import (
 from sgp_ros.diagnosis.decide.cross_validation import support
 from sgp_ros.diagnosis.explain import growth
 from sgp_ros.diagnosis.explain.candidates import fit, split
-from sgp_ros.diagnosis.explain.comparison import _carrying
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import beyond_plain, floors
 from sgp_ros.diagnosis.explain.frame import Frame
@@ -33,6 +32,7 @@ from sgp_ros.diagnosis.explain.joint_search import (
     uncoupled,
     usual,
 )
+from sgp_ros.diagnosis.explain.more_effects import _carrying
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import are_apart, distinct, screen
 from sgp_ros.physics.catalogue import EFFECTS
