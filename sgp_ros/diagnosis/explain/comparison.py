@@ -77,7 +77,7 @@ def compare_models(equations: Equations, progress: Callable[[float], None]) -> C
         progress(0.45 + 0.55 * (number + 1) / len(parents))
     pairs = ranked([*pairs, *_exchanged(columns, ranked(pairs))])
     pairs = ranked([*pairs, *_plain(columns, (*singles[:1], *pairs[:1]))])
-    found = Comparison(*bases, tuple(singles), tuple(pairs))
+    found = Comparison(bases[0], bases[1], tuple(singles), tuple(pairs))
     longer = more(columns, found.nominal, found.base, (*singles, *pairs))
     return replace(found, more=tuple(longer))
 
