@@ -113,10 +113,9 @@ def _rotors(effects: Sequence[EffectAt]) -> dict[Place, float]:
     return {s.place: float(s.coefficients[0]) for s in effects if s.effect.is_inertial}
 
 
-def have_rotors(effects: Sequence[EffectAt]) -> bool:
-    """Return whether each motor that the nominal robot lacks is beside its spring."""
-    rotors = _rotors(effects)
-    return all(Place(s.place.joint) in rotors for s in effects if s.place.kind == BARE)
+def has_rotor(place: Place, effects: Sequence[EffectAt]) -> bool:
+    """Return whether the motor of a spring is in the nominal robot, or among these effects."""
+    return place.kind != BARE or Place(place.joint) in _rotors(effects)
 
 
 def with_rotors(effects: Sequence[EffectAt]) -> tuple[EffectAt, ...]:

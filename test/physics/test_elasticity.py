@@ -126,11 +126,12 @@ def test_a_rotor_that_the_robot_file_lacks_is_told_from_the_link():
     ]))  # fmt: skip
     columns, start = Columns(found), np.sqrt((found.d**2).mean(axis=0)) + 1e-9
     left, models = {}, {}
+    beside = EffectAt(ARMATURE, Place(ELBOW))
+    alone, rotor_alone = (fit(columns, x, start, is_free=False) for x in ((), (beside,)))
+    assert BARE not in {s.place.kind for _, s in screen(columns, alone, [LAW])}
     for kind in ('motor', BARE):
         place = Place(ELBOW, kind)
-        springs = [t for t in screen(columns, fit(columns, (), start, is_free=False), [LAW])
-                   if t[1].place == place]  # fmt: skip
-        beside = EffectAt(ARMATURE, Place(ELBOW))
+        springs = [t for t in screen(columns, rotor_alone, [LAW]) if t[1].place == place]
         models[kind] = fit(columns, (beside, springs[0][1]), start, is_free=False, steps=30)
         left[kind] = float(models[kind].mean_square[ELBOW] / (found.d[:, ELBOW] ** 2).mean())
     armature, spring = models[BARE].effects

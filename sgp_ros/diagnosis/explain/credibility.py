@@ -18,7 +18,7 @@ from sgp_ros.diagnosis.criteria import (
 from sgp_ros.diagnosis.explain.fitted_model import Model, add_force, beyond_plain
 from sgp_ros.diagnosis.explain.screening import WIDEST, are_apart
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.elasticity import have_rotors
+from sgp_ros.physics.elasticity import has_rotor
 from sgp_ros.physics.parts import MOTOR
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -52,7 +52,8 @@ def is_credible(model: Model) -> bool:
     motion = model.frame.equations.motion
     is_finite = model.is_possible() and bool(np.isfinite(model.score))
     is_finite = is_finite and are_apart(model.effects, motion) and is_sound(model)
-    is_finite = is_finite and _delivers(model) and have_rotors(model.effects)
+    is_finite = is_finite and _delivers(model)
+    is_finite = is_finite and all(has_rotor(s.place, model.effects) for s in model.effects)
     equations = model.frame.equations
     return is_finite and all(
         s.effect.is_inside(s, motion)

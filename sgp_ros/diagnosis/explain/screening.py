@@ -13,6 +13,7 @@ from sgp_ros.diagnosis.explain.products import Products, Rest
 from sgp_ros.diagnosis.explain.regression import Columns, Seen, dry_joints
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt, in_series
+from sgp_ros.physics.elasticity import has_rotor
 from sgp_ros.physics.parts import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -53,7 +54,8 @@ def screen(
         for place in _free_places(effect, model, columns.equations(held).motion):
             if joints is not None and place.joint not in joints:
                 continue
-            if not shows(effect, place, columns.equations(held).motion):
+            is_shown = shows(effect, place, columns.equations(held).motion)
+            if not (is_shown and has_rotor(place, model.effects)):
                 continue
             dry = held | effect.held_joints(place)
             if dry not in rests:

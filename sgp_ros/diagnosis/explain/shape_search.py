@@ -234,6 +234,6 @@ def _descended(
                 damping = max(damping / 5.0, 1e-8)
                 break
             damping *= 6.0
-        if not improved or gain < 1e-6:
+        if not improved or gain < 1e-4:
             break
     return cost, candidates
