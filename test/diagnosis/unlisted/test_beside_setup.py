@@ -20,6 +20,10 @@ class _Worth(Connected):
     def nominal(self):
         return 0.0
 
+    @property
+    def verdict(self):
+        return 'missing_physics'
+
 
 @pytest.mark.parametrize(('gain', 'is_kept'), [(100.0, True), (12.0, False)])
 def test_an_error_must_be_worth_more_than_the_law_alone(monkeypatch, gain, is_kept):
