@@ -119,7 +119,9 @@ def test_a_child_that_dies_is_reported_with_its_last_words(tmp_path):
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    'number', [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)]
+)
 def test_an_interrupted_demonstration_leaves_no_process(number, tmp_path):
     """Both nodes run when the signal comes; all three are gone after it."""
     code = 'import signal; signal.signal(signal.SIGINT, signal.default_int_handler); '

@@ -75,6 +75,7 @@ def test_what_follows_the_load_is_no_disturbance(equations_for, monkeypatch):
     assert disturbance(equations) == ()
 
 
+@pytest.mark.long
 def test_physics_is_named_without_the_time_in_which_a_hand_pushes(robots):
     """With that time it was unexplained."""
     robot, tree = robots[1]

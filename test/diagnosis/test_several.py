@@ -117,6 +117,7 @@ def test_friction_that_is_lower_in_the_second_differs(found):
     )
 
 
+@pytest.mark.long
 def test_a_torque_constant_differs_once_a_motor_was_replaced(found):
     """The friction, which the second recording shows larger, is common."""
     one = found('motor')

@@ -140,7 +140,9 @@ def test_roll_outs_of_the_nominal_robot_have_what_it_states(named, robots):
     assert known.proofs['train'].failed == 0
 
 
-@pytest.mark.parametrize('name', ['viscous_friction', 'coulomb_friction'])
+@pytest.mark.parametrize(
+    'name', [pytest.param('viscous_friction', marks=pytest.mark.long), 'coulomb_friction']
+)
 def test_what_the_robot_states_too_much_of_is_taken_off(robots, name):
     """The sentence says so."""
     robot, tree = robots[1]

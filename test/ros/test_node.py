@@ -208,7 +208,11 @@ def test_a_valid_parameter_takes_effect(graph: Graph) -> None:
     graph.wait_until(lambda: graph.count('buffer', 'model') == 10, 'a smaller buffer')
 
 
-@pytest.mark.parametrize('kernel', ['squared_exponential', 'additive_squared_exponential'])
+@pytest.mark.parametrize(
+    'kernel',
+    ['squared_exponential',
+     pytest.param('additive_squared_exponential', marks=pytest.mark.long)],
+)  # fmt: skip
 def test_a_dump_of_the_parameters_loads_again(graph: Graph, tmp_path: Path, kernel: str) -> None:
     node = _start(graph, model__kernel=kernel)
     _ready(graph, Stream(graph))
@@ -314,7 +318,9 @@ def test_a_killed_fit_is_reported_and_the_node_goes_on(graph: Graph) -> None:
     stream.publish_until_read(20)
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    'number', [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)]
+)
 def test_a_signal_ends_the_nodes_without_trace(graph: Graph, number: int) -> None:
     node, robot = _start(graph), graph.start('reaction_wheel')
     graph.wait_until(lambda: graph.count('read') > 10, 'states')
@@ -355,7 +361,9 @@ def test_a_record_survives_a_killed_node(graph: Graph, tmp_path: Path) -> None:
     assert 'recovered' in ' '.join(recording.remarks)
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize(
+    'number', [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.long)]
+)
 def test_a_record_split_by_age_replays_to_the_same_numbers(
     graph: Graph, tmp_path: Path, number: int
 ) -> None:

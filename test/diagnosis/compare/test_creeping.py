@@ -92,6 +92,7 @@ def test_friction_that_a_bundle_of_cables_adds_is_none_of_the_file(robots):
     assert creeping_friction(raw, tree) == {}
 
 
+@pytest.mark.long
 def test_a_machine_whose_stated_friction_creeps_shows_no_mismatch(creeps, robots):
     robot, tree = robots[1]
     found = diagnose(creeps, robot, tree, {}, stated=_stated(tree))

@@ -77,7 +77,7 @@ def test_the_noise_of_a_still_joint_explains_nothing(robots):
     assert 'joint1' not in {f.joint for f in (*found.findings, *found.alternatives)}
 
 
-@pytest.mark.parametrize('level', [0.0, 0.6])
+@pytest.mark.parametrize('level', [0.0, pytest.param(0.6, marks=pytest.mark.long)])
 def test_a_joint_whose_efforts_are_noise_takes_nothing_from_the_others(robots, level):
     """Noise of three times its effort: no law, body or torque constant makes that small.
 

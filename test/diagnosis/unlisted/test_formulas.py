@@ -77,7 +77,10 @@ def _found(equations_for, links, **what):
         (_brake_and_friction, 1,
          'a*dq[joint0]/(1 + (dq[joint0]/v0)**2) + d*tanh(dq[joint0]/v_s)',
          {'a': -0.8, 'v0': 1.5, 'd': -0.3}),
-        (_contact, 1, 'a*(max(q[joint0] - x0, 0)/r)**p0', {'p0': 1.5, 'x0': 0.3}),
+        pytest.param(
+            _contact, 1, 'a*(max(q[joint0] - x0, 0)/r)**p0', {'p0': 1.5, 'x0': 0.3},
+            marks=pytest.mark.long,
+        ),
         pytest.param(
             _Play(), 1, 'a*play(q[joint0], T)', {'a': -1.2, 'T': 0.5}, marks=pytest.mark.long
         ),
@@ -105,6 +108,7 @@ def test_laws_are_found_with_their_numbers(equations_for, force, links, formula,
         assert values[name] == pytest.approx(value, rel=0.02), name
 
 
+@pytest.mark.long
 def test_dry_friction_of_any_form_holds_a_joint_at_rest(equations_for):
     """Rows in which a cable holds its joint ask nothing of its law, nor of its rivals."""
     found, values = _found(equations_for, 1, dry=_cable)

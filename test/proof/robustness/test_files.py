@@ -59,6 +59,7 @@ def test_damaged_files_are_read_or_refused_in_one_line(samples, tmp_path):
     assert {'read', 'refused'} == set(outcomes)
 
 
+@pytest.mark.long
 def test_recordings_that_can_be_read_go_through_the_commands(samples, tmp_path):
     """Each says what of them was not read, and prints it."""
     faults = Faults()
