@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.bodies import SPREAD
 from sgp_ros.diagnosis.criteria import (
     ALIKE,
     DOUBTED,
@@ -16,6 +17,7 @@ from sgp_ros.diagnosis.criteria import (
     PER_EFFECT,
     PER_PARAMETER,
     PER_UNUSUAL,
+    STATED_ERROR,
     TEMPER,
 )
 from sgp_ros.diagnosis.result import Equivalent, Finding, Location, Parameter
@@ -45,15 +47,20 @@ def setup_advice(found: Connection) -> str:
 
 
 def error_finding(found: Connection, number: int, gain: float) -> Finding:
-    """Return an error with its probability against its rivals and against no error."""
+    """Return an error with its probability against its rivals and against no error.
+
+    Gains of drives are found with the bodies of the robot file, whose errors are theirs too.
+    """
     e = found.errors[number]
     rivals = [r.worth - e.worth for r in found.rivals[number]]
     odds = math.exp(-TEMPER * gain) + math.exp(-TEMPER * e.needed)
     odds += sum(math.exp(min(TEMPER * r, 50.0)) for r in rivals)
+    of_bodies = STATED_ERROR * SPREAD * e.numbers if e.hypothesis.is_of_gains else 0.0 * e.numbers
+    deviations = np.where(e.std > 0.0, np.hypot(e.std, of_bodies), np.inf)
     numbers: dict[str, Parameter] = {
-        name: Parameter(float(x), float(s) if math.isfinite(s) and s > 0.0 else None, unit)
+        name: Parameter(float(x), float(s) if math.isfinite(s) else None, unit)
         for name, x, s, unit in zip(
-            e.hypothesis.names, e.numbers, e.std, e.hypothesis.units, strict=True
+            e.hypothesis.names, e.numbers, deviations, e.hypothesis.units, strict=True
         )
     }
     words = {name: Parameter(word) for name, word in e.hypothesis.words.items()}
