@@ -14,7 +14,7 @@ from sgp_ros.diagnosis.criteria import (
     COUNTED_SHARE,
     INDEPENDENT_ROWS,
     NEARLY,
-    PER_EFFECT,
+    PER_PARAMETER,
     REGION_ENERGY,
 )
 from sgp_ros.diagnosis.decide.scale import Scale
@@ -179,10 +179,11 @@ def is_creep(columns: Columns, scale: Scale, listed: Model, smooth: Model, joint
 
 
 def acts_as_bodies(equations: Equations, force: np.ndarray, joint: int) -> bool:
-    """Return whether other bodies, not much less likely, would act on a joint as a force does.
+    """Return whether other bodies, hardly less likely, would act on a joint as a force does.
 
     Bodies that could do so and yet were not found contradict other joints, as they do where the
-    lengths of the robot file are wrong; that a law acts like a weight would be a coincidence.
+    lengths of the robot file are wrong; that a law acts like a weight would be a coincidence. If no
+    other joint moves, bodies were compared with the law.
 
     Args:
         equations: of the recording.
@@ -196,7 +197,8 @@ def acts_as_bodies(equations: Equations, force: np.ndarray, joint: int) -> bool:
     y = np.concatenate([force / scale, np.zeros(base.shape[1])])
     w = np.linalg.lstsq(A, y, rcond=None)[0]
     rest = float(((force - base @ w) ** 2).mean())
-    return rest < NEARLY * size and 0.5 * float(w @ w) < PER_EFFECT
+    is_alone = equations.motion.moves.sum() < 2
+    return not is_alone and rest < NEARLY * size and 0.5 * float(w @ w) < PER_PARAMETER
 
 
 def _is_slow(listed: Model, smooth: Model, joint: int) -> bool:
