@@ -182,8 +182,8 @@ def acts_as_bodies(equations: Equations, force: np.ndarray, joint: int) -> bool:
     """Return whether other bodies, hardly less likely, would act on a joint as a force does.
 
     Bodies that could do so and yet were not found contradict other joints, as they do where the
-    lengths of the robot file are wrong; that a law acts like a weight would be a coincidence. If no
-    other joint moves, bodies were compared with the law.
+    lengths of the robot file are wrong; that a law acts like a weight would be a coincidence. If
+    no other joint moves, bodies were compared with the law.
 
     Args:
         equations: of the recording.
