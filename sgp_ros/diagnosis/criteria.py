@@ -19,7 +19,7 @@ COUNTED_SHARE = SHARE_TOLERANCE * LEAST_SHARE
 EVIDENCE = 10.0
 """Evidence that an effect must have, on the recording and on parts left out [nats]. Nulls."""
 
-LEAST_FREE = 0.2
+MOST_MISSED = 0.2
 """Part of the inertial force that a robot without any effort may miss where nothing drives it [1].
 
 Guards. A motor that is not recorded supplies what moves the joint, and more where it carries load.

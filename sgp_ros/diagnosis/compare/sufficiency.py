@@ -22,9 +22,9 @@ from sgp_ros.diagnosis.compare.trajectory import (
     parallel_filter,
 )
 from sgp_ros.diagnosis.criteria import (
-    LEAST_FREE,
     LEAST_MOTION,
     LEAST_ROWS,
+    MOST_MISSED,
     UNSIGNED_LOW,
     UNSIGNED_SHARE,
     UNSIGNED_ZERO,
@@ -149,7 +149,7 @@ def require_signed(raw: RawTrajectory, names: Sequence[str]) -> None:
 def without_motors(raw: RawTrajectory, tree: Tree) -> tuple[Tree, tuple[str, ...]]:
     """Return the robot with joints as passive that nothing drives, and a remark if there are some.
 
-    Their recorded effort is zero throughout, and their motion is mostly that of the robot without
+    Their recorded effort is zero throughout, and their motion is nearly that of the robot without
     any effort. It is not where efforts were not recorded: then nothing is changed.
 
     Args:
@@ -160,12 +160,14 @@ def without_motors(raw: RawTrajectory, tree: Tree) -> tuple[Tree, tuple[str, ...
         return tree, ()
     driven = tree.is_actuated.copy()
     driven[: tree.size] &= raw.effort.any(axis=0)
+    if (driven == tree.is_actuated).all():
+        return tree, ()
     idle = replace(tree, is_actuated=driven)
     bandwidth = choose_bandwidth(raw, idle)
     motion, low = observe(raw, idle, bandwidth), parallel_filter(raw, bandwidth)
     needed = low(motion.nominal_effort - motion.effort - motion.stated_force)
     inertial = low(motion.mass_diagonal * motion.acceleration)
-    is_free = (needed**2).mean(axis=0) < LEAST_FREE * (inertial**2).mean(axis=0)
+    is_free = (needed**2).mean(axis=0) < MOST_MISSED * (inertial**2).mean(axis=0)
     driven[: tree.size] |= tree.is_actuated[: tree.size] & ~(is_free & motion.moves)
     names = [n for j, n in enumerate(tree.moving_names) if driven[j] != tree.is_actuated[j]]
     if not names:
