@@ -124,3 +124,26 @@ def test_small_everyday_laws_are_compared_with_a_rarer_one(equations_for):
     assert {'viscous_friction', 'coulomb_friction'} <= _names(found[0])
     assert min(found[0].shares) < COUNTED_SHARE
     assert list(more_effects._everyday(columns, plain, nominal.sigma)) == []
+
+
+@pytest.mark.parametrize(
+    ('step', 'amplitude', 'drag'), [('_everyday', 2.0, 0.01), ('_freed', 0.6, 0.025)]
+)
+def test_what_is_asked_beside_the_searches_is_compared(
+    equations_for, monkeypatch, step, amplitude, drag
+):
+    """Where a rarer law suffices, and where models beside the bodies of the file were found."""
+    world = simulate(
+        CHAINS[1], 7, 10.0,
+        force=lambda t, q, v: (amplitude * np.sin(5.0 * q[0]) - drag * v[0],),
+    )  # fmt: skip
+    _, equations = equations_for(world)
+    columns, nominal = Columns(equations), fitted(equations)
+    wave = EffectAt(EFFECTS['cogging'], Place(0), np.array([5.0]))
+    best = fit(columns, (wave,), nominal.sigma, is_free=False)
+    other = fitted(equations, 'spring', 'viscous_friction', 'quadratic_drag')
+    monkeypatch.setattr(more_effects, 'by_joint', lambda *_: [])
+    monkeypatch.setattr(more_effects, step, lambda *_: [other])
+    monkeypatch.setattr(more_effects, 'is_credible', lambda _: True)
+    monkeypatch.setattr('sgp_ros.diagnosis.explain.fitted_model.Model.is_possible', lambda _: True)
+    assert other in more_effects.more(columns, nominal, nominal, (best,))

@@ -276,6 +276,15 @@ def test_names_stay_only_beside_a_formula_that_differs_little_too(
     assert found.is_slight is is_kept
 
 
+def test_a_formula_that_bodies_would_imitate_is_not_asserted(equations_for, monkeypatch):
+    monkeypatch.setattr(assertion, 'acts_as_bodies', lambda *_: True)
+    _, equations = equations_for(simulate(CHAINS[1], 11, 10.0, force=_brake))
+    comparison = compare_models(equations, lambda _share: None)
+    found = with_laws(equations, comparison, decide(equations, comparison))
+    assert law_of(found.decision.model, 0) is None
+    assert found.why_not[0].startswith('other bodies')
+
+
 @pytest.mark.long
 def test_a_law_in_a_narrow_region_is_found_beside_friction(equations_for):
     """A magnet that holds near one pose: too narrow for the spline that is compared first."""
