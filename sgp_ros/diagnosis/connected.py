@@ -251,8 +251,9 @@ def _stands_for_gains(plain: Connected, found: Connection) -> bool:
 def _gain(plain: Connected, corrected: Connected, price: float) -> float:
     """Return by how much the corrected recording is better explained, less a price [nats].
 
-    Efforts, given the motion, and the motion must both be; 0 where only one of them clearly is,
-    unless nothing explains the recording as it is: the models of it then are no explanations.
+    Efforts, given the motion, and the motion must both be; 0 where only one of them clearly is.
+    Where nothing explains the recording as it is, one of them must be, and the other no worse, for
+    the models of it are no explanations.
     """
     nominal, recorded = np.minimum(plain.nominal, corrected.nominal), plain.equations.power
     worth = [[c.worth(nominal, recorded, is_of_motion=m) for m in (False, True)]
@@ -261,7 +262,7 @@ def _gain(plain: Connected, corrected: Connected, price: float) -> float:
     if max(gains) < PER_EFFECT:
         return min(gains)
     is_solved = plain.verdict == 'unexplained' != corrected.verdict
-    return max(gains) if is_solved and min(gains) >= 0.0 else max(min(gains), 0.0)
+    return max(gains) if is_solved and min(gains) >= -price else max(min(gains), 0.0)
 
 
 def _named(connected: Connected) -> frozenset[tuple[str, str]]:

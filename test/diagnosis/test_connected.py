@@ -176,7 +176,7 @@ def test_recorded_efforts_in_any_unit_are_explained_alike(monkeypatch):
     [
         (60.0, 40.0, False, 30.0), (60.0, -50.0, False, 0.0), (-50.0, 60.0, False, 0.0),
         (12.0, -50.0, False, -60.0), (60.0, 11.0, False, 1.0), (60.0, 11.0, True, 50.0),
-        (60.0, 9.0, True, 0.0), (15.0, 12.0, True, 2.0),
+        (60.0, 1.0, True, 50.0), (60.0, -1.0, True, 0.0), (15.0, 12.0, True, 2.0),
     ],
 )  # fmt: skip
 def test_efforts_and_motion_must_both_be_better_explained(of_efforts, of_motion, is_open, gain):
