@@ -108,5 +108,7 @@ def test_a_force_that_other_bodies_would_have_is_told_from_one_that_no_body_has(
     assert acts_as_bodies(equations, 1.3 * weight, 1)
     assert not acts_as_bodies(equations, 4.0 * weight, 1)
     assert not acts_as_bodies(equations, weight.std() * np.sin(9.0 * q), 1)
+    mixed = weight + 0.6 * weight.std() * np.sin(9.0 * q)  # a quarter of it
+    assert not acts_as_bodies(equations, mixed, 1)
     _, alone = equations_for(simulate(CHAINS[1], 4, 10.0))
     assert not acts_as_bodies(alone, 1.3 * alone.bases[0][:, alone.instants], 0)
