@@ -51,7 +51,7 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
     for _ in range(SWEEPS):
         before = model.key
         for block in blocks_of(model):
-            model = shrunk(columns, grown(columns, model, block), block)
+            model = _shrunk(columns, grown(columns, model, block), block)
         if model.key == before:
             better = best_of(model, coupled(columns, model))
             if better is None:
@@ -124,13 +124,20 @@ def built_up(columns: Columns, model: Model) -> Model:
     return fit(columns, swapped, model.sigma, is_free=model.is_free, w=model.w)
 
 
-def shrunk(columns: Columns, model: Model, block: Block) -> Model:
+def _shrunk(columns: Columns, model: Model, block: Block) -> Model:
     """Remove laws that are not worth their price, or replace them by a law of one number."""
     while any(block.holds(s) for s in model.effects):
         better = best_of(model, _changes(columns, model, block, is_simple=True))
         if better is None:
             break
         model = better
+    return model
+
+
+def without_vain(columns: Columns, model: Model) -> Model:
+    """Return a model without laws that are not worth their price, whatever block they are of."""
+    for block in blocks_of(model):
+        model = _shrunk(columns, model, block)
     return model
 
 

@@ -16,8 +16,8 @@ from sgp_ros.diagnosis.criteria import (
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible, ranked
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.growth import blocks_of, crossed
-from sgp_ros.diagnosis.explain.joint_search import built_up, by_joint, large, shrunk, usual
+from sgp_ros.diagnosis.explain.growth import crossed
+from sgp_ros.diagnosis.explain.joint_search import built_up, by_joint, large, usual, without_vain
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import COMMAND_DELAY
@@ -71,9 +71,7 @@ def _everyday(columns: Columns, best: Model, sigma: np.ndarray) -> Iterator[Mode
     """Yield the laws that nearly every joint has, however small, in place of any rarer one."""
     for is_free in (False, True) if not all(s.effect.is_usual for s in best.effects) else ():
         model = usual(columns, fit(columns, (), sigma, is_free=is_free), least=0.0)
-        for block in blocks_of(model):
-            model = shrunk(columns, model, block)
-        yield from filter(is_credible, [model])
+        yield from filter(is_credible, [without_vain(columns, model)])
 
 
 def _carrying(columns: Columns, models: list[Model]) -> list[Model]:
@@ -95,9 +93,7 @@ def _freed(columns: Columns, models: list[Model]) -> Iterator[Model]:
     stated = [m for m in models if not m.is_free]
     for best in sorted(stated, key=lambda m: -gain(m, stated[0]))[:1]:
         laws = tuple(s for s in best.effects if not s.effect.is_body)
-        free = fit(columns, laws, best.sigma, is_free=True)
-        for block in blocks_of(free):
-            free = shrunk(columns, free, block)
+        free = without_vain(columns, fit(columns, laws, best.sigma, is_free=True))
         yield from filter(is_credible, (free, large(columns, free)))
 
 

@@ -88,14 +88,16 @@ def test_a_law_of_one_number_is_tried_in_place_of_a_richer_one(equations_for):
     _, equations = equations_for(world)
     rich = fitted(equations, 'asymmetric_coulomb', 'viscous_friction')
     (block, *_) = growth.blocks_of(rich)
-    found = joint_search.shrunk(Columns(equations), rich, block)
+    found = joint_search._shrunk(Columns(equations), rich, block)
     assert _names(found) == {'coulomb_friction', 'viscous_friction'}
     assert gain(found, rich) > 0.0
-    assert joint_search.shrunk(Columns(equations), found, block) is found
+    assert joint_search._shrunk(Columns(equations), found, block) is found
 
 
 @pytest.mark.parametrize('is_load', [False, True])
-def test_laws_beside_the_bodies_of_the_file_may_have_stood_for_others(equations_for, is_load):
+def test_laws_beside_the_bodies_of_the_file_may_have_stood_for_others(
+    equations_for, monkeypatch, is_load
+):
     """A torque constant of a link that is a little heavier goes; its friction stays."""
     world = simulate(
         heavier(CHAINS[2], 0, 1.1), 7, 10.0, force=lambda t, q, v: (-0.3 * v[0], 0.0)
@@ -109,6 +111,8 @@ def test_laws_beside_the_bodies_of_the_file_may_have_stood_for_others(equations_
         assert model.is_free
         assert _names(model) == {'viscous_friction'}
     assert list(more_effects._freed(Columns(equations), found)) == []
+    monkeypatch.setattr(more_effects, 'large', lambda *_: found[0])
+    assert list(more_effects._freed(Columns(equations), [stated]))[1:] == found[:1]
 
 
 def test_small_everyday_laws_are_compared_with_a_rarer_one(equations_for):
