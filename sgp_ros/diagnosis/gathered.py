@@ -180,10 +180,9 @@ def prepared(
     tree, passive = without_motors(recordings.learned, tree)
     tree = with_open_bodies(recordings.learned, tree, unstated)
     creeping = creeping_friction(recordings.learned, tree)
-    remarks = (*passive, *open_remark(tree, unstated), *creeping_remark(creeping))
-    recordings = recordings.changed(lambda raw: with_creeping(raw, creeping))
-    remarks = recordings.remarks + remarks
-    return replace(recordings, unstated=unstated, remarks=remarks), tree
+    said = (*passive, *open_remark(tree, unstated), *creeping_remark(creeping))
+    changed = recordings.changed(lambda raw: with_creeping(raw, creeping))
+    return replace(changed, unstated=unstated, remarks=(*recordings.remarks, *said)), tree
 
 
 def driven(events: Iterable[Event], tree: Tree, known: Knowledge) -> list[Event]:

@@ -55,8 +55,8 @@ def error_finding(found: Connection, number: int, gain: float) -> Finding:
     rivals = [r.worth - e.worth for r in found.rivals[number]]
     odds = math.exp(-TEMPER * gain) + math.exp(-TEMPER * e.needed)
     odds += sum(math.exp(min(TEMPER * r, 50.0)) for r in rivals)
-    of_bodies = STATED_ERROR * SPREAD * e.numbers if e.hypothesis.is_of_gains else 0.0 * e.numbers
-    deviations = np.where(e.std > 0.0, np.hypot(e.std, of_bodies), np.inf)
+    of_bodies = STATED_ERROR * SPREAD if e.hypothesis.is_of_gains else 0.0
+    deviations = np.where(e.std > 0.0, np.hypot(e.std, of_bodies * e.numbers), np.inf)
     numbers: dict[str, Parameter] = {
         name: Parameter(float(x), float(s) if math.isfinite(s) else None, unit)
         for name, x, s, unit in zip(

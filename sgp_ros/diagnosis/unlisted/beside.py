@@ -190,6 +190,8 @@ def acts_as_bodies(equations: Equations, force: np.ndarray, joint: int) -> bool:
         force: filtered, (N,) [N m or N].
         joint: index.
     """
+    if equations.motion.moves.sum() < 2:
+        return False
     base = equations.bases[joint][:, equations.instants :]
     size = float((force**2).mean())
     scale = math.sqrt(len(force) * NEARLY**2 * size / INDEPENDENT_ROWS)
@@ -197,8 +199,7 @@ def acts_as_bodies(equations: Equations, force: np.ndarray, joint: int) -> bool:
     y = np.concatenate([force / scale, np.zeros(base.shape[1])])
     w = np.linalg.lstsq(A, y, rcond=None)[0]
     rest = float(((force - base @ w) ** 2).mean())
-    is_alone = equations.motion.moves.sum() < 2
-    return not is_alone and rest < NEARLY**2 * size and 0.5 * float(w @ w) < PER_PARAMETER
+    return rest < NEARLY**2 * size and 0.5 * float(w @ w) < PER_PARAMETER
 
 
 def _is_slow(listed: Model, smooth: Model, joint: int) -> bool:
