@@ -18,6 +18,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 
 DEADLINE_S = 300.0
 """Only ends a test that hangs: on a computer that is busy, a node may take a minute to start."""
@@ -98,7 +99,7 @@ class Graph:
         self._processes: list[NodeProcess] = []
         self._statuses: dict[str, dict[str, str]] = {}
         self._messages: dict[str, str] = {}
-        self.client.create_subscription(DiagnosticArray, '/diagnostics', self._note, 10)
+        self._reports = self._hear_reports()
 
     def start(
         self,
@@ -179,7 +180,9 @@ class Graph:
         return int(self.status(status, node).get(key, '0'))
 
     def forget(self) -> None:
-        """Forget all statuses, of a node that is gone."""
+        """Forget all statuses of a node that is gone, those still on their way too."""
+        self.client.destroy_subscription(self._reports)
+        self._reports = self._hear_reports()
         self._statuses.clear()
         self._messages.clear()
 
@@ -191,6 +194,9 @@ class Graph:
                 process.process.wait()
         self._executor.shutdown()
         self.client.destroy_node()
+
+    def _hear_reports(self) -> Subscription:
+        return self.client.create_subscription(DiagnosticArray, '/diagnostics', self._note, 10)
 
     def _note(self, array: DiagnosticArray) -> None:
         for status in array.status:
