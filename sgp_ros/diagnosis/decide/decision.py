@@ -28,8 +28,6 @@ from sgp_ros.diagnosis.criteria import (
     LEAST_SHARE,
     NEARLY,
     NOTHING_EXPLAINED,
-    PER_EFFECT,
-    SLIGHT_REST,
     UNNAMED_EXCESS,
 )
 from sgp_ros.diagnosis.decide.cancelling import within_accuracy
@@ -107,8 +105,6 @@ def decide(equations: Equations, comparison: Comparison) -> Decision:
     scale, base = Scale.of(equations, comparison), comparison.base
     ranked = _ranked(comparison, scale)
     likely = [m for m in ranked if scale.worth(m) > scale.worth(base)]
-    if scale.base.max() < SLIGHT_REST and base.strain < PER_EFFECT:
-        likely = []
     best = supported(equations, scale, likely)
     rivals = tuple(m for m in ranked if m is not best)
     if best is not None:

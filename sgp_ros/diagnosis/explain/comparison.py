@@ -6,15 +6,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import (
-    COUNTED_SHARE,
-)
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, PER_EFFECT, SLIGHT_REST
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import ranked
 from sgp_ros.diagnosis.explain.fitted_model import Model, first_scale
-from sgp_ros.diagnosis.explain.joint_search import (
-    uncoupled,
-)
+from sgp_ros.diagnosis.explain.joint_search import uncoupled
 from sgp_ros.diagnosis.explain.more_effects import more
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
@@ -51,17 +47,27 @@ class Comparison:
         """The better of the two models without effects."""
         return self.nominal if self.nominal.score >= self.parameters.score else self.parameters
 
+    @property
+    def is_calm(self) -> bool:
+        """Whether likely bodies leave too little for any effect."""
+        return bool(self.base.left.max() < SLIGHT_REST and self.base.strain < PER_EFFECT)
+
 
 def compare_models(equations: Equations, progress: Callable[[float], None]) -> Comparison:
     """Fit the models that could explain the discrepancy.
 
     Every model comes in two variants: with bodies as the nominal robot has them, and with bodies
-    that may differ. The freedom of the second has its price in evidence.
+    that may differ. The freedom of the second has its price in evidence. No effect is looked for
+    where bodies leave too little for any.
     """
     columns = Columns(equations)
     start = first_scale(equations)
     bases = [fit(columns, (), start, is_free=is_free) for is_free in (False, True)]
     progress(0.05)
+    plain = Comparison(bases[0], bases[1], (), ())
+    if plain.is_calm:
+        progress(1.0)
+        return plain
     effects = tuple(equations.motion.catalogue.values())
     singles: list[Model] = []
     for number, base in enumerate(bases):
@@ -77,9 +83,8 @@ def compare_models(equations: Equations, progress: Callable[[float], None]) -> C
         progress(0.45 + 0.55 * (number + 1) / len(parents))
     pairs = ranked([*pairs, *_exchanged(columns, ranked(pairs))])
     pairs = ranked([*pairs, *_plain(columns, (*singles[:1], *pairs[:1]))])
-    found = Comparison(bases[0], bases[1], tuple(singles), tuple(pairs))
-    longer = more(columns, found.nominal, found.base, (*singles, *pairs))
-    return replace(found, more=tuple(longer))
+    longer = more(columns, plain.nominal, plain.base, (*singles, *pairs))
+    return replace(plain, singles=tuple(singles), pairs=tuple(pairs), more=tuple(longer))
 
 
 def _fitted(
