@@ -21,7 +21,7 @@ from typing import Any
 STAGES = {
     'diagnose': {
         'reading': ('sgp_ros.apps.diagnose._read', 'sgp_ros.diagnosis.pipeline.gather'),
-        'connection': ('sgp_ros.diagnosis.connected.search',),
+        'connection': ('sgp_ros.diagnosis.connecting.search',),
         'screening': ('sgp_ros.diagnosis.explain.comparison.screen',),
         'fits': (
             'sgp_ros.diagnosis.explain.comparison.fit',

@@ -10,7 +10,8 @@ from typing import Any
 from sgp_ros.apps.recorded import gains_of, read_events
 from sgp_ros.batch.contradictions import require_sense
 from sgp_ros.batch.recording_check import RecordingCheck, check_recording
-from sgp_ros.diagnosis.connected import Connected, connect, with_laws
+from sgp_ros.diagnosis.connected import Connected
+from sgp_ros.diagnosis.connecting import connect, with_laws
 from sgp_ros.diagnosis.gathered import Knowledge, gather
 from sgp_ros.diagnosis.mapping import finding_content
 from sgp_ros.diagnosis.result import Finding

@@ -14,7 +14,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.connected import Connected, connect
+from sgp_ros.diagnosis.connected import Connected
+from sgp_ros.diagnosis.connecting import connect
 from sgp_ros.diagnosis.criteria import DISTURBED, MOST_DISTURBED
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import first_scale, floors

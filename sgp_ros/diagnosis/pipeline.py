@@ -14,7 +14,8 @@ from sgp_ros.diagnosis.compare.open_bodies import open_bodies
 from sgp_ros.diagnosis.compare.sufficiency import require_signed
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.diagnosis.compare.velocity_sensor import sensor_lags
-from sgp_ros.diagnosis.connected import Connected, compared, with_laws
+from sgp_ros.diagnosis.connected import Connected, compared
+from sgp_ros.diagnosis.connecting import with_laws
 from sgp_ros.diagnosis.decide.certainty import (
     Probabilities,
     certainty_of,

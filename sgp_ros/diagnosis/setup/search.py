@@ -83,6 +83,13 @@ class Connection:
         """Whether no error was found, and no residual counts as physics at any joint."""
         return not self.errors and float(self.end.left.max()) <= COUNTED_SHARE
 
+    def without(self, i: int) -> Connection:
+        """Return the errors but one, with their numbers as they are."""
+        rivals = self.rivals[:i] + self.rivals[i + 1 :]
+        return replace(
+            self, errors=_undoing(self.errors[:i] + self.errors[i + 1 :]), rivals=rivals
+        )
+
 
 def search(probe: Probe) -> Connection:
     """Return the errors that explain what bodies and everyday friction do not.
@@ -103,11 +110,12 @@ def search(probe: Probe) -> Connection:
     if all(c[-1].agreement.left.max() > COUNTED_SHARE for c in chains):
         chains.append(_grown(probe, [], start, rivals))
     best = max(chains, key=lambda c: _worth(c, start))
-    errors = _of_the_connection(probe, best)
+    # physics beside them stays to be found
+    errors = _undoing([e for e in best if not e.hypothesis.is_physics])
     late = max((float(e.std[0]) for e in best if e.hypothesis.is_physics), default=0.0)
     end = best[-1].agreement if best else start
     others = tuple(rivals[e.hypothesis.key] for e in errors)
-    return Connection(tuple(errors), others, start, end, late)
+    return Connection(errors, others, start, end, late)
 
 
 def _physics(probe: Probe, h: Hypothesis) -> Tried:
@@ -161,14 +169,13 @@ def _gain(probe: Probe, tried: Tried, base: Correction, now: Agreement) -> float
     return min(gains)
 
 
-def _of_the_connection(probe: Probe, errors: Sequence[Tried]) -> list[Tried]:
-    """Return errors without the physics beside them, which stays to be found."""
-    correction, kept = Correction.none(probe.motion.tree.size), []
+def _undoing(errors: Sequence[Tried]) -> tuple[Tried, ...]:
+    """Return errors that are undone one after the other, with their numbers as they are."""
+    kept: list[Tried] = []
     for e in errors:
-        if not e.hypothesis.is_physics:
-            correction = e.hypothesis.applied(correction, e.numbers)
-            kept.append(replace(e, correction=correction))
-    return kept
+        before = kept[-1].correction if kept else Correction.none(len(e.correction.scale))
+        kept.append(replace(e, correction=e.hypothesis.applied(before, e.numbers)))
+    return tuple(kept)
 
 
 def _beside(probe: Probe, errors: Sequence[Tried], ranked: Sequence[Tried]) -> list[Tried]:

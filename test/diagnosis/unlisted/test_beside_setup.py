@@ -7,7 +7,8 @@ from dataclasses import replace
 import pytest
 
 from sgp_ros.diagnosis import connected as module
-from sgp_ros.diagnosis.connected import Connected, with_laws
+from sgp_ros.diagnosis.connected import Connected
+from sgp_ros.diagnosis.connecting import with_laws
 
 
 class _Worth(Connected):

@@ -1,0 +1,183 @@
+"""Errors of the connection, undone where that explains a recording better than physics alone.
+
+The usual comparison of models is made on the recording as it is. Where the search for errors of
+the connection proposes some, it is made again on the corrected recording, and the errors are
+asserted only where they, with whatever physics is left, are worth more than all physics without.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from sgp_ros.diagnosis.compare.equations import joint_name
+from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth
+from sgp_ros.diagnosis.connected import Connected, compared
+from sgp_ros.diagnosis.criteria import ALIKE, MOST_CERTAIN, PER_EFFECT, TEMPER
+from sgp_ros.diagnosis.decide.differences import in_halves
+from sgp_ros.diagnosis.gathered import Recordings
+from sgp_ros.diagnosis.result import Equivalent
+from sgp_ros.diagnosis.setup.evidence import Probe
+from sgp_ros.diagnosis.setup.said import equal_errors, error_finding, price_of, setup_advice
+from sgp_ros.diagnosis.setup.search import Connection, search
+from sgp_ros.diagnosis.unlisted.statement import extended
+from sgp_ros.physics.catalogue import TORQUE_GAIN
+from sgp_ros.rigid.tree import Tree
+
+_CORRECTED = 'All other results are for the recording corrected in this way.'
+
+
+def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None]) -> Connected:
+    """Return the recordings with the best explanation, corrected or not.
+
+    Args:
+        recordings: as they are.
+        tree: nominal robot.
+        progress: called with the share that is done.
+
+    Raises:
+        RecordingError: too little is left to decide.
+    """
+    each = in_halves(progress)
+    plain = compared(recordings, tree, next(each))
+    # known inertia is what tells units and signs apart
+    is_open = recordings.learned.approach is not None or bool(recordings.unstated)
+    if is_open or plain.verdict == 'no_mismatch':
+        return plain
+    bandwidth = choose_bandwidth(recordings.learned, tree)
+    known = plain
+    if recordings.learned.gains is not None:
+        # gains can be separated from bodies only where these are known
+        by_gains = search(Probe(recordings.learned, tree, bandwidth, knows_bodies=True))
+        known = _connected(plain, by_gains, tree, each)
+        is_body = plain.verdict == 'parameters_only'
+        if by_gains.is_enough or (known.findings and not is_body):
+            return known
+    found = search(Probe(recordings.learned, tree, bandwidth))
+    if not known.findings:
+        return _connected(plain, found, tree, each)
+    # what other bodies leave is too small to tell them from other gains
+    return _beside(plain, by_gains, 0.0) if found.is_enough else known
+
+
+def with_laws(connected: Connected) -> Connected:
+    """Return what is decided where laws that no list has are looked for.
+
+    Where some are, the recording as it is may have such a law and no error of its connection.
+    """
+    found = _extended(connected)
+    if not found.laws or connected.uncorrected is None:
+        return found
+    alone = _extended(connected.uncorrected)
+    return found if _gain(alone, found, found.price) >= PER_EFFECT else alone
+
+
+def _extended(connected: Connected) -> Connected:
+    several, laws = extended(connected.several)
+    return replace(connected, several=several, laws=laws)
+
+
+def _connected(
+    plain: Connected, found: Connection, tree: Tree, each: Iterator[Callable[[float], None]],
+    corrected: Connected | None = None,
+) -> Connected:  # fmt: skip
+    """Return the recordings with errors of the connection undone where that is worth it.
+
+    An error that is not certain must be worth it beside the others, too, with the physics that is
+    found without it.
+
+    Args:
+        plain: what was compared on the recordings as they are.
+        found: errors.
+        tree: nominal robot.
+        each: progress of one comparison after the other.
+        corrected: what was compared with these errors undone, where that is known.
+    """
+    if not found.errors:
+        return plain
+    corrected = corrected or _undone(plain, found, tree, each)
+    is_free = any(len(e.numbers) for e in found.errors)  # and may imitate a law
+    if is_free and corrected.verdict == 'unexplained':
+        said = (setup_advice(found),) * (plain.verdict == 'unexplained')
+        return replace(plain, remarks=(*said, *plain.remarks))
+    price, rare = price_of(found)
+    gain = _gain(plain, corrected, price)
+    if gain >= PER_EFFECT and plain.verdict != 'unexplained':
+        # on the same band: what is slower has less noise
+        cutoff = corrected.equations.filter.cutoff
+        if plain.equations.filter.cutoff > cutoff:
+            on_band = compared(plain.recordings, tree, next(each), cutoff)
+            gain = _gain(on_band, corrected, price)
+    if gain < (-ALIKE if _stands_for_gains(plain, found) else PER_EFFECT):
+        return plain if gain + rare < -ALIKE else _beside(plain, found, gain, _named(corrected))
+    errors = tuple(error_finding(found, i, gain) for i in range(len(found.errors)))
+    least = min(range(len(errors)), key=lambda i: errors[i].probability)
+    if len(errors) > 1 and errors[least].probability < MOST_CERTAIN:
+        fewer = found.without(least)
+        without = _undone(plain, fewer, tree, each)
+        if _gain(without, corrected, price - price_of(fewer)[0]) < PER_EFFECT:
+            return _connected(plain, fewer, tree, each, without)
+    return replace(
+        corrected, findings=errors,
+        equivalents=equal_errors(found), delay_std=found.delay_std, uncorrected=plain, price=price,
+        remarks=(*(f'{e.remedy} {_CORRECTED}' for e in found.errors), *plain.recordings.remarks),
+    )  # fmt: skip
+
+
+def _undone(
+    plain: Connected, found: Connection, tree: Tree, each: Iterator[Callable[[float], None]]
+) -> Connected:
+    """Return the models that are compared where errors of the connection are undone."""
+    correction = found.errors[-1].correction
+    recordings, whole = plain.recordings.corrected(correction), correction.tree(tree)
+    return replace(compared(recordings, whole, next(each)), correction=correction)
+
+
+def _stands_for_gains(plain: Connected, found: Connection) -> bool:
+    """Return whether the gain of a motor imitates those of its drive, both scaled alike.
+
+    Where commands are position targets, the motor that multiplies them is the drive.
+    """
+    named = {e.hypothesis.joint for e in found.errors if 'kp' in e.hypothesis.names}
+    scaled = {joint for effect, joint in _named(plain) if effect == TORQUE_GAIN.name}
+    return plain.recordings.learned.gains is not None and bool(named & scaled)
+
+
+def _gain(plain: Connected, corrected: Connected, price: float) -> float:
+    """Return by how much the corrected recording is better explained, less a price [nats].
+
+    Efforts, given the motion, and the motion must both be; 0 where only one of them clearly is.
+    Where nothing explains the recording as it is, one of them must be, and the other no worse, for
+    the models of it are no explanations.
+    """
+    nominal, recorded = np.minimum(plain.nominal, corrected.nominal), plain.equations.power
+    worth = [[c.worth(nominal, recorded, is_of_motion=m) for m in (False, True)]
+             for c in (corrected, plain)]  # fmt: skip
+    gains = [a - b - price for a, b in zip(*worth, strict=True)]
+    if max(gains) < PER_EFFECT:
+        return min(gains)
+    is_solved = plain.verdict == 'unexplained' != corrected.verdict
+    return max(gains) if is_solved and min(gains) >= -price else max(min(gains), 0.0)
+
+
+def _named(connected: Connected) -> frozenset[tuple[str, str]]:
+    """Return the names and joints of the effects that are asserted."""
+    motion, model = connected.equations.motion, connected.several.decision.model
+    return frozenset((s.name, joint_name(motion, s.place.joint)) for s in model.effects)
+
+
+def _beside(
+    plain: Connected, found: Connection, gain: float,
+    common: frozenset[tuple[str, str]] = frozenset(),
+) -> Connected:  # fmt: skip
+    """Return the recording as it is, with errors of the connection that explain as much."""
+    named = tuple((e.hypothesis.joint, e.hypothesis.effect) for e in found.errors)
+    return replace(
+        plain, equivalents=(Equivalent(named, '', 1.0),),
+        rivals=tuple(joint for joint, _ in named),
+        has_rival_gains=any(e.hypothesis.is_of_gains for e in found.errors),
+        trust=1.0 / (1.0 + math.exp(TEMPER * gain)), common=common,
+    )  # fmt: skip
