@@ -92,8 +92,8 @@ PROOF_ROOMS = {
 SUB_ROOMS = {
     'diagnosis': (
         'criteria', 'shown', 'result', 'compare', 'setup', 'explain', 'locate', 'decide',
-        'unlisted', 'findings', 'prove', 'mapping', 'gathered', 'connected', 'connecting',
-        'disturbed', 'reference', 'pipeline',
+        'unlisted', 'findings', 'wrong_bodies', 'prove', 'mapping', 'gathered', 'connected',
+        'connecting', 'disturbed', 'reference', 'pipeline',
     ),
     'robots': (
         'entries', 'shipped', 'listing', 'gains', 'models', 'observed_motion', 'nominal_prior',

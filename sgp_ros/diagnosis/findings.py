@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -230,44 +230,6 @@ def _unknown(
     # the joint that comes first is the answer
     chance = float(min(chances.unknown[joint], chances.unknown[decision.unknown[0]]))
     return Finding(names[joint], UNKNOWN, {}, where, 0.0, chance, share, '', on)
-
-
-def parameter_errors(
-    equations: Equations, model: Model, unstated: Collection[int] = ()
-) -> tuple[ParameterError, ...]:
-    """Return masses and centres that differ by more than two standard deviations.
-
-    Args:
-        equations: of the recording.
-        model: that was asserted.
-        unstated: bodies that the robot's file leaves open: nothing that was stated is wrong.
-    """
-    tree = equations.motion.tree
-    if not model.is_free:
-        return ()
-    C = model.frame.covariance[equations.instants :, equations.instants :]
-    changed = equations.with_bodies(equations.motion, model.w).tree.parameters
-    D = equations.directions.reshape(len(C), -1, 10)
-    found = []
-    for body, link in enumerate(tree.link_names):
-        before, after = tree.parameters[body], changed[body]
-        if after[0] <= 0.0 or before[0] <= 0.0 or body in unstated:
-            continue
-        slopes = {'mass': D[:, body, 0]}
-        for axis, name in enumerate('xyz'):
-            slopes[f'com_{name}'] = (
-                D[:, body, 1 + axis] - after[1 + axis] / after[0] * D[:, body, 0]
-            ) / after[0]
-        values = {'mass': (after[0], before[0], 'kg')} | {
-            f'com_{n}': (after[1 + i] / after[0], before[1 + i] / before[0], 'm')
-            for i, n in enumerate('xyz')
-        }
-        for name, (now, then, unit) in values.items():
-            std = float(np.sqrt(max(float(slopes[name] @ C @ slopes[name]), 0.0)))
-            std = float(np.hypot(std, NUMBER_ERROR * abs(now - then)))
-            if abs(now - then) > 2.0 * std and abs(now - then) > 1e-9:
-                found.append(ParameterError(link, name, float(now), std, float(then), unit))
-    return tuple(found)
 
 
 def verdict_of(

@@ -34,7 +34,6 @@ from sgp_ros.diagnosis.findings import (
     asserted,
     bound_remarks,
     differences,
-    parameter_errors,
     verdict_of,
 )
 from sgp_ros.diagnosis.gathered import Knowledge, Recordings, gather, prepared
@@ -56,6 +55,7 @@ from sgp_ros.diagnosis.reference import (
 from sgp_ros.diagnosis.result import Diagnosis, Proof
 from sgp_ros.diagnosis.setup.said import doubted_scales
 from sgp_ros.diagnosis.shown import Predictions, Traces
+from sgp_ros.diagnosis.wrong_bodies import parameter_errors
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import NumericalError
@@ -224,8 +224,9 @@ def _against(
         findings = tuple(none_in_simulation(f) for f in found.findings)
         return replace(found, reference='simulation', findings=findings)
     reference = against_simulation(
-        connected.equations, connected.several, sim.equations, sim.several
-    )
+        connected.equations, connected.several, sim.equations, sim.several,
+        connected.recordings.unstated,
+    )  # fmt: skip
     return _compared(found, connected, reference, (said,))
 
 
@@ -235,12 +236,13 @@ def _compared(
     """Return the diagnosis with what differs from the simulation in the place of its findings."""
     if reference is None:
         return replace(found, remarks=(*said, _UNCLEAR, *found.remarks))
-    is_calm = reference.verdict in _CALM
+    is_calm, bodies = reference.verdict in _CALM, reference.bodies
     return replace(
         found, reference='simulation', findings=reference.findings, shared=reference.shared,
         verdict='setup_error' if is_calm and connected.findings else reference.verdict,
         certainty=_certainty(reference.certainty, connected),
         traces=replace(found.traces, forces=()), remarks=(*said, *found.remarks),
+        parameter_errors=found.parameter_errors if bodies is None else bodies,
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ it states needs no fit.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,7 +27,8 @@ from sgp_ros.diagnosis.explain.fitted_model import Model, first_scale
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.findings import stated_parameters
-from sgp_ros.diagnosis.result import Finding, Location, Parameter
+from sgp_ros.diagnosis.result import Finding, Location, Parameter, ParameterError
+from sgp_ros.diagnosis.wrong_bodies import parameter_errors
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
@@ -44,12 +45,17 @@ class Reference:
         findings: effects that differ, with their numbers on both.
         shared: effects that both have alike.
         certainty: probability that the verdict is right.
+        has_other_bodies: whether what bodies differ in counts as physics.
+        bodies: of the machine that differ from those of the simulation; None where these are
+            the nominal ones.
     """
 
     verdict: str
     findings: tuple[Finding, ...]
     shared: tuple[Finding, ...]
     certainty: float
+    has_other_bodies: bool
+    bodies: tuple[ParameterError, ...] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +74,18 @@ class _Side:
         return cls(equations, scale, Columns(equations), model.effects)
 
     def fitted(self, effects: tuple[EffectAt, ...], *, is_free: bool) -> Model:
-        start = first_scale(self.equations)
-        return fit(self.columns, effects, start, is_free=is_free, steps=_STEPS)
+        """Return a model of effects; the shapes of those that are not named here stay."""
+        start, own = first_scale(self.equations), {s.key: s for s in self.named}
+        others = tuple(s for s in effects if s.key not in own)
+        ordered = (*others, *(own[s.key] for s in effects if s.key in own))
+        still = len(others)
+        return fit(self.columns, ordered, start, is_free=is_free, steps=_STEPS, still=still)
 
 
 def against_simulation(
-    equations: Equations, several: Several, simulated: Equations, simulation: Several
-) -> Reference | None:
+    equations: Equations, several: Several, simulated: Equations, simulation: Several,
+    unstated: Collection[int] = (),
+) -> Reference | None:  # fmt: skip
     """Return what differs; None where either recording is unexplained.
 
     Args:
@@ -82,6 +93,7 @@ def against_simulation(
         several: its models.
         simulated: equations of the simulation, for the same nominal robot.
         simulation: its models.
+        unstated: bodies that the robot's file leaves open.
     """
     decisions = several.decision, simulation.decision
     if any(d.verdict == 'unexplained' for d in decisions):
@@ -89,12 +101,18 @@ def against_simulation(
     real, sim = _Side.of(equations, several), _Side.of(simulated, simulation)
     is_free = any(d.model.is_free for d in decisions)
     ours, theirs = _best(real, sim, is_free=is_free)
-    std = reported_std(ours, real.columns), reported_std(theirs, sim.columns)
+    std = reported_std(ours, real.columns)
+    known = dict(zip((s.key for s in theirs.effects),
+                     zip(theirs.effects, reported_std(theirs, sim.columns), strict=True),
+                     strict=True))  # fmt: skip
     power = _moving_power(equations)
     findings: list[Finding] = []
     shared: list[Finding] = []
-    for i, (here, there) in enumerate(zip(ours.effects, theirs.effects, strict=True)):
-        finding = _compared(here, there, (std[0][i], std[1][i]), equations)
+    for here, of_here in zip(ours.effects, std, strict=True):
+        there, of_there = known[here.key]
+        finding = _compared(here, there, (of_here, of_there), equations)
+        if here.key not in {s.key for s in sim.named}:
+            finding = _sized(finding, here)
         force = (
             here.columns(equations.motion) @ here.coefficients
             - there.columns(equations.motion) @ there.coefficients
@@ -104,7 +122,9 @@ def against_simulation(
         finding = replace(finding, share=float(np.max(share)))
         is_different = finding.share > COUNTED_SHARE and finding.probability > 0.5
         (findings if is_different else shared).append(finding)
-    return _reference(equations, findings, shared, ours.w - theirs.w)
+    found = _reference(equations, findings, shared, ours.w - theirs.w)
+    bodies = parameter_errors(equations, ours, unstated, theirs) if found.has_other_bodies else ()
+    return replace(found, bodies=bodies)
 
 
 def against_model(
@@ -158,12 +178,23 @@ def _reference(
 ) -> Reference:
     """Return the comparison; `shift` (p,) is by how much the bodies differ."""
     moved = (equations.force_of_bodies(shift) ** 2).mean(axis=0) / _moving_power(equations)
-    calm = 'parameters_only' if moved.max() > COUNTED_SHARE else 'no_mismatch'
+    is_other = bool(moved.max() > COUNTED_SHARE)
+    calm = 'parameters_only' if is_other else 'no_mismatch'
     findings.sort(key=lambda f: -f.probability)
     verdict = 'missing_physics' if findings else calm
     stated = [f.probability for f in findings]
     stated = stated or [1.0 - f.probability for f in shared if f.share > COUNTED_SHARE]
-    return Reference(verdict, tuple(findings), tuple(shared), min([*stated, MOST_CERTAIN]))
+    certainty = min([*stated, MOST_CERTAIN])
+    return Reference(verdict, tuple(findings), tuple(shared), certainty, is_other)
+
+
+def _sized(found: Finding, law: EffectAt) -> Finding:
+    """Return a finding with the sizes alone of a law that the simulation is not known to have."""
+    theirs = {
+        q.name: found.in_simulation[q.name] for q in law.sizes if q.name in found.in_simulation
+    }
+    apart = {name: x for name, x in found.difference.items() if name in theirs}
+    return replace(found, in_simulation=theirs, difference=apart)
 
 
 def _plain(

@@ -152,7 +152,8 @@ def quantity(p: Parameter, *, is_short: bool = False) -> str:
     unit = '' if p.unit in {'', '1'} else f' {p.unit}'
     half = INTERVAL_95 * p.std if p.std is not None and math.isfinite(p.std) else 0.0
     if half <= 0.0:
-        return f'{p.value:.3g}' if is_short else f'{p.value:.3g}{unit}'
+        value = f'{p.value + 0.0:.3g}'  # no negative zero
+        return value if is_short else f'{value}{unit}'
     places = int(np.clip(1 - math.floor(math.log10(half)), 0, 12))
     if is_short:
         return f'{p.value:.{places}f}'
