@@ -14,9 +14,10 @@ zero of the column (0 by default), and `episode`, a column that numbers parts wh
 anew: they follow each other. A joint has a `position`, and may have `velocity` and `effort`.
 One of which only the velocity was logged, such as a wheel, has no `position`: it is the integral
 of the velocity, from zero.
-`commands` lists joints the same way; they are written in that order, as the type `command_type`
-(`std_msgs/Float64MultiArray` by default, see `command_types` for the others). In their place,
-`targets` lists what drives are told to reach, and `gains` what they do about it:
+`commands` lists joints the same way. `command_type` is the type in which they are written
+(`sensor_msgs/JointState` by default, see `command_types` for the others; one without names has
+them in the order of this list, which must be that of the robot). In their place, `targets` lists
+what drives are told to reach, and `gains` what they do about it:
 
     targets: {axis: {position: {column: q_des, unit: m}, velocity: {column: dq_des, unit: m/s}}}
     gains: {kp: {axis: 300.0}, kd: {axis: 10.0}}    # or {axis: {column: kp}}
@@ -44,7 +45,7 @@ import numpy as np
 from sgp_ros.engine.samples import CommandSample
 from sgp_ros.errors import ConfigError
 from sgp_ros.markup import YAMLError, load_yaml
-from sgp_ros.recordings.command_types import COMMAND_TYPES, FLOAT64_ARRAY
+from sgp_ros.recordings.command_types import COMMAND_TYPES
 from sgp_ros.recordings.messages import JOINT_STATE
 from sgp_ros.recordings.table_files import Columns
 from sgp_ros.recordings.table_units import TIME_UNITS, UNITS
@@ -148,8 +149,7 @@ def check_map(content: Mapping[str, object], columns: Columns) -> TableMap:
     }
     if commands and targets:
         check.problems.append('commands and targets: only one of them may be given')
-    default = JOINT_STATE if targets else FLOAT64_ARRAY
-    kind = check.command_type(content.get('command_type', default), tuple(commands or targets))
+    kind = check.command_type(content.get('command_type', JOINT_STATE), tuple(commands or targets))
     if check.problems:
         raise ConfigError(
             f'{len(check.problems)} problems in the map: ' + ' | '.join(check.problems),

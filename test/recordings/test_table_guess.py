@@ -609,6 +609,15 @@ def test_a_commanded_effort_beside_targets_without_gains_is_what_drives(tmp_path
     assert {c.kind for c in _read(path, tmp_path, slide)[2]} == {POSITION}
 
 
+def test_commands_of_a_table_keep_their_joints_in_any_order(tmp_path):
+    """Numbers without names would be taken in the order of the robot, whatever the columns."""
+    asked = {'elbow_cmd_Nm': TAU[:, 1], 'shoulder_cmd_Nm': TAU[:, 0]}
+    seen = {'t_s': T, 'elbow_deg': np.degrees(Q[:, 1]), 'shoulder_deg': np.degrees(Q[:, 0])}
+    _, _, commands = _read(_npz(tmp_path, **seen, **asked), tmp_path)
+    given = dict(zip(commands[7].names, commands[7].effort, strict=True))
+    assert given == pytest.approx({'shoulder': TAU[7, 0], 'elbow': TAU[7, 1]})
+
+
 @pytest.mark.parametrize('name', ['log.pkl', 'log.zarr', 'log.npy', 'policy.pt'])
 def test_what_is_never_read_is_refused_with_the_reason(tmp_path, capsys, name):
     (tmp_path / name).write_bytes(b'x')
