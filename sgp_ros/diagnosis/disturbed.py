@@ -60,7 +60,7 @@ def undisturbed(
         again = connect(calm, tree, lambda _: None)
     except (RecordingError, ValueError):  # too little is left to decide
         return connected
-    if len(again.several.decision.unknown) >= len(decision.unknown):
+    if again.several.decision.unknown:
         return connected
     times = ', '.join(f'{start:.1f} to {end:.1f} s' for start, end in spans)
     said = (

@@ -57,8 +57,8 @@ def compare_models(equations: Equations, progress: Callable[[float], None]) -> C
     """Fit the models that could explain the discrepancy.
 
     Every model comes in two variants: with bodies as the nominal robot has them, and with bodies
-    that may differ. The freedom of the second has its price in evidence. No effect is looked for
-    where bodies leave too little for any.
+    that may differ. The freedom of the second has its price in evidence. Where bodies leave too
+    little for any effect, none is looked for but what would explain the same as other bodies.
     """
     columns = Columns(equations)
     start = first_scale(equations)
@@ -67,16 +67,15 @@ def compare_models(equations: Equations, progress: Callable[[float], None]) -> C
     plain = Comparison(bases[0], bases[1], (), ())
     if plain.is_calm:
         progress(1.0)
-        return plain
-    effects = tuple(equations.motion.catalogue.values())
+        found = _singles(columns, plain.nominal) if plain.base.is_free else ()
+        return replace(plain, singles=tuple(ranked(found)))
     singles: list[Model] = []
     for number, base in enumerate(bases):
-        first = _distinct(screen(columns, base, effects), FIRST)
-        singles += _fitted(columns, base, [(s,) for s in first], MOST_SINGLES)
+        singles += _singles(columns, base)
         progress(0.05 + 0.2 * (number + 1))
     singles = ranked(singles)
     pairs: list[Model] = []
-    parents = _varied(singles)
+    parents, effects = _varied(singles), tuple(equations.motion.catalogue.values())
     for number, single in enumerate(parents):
         second = _distinct(screen(columns, single, effects), SECOND)
         pairs += _fitted(columns, single, [(*single.effects, s) for s in second], MOST_PAIRS)
@@ -85,6 +84,13 @@ def compare_models(equations: Equations, progress: Callable[[float], None]) -> C
     pairs = ranked([*pairs, *_plain(columns, (*singles[:1], *pairs[:1]))])
     longer = more(columns, plain.nominal, plain.base, (*singles, *pairs))
     return replace(plain, singles=tuple(singles), pairs=tuple(pairs), more=tuple(longer))
+
+
+def _singles(columns: Columns, base: Model) -> list[Model]:
+    """Return the models of single effects beside bodies as those of a model."""
+    effects = tuple(columns.equations(frozenset()).motion.catalogue.values())
+    first = _distinct(screen(columns, base, effects), FIRST)
+    return _fitted(columns, base, [(s,) for s in first], MOST_SINGLES)
 
 
 def _fitted(

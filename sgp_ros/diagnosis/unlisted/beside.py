@@ -32,6 +32,8 @@ from sgp_ros.physics.law import FormulaLaw
 from sgp_ros.physics.parts import JOINT, MOTOR, Place
 
 PLAIN = (COULOMB_FRICTION, VISCOUS_FRICTION, CONSTANT_LOAD)
+_FURTHER = 3
+"""Listed laws that are fitted beside a formula which leaves too much."""
 _NONE = 2.0
 """Standard deviations below which a coefficient is not distinguished from zero."""
 
@@ -94,10 +96,11 @@ def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
 
 
 def refined(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
-    """Return a model with a richer law in place of a plain one beside its formula, if worth more.
+    """Return a model with richer or further listed laws beside its formula, if worth more.
 
     Friction that creeps before it slides, or has another level each way, is that beside a formula
-    too; what plain friction leaves of it would be taken for an error of the formula.
+    too; what plain friction leaves of it would be taken for an error of the formula. So would what
+    is left by a law of the list that the formula's force hid.
 
     Args:
         columns: of the recording.
@@ -106,21 +109,34 @@ def refined(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
         joint: index.
     """
     laws = model.frame.equations.motion.catalogue.values()
+    far, near = far_and_near(model, joint)
+
+    def tried(kept: tuple[EffectAt, ...], found: Iterable[EffectAt]) -> list[Model]:
+        return [
+            fit(columns, (*far, *kept, s), model.sigma, is_free=model.is_free, w=model.w, rounds=2,
+                steps=10, still=len(far))
+            for s in found
+        ]  # fmt: skip
+
     trials = []
     for plain in own_effects(model, joint):
         richer = [e for e in laws if plain.name in e.plain and not e.has_source]
-        others = tuple(s for s in model.effects if s is not plain)
+        kept = tuple(s for s in near if s is not plain)
         if richer:
+            others = (*far, *kept)
             base = fit(columns, others, model.sigma, is_free=model.is_free, w=model.w,
                        still=len(others))  # fmt: skip
-            trials += [
-                fit(columns, (*others, s), model.sigma, is_free=model.is_free, w=model.w, rounds=2,
-                    steps=10)
-                for s in distinct(screen(columns, base, richer, (joint,)))
-            ]  # fmt: skip
-    possible = [t for t in trials if is_credible(t)]
-    best = max(possible, key=scale.worth, default=model)
-    return best if scale.worth(best) > scale.worth(model) else model
+            trials += tried(kept, distinct(screen(columns, base, richer, (joint,))))
+    is_left = scale.excess(model)[joint] > 1.0
+    if is_left:
+        for s in distinct(screen(columns, model, laws, (joint,)), _FURTHER):
+            friction = (x for j in {joint, s.place.source} - {-1} for x in _friction(j))
+            usual = (x for x in friction if x.key not in model.key | {s.key})
+            trials += [earned(columns, scale, m, joint) for m in tried((*near, *usual), [s])]
+    best = max(filter(is_credible, trials), key=scale.worth, default=model)
+    if scale.worth(best) <= scale.worth(model):
+        return model
+    return refined(columns, scale, best, joint) if is_left else best
 
 
 def says_less(columns: Columns, model: Model, joint: int) -> bool:
@@ -262,13 +278,16 @@ def beside(listed: Model, joint: int, *, is_open: bool) -> Iterable[tuple[Effect
         joint: index.
         is_open: whether it leaves the joint unexplained.
     """
-    friction = tuple(EffectAt(e, Place(joint)) for e in (COULOMB_FRICTION, VISCOUS_FRICTION))
     found = _subsets(own_effects(listed, joint))
-    found += _subsets(friction) if is_open else []
+    found += _subsets(_friction(joint)) if is_open else []
     unique: dict[object, tuple[EffectAt, ...]] = {}
     for kept in found:
         unique.setdefault(frozenset(s.key for s in kept), kept)
     return unique.values()
+
+
+def _friction(joint: int) -> tuple[EffectAt, ...]:
+    return tuple(EffectAt(e, Place(joint)) for e in (COULOMB_FRICTION, VISCOUS_FRICTION))
 
 
 def _subsets(effects: tuple[EffectAt, ...]) -> list[tuple[EffectAt, ...]]:

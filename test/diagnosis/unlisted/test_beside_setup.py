@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from sgp_ros.diagnosis import connected as module
+from sgp_ros.diagnosis import connecting as module
 from sgp_ros.diagnosis.connected import Connected
 from sgp_ros.diagnosis.connecting import with_laws
 
