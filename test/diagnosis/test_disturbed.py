@@ -7,7 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis import disturbed
+from sgp_ros.diagnosis.connected import Connected
 from sgp_ros.diagnosis.disturbed import _is_of_load, disturbance
+from sgp_ros.diagnosis.gathered import Recordings
 from sgp_ros.diagnosis.pipeline import diagnose
 from test.diagnosis.worlds import CHAINS, events_of, simulate
 
@@ -73,6 +76,27 @@ def test_what_follows_the_load_is_no_disturbance(equations_for, monkeypatch):
     assert disturbance(equations)
     monkeypatch.setattr('sgp_ros.diagnosis.disturbed._is_of_load', lambda *_: True)
     assert disturbance(equations) == ()
+
+
+@pytest.mark.parametrize(('unknown', 'is_left_out'), [((), True), ((1,), False)])
+def test_time_is_left_out_only_where_all_others_are_explained(monkeypatch, unknown, is_left_out):
+    """A law that no list has stays unknown: half of it would else be called a hand."""
+    raw = SimpleNamespace(recording=None, approach=None, time=np.arange(10.0))
+    recordings = Recordings(('run',), raw, {}, {}, (), ())
+
+    def connected(recordings, _tree, _progress):
+        left = (0, 1) if len(recordings.learned.time) == 10 else unknown
+        several = SimpleNamespace(decision=SimpleNamespace(unknown=left))
+        return Connected(recordings, None, several)
+
+    for name, stub in {
+        'connect': connected, 'disturbance': lambda _: ((2.0, 3.0),),
+        'part_of': lambda raw, kept: SimpleNamespace(time=raw.time[kept]),
+    }.items():  # fmt: skip
+        monkeypatch.setattr(disturbed, name, stub)
+    found = disturbed.undisturbed(recordings, None, lambda _: None)
+    assert len(found.recordings.learned.time) == (8 if is_left_out else 10)
+    assert bool(found.remarks) is is_left_out
 
 
 @pytest.mark.long

@@ -36,6 +36,20 @@ def test_a_load_is_not_compared_with_bodies_that_may_differ(equations_for, heavy
     assert screen(columns, fitted(equations, is_free=True), load) == []
 
 
+@pytest.mark.parametrize('is_heavy', [False, True])
+def test_no_effect_is_looked_for_where_bodies_leave_nothing(
+    equations_for, perfect, heavy, is_heavy
+):
+    """Beside wrong bodies only what would say the same: a spring may act as a weight does."""
+    _, equations = equations_for(heavy[1] if is_heavy else perfect[1])
+    found = comparison.compare_models(equations, lambda _share: None)
+    assert found.is_calm
+    assert found.base.is_free is is_heavy
+    assert bool(found.singles) is is_heavy
+    assert not any(m.is_free for m in found.singles)
+    assert found.pairs == found.more == ()
+
+
 def test_effects_that_show_only_together_are_found_by_exchange(equations_for):
     """From two that are neither: one gives way, then the other."""
     world = simulate(CHAINS[1], 4, 12.0, force=_falling_friction, dry=lambda t, q, s: 0.3)

@@ -21,7 +21,7 @@ from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.diagnosis.unlisted import assertion, shapes
 from sgp_ros.diagnosis.unlisted import search as searching
 from sgp_ros.diagnosis.unlisted.assertion import _in_plain_laws, with_laws
-from sgp_ros.diagnosis.unlisted.beside import earned, is_bent, law_of
+from sgp_ros.diagnosis.unlisted.beside import earned, is_bent, law_of, refined
 from sgp_ros.diagnosis.unlisted.formulas import Range, texts
 from sgp_ros.diagnosis.unlisted.formulas import law as a_law
 from sgp_ros.diagnosis.unlisted.search import Searched, search
@@ -121,6 +121,20 @@ def test_what_is_no_function_of_the_motion_has_no_law(equations_for, name):
     assert found.decision.verdict == decision.verdict
 
 
+def _with_brake(equations, *names):
+    """Return the columns of a recording, and a model of the brake beside listed effects."""
+    motion, columns = equations.motion, Columns(equations)
+    smooth = next(s for s in smooth_forces(motion, 0) if (s.variable.kind, s.gate) == ('dq', ''))
+    text, seen = 'a*X/(1 + (X/v0)**2)', Range.of_variable(smooth.variable, motion)
+    assert text in texts(smooth)
+    law = a_law(smooth, motion, seen, text, {'v0': 1.5})
+    place = Place(0)
+    effects = [EffectAt(law, place, np.array([1.5]))]
+    effects += [EffectAt(EFFECTS[n], place) for n in names]
+    start = np.sqrt((equations.d**2).mean(axis=0))
+    return columns, fit(columns, tuple(effects), start, is_free=False)
+
+
 @pytest.mark.parametrize('friction', [0.0, 0.3])
 def test_a_listed_effect_beside_a_formula_earns_its_price_again(equations_for, friction):
     """One that only stood for a part of the formula goes, one that is there stays."""
@@ -129,22 +143,29 @@ def test_a_listed_effect_beside_a_formula_earns_its_price_again(equations_for, f
         return (_brake(t, q, v)[0] - friction * math.tanh(v[0] / 0.01),)
 
     _, equations = equations_for(simulate(CHAINS[1], 11, 10.0, force=force))
-    motion, columns = equations.motion, Columns(equations)
-    smooth = next(s for s in smooth_forces(motion, 0) if (s.variable.kind, s.gate) == ('dq', ''))
-    text, seen = 'a*X/(1 + (X/v0)**2)', Range.of_variable(smooth.variable, motion)
-    assert text in texts(smooth)
-    law = a_law(smooth, motion, seen, text, {'v0': 1.5})
-    place = Place(0)
-    effects = [EffectAt(law, place, np.array([1.5]))]
-    effects += [EffectAt(EFFECTS[n], place) for n in ('torque_gain', 'coulomb_friction')]
-    start = np.sqrt((equations.d**2).mean(axis=0))
-    model = fit(columns, tuple(effects), start, is_free=False)
+    columns, model = _with_brake(equations, 'torque_gain', 'coulomb_friction')
     scale = Scale.of(equations, compare_models(equations, lambda _share: None))
     scale = scale.of_forms()
     left = earned(columns, scale, model, 0)
     names = [s.name for s in left.effects]
     assert names == ['law', 'coulomb_friction'][: 1 + (friction > 0.0)]
     assert scale.worth(left) > scale.worth(model)
+
+
+def test_a_listed_law_that_a_formula_hid_is_found_beside_it(equations_for):
+    """A brake beside cogging and friction, of which the list alone had named nothing."""
+
+    def force(t, q, v):
+        return (_brake(t, q, v)[0] + 0.2 * math.sin(9.0 * q[0]) - 0.1 * math.tanh(v[0] / 0.01),)
+
+    _, equations = equations_for(simulate(CHAINS[1], 11, 10.0, force=force))
+    columns, model = _with_brake(equations)
+    scale = Scale.of(equations, compare_models(equations, lambda _share: None)).of_forms()
+    found = refined(columns, scale, model, 0)
+    assert {s.name for s in found.effects} == {'law', 'cogging', 'coulomb_friction'}
+    periods = next(s for s in found.effects if s.name == 'cogging').report(equations.motion)
+    assert periods['periods'] == pytest.approx(9.0, rel=0.01)
+    assert scale.excess(found)[0] < 1.0 < scale.excess(model)[0]
 
 
 @pytest.mark.parametrize('name', ['plain', 'brake'])
