@@ -93,7 +93,7 @@ SUB_ROOMS = {
     'diagnosis': (
         'criteria', 'shown', 'result', 'compare', 'setup', 'explain', 'locate', 'decide',
         'unlisted', 'findings', 'wrong_bodies', 'prove', 'mapping', 'gathered', 'connected',
-        'connecting', 'disturbed', 'reference', 'pipeline',
+        'connecting', 'disturbed', 'common_structure', 'reference', 'pipeline',
     ),
     'robots': (
         'entries', 'shipped', 'listing', 'gains', 'models', 'observed_motion', 'nominal_prior',

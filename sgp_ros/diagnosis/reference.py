@@ -18,13 +18,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sgp_ros.diagnosis.common_structure import Side, common_models
 from sgp_ros.diagnosis.compare.equations import Equations, joint_name
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, LEAST_SHARE, MOST_CERTAIN, PER_EFFECT, TEMPER
 from sgp_ros.diagnosis.decide.differences import Several
-from sgp_ros.diagnosis.decide.scale import Scale
-from sgp_ros.diagnosis.explain.candidates import fit
-from sgp_ros.diagnosis.explain.fitted_model import Model, first_scale
-from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.findings import stated_parameters
 from sgp_ros.diagnosis.result import Finding, Location, Parameter, ParameterError
@@ -32,8 +29,6 @@ from sgp_ros.diagnosis.wrong_bodies import parameter_errors
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
-
-_STEPS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,30 +53,6 @@ class Reference:
     bodies: tuple[ParameterError, ...] | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class _Side:
-    """One recording with its models."""
-
-    equations: Equations
-    scale: Scale
-    columns: Columns
-    named: tuple[EffectAt, ...]
-
-    @classmethod
-    def of(cls, equations: Equations, several: Several) -> _Side:
-        model = several.decision.model
-        scale = Scale.of(equations, several.comparison)
-        return cls(equations, scale, Columns(equations), model.effects)
-
-    def fitted(self, effects: tuple[EffectAt, ...], *, is_free: bool) -> Model:
-        """Return a model of effects; the shapes of those that are not named here stay."""
-        start, own = first_scale(self.equations), {s.key: s for s in self.named}
-        others = tuple(s for s in effects if s.key not in own)
-        ordered = (*others, *(own[s.key] for s in effects if s.key in own))
-        still = len(others)
-        return fit(self.columns, ordered, start, is_free=is_free, steps=_STEPS, still=still)
-
-
 def against_simulation(
     equations: Equations, several: Several, simulated: Equations, simulation: Several,
     unstated: Collection[int] = (),
@@ -98,9 +69,9 @@ def against_simulation(
     decisions = several.decision, simulation.decision
     if any(d.verdict == 'unexplained' for d in decisions):
         return None
-    real, sim = _Side.of(equations, several), _Side.of(simulated, simulation)
+    real, sim = Side.of(equations, several), Side.of(simulated, simulation)
     is_free = any(d.model.is_free for d in decisions)
-    ours, theirs = _best(real, sim, is_free=is_free)
+    ours, theirs = common_models(real, sim, is_free=is_free)
     std = reported_std(ours, real.columns)
     known = dict(zip((s.key for s in theirs.effects),
                      zip(theirs.effects, reported_std(theirs, sim.columns), strict=True),
@@ -139,7 +110,7 @@ def against_model(
     """
     if several.decision.verdict == 'unexplained':
         return None
-    real = _Side.of(equations, several)
+    real = Side.of(equations, several)
     is_free = several.decision.model.is_free
     theirs = {s.key: s for s in stated}
     union = theirs | {s.key: s for s in real.named}
@@ -241,18 +212,6 @@ def none_in_simulation(found: Finding) -> Finding:
     none = {q.name: Parameter(q.neutral, None, p.unit) for q, p in ours.items()}
     apart = {q.name: replace(p, value=float(p.value) - q.neutral) for q, p in ours.items()}
     return replace(found, in_simulation=none, difference=apart)
-
-
-def _best(real: _Side, sim: _Side, *, is_free: bool) -> tuple[Model, Model]:
-    """Return the models of both in the structure that is worth most on the two together."""
-    union = {s.key: s for s in (*sim.named, *real.named)}
-    structures = {tuple(s.key for s in x): x for x in (real.named, sim.named, union.values())}
-    found = []
-    for effects in structures.values():
-        models = tuple(side.fitted(tuple(effects), is_free=is_free) for side in (real, sim))
-        worth = real.scale.worth(models[0]) + sim.scale.worth(models[1])
-        found.append((worth, models))
-    return max(found, key=lambda x: x[0])[1]  # type: ignore[return-value]  # two of each
 
 
 def _moving_power(equations: Equations) -> np.ndarray:

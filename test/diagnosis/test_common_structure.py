@@ -1,0 +1,82 @@
+"""One structure of laws for a machine and its simulation."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis import common_structure
+from sgp_ros.diagnosis.common_structure import Side, common_models
+from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.fitted_model import first_scale
+from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
+
+NUMBERS = {
+    'asymmetric_coulomb': {'real': [13.0, 35.0], 'sim': [55.0, -7.5]},
+    'coulomb_friction': {'real': [24.0], 'sim': [24.0]},
+    'constant_load': {'real': [11.0], 'sim': [-31.0]},
+    'viscous_friction': {'real': [60.0], 'sim': [60.0]},
+    'stribeck_friction': {'real': [0.34, 0.75], 'sim': [0.34, 0.32]},
+}
+"""Numbers that a fit of each law finds: bodies hold a load up that the simulation has not."""
+
+
+def _at(name, shape=()):
+    return EffectAt(EFFECTS[name], Place(0), np.array(shape))
+
+
+def _side(which, named, share=0.1):
+    """A recording on which every structure is worth the less the more laws it has."""
+    motion = SimpleNamespace(stated_number=lambda _number, _joint: 0.0)
+
+    def fitted(effects, *, is_free):
+        assert is_free
+        laws = tuple(
+            EffectAt(s.effect, s.place, s.shape, np.array(NUMBERS[s.name][which])) for s in effects
+        )
+        frame = SimpleNamespace(equations=SimpleNamespace(motion=motion))
+        return SimpleNamespace(effects=laws, shares=(share,) * len(laws), frame=frame)
+
+    scale = SimpleNamespace(worth=lambda m: -len(m.effects))
+    return SimpleNamespace(named=named, fitted=fitted, scale=scale)
+
+
+def _names(models):
+    return [{s.name for s in m.effects} for m in models]
+
+
+@pytest.mark.parametrize(('share', 'is_replaced'), [(0.1, True), (0.001, False)])
+def test_a_law_that_one_side_cannot_have_gives_way_to_everyday_laws(share, is_replaced):
+    """Friction that drives one way is a constant load beside plain friction, if it counts."""
+    named = (_at('asymmetric_coulomb'),)
+    models = common_models(_side('real', named), _side('sim', named, share), is_free=True)
+    everyday = {'coulomb_friction', 'viscous_friction', 'constant_load'}
+    assert _names(models) == [everyday if is_replaced else {'asymmetric_coulomb'}] * 2
+
+
+def test_a_law_that_one_side_hardly_has_stays():
+    """A static friction that is no more than that of sliding is none, and nothing impossible."""
+    named = (_at('stribeck_friction', [0.4]),)
+    models = common_models(_side('real', named), _side('sim', named), is_free=True)
+    assert _names(models) == [{'stribeck_friction'}] * 2
+
+
+def test_shapes_of_laws_that_only_the_other_side_names_stay(equations_for, viscous):
+    """An end stop that the motion of a simulation does not reach has no place of its own there."""
+    _, equations = equations_for(viscous)
+    wave = EffectAt(EFFECTS['cogging'], Place(0), np.array([7.3]))
+    named = (EffectAt(EFFECTS['viscous_friction'], Place(0)),)
+    side = Side(equations, None, Columns(equations), named)
+    kept = next(
+        s for s in side.fitted((*named, wave), is_free=False).effects if s.name == 'cogging'
+    )
+    assert kept.shape == pytest.approx([7.3])
+    free = fit(Columns(equations), (*named, wave), first_scale(equations), is_free=False,
+               steps=common_structure._STEPS)  # fmt: skip
+    moved = next(s for s in free.effects if s.name == 'cogging')
+    assert moved.shape != pytest.approx([7.3], rel=1e-6)
