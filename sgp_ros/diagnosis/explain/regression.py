@@ -16,8 +16,8 @@ from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
-MOST_HELD = 30_000_000
-"""Numbers that are remembered before all are forgotten: 240 MB."""
+MOST_HELD = 15_000_000
+"""Numbers that are remembered before the first ones are forgotten: 120 MB."""
 MOST_SLOPES = 15_000_000
 """Slopes of efforts that motions of changed bodies hold before they let go of them: 120 MB."""
 
@@ -153,15 +153,15 @@ class Columns:
         keys = (*key, bool(equations.moving[:, max(joint, 0)].all())), (*key, equations)
         for known in keys:
             if known in self._known:
-                return self._known[known]
+                self._known[known] = found = self._known.pop(known)  # the last one to be forgotten
+                return found
         raw = make()
         x = equations.compact(raw, joint, is_inertial=is_inertial)
         found = Seen(equations, x, joint, count)
-        if self._held > MOST_HELD:
-            self._known.clear()
-            self._held = 0
-        self._known[keys[raw.ndim == 3]] = found
         self._held += found.x.size
+        while self._held > MOST_HELD and self._known:
+            self._held -= self._known.pop(next(iter(self._known))).x.size
+        self._known[keys[raw.ndim == 3]] = found
         return found
 
 

@@ -229,6 +229,9 @@ def test_columns_know_whom_they_were_made_for(equations_for, viscous, monkeypatc
     motion = equations.motion
     assert columns.local(rub, equations, motion) is columns.local(rub, equations, motion)
     monkeypatch.setattr(regression, 'MOST_HELD', 100 * len(equations.d))
+    first = columns.local(rub, equations, motion)
     for i in range(450):
         columns.of(replace(tilt, shape=np.array([0.0, 0.001 * i])), equations, w)
+        assert columns.local(rub, equations, motion) is first  # asked for again and again
     assert len(columns._known) <= 101
+    assert sum(x.x.size for x in columns._known.values()) <= 101 * len(equations.d)
