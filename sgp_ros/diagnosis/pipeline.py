@@ -85,7 +85,6 @@ def diagnose(
     simulation: Iterable[Event] | None = None,
     simulated: Sequence[EffectAt] | None = None,
     has_overlays: bool = False,
-    is_thinned: bool = False,
     progress: Progress = lambda _share: None,
 ) -> Diagnosis:
     """Say what a recording has that the nominal robot lacks.
@@ -103,7 +102,6 @@ def diagnose(
         simulation: events of the simulation to compare with; None for the robot alone.
         simulated: physics of a simulation that is known by its model, whose bodies `tree` has.
         has_overlays: whether motions of both models are replayed over the measured ones.
-        is_thinned: whether rows are left out that the band of the equations does not need.
         progress: called with the share that is done.
 
     Raises:
@@ -116,8 +114,7 @@ def diagnose(
     known = Knowledge(robot, stated, config, gains, is_static=is_static)
     recordings = gather(several, tests, tree, known, holds_out=holds_out)
     require_signed(recordings.learned, tree.moving_names)
-    recordings = recordings.thinned() if is_thinned else recordings
-    recordings, tree = prepared(recordings, tree, unstated)
+    recordings, tree = prepared(recordings.thinned(), tree, unstated)
     try:
         connected = with_laws(undisturbed(recordings, tree, lambda x: progress(0.05 + 0.85 * x)))
         model, before = connected.several.decision.model, connected.uncorrected or connected

@@ -130,7 +130,7 @@ def _outcome(
         require_motion(events, nominal.robot.name, nominal.tree.moving_names)
         found = diagnose(
             events, nominal.robot, nominal.tree, {}, stated=nominal.stated, config=config,
-            is_thinned=True, progress=lambda share: connection.send(float(share)),
+            progress=lambda share: connection.send(float(share)),
         )  # fmt: skip
         return with_sentences(found)
     except SgpError as error:

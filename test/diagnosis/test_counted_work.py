@@ -55,6 +55,6 @@ def test_a_diagnosis_does_no_more_work_than_it_did(robots, counted, monkeypatch,
     monkeypatch.setattr(worlds, 'PERIOD', period_s)
     world = simulate(CHAINS[1], 11, 8.0, dry=lambda t, q, s: 0.4)
     robot, tree = robots[1]
-    found = diagnose(events_of(world), robot, tree, {}, holds_out=True, is_thinned=True)
+    found = diagnose(events_of(world), robot, tree, {}, holds_out=True)
     assert [f.effect for f in found.findings] == ['coulomb_friction']
     assert {name: n for name, n in counted.items() if n > MOST[name]} == {}
