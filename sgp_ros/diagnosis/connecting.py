@@ -16,7 +16,7 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import joint_name
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth
 from sgp_ros.diagnosis.connected import Connected, compared
-from sgp_ros.diagnosis.criteria import ALIKE, MOST_CERTAIN, PER_EFFECT, TEMPER
+from sgp_ros.diagnosis.criteria import ALIKE, MOST_CERTAIN, NEARLY, PER_EFFECT, TEMPER
 from sgp_ros.diagnosis.decide.differences import in_halves
 from sgp_ros.diagnosis.gathered import Recordings
 from sgp_ros.diagnosis.result import Equivalent
@@ -100,7 +100,7 @@ def _connected(
         return plain
     corrected = corrected or _undone(plain, found, tree, each)
     is_free = any(len(e.numbers) for e in found.errors)  # and may imitate a law
-    if is_free and corrected.verdict == 'unexplained':
+    if is_free and _may_be_a_law(plain, corrected):
         said = (setup_advice(found),) * (plain.verdict == 'unexplained')
         return replace(plain, remarks=(*said, *plain.remarks))
     price, rare = price_of(found)
@@ -134,6 +134,20 @@ def _undone(
     correction = found.errors[-1].correction
     recordings, whole = plain.recordings.corrected(correction), correction.tree(tree)
     return replace(compared(recordings, whole, next(each)), correction=correction)
+
+
+def _may_be_a_law(plain: Connected, corrected: Connected) -> bool:
+    """Return whether numbers of an error may imitate a law that stays unknown.
+
+    Much of what is unknown as it was recorded is then left there.
+    """
+    if corrected.verdict == 'unexplained':
+        return True
+    before, after = (c.several.decision.tentative or c.several.decision.model
+                     for c in (plain, corrected))  # fmt: skip
+    unknown = [j for j in corrected.several.decision.unknown
+               if j in plain.several.decision.unknown]  # fmt: skip
+    return any(after.left[j] > NEARLY * before.left[j] for j in unknown)
 
 
 def _stands_for_gains(plain: Connected, found: Connection) -> bool:

@@ -17,7 +17,8 @@ from sgp_ros.diagnosis.setup.search import Connection, Tried
 
 def _of(cutoff, verdict='missing_physics'):
     """Return what a comparison up to a cut-off [Hz] returns, as far as it is asked."""
-    several = SimpleNamespace(decision=SimpleNamespace(verdict=verdict))
+    decision = SimpleNamespace(verdict=verdict, unknown=(), tentative=None, model=None)
+    several = SimpleNamespace(decision=decision)
     recordings = SimpleNamespace(
         remarks=(), corrected=lambda _c: None, learned=SimpleNamespace(gains=None)
     )
@@ -164,3 +165,20 @@ def test_an_error_that_is_not_certain_must_be_worth_it_beside_physics(
     said = connecting._connected(_of(10.0), found, None, in_halves(lambda _: None))
     assert [f.effect for f in said.findings] == kept
     assert said.correction.clock == len(kept)
+
+
+@pytest.mark.parametrize(('unknown', 'left', 'may_be'), [((), 0.9, False), ((1,), 0.1, False),
+                                                          ((1,), 0.9, True)])  # fmt: skip
+def test_numbers_of_an_error_do_not_stand_for_a_law_that_stays_unknown(unknown, left, may_be):
+    """A rubber band pulls as a tilted base does, and most of it is left."""
+
+    def of(joints, share):
+        model = SimpleNamespace(left=np.array([0.0, share]))
+        decision = SimpleNamespace(
+            verdict='missing_physics', unknown=joints, tentative=None, model=model
+        )
+        return SimpleNamespace(
+            verdict='missing_physics', several=SimpleNamespace(decision=decision)
+        )
+
+    assert connecting._may_be_a_law(of((0, 1), 1.0), of(unknown, left)) is may_be
