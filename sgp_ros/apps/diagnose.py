@@ -163,8 +163,9 @@ def examine(
     if chosen.sim is not None and simulated is None:
         simulation = _events(chosen.sim, model, chosen, remarks)
     source = EFFORT_SOURCES[chosen.effort]
-    compared = None if chosen.static else simulation
-    checks = checked(events, model, gains, remarks, compared)
+    # settled points are no motion: neither is compared, nor do remarks on a motion apply
+    compared, said = (None, []) if chosen.static else (simulation, remarks)
+    checks = checked(events, model, gains, said, compared)
     found = diagnose(
         events, model, tree, tests, stated=nominal.stated, holds_out=not chosen.tests,
         is_static=chosen.static, gains=gains, simulation=simulation, simulated=simulated,

@@ -58,7 +58,11 @@ def run_import(
         )
     if summary.gains_path is not None:
         print(f'gains of the drives in {summary.gains_path}')
-    print(next_lines(after_import(summary.path, robot, summary.gains_path)))
+    print(
+        next_lines(
+            after_import(summary.path, robot, summary.gains_path, has_poses=summary.has_poses)
+        )
+    )
     return summary.to_mapping()
 
 

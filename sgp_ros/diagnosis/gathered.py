@@ -9,7 +9,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.creeping import creeping_friction, creeping_remark, with_creeping
 from sgp_ros.diagnosis.compare.open_bodies import open_remark, with_open_bodies
-from sgp_ros.diagnosis.compare.settled import collect_settled
+from sgp_ros.diagnosis.compare.settled import LEAST_POSES, collect_settled
 from sgp_ros.diagnosis.compare.several import join
 from sgp_ros.diagnosis.compare.sufficiency import (
     at_rest,
@@ -57,10 +57,12 @@ class Knowledge:
     gains: Gains | None = None
     is_static: bool = False
 
-    def collected(self, events: Iterable[Event], least_step: float = 0.0) -> RawTrajectory:
+    def collected(
+        self, events: Iterable[Event], least_step: float = 0.0, least_poses: int = LEAST_POSES
+    ) -> RawTrajectory:
         """Return a recording on its grid."""
         if self.is_static:
-            return collect_settled(events, self.robot, self.stated, self.config)
+            return collect_settled(events, self.robot, self.stated, self.config, least_poses)
         return collect(
             events, self.robot, self.stated, self.config, least_step=least_step, gains=self.gains
         )
@@ -128,7 +130,7 @@ def gather(
         RecordingError: nothing can be used, or nothing moves.
     """
     raws, still = _collected(several, tree, known)
-    held = {stem: known.collected(test) for stem, test in tests.items()}
+    held = {stem: known.collected(test, least_poses=1) for stem, test in tests.items()}
     learned, kept, remarks = _kept_back(raws) if holds_out else (join(raws), {}, ())
     if still:
         remarks += (f'Joints that do not move cannot be diagnosed: {", ".join(still)}.',)

@@ -19,6 +19,7 @@ from sgp_ros.recordings.table_gains import is_recorded
 from sgp_ros.recordings.table_groups import one_recording
 from sgp_ros.recordings.table_guess import guess_map
 from sgp_ros.recordings.table_map import read_map
+from sgp_ros.recordings.table_time import approach
 from sgp_ros.recordings.table_turns import TURN, counted_on
 from sgp_ros.recordings.table_units import ANGLES
 from sgp_ros.recordings.tables import Table, read_table
@@ -47,6 +48,7 @@ class ImportSummary:
         map_path: of the map that was guessed; None where one was given.
         gains_path: of the gains that the table or its map states; None without.
         quality: counts of missing numbers, gaps, backward and repeated stamps.
+        has_poses: whether the rows were recognised as settled poses.
     """
 
     path: Path
@@ -60,6 +62,7 @@ class ImportSummary:
     map_path: Path | None = None
     gains_path: Path | None = None
     quality: Mapping[str, Any] = field(default_factory=dict)
+    has_poses: bool = False
 
     def to_mapping(self) -> dict[str, object]:
         """Return the summary as JSON holds it."""
@@ -116,6 +119,7 @@ def import_table(
         max(table.stamps_ns), (*remarks, *table.remarks), tuple(unsure),
         _written(out_path, 'map', content) if map_path is None else None,
         _gains(out_path, content.get('gains')), quality(table),
+        has_poses=map_path is None and bool(approach(loaded[0])),
     )  # fmt: skip
 
 

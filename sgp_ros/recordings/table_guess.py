@@ -35,7 +35,7 @@ from sgp_ros.recordings.table_entries import (
     of_signals,
 )
 from sgp_ros.recordings.table_gains import add_gains
-from sgp_ros.recordings.table_time import guessed_times
+from sgp_ros.recordings.table_time import approach, guessed_times
 from sgp_ros.recordings.table_units import (
     UNITS,
     as_numbers,
@@ -86,6 +86,14 @@ def guess_map(
         name: {'position': positions[label].place(units[label])} for label, name in joints.items()
     }
     _add_velocities(found, entries, joints, positions, units, seconds, guess)
+    side = approach(columns)
+    if side:
+        guess.unsure.append(
+            f'The rows are taken as poses that were approached from the side that {side} tells: '
+            'diagnose them with --static.'
+        )
+        for channels in found.values():
+            channels['velocity'] = {'column': side, 'unit': 'rad/s'}
     _add_efforts(found, entries, joints, hinted, guess)
     guess.content['joints'] = found
     add_gains(columns, entries, joints, rows, guess)

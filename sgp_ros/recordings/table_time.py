@@ -12,6 +12,7 @@ from sgp_ros.recordings.table_entries import Columns, Guess
 from sgp_ros.recordings.table_units import PER_SECOND, as_numbers, time_unit
 
 _RATES = {'fs', 'rate', 'hz', 'freq', 'frequency', 'sampling_rate', 'fps'}
+_APPROACHES = {'approach', 'side', 'direction'}
 _STEPS = {'dt', 'ts', 'step', 'timestep', 'sample_time'}
 
 
@@ -51,11 +52,11 @@ def guessed_times(columns: Columns, rows: int, rate_hz: float | None, guess: Gue
         start = {'start': float(before)} if before else {}
         guess.content['time'] = {'column': name, 'unit': unit, **start, **_episodes(columns, rows)}
         return seconds
-    rate_hz = rate_hz or _stated_rate(columns)
+    rate_hz = rate_hz or _stated_rate(columns) or (1.0 if approach(columns) else None)
     if rate_hz is None:
         raise RecordingError(
             f'no column of time among {sorted(columns)}', 'a name such as t, time, timestamp_ns',
-            'give the sampling rate with --rate HZ',
+            'give the sampling rate with --rate HZ (any for poses, one a row)',
         )  # fmt: skip
     guess.content['time'] = {'rate': rate_hz}
     return np.arange(rows) / rate_hz
@@ -64,6 +65,15 @@ def guessed_times(columns: Columns, rows: int, rate_hz: float | None, guess: Gue
 def _may_be_time(said: Meaning) -> bool:
     """Return whether a name says so, or says nothing but a unit of time."""
     return said.role == TIME or (not said.role and said.unit in PER_SECOND)
+
+
+def approach(columns: Columns) -> str:
+    """Return the column that says from which side poses were approached; empty for none."""
+    for name, array in columns.items():
+        numbers = as_numbers(array)
+        if name.lower() in _APPROACHES and numbers is not None and numbers.ndim == 1:
+            return name if set(np.unique(numbers)) <= {-1.0, 1.0} else ''
+    return ''
 
 
 def _episodes(columns: Columns, rows: int) -> dict[str, str]:

@@ -95,11 +95,15 @@ def after_demo(bag: Path) -> Steps:
     ]  # fmt: skip
 
 
-def after_import(path: Path, robot: str | None, gains: Path | None = None) -> Steps:
+def after_import(
+    path: Path, robot: str | None, gains: Path | None = None, *, has_poses: bool = False
+) -> Steps:
     """Return what to do with an imported recording of a robot; None where it is not known."""
     command = f'sgp diagnose {_path(path)} --robot ' + (quote(robot) if robot else 'ROBOT.urdf')
     if gains is not None:
         command += f' --gains {_path(gains)}'
+    if has_poses:
+        command += ' --static'
     return [('Find what physics the model lacks:', command)]
 
 

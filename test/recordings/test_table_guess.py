@@ -618,6 +618,21 @@ def test_commands_of_a_table_keep_their_joints_in_any_order(tmp_path):
     assert given == pytest.approx({'shoulder': TAU[7, 0], 'elbow': TAU[7, 1]})
 
 
+def test_poses_need_no_clock_where_the_side_of_their_approach_is_told(tmp_path, capsys):
+    """Each row is a pose that was approached from one side, as the directions of all joints."""
+    side = np.where(np.arange(200) % 2, 1.0, -1.0)
+    table = {'q_shoulder': Q[:, 0], 'q_elbow': Q[:, 1], 'tau_shoulder': TAU[:, 0],
+             'tau_elbow': TAU[:, 1], 'approach': side}  # fmt: skip
+    summary, states, _ = _read(_npz(tmp_path, **table), tmp_path)
+    assert summary.has_poses
+    assert any('--static' in said for said in summary.unsure)
+    np.testing.assert_array_equal([s.velocity for s in states], np.column_stack([side, side]))
+    assert main(['import', str(_npz(tmp_path, **table)), '--out', str(tmp_path / 'x')]) == 0
+    assert '--static' in capsys.readouterr().out
+    with pytest.raises(RecordingError, match='no column of time'):
+        _read(_npz(tmp_path, **table | {'approach': 0.5 * side}), tmp_path)
+
+
 @pytest.mark.parametrize('name', ['log.pkl', 'log.zarr', 'log.npy', 'policy.pt'])
 def test_what_is_never_read_is_refused_with_the_reason(tmp_path, capsys, name):
     (tmp_path / name).write_bytes(b'x')

@@ -51,14 +51,18 @@ def collect_settled(
     robot: Robot,
     stated: tuple[EffectAt, ...] = (),
     config: EngineConfig = USUAL,
+    least: int = LEAST_POSES,
 ) -> RawTrajectory:
     """Return settled points as numbered rows, whatever their stamps say.
+
+    Velocities of one size are the directions from which they were approached.
 
     Args:
         events: of the recording; states carry measured efforts.
         robot: names, actuated joints and gains.
         stated: effects that the nominal robot has, beside those of its tree.
         config: settings of the intake.
+        least: poses that there must be.
 
     Raises:
         RecordingError: too few poses, or no measured efforts.
@@ -67,14 +71,18 @@ def collect_settled(
     numbered = [replace(e, stamp_ns=i * _ROW_NS) for i, e in enumerate(taken)]
     accepted = accept(numbered, robot, replace(config, effort_source='state'))
     rows = np.flatnonzero(accepted.is_measured)
-    if len(rows) < LEAST_POSES:
+    if len(rows) < least:
         raise RecordingError(
-            f'{len(rows)} poses with a measured effort', f'at least {LEAST_POSES}',
+            f'{len(rows)} poses with a measured effort', f'at least {least}',
             'record more poses, with the effort that holds each',
         )  # fmt: skip
     position = accepted.position[rows]
     n, k = position.shape
     approach = np.column_stack([approaches(position[:, j]) for j in range(k)])
+    if accepted.velocity is not None:
+        speed = np.abs(accepted.velocity[rows])
+        if (speed > 0.0).all() and np.ptp(speed) == 0.0:
+            approach = np.sign(accepted.velocity[rows])
     return RawTrajectory(
         np.arange(n, dtype=float), 1.0, position, None, accepted.effort[rows], None,
         (slice(0, n),), dict(accepted.counts.refused), np.zeros(k),

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sgp_ros.batch.acceptance import USUAL
 from sgp_ros.diagnosis.compare.settled import approaches, collect_settled, every_fourth, shows
 from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, observe
+from sgp_ros.diagnosis.gathered import Knowledge, gather
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.engine.samples import JointSample, frozen_array
 from sgp_ros.errors import RecordingError
@@ -131,3 +133,24 @@ def test_each_fourth_pose_is_held_out_with_its_direction(robots):
 def test_too_few_points_are_refused_in_one_line(robots):
     with pytest.raises(RecordingError, match='40 poses with a measured effort'):
         collect_settled(_points(20), robots[1][0])
+
+
+def test_few_points_may_prove_what_many_say(robots):
+    robot, tree = robots[1]
+    known = Knowledge(robot, (), USUAL, is_static=True)
+    points = {'few': _points(20)}
+    found = gather({'many': _points(100)}, points, tree, known, holds_out=False)
+    assert len(found.held['few'].time) == 40
+    with pytest.raises(RecordingError, match='40 poses'):
+        gather(points, {}, tree, known, holds_out=False)
+
+
+def test_velocities_of_one_size_tell_from_which_side_poses_were_approached(robots):
+    """Poses in any order, each approached from the side that its row tells; a speed tells none."""
+    points, side = _points(100), np.where(np.arange(200) % 3, 1.0, -1.0)
+    told = [replace(p, velocity=frozen_array([x])) for p, x in zip(points, side, strict=True)]
+    assert collect_settled(told, robots[1][0]).approach[:, 0] == pytest.approx(side)
+    noise = np.random.default_rng(1).normal(size=200)
+    seen = [replace(p, velocity=frozen_array([x])) for p, x in zip(points, noise, strict=True)]
+    followed = collect_settled(points, robots[1][0]).approach
+    np.testing.assert_array_equal(collect_settled(seen, robots[1][0]).approach, followed)
