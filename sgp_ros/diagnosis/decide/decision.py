@@ -104,7 +104,7 @@ def decide(equations: Equations, comparison: Comparison) -> Decision:
     """
     scale, base = Scale.of(equations, comparison), comparison.base
     ranked = _ranked(comparison, scale)
-    likely = [m for m in ranked if scale.worth(m) > scale.worth(base)]
+    likely = [m for m in ranked if scale.worth(m) > scale.worth(base) and not comparison.is_calm]
     best = supported(equations, scale, likely)
     rivals = tuple(m for m in ranked if m is not best)
     if best is not None:

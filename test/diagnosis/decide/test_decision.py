@@ -42,6 +42,19 @@ def damped(equations_for, viscous):
     return equations_for(viscous)[1]
 
 
+def test_where_likely_bodies_leave_too_little_no_effect_is_asserted(equations_for, heavy):
+    """However much it gains: the bodies of the file and a law may be alike a little better."""
+    _, equations = equations_for(heavy[1])
+    gain, bodies = fitted(equations, 'torque_gain'), fitted(equations, is_free=True)
+    part = np.sqrt(0.5 * SLIGHT_REST * equations.power)
+    comparison = Comparison(
+        fitted(equations), replace(bodies, residual=bodies.residual + part),
+        (replace(gain, residual=0.0 * gain.residual, score=1e6),), (),
+    )  # fmt: skip
+    assert comparison.is_calm
+    assert decide(equations, comparison).verdict == 'parameters_only'
+
+
 def test_an_effect_that_explains_all_is_asserted(damped):
     right, wrong = fitted(damped, 'viscous_friction'), fitted(damped, 'spring')
     decision = decide(damped, _comparison(damped, wrong, right))
