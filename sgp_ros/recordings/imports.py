@@ -119,7 +119,7 @@ def import_table(
         max(table.stamps_ns), (*remarks, *table.remarks), tuple(unsure),
         _written(out_path, 'map', content) if map_path is None else None,
         _gains(out_path, content.get('gains')), quality(table),
-        has_poses=map_path is None and bool(approach(loaded[0])),
+        has_poses=map_path is None and bool(approach(loaded[0], content['time'])),
     )  # fmt: skip
 
 

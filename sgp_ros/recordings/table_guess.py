@@ -86,7 +86,7 @@ def guess_map(
         name: {'position': positions[label].place(units[label])} for label, name in joints.items()
     }
     _add_velocities(found, entries, joints, positions, units, seconds, guess)
-    side = approach(columns)
+    side = approach(columns, guess.content['time'])
     if side:
         guess.unsure.append(
             f'The rows are taken as poses that were approached from the side that {side} tells: '

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from sgp_ros.recordings.table_entries import Columns, Guess
 from sgp_ros.recordings.table_units import PER_SECOND, as_numbers, time_unit
 
 _RATES = {'fs', 'rate', 'hz', 'freq', 'frequency', 'sampling_rate', 'fps'}
+_POSES_HZ = 1.0
+"""Rate that stands for none."""
 _APPROACHES = {'approach', 'side', 'direction'}
 _STEPS = {'dt', 'ts', 'step', 'timestep', 'sample_time'}
 
@@ -52,7 +55,7 @@ def guessed_times(columns: Columns, rows: int, rate_hz: float | None, guess: Gue
         start = {'start': float(before)} if before else {}
         guess.content['time'] = {'column': name, 'unit': unit, **start, **_episodes(columns, rows)}
         return seconds
-    rate_hz = rate_hz or _stated_rate(columns) or (1.0 if approach(columns) else None)
+    rate_hz = rate_hz or _stated_rate(columns) or (_POSES_HZ if _approach(columns) else None)
     if rate_hz is None:
         raise RecordingError(
             f'no column of time among {sorted(columns)}', 'a name such as t, time, timestamp_ns',
@@ -67,8 +70,17 @@ def _may_be_time(said: Meaning) -> bool:
     return said.role == TIME or (not said.role and said.unit in PER_SECOND)
 
 
-def approach(columns: Columns) -> str:
-    """Return the column that says from which side poses were approached; empty for none."""
+def approach(columns: Columns, time: Mapping[str, object]) -> str:
+    """Return the column that says from which side poses were approached; empty for none.
+
+    Args:
+        columns: of the table by name.
+        time: of its map; rows that have a time, or a rate, are no poses.
+    """
+    return _approach(columns) if time == {'rate': _POSES_HZ} else ''
+
+
+def _approach(columns: Columns) -> str:
     for name, array in columns.items():
         numbers = as_numbers(array)
         if name.lower() in _APPROACHES and numbers is not None and numbers.ndim == 1:

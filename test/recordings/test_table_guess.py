@@ -631,6 +631,9 @@ def test_poses_need_no_clock_where_the_side_of_their_approach_is_told(tmp_path, 
     assert '--static' in capsys.readouterr().out
     with pytest.raises(RecordingError, match='no column of time'):
         _read(_npz(tmp_path, **table | {'approach': 0.5 * side}), tmp_path)
+    summary, states, _ = _read(_npz(tmp_path, t=T, **table), tmp_path)  # a motion
+    assert not summary.has_poses
+    assert states[0].velocity is None
 
 
 @pytest.mark.parametrize('name', ['log.pkl', 'log.zarr', 'log.npy', 'policy.pt'])
