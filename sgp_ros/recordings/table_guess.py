@@ -138,7 +138,9 @@ def _position_units(
     ]  # fmt: skip
     angle, is_sure = position_unit(ranges, are_joints_known=bool(hinted))
     if ranges and not is_sure:
-        guess.unsure.append(f'Positions go beyond one turn and are assumed to be in {angle}.')
+        guess.unsure.append(
+            f'Positions go beyond one turn or their range and are assumed to be in {angle}.'
+        )
     units = {}
     for x, hint in hints.items():
         slide = slide_unit(positions[x].numbers, hint.lower, hint.upper) if hint.slides else ''

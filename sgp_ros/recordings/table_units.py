@@ -83,10 +83,17 @@ def time_unit(stamps: np.ndarray, said: str) -> tuple[str, bool]:
     return fitting[0], len(fitting) == 1
 
 
+_MOVES = 0.1
+"""Part of its range over which a joint moves."""
+
+
 def position_unit(
     columns: Sequence[tuple[np.ndarray, float, float]], *, are_joints_known: bool = False
 ) -> tuple[str, bool]:
     """Return `rad` or `deg` of turning joints and whether it is sure.
+
+    What is within its range in radians is so in degrees, too. Where more joints move within their
+    ranges in radians than leave them, these are other errors, such as angles of a motor.
 
     Args:
         columns: of each joint its numbers (n,) and its range [rad], infinite for none.
@@ -94,7 +101,7 @@ def position_unit(
             and how far it went does not tell the unit.
     """
     votes = {'rad': 0, 'deg': 0}
-    largest = 0.0
+    largest, moving = 0.0, 0
     for numbers, lower, upper in columns:
         low, high = np.nanmin(numbers), np.nanmax(numbers)
         if not are_joints_known or np.isfinite(lower) or np.isfinite(upper):
@@ -102,7 +109,11 @@ def position_unit(
         for unit, factor in (('rad', 1.0), ('deg', np.pi / 180.0)):
             if np.isfinite(lower) and np.isfinite(upper):
                 low, high = _ends(factor * numbers, lower, upper)
-                votes[unit] += low >= lower - MARGIN and high <= upper + MARGIN
+                is_inside = low >= lower - MARGIN and high <= upper + MARGIN
+                votes[unit] += is_inside
+                moving += unit == 'rad' and is_inside and high - low > _MOVES * (upper - lower)
+    if 0 < votes['deg'] - votes['rad'] < moving:
+        return 'rad', False
     if votes['rad'] != votes['deg']:
         return ('rad', True) if votes['rad'] > votes['deg'] else ('deg', True)
     if largest <= TURN + MARGIN:

@@ -20,6 +20,7 @@ from sgp_ros.recordings.column_names import meaning
 from sgp_ros.recordings.imports import import_table
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.recordings.table_entries import JointHint
+from sgp_ros.recordings.table_units import position_unit
 
 T = np.arange(200) * 0.005
 Q = np.column_stack([np.sin(3.0 * T), 0.5 * np.cos(2.0 * T)])
@@ -634,6 +635,16 @@ def test_poses_need_no_clock_where_the_side_of_their_approach_is_told(tmp_path, 
     summary, states, _ = _read(_npz(tmp_path, t=T, **table), tmp_path)  # a motion
     assert not summary.has_poses
     assert states[0].velocity is None
+
+
+@pytest.mark.parametrize(('moving', 'unit'), [(1.0, 'rad'), (0.05, 'deg')])
+def test_one_joint_out_of_its_range_is_no_sign_of_degrees(moving, unit):
+    """All others would move within a degree; unless they hardly move in either unit."""
+    wave = np.sin(3.0 * T)
+    columns = [(moving * wave, -2.0, 2.0), (moving * wave, -1.5, 1.5), (2.5 * wave, -2.0, 2.0)]
+    assert position_unit(columns, are_joints_known=True) == (unit, unit == 'deg')
+    degrees = [(np.degrees(x), low, high) for x, low, high in columns]
+    assert position_unit(degrees, are_joints_known=True)[0] == 'deg'
 
 
 @pytest.mark.parametrize('name', ['log.pkl', 'log.zarr', 'log.npy', 'policy.pt'])
