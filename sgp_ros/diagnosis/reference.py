@@ -92,7 +92,9 @@ def against_simulation(
         share = (force**2).mean(axis=0) / (power if force.ndim == 2 else power[joint])
         finding = replace(finding, share=float(np.max(share)))
         is_different = finding.share > COUNTED_SHARE and finding.probability > 0.5
-        (findings if is_different else shared).append(finding)
+        (findings if is_different else shared).append(
+            _with_reason(finding, is_different=is_different)
+        )
     found = _reference(equations, findings, shared, ours.w - theirs.w)
     bodies = parameter_errors(equations, ours, unstated, theirs) if found.has_other_bodies else ()
     return replace(found, bodies=bodies)
@@ -115,8 +117,9 @@ def against_model(
     theirs = {s.key: s for s in stated}
     union = theirs | {s.key: s for s in real.named}
     models = [real.fitted(x, is_free=is_free) for x in (real.named, tuple(union.values()))]
-    worth = [real.scale.worth(m) for m in models]
-    ours = models[int(np.argmax(worth))]
+    ours = max(models, key=real.scale.worth)
+    each = zip(models[1].effects, reported_std(models[1], real.columns), strict=True)
+    with_all = {s.key: (s, std) for s, std in each}
     power, motion = _moving_power(equations), equations.motion
     findings: list[Finding] = []
     shared: list[Finding] = []
@@ -131,13 +134,15 @@ def against_model(
             force = here.force(motion) - there.force(motion)
         share = float(((force**2).mean(axis=0) / power).max())
         is_different = share > COUNTED_SHARE and finding.probability > 0.5
-        (findings if is_different else shared).append(replace(finding, share=share))
+        finding = _with_reason(replace(finding, share=share), is_different=is_different)
+        (findings if is_different else shared).append(finding)
     for there in theirs.values():
         share = float(((there.force(motion) ** 2).mean(axis=0) / power).max())
-        if share > COUNTED_SHARE:
-            odds = math.exp(min(TEMPER * (worth[1] - worth[0]), 50.0))
-            findings.append(_absent(there, equations, 1.0 / (1.0 + odds), share))
-        else:  # too little to be seen: nothing speaks against the simulation
+        here, std = with_all[there.key]
+        apart = _compared(here, there, (std, {}), equations).probability
+        if share > COUNTED_SHARE and apart > 0.5:
+            findings.append(_absent(there, equations, apart, share))
+        else:  # too little to be seen, or bodies say the same: the simulation may be right
             said = stated_parameters(there, motion, {})
             found = _plain(there, said, equations, MOST_CERTAIN)
             shared.append(replace(found, share=share, in_simulation=said))
@@ -166,6 +171,12 @@ def _sized(found: Finding, law: EffectAt) -> Finding:
     }
     apart = {name: x for name, x in found.difference.items() if name in theirs}
     return replace(found, in_simulation=theirs, difference=apart)
+
+
+def _with_reason(found: Finding, *, is_different: bool) -> Finding:
+    """Return a finding with the reason why it is shared although its numbers differ."""
+    is_slight = not is_different and found.probability > 0.5
+    return replace(found, why='they differ by too little to count') if is_slight else found
 
 
 def _plain(

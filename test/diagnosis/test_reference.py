@@ -3,16 +3,33 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from sgp_ros.cli import main
+from sgp_ros.diagnosis.decide.differences import decide_several
+from sgp_ros.diagnosis.reference import against_model
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 
 CASES = Path(__file__).parents[3] / 'shared' / 'practice2' / 'cases'
 ANSWERS = CASES.parent / 'answers'
 
-pytestmark = pytest.mark.skipif(not CASES.is_dir(), reason='shared recordings are elsewhere')
+
+def test_a_law_of_the_simulation_that_bodies_may_be_is_not_said_to_be_absent(equations_for, heavy):
+    """A rotor of one joint and a link with more inertia are one, unlike friction."""
+    _, equations = equations_for(heavy[1])
+    several = decide_several(equations, 1, lambda _share: None)
+    assert several.decision.model.is_free
+    rotor = EffectAt(EFFECTS['armature'], Place(0), coefficients=np.array([0.03]))
+    rub = EffectAt(EFFECTS['viscous_friction'], Place(0), coefficients=np.array([0.5]))
+    found = against_model(equations, several, [rotor, rub])
+    assert [f.effect for f in found.findings] == ['viscous_friction']
+    assert [f.effect for f in found.shared] == ['armature']
 
 
+@pytest.mark.skipif(not CASES.is_dir(), reason='shared recordings are elsewhere')
 @pytest.mark.parametrize(
     'case', ['case_05', *(pytest.param(c, marks=pytest.mark.long) for c in ('case_06', 'case_07'))]
 )
