@@ -8,7 +8,8 @@ import pytest
 
 from sgp_ros.cli import main
 from sgp_ros.diagnosis.decide.differences import decide_several
-from sgp_ros.diagnosis.reference import against_model
+from sgp_ros.diagnosis.reference import _sized, against_model, against_simulation
+from sgp_ros.diagnosis.result import Finding, Location, Parameter
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
@@ -27,6 +28,33 @@ def test_a_law_of_the_simulation_that_bodies_may_be_is_not_said_to_be_absent(equ
     found = against_model(equations, several, [rotor, rub])
     assert [f.effect for f in found.findings] == ['viscous_friction']
     assert [f.effect for f in found.shared] == ['armature']
+
+
+@pytest.mark.parametrize('is_same', [True, False])
+def test_bodies_are_compared_with_those_of_the_simulation(equations_for, heavy, perfect, is_same):
+    """A link that only the file has wrong is no difference."""
+    (_, real), (_, sim) = (
+        equations_for(heavy[1]),
+        equations_for((heavy if is_same else perfect)[1]),
+    )
+    ours, theirs = (decide_several(x, 1, lambda _share: None) for x in (real, sim))
+    found = against_simulation(real, ours, sim, theirs)
+    assert found.verdict == ('no_mismatch' if is_same else 'parameters_only')
+    assert bool(found.bodies) is not is_same
+    assert found.findings == ()
+
+
+def test_a_law_that_the_simulation_is_not_known_to_have_has_no_place_there():
+    """Its size is asked for where the machine has it."""
+    numbers = {
+        'position': Parameter(0.3, 0.1, 'rad'),
+        'stiffness': Parameter(0.0, None, 'N m/rad'),
+    }
+    stop = Finding('knee', 'end_stop', numbers, Location(), 1.0, 0.9, 1.0,
+                   in_simulation=numbers, difference=numbers)  # fmt: skip
+    sized = _sized(stop, EffectAt(EFFECTS['end_stop'], Place(0)))
+    assert set(sized.in_simulation) == set(sized.difference) == {'stiffness'}
+    assert set(sized.parameters) == {'position', 'stiffness'}
 
 
 @pytest.mark.skipif(not CASES.is_dir(), reason='shared recordings are elsewhere')
