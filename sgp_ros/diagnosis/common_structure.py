@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from sgp_ros.diagnosis.compare.equations import Equations
@@ -12,12 +12,14 @@ from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model, first_scale
 from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.unlisted.beside import PLAIN
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 _STEPS = 8
+Estimates = dict[tuple[str, Place], tuple[EffectAt, Mapping[str, float]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +52,11 @@ class Side:
         ordered = (*others, *(own[s.key] for s in effects if s.key in own))
         still = len(others)
         return fit(self.columns, ordered, start, is_free=is_free, steps=_STEPS, still=still)
+
+    def estimates(self, model: Model) -> Estimates:
+        """Return the effects of a model of this recording with their deviations, by key."""
+        std = reported_std(model, self.columns)
+        return {s.key: (s, x) for s, x in zip(model.effects, std, strict=True)}
 
 
 def common_models(real: Side, sim: Side, *, is_free: bool) -> tuple[Model, Model]:

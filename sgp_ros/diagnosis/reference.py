@@ -22,7 +22,6 @@ from sgp_ros.diagnosis.common_structure import Side, common_models
 from sgp_ros.diagnosis.compare.equations import Equations, joint_name
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, LEAST_SHARE, MOST_CERTAIN, PER_EFFECT, TEMPER
 from sgp_ros.diagnosis.decide.differences import Several
-from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.findings import stated_parameters
 from sgp_ros.diagnosis.result import Finding, Location, Parameter, ParameterError
 from sgp_ros.diagnosis.wrong_bodies import parameter_errors
@@ -72,17 +71,14 @@ def against_simulation(
     real, sim = Side.of(equations, several), Side.of(simulated, simulation)
     is_free = any(d.model.is_free for d in decisions)
     ours, theirs = common_models(real, sim, is_free=is_free)
-    std = reported_std(ours, real.columns)
-    known = dict(zip((s.key for s in theirs.effects),
-                     zip(theirs.effects, reported_std(theirs, sim.columns), strict=True),
-                     strict=True))  # fmt: skip
+    known, named = sim.estimates(theirs), {s.key for s in sim.named}
     power = _moving_power(equations)
     findings: list[Finding] = []
     shared: list[Finding] = []
-    for here, of_here in zip(ours.effects, std, strict=True):
+    for here, of_here in real.estimates(ours).values():
         there, of_there = known[here.key]
         finding = _compared(here, there, (of_here, of_there), equations)
-        if here.key not in {s.key for s in sim.named}:
+        if here.key not in named:
             finding = _sized(finding, here)
         force = (
             here.columns(equations.motion) @ here.coefficients
@@ -118,12 +114,10 @@ def against_model(
     union = theirs | {s.key: s for s in real.named}
     models = [real.fitted(x, is_free=is_free) for x in (real.named, tuple(union.values()))]
     ours = max(models, key=real.scale.worth)
-    each = zip(models[1].effects, reported_std(models[1], real.columns), strict=True)
-    with_all = {s.key: (s, std) for s, std in each}
     power, motion = _moving_power(equations), equations.motion
     findings: list[Finding] = []
     shared: list[Finding] = []
-    for here, std in zip(ours.effects, reported_std(ours, real.columns), strict=True):
+    for here, std in real.estimates(ours).values():
         there = theirs.pop(here.key, None)
         if there is None:
             said = stated_parameters(here, motion, dict(std))
@@ -136,6 +130,7 @@ def against_model(
         is_different = share > COUNTED_SHARE and finding.probability > 0.5
         finding = _with_reason(replace(finding, share=share), is_different=is_different)
         (findings if is_different else shared).append(finding)
+    with_all = real.estimates(models[1]) if theirs else {}
     for there in theirs.values():
         share = float(((there.force(motion) ** 2).mean(axis=0) / power).max())
         here, std = with_all[there.key]

@@ -78,16 +78,20 @@ def collect_settled(
         )  # fmt: skip
     position = accepted.position[rows]
     n, k = position.shape
-    approach = np.column_stack([approaches(position[:, j]) for j in range(k)])
-    if accepted.velocity is not None:
-        speed = np.abs(accepted.velocity[rows])
-        if (speed > 0.0).all() and np.ptp(speed) == 0.0:
-            approach = np.sign(accepted.velocity[rows])
+    approach = None if accepted.velocity is None else _told(accepted.velocity[rows])
+    if approach is None:
+        approach = np.column_stack([approaches(position[:, j]) for j in range(k)])
     return RawTrajectory(
         np.arange(n, dtype=float), 1.0, position, None, accepted.effort[rows], None,
         (slice(0, n),), dict(accepted.counts.refused), np.zeros(k),
         taken[0].stamp_ns, stated, (), approach=approach,
     )  # fmt: skip
+
+
+def _told(velocity: np.ndarray) -> np.ndarray | None:
+    """Return the directions that velocities of one size are; None of others."""
+    speed = np.abs(velocity)
+    return np.sign(velocity) if (speed > 0.0).all() and np.ptp(speed) == 0.0 else None
 
 
 def approaches(position: np.ndarray) -> np.ndarray:
