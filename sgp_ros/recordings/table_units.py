@@ -93,7 +93,8 @@ def position_unit(
     """Return `rad` or `deg` of turning joints and whether it is sure.
 
     What is within its range in radians is so in degrees, too. Where more joints move within their
-    ranges in radians than leave them, these are other errors, such as angles of a motor.
+    ranges in radians than leave them, and none goes beyond one turn, these are other errors, such
+    as angles of a motor.
 
     Args:
         columns: of each joint its numbers (n,) and its range [rad], infinite for none.
@@ -112,7 +113,7 @@ def position_unit(
                 is_inside = low >= lower - MARGIN and high <= upper + MARGIN
                 votes[unit] += is_inside
                 moving += unit == 'rad' and is_inside and high - low > _MOVES * (upper - lower)
-    if 0 < votes['deg'] - votes['rad'] < moving:
+    if 0 < votes['deg'] - votes['rad'] < moving and largest <= TURN + MARGIN:
         return 'rad', False
     if votes['rad'] != votes['deg']:
         return ('rad', True) if votes['rad'] > votes['deg'] else ('deg', True)

@@ -645,6 +645,8 @@ def test_one_joint_out_of_its_range_is_no_sign_of_degrees(moving, unit):
     assert position_unit(columns, are_joints_known=True) == (unit, unit == 'deg')
     degrees = [(np.degrees(x), low, high) for x, low, high in columns]
     assert position_unit(degrees, are_joints_known=True)[0] == 'deg'
+    columns[2] = (30.0 * wave, -2.0, 2.0)  # the others follow within a degree
+    assert position_unit(columns, are_joints_known=True)[0] == 'deg'
 
 
 @pytest.mark.parametrize('name', ['log.pkl', 'log.zarr', 'log.npy', 'policy.pt'])
