@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -75,6 +76,27 @@ def _die_with_parent() -> None:
         ctypes.CDLL(None).prctl(_SET_PARENT_DEATH_SIGNAL, signal.SIGTERM)
 
 
+@contextlib.contextmanager
+def _interrupted_later() -> Iterator[None]:
+    """Hold back interruptions, whose handlers raise, until the end.
+
+    Python runs hooks around a fork, and what a handler raises in these is lost.
+    """
+    came: list[int] = []
+    before = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)}
+    is_main = threading.current_thread() is threading.main_thread()  # the one that is interrupted
+    held = {n: f for n, f in before.items() if is_main and callable(f)}
+    for number in held:
+        signal.signal(number, lambda n, _frame: came.append(n))
+    try:
+        yield
+    finally:
+        for number, handler in held.items():
+            signal.signal(number, handler)
+        for first in came[:1]:
+            signal.raise_signal(first)
+
+
 class LiveProcesses:
     """Child processes that never outlive the run.
 
@@ -93,13 +115,13 @@ class LiveProcesses:
         for name, value in parameters.items():
             arguments += ['-p', f'{name}:={value}']
         errors = Path(self._environment['ROS_LOG_DIR']) / f'{module}.stderr'
-        with errors.open('wb') as file:
+        self._errors[module] = errors
+        with errors.open('wb') as file, _interrupted_later():
             self._children[module] = subprocess.Popen(  # noqa: S603 - our own modules
                 arguments, env=self._environment, stdin=subprocess.DEVNULL, stdout=file,
                 stderr=subprocess.STDOUT, start_new_session=True,
                 preexec_fn=_die_with_parent,  # noqa: PLW1509 - one call, no lock to wait for
             )  # fmt: skip
-        self._errors[module] = errors
         return module
 
     def wait_for(

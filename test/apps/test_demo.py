@@ -118,6 +118,32 @@ def test_a_child_that_dies_is_reported_with_its_last_words(tmp_path):
     assert _children() == []
 
 
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_while_a_process_starts_comes_after_it(monkeypatch, tmp_path, number):
+    """In the hooks of a fork it would be lost, and the demonstration would go on."""
+    started = []
+
+    def popen(*_arguments, **_options):
+        signal.raise_signal(number)
+        started.append(number)
+        return 'child'
+
+    def interrupt(_number, _frame):
+        raise KeyboardInterrupt
+
+    before = signal.signal(number, interrupt)
+    monkeypatch.setattr(subprocess, 'Popen', popen)
+    processes = LiveProcesses({'ROS_LOG_DIR': str(tmp_path)})
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            processes.start('node', {})
+        assert signal.getsignal(number) is interrupt
+    finally:
+        signal.signal(number, before)
+    assert started == [number]
+    assert processes._children == {'node': 'child'}  # and is stopped with the others
+
+
 @pytest.mark.ros
 @pytest.mark.parametrize(
     'number', [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)]
