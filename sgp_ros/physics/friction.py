@@ -246,6 +246,7 @@ class LoadFriction(Effect):
         Quantity('level', 'N m', low=0.0, is_scored=False), Quantity('mu', '1', low=0.0),
     )  # fmt: skip
     linear = ('level', 'mu')
+    plain = ('coulomb_friction',)
     site = MOTOR
     drawn_over = 'velocity'
     is_dry = True

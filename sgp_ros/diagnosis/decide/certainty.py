@@ -64,9 +64,9 @@ def settled(
     Effects that are asserted beside others have a probability of at least `LEAST_ASSERTED`; a law
     that few joints have is worth `ALIKE` more than no law, or than its plain law. Others are
     replaced by the plain law that they add to, if their rivals add to it too, or are left out,
-    unless another compared model, with probable effects only, is worth more than the result. The
-    most probable effect stays, because something is missing there, unless bodies alone leave less
-    than counts as physics.
+    unless another compared model, with probable effects only, is worth more than the result. One
+    stays without which a joint is not described, for the other laws there would take its place; so
+    does the most probable, unless bodies alone leave less than counts as physics.
     """
     dropped: set[object] = set()
     while True:
@@ -107,10 +107,15 @@ def settled(
         kept = _without(equations, decision.model, weakest)
         known = [m for m in rivals if _is_probable(m, chances) and not dropped & m.key]
         best = max([kept, *filter(chances.scale.counts, known)], key=chances.scale.worth)
-        if not is_credible(best):
+        if not is_credible(best) or _opens(chances.scale, decision.model, best):
             return decision, contrasts, chances
         why = f'{weakest.effect.words} is improbable in it (probability {min(p):.2g})'
         decision = replace(decision.without(why), model=best, rivals=rivals)
+
+
+def _opens(scale: Scale, model: Model, fewer: Model) -> bool:
+    """Return whether a model does not describe a joint that the one it is to replace describes."""
+    return bool(((scale.excess(fewer) >= 1.0) & (scale.excess(model) < 1.0)).any())
 
 
 def settled_of(several: Several) -> tuple[Several, Contrasts, Probabilities]:
@@ -178,8 +183,9 @@ def probabilities(
 
     A richer law whose numbers reduce it to the asserted one is not a rival; bodies that do what an
     asserted law does, on any motion, are one. An effect is only as certain as its joint is well
-    described; one that acts on all joints, as the worst of them. Unlikely numbers are
-    doubted.
+    described; one that acts on all joints, as the worst of them; a gain, whose measure are bodies
+    that may differ, as the worst joint, known or not, for bodies take up what is not known there.
+    Unlikely numbers are doubted.
     """
     scale, asserted = Scale.of(equations, comparison), decision.model
     if any(s.effect.has_chosen_form for s in asserted.effects):
@@ -211,6 +217,8 @@ def probabilities(
         for s in named.values():
             is_own = s.effect.site in {JOINT, MOTOR} and s.place.joint >= 0
             a = adequate[s.place.joint] if is_own else min(described, default=0.0)
+            if model.is_free and s.effect.alike:
+                a = float(adequate.min())
             by_key[s.key] = by_key.get(s.key, 0.0) + float(p * a)
     far = {s.key for s in asserted.effects if _is_far(s)}
     return Probabilities(

@@ -181,7 +181,8 @@ def _opened(
     than what is named.
     """
     base = comparison.base
-    open_, worst = np.flatnonzero(excess >= 1.0), int(np.argmax(scale.base))
+    open_ = np.flatnonzero(excess >= 1.0)
+    worst = int(open_[np.argmax(scale.base[open_])])
     known = without(
         equations, best, lambda s: s.place.joint in open_ and s.effect.site in {JOINT, MOTOR}
     )
