@@ -87,8 +87,8 @@ class Scale:
     def excess(self, model: Model, predictable: np.ndarray | None = None) -> np.ndarray:
         """Return what a model leaves at each joint, relative to what an adequate one may, (k,).
 
-        A joint with effects of its own is measured relative to the force that they had to explain;
-        others relative to all that is explained there, or to the least share of physics if larger.
+        Relative to the force that there was to explain at the joint; without effects of its own,
+        whatever is explained at others, up to the least share of physics if larger.
 
         Args:
             model: fitted.
@@ -98,9 +98,8 @@ class Scale:
         predictable = np.ones((2, len(self.power))) if predictable is None else predictable
         owned = [s.place.joint for s in model.effects if s.effect.site in {JOINT, MOTOR}]
         is_own = np.isin(np.arange(len(self.power)), owned)
-        explained = np.where(is_own, self.found(model), self.explained(model))
-        slight = np.where(is_own, SLIGHT_REST, LEAST_SHARE)
-        limits = np.maximum(np.multiply.outer([ADEQUATE_REST, COLOURED_REST], explained), slight)
+        slight, found = np.where(is_own, SLIGHT_REST, LEAST_SHARE), self.found(model)
+        limits = np.maximum(np.multiply.outer([ADEQUATE_REST, COLOURED_REST], found), slight)
         return np.asarray((predictable * model.left / limits).max(axis=0))
 
     def counts(self, model: Model) -> bool:
