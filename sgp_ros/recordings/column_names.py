@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass
 
 TIME, POSITION, VELOCITY, EFFORT, CURRENT = 'time', 'position', 'velocity', 'effort', 'current'
-COMMAND, KP, KD, OTHER = 'command', 'kp', 'kd', 'other'
+DUTY, COMMAND, KP, KD, OTHER = 'duty', 'command', 'kp', 'kd', 'other'
 
 _QUANTITIES = {
     TIME: 't ts time times timestamp timestamps stamp stamps sec secs seconds clock zeit',
@@ -22,6 +22,7 @@ _QUANTITIES = {
     EFFORT: 'tau taus torque torques effort efforts eff effs force forces qfrc load moment trq '
     'drehmoment kraft',
     CURRENT: 'i current currents amps curr strom',
+    DUTY: 'pwm duty',
     KP: 'kp stiffness pgain',
     KD: 'kd dgain',
     OTHER: 'ddq qdd qddot acc accel acceleration accelerations qacc temperature temp voltage '
@@ -119,7 +120,7 @@ def _stronger(before: str, found: str) -> str:
     """Return which of two quantities a name means: `state` of a position is its position."""
     if not before or OTHER in {before, found}:
         return OTHER if before and OTHER in {before, found} else found
-    order = (KP, KD, VELOCITY, EFFORT, CURRENT, POSITION, TIME)
+    order = (KP, KD, VELOCITY, EFFORT, CURRENT, DUTY, POSITION, TIME)
     return min((before, found), key=order.index)
 
 

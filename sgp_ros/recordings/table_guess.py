@@ -17,6 +17,7 @@ from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.column_names import (
     COMMAND,
     CURRENT,
+    DUTY,
     EFFORT,
     POSITION,
     VELOCITY,
@@ -97,7 +98,7 @@ def guess_map(
     _add_efforts(found, entries, joints, hinted, guess)
     guess.content['joints'] = found
     add_gains(columns, entries, joints, rows, guess)
-    _add_commands(entries, joints, positions, units, guess)
+    _add_commands(entries, joints, positions, units, seconds, guess)
     if not (
         {'commands', 'targets'} & set(guess.content) or any('effort' in x for x in found.values())
     ):
@@ -171,14 +172,14 @@ def _add_efforts(
     found: dict[str, dict[str, Any]], entries: Sequence[Entry], joints: Mapping[str, str],
     hinted: Mapping[str, JointHint], guess: Guess,
 ) -> None:  # fmt: skip
-    efforts = chosen(entries, EFFORT, guess)
-    currents = {} if efforts else chosen(entries, CURRENT, guess)
+    known = ((role, chosen(entries, role, guess)) for role in (EFFORT, CURRENT, DUTY))
+    role, efforts = next((x for x in known if x[1]), (EFFORT, {}))
     open_unit = ''
-    for label, e in (efforts or currents).items():
+    for label, e in efforts.items():
         if label not in joints:
             guess.unsure.append(f'The effort {e.column} belongs to no position column: ignored.')
             continue
-        unit, more = 'A' if currents else e.said.unit, {}
+        unit, more = {CURRENT: 'A', DUTY: '%'}.get(role, e.said.unit), {}
         if unit in {'A', '%'}:
             open_unit, more = unit, {'scale': 1e-3 if e.said.unit == 'mA' else 1.0}
         elif unit not in _EFFORTS:
@@ -206,23 +207,39 @@ def _asked(
     return {kind: {x: e for x, e in found.items() if x in joints} for kind, found in asked.items()}
 
 
+def _meant(
+    commands: Mapping[str, Entry],
+    positions: Mapping[str, Entry],
+    seconds: np.ndarray,
+    guess: Guess,
+) -> tuple[str, str]:
+    """Return what commands ask for whose names do not say it, empty if that is open, in words."""
+    pairs = [(e.numbers, positions[x].numbers) for x, e in commands.items()]
+    if float(np.median([follows(u, q) for u, q in pairs])) > 0.5:
+        return POSITION, 'stays close to the positions: taken as position targets'
+    with np.errstate(divide='ignore', invalid='ignore'):
+        near = [follows(u, np.gradient(q, seconds)) for u, q in pairs]
+    if float(np.median(near)) > 0.5:
+        return VELOCITY, 'stays close to the velocities: taken as velocity targets'
+    if any('effort' in x for x in guess.content['joints'].values()):
+        return '', 'commands something that the positions do not follow: ignored'
+    return EFFORT, (
+        'is followed by neither positions nor velocities, and no effort is measured: taken as '
+        'commanded efforts in N m, or N'
+    )
+
+
 def _add_commands(
     entries: Sequence[Entry], joints: Mapping[str, str], positions: Mapping[str, Entry],
-    units: Mapping[str, str], guess: Guess,
+    units: Mapping[str, str], seconds: np.ndarray, guess: Guess,
 ) -> None:  # fmt: skip
     """Enter targets of position or velocity, or commanded efforts, whichever the log has."""
     named = _asked(entries, joints, guess)
     open_ones = named.pop(COMMAND)
     if open_ones and not any(named.values()):
-        alike = [follows(e.numbers, positions[x].numbers) for x, e in open_ones.items()]
-        column = next(iter(open_ones.values())).column
-        said = (
-            f'It is unclear what {column} commands, and the positions do not follow it: ignored.'
-        )
-        if float(np.median(alike)) > 0.5:
-            named[POSITION] = open_ones
-            said = f'{column} stays close to the positions: taken as position targets.'
-        guess.unsure.append(said)
+        kind, said = _meant(open_ones, positions, seconds, guess)
+        named |= {kind: open_ones} if kind else {}
+        guess.unsure.append(f'{next(iter(open_ones.values())).column} {said}.')
     copies = [x for x, e in named[POSITION].items()
               if np.array_equal(e.numbers, positions[x].numbers, equal_nan=True)]  # fmt: skip
     if named[POSITION] and len(copies) == len(named[POSITION]):

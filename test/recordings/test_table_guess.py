@@ -71,6 +71,8 @@ def _read(path, folder, hints=HINTS, rate=None):
         ('base_pan_load_pct', 'effort', False, 'base_pan', '%'),
         ('Load [%]', 'effort', False, '', '%'),
         ('load', 'effort', False, '', '%'),
+        ('lift_pwm', 'duty', False, 'lift', ''),
+        ('Present_PWM', 'duty', False, 'Present', ''),
         ('wheel_rpm', '', False, 'wheel', 'rpm'),
         ('load_torque', 'effort', False, '', ''),
         ('goal_position', 'position', True, '', ''),
@@ -344,7 +346,26 @@ def test_an_action_is_what_the_positions_say(tmp_path):
     assert any('taken as position targets' in said for said in summary.unsure)
     summary, _, commands = _read(_npz(tmp_path, t=T, q=Q, tau=TAU, action=9.0 * TAU), tmp_path)
     assert commands == []
-    assert any('It is unclear what action commands' in said for said in summary.unsure)
+    assert any('action commands something' in said for said in summary.unsure)
+
+
+def test_an_action_that_is_all_there_is_of_efforts_is_one(tmp_path):
+    """Unless velocities follow it."""
+    summary, _, commands = _read(_npz(tmp_path, t=T, q=Q, action=9.0 * TAU), tmp_path)
+    np.testing.assert_allclose([c.effort for c in commands], 9.0 * TAU)
+    assert {c.kind for c in commands} == {EFFORT}
+    assert any('taken as commanded efforts' in said for said in summary.unsure)
+    summary, _, commands = _read(_npz(tmp_path, t=T, q=Q, action=DQ), tmp_path)
+    assert {c.kind for c in commands} == {VELOCITY}
+
+
+def test_a_duty_cycle_stands_for_an_effort_where_there_is_none(tmp_path):
+    """Its scale has to be entered; measured torques or currents are preferred."""
+    summary, states, _ = _read(_npz(tmp_path, t=T, q=Q, pwm=TAU), tmp_path)
+    np.testing.assert_allclose([s.effort for s in states], TAU)
+    assert any('torque of 1 %' in said for said in summary.unsure)
+    _, states, _ = _read(_npz(tmp_path, t=T, q=Q, pwm=TAU, tau=2.0 * TAU), tmp_path)
+    np.testing.assert_allclose([s.effort for s in states], 2.0 * TAU)
 
 
 def test_a_target_that_is_the_position_is_no_target(tmp_path):
