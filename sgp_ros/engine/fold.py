@@ -125,9 +125,8 @@ class Fold:
                 self.filter.take(None, self.intake.commands)
                 continue
             if isinstance(event, JointSample):
-                is_duplicate = event.stamp_ns == self.intake.last_state_ns
                 state = self.intake.take_state(event)
-                if is_duplicate:
+                if self.intake.repeats:
                     continue
                 changes, found = self._estimates(*self.filter.take(state, self.intake.commands))
                 released += [event, *changes]

@@ -15,6 +15,7 @@ from sgp_ros.engine.clock import END_NS
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.held_commands import CommandHistory
 from sgp_ros.engine.limits import Limits
+from sgp_ros.engine.missing_messages import RepeatedNumbers
 from sgp_ros.engine.results import Counts
 from sgp_ros.engine.samples import (
     EFFORT,
@@ -69,7 +70,9 @@ class Intake:
     Attributes:
         commands: those taken.
         targets: taken of a robot with stated gains, (2 k,) each.
-        last_state_ns: stamp of the last state that was not a duplicate [ns]; None before.
+        last_state_ns: stamp of the last state that was no repetition [ns]; None before.
+        repeats: why the last state was one, `duplicate` or `stale`; empty if it was none.
+        repeated: what decides on that.
         is_measured: whether a state with a measured effort has been accepted.
         limits: what the joints cannot do.
     """
@@ -91,6 +94,7 @@ class Intake:
         self._drives = stated_gains(robot.source, self._joints, driven)
         self.last_state_ns: int | None = None
         self.is_measured = False
+        self.repeats, self.repeated = '', RepeatedNumbers()
         self.limits = Limits(robot)
         self.configure(config)
 
@@ -158,8 +162,9 @@ class Intake:
     def take_state(self, sample: JointSample) -> State | None:
         """Return a state in the robot's order; None where it is refused, for one reason."""
         last = self.last_state_ns
-        if sample.stamp_ns == last:
-            self._counts.refused['duplicate'] += 1
+        self.repeats = self.repeated.reason(sample, last, self._config.max_gap)
+        if self.repeats:
+            self._counts.refused[self.repeats] += 1
             return None
         self.last_state_ns = sample.stamp_ns
         if last is not None and sample.stamp_ns - last > self._config.max_gap * 1e9:
@@ -286,10 +291,7 @@ def _chosen(values: np.ndarray | None, order: np.ndarray | None) -> np.ndarray |
 
 
 def _are_numbers(values: np.ndarray) -> bool:
-    """Return whether all numbers (m,) are smaller than `GREATEST`.
-
-    In the usual case, their norm decides for all at once.
-    """
+    """Return whether all numbers (m,) are below `GREATEST`; mostly, their norm decides at once."""
     return math.hypot(*values.tolist()) < GREATEST or bool((np.abs(values) < GREATEST).all())
 
 

@@ -15,8 +15,8 @@ from sgp_ros.gp.scores import RunningScore
 from sgp_ros.robots.robot import Robot
 
 REFUSALS = (
-    'late', 'duplicate', 'nonfinite', 'unpaired', 'unknown_joint', 'gap', 'wrong_length', 'clock',
-    'implausible', 'reset', 'error',
+    'late', 'duplicate', 'stale', 'nonfinite', 'unpaired', 'unknown_joint', 'gap', 'wrong_length',
+    'clock', 'implausible', 'reset', 'error',
 )  # fmt: skip
 """Reasons for which a state is refused; each refused state has exactly one."""
 

@@ -86,6 +86,7 @@ def _plain(engine: Engine) -> dict[str, Any]:
         else [None if s is None else encode_state(s) for s in engine.filter.trial.states],
         'last_state_ns': intake.last_state_ns,
         'is_measured': intake.is_measured,
+        'repeated': intake.repeated.state(),
         'impossible': intake.limits.impossible,
         'scoring': estimator.scoring.state(),
         'gate': estimator.gate.state(),
@@ -189,6 +190,7 @@ def _fill(engine: Engine, snapshot: Mapping[str, np.ndarray]) -> None:
             engine.filter.trial.add(None if entry is None else decode_state(entry))
     intake.last_state_ns = text['last_state_ns']
     intake.is_measured = text['is_measured']
+    intake.repeated.restore(text['repeated'])
     intake.limits.impossible = text['impossible']
     released = text['released']
     engine.order.resume(

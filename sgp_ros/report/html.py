@@ -22,6 +22,7 @@ from sgp_ros.report.run_charts import run_charts
 MEANINGS = {
     'late': 'older than a state that was already used',
     'duplicate': 'a stamp that was already used',
+    'stale': 'the numbers of the state before it, sent again while joints move',
     'nonfinite': 'NaN or infinite where a number is needed',
     'unpaired': 'no command at or before it, or one that is too old, and no measured effort',
     'unknown_joint': 'a joint of the robot is not in the message',

@@ -209,6 +209,7 @@ def _state_remedy(reason: str, arrivals: Arrivals) -> str:
         'reset': 'they still waited to be sorted when everything was reset; nothing to do',
         'error': 'an internal error; please report the first one in the log',
         'duplicate': 'stamps repeat; look for several publishers, or a source without stamps',
+        'stale': 'the driver sends old numbers again under new stamps; check its rate and bus',
         'nonfinite': 'positions or velocities are not finite; check the sensors',
         'gap': 'pauses are longer than max_gap; raise max_gap or the publishing rate',
     }.get(reason, 'see docs/bringup.md')

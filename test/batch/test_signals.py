@@ -123,8 +123,8 @@ def test_each_refused_state_is_counted_for_one_reason():
     ]
     signals = collect_signals([*good, *bad], LINEAR_AXIS, EngineConfig(max_gap=0.1))
     assert signals.refused == {
-        'late': 0, 'duplicate': 1, 'nonfinite': 2, 'unpaired': 1, 'unknown_joint': 1, 'gap': 0,
-        'clock': 0, 'error': 0, 'implausible': 0, 'reset': 0, 'wrong_length': 0,
+        'late': 0, 'duplicate': 1, 'stale': 0, 'nonfinite': 2, 'unpaired': 1, 'unknown_joint': 1,
+        'gap': 0, 'clock': 0, 'error': 0, 'implausible': 0, 'reset': 0, 'wrong_length': 0,
     }  # fmt: skip
     assert len(signals.time) == 50
 

@@ -16,6 +16,7 @@ from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.engine import Engine
 from sgp_ros.engine.results import REFUSALS
 from sgp_ros.engine.samples import CommandSample, JointSample, frozen_array
+from sgp_ros.engine.snapshots import restored, take_snapshot
 from sgp_ros.errors import RecordingError
 from sgp_ros.physics.term import Joint
 from test.engine.worlds import PENDULUM, START_NS
@@ -172,3 +173,40 @@ def test_commands_are_kept_no_longer_than_a_state_needs_them():
         engine.push(CommandSample(state.stamp_ns, frozen_array([float(i), 0.0])))
         engine.push(state)
     assert len(engine.intake.commands.stamps_ns) <= 2
+
+
+def _moving(held, *, is_quantised=False):
+    """Two seconds of motion and one of rest, in which each number is sent so many times."""
+    i = np.arange(300)
+    s = np.minimum(i // held * held, 200) / 100.0
+    q = np.stack([np.sin(s), np.sin(2.0 * s), np.sin(3.0 * s)], axis=1)
+    v = np.full_like(q, 0.3) if is_quantised else np.cos(q) * (s < 2.0)[:, None]
+    rows = [[frozen_array(x[n]) for x in (q, v, q + 1.0)] for n in i]
+    return [JointSample(START_NS + 10 * MS * n, ORDERS[0], *row) for n, row in enumerate(rows)]
+
+
+def _stale(events):
+    """Return how many states each of the ways refuses as stale, which must be equal."""
+    config = EngineConfig(hyper=Engine(ARM, _config()).config.hyper)
+    engine = Engine(ARM, config)
+    for i, event in enumerate(events):
+        engine.push(event)
+        if i == len(events) // 3:
+            engine = restored(ARM, take_snapshot(engine))
+    engine.flush()
+    found = engine.counts.refused['stale']
+    assert collect_signals(events, ARM).refused['stale'] == found
+    assert engine.counts.refused['gap'] == 0
+    return found
+
+
+def test_numbers_that_are_sent_again_while_joints_move_are_refused():
+    """A bus that was late; not what a joint at rest sends, or a coarse encoder."""
+    events = _moving(1)
+    stop = _stale(events)
+    assert stop == 12  # as the joints rest at once
+    late = [replace(e, stamp_ns=e.stamp_ns + 10 * MS) for e in events[20:200:20]]
+    kept = [e for i, e in enumerate(events) if i % 20 != 1 or not 20 < i < 200]
+    assert _stale(sorted([*kept, *late], key=lambda e: e.stamp_ns)) == 9 + stop
+    assert _stale(_moving(2)) == 99 + stop  # nothing is known of the first number
+    assert _stale(_moving(2, is_quantised=True)) == 0
