@@ -24,8 +24,9 @@ import numpy as np
 from sgp_proof.concealed.unlisted import SAME, law_error
 from sgp_proof.result_files import RESULTS, write_result
 from sgp_ros.apps.recorded import read_events
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import make_equations
-from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.physics.formula import read_formula
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import nominal_tree

@@ -18,8 +18,9 @@ import numpy as np
 
 from sgp_proof.concealed.unlisted import FAMILIES
 from sgp_proof.result_files import ROOT, make_parser, seed_range, write_result
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import make_equations
-from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.decide import cancelling
 from sgp_ros.diagnosis.decide.certainty import settled
 from sgp_ros.diagnosis.decide.decision import decide

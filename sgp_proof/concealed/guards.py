@@ -19,9 +19,10 @@ import numpy as np
 
 from sgp_proof.concealed.draw import draw_case
 from sgp_proof.result_files import make_parser, write_result
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.sufficiency import motion_to_noise
-from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.decide.certainty import certainty_of, probabilities
 from sgp_ros.diagnosis.decide.decision import decide
 from sgp_ros.diagnosis.decide.equivalence import Contrasts

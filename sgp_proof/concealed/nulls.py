@@ -28,8 +28,9 @@ from sgp_proof.concealed.robots import urdf
 from sgp_proof.concealed.unknown import NAME as OUTSIDE
 from sgp_proof.result_files import RESULTS, seed_range, write_result
 from sgp_ros.apps.simulation import write_simulated
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import joint_name, make_equations
-from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.decide.cross_validation import structure
 from sgp_ros.diagnosis.decide.decision import decide
 from sgp_ros.diagnosis.decide.scale import Scale

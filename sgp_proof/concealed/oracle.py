@@ -24,8 +24,9 @@ import numpy as np
 from sgp_proof.concealed.balance import RATE_HZ, WIDTH_S, low_passed
 from sgp_proof.concealed.scoring import HELD_OUT, parameter_scores
 from sgp_proof.concealed.unknown import NAME, UNKNOWN
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import joint_name, make_equations
-from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.regression import Columns

@@ -17,9 +17,10 @@ import numpy as np
 from sgp_proof.real.diagnosis import MACHINES, execute, inside
 from sgp_proof.result_files import make_parser, write_result
 from sgp_ros.apps.recorded import read_events
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.open_bodies import open_bodies, with_open_bodies
-from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.report.metrics import versions
 from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.robots.nominal import nominal_model

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from sgp_ros.apps.recorded import checked, gains_of, read_events
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import make_equations
-from sgp_ros.diagnosis.compare.trajectory import RawTrajectory, choose_bandwidth
+from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import first_scale
 from sgp_ros.diagnosis.explain.regression import Columns

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import Equations, make_equations
 from sgp_ros.diagnosis.compare.sufficiency import require_rows
-from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth
 from sgp_ros.diagnosis.compare.volume import noisy_volume
 from sgp_ros.diagnosis.criteria import NEARLY
 from sgp_ros.diagnosis.decide.differences import Several, decide_several

@@ -13,8 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import joint_name
-from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth
 from sgp_ros.diagnosis.connected import Connected, compared
 from sgp_ros.diagnosis.criteria import ALIKE, MOST_CERTAIN, NEARLY, PER_EFFECT, TEMPER
 from sgp_ros.diagnosis.decide.differences import in_halves

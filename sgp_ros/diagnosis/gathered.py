@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.creeping import creeping_friction, creeping_remark, with_creeping
 from sgp_ros.diagnosis.compare.open_bodies import open_remark, with_open_bodies
 from sgp_ros.diagnosis.compare.settled import LEAST_POSES, collect_settled
@@ -18,13 +19,7 @@ from sgp_ros.diagnosis.compare.sufficiency import (
     without_motors,
 )
 from sgp_ros.diagnosis.compare.thinning import thinned
-from sgp_ros.diagnosis.compare.trajectory import (
-    Bandwidth,
-    RawTrajectory,
-    choose_bandwidth,
-    collect,
-    observe,
-)
+from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, collect, observe
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE
 from sgp_ros.diagnosis.prove.held_out import HELD_OUT, keep_back
 from sgp_ros.diagnosis.setup.correction import Correction

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import make_equations
-from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.compare.trajectory import collect
 from test.diagnosis.worlds import CHAINS, events_of, heavier, robot_of, simulate
 
 

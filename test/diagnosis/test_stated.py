@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import make_equations
-from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.compare.velocity_sensor import lagged, sensor_lags
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.physics.catalogue import EFFECTS as LAWS

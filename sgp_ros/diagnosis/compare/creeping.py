@@ -12,8 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import Equations, make_equations
-from sgp_ros.diagnosis.compare.trajectory import RawTrajectory, choose_bandwidth
+from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.diagnosis.criteria import ALIKE, INDEPENDENT_ROWS
 from sgp_ros.physics.catalogue import COULOMB_FRICTION, HYSTERESIS
 from sgp_ros.physics.effect_at import EffectAt

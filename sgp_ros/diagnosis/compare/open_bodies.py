@@ -19,12 +19,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.trajectory import (
-    RawTrajectory,
-    choose_bandwidth,
-    observe,
-    parallel_filter,
-)
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
+from sgp_ros.diagnosis.compare.trajectory import RawTrajectory, observe, parallel_filter
 from sgp_ros.errors import ConfigError
 from sgp_ros.rigid.base_parameters import RegressorFactor
 from sgp_ros.rigid.consistent import project_information

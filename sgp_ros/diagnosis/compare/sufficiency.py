@@ -13,14 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.grid import noise_density
-from sgp_ros.diagnosis.compare.trajectory import (
-    Bandwidth,
-    RawTrajectory,
-    choose_bandwidth,
-    observe,
-    parallel_filter,
-)
+from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, observe, parallel_filter
 from sgp_ros.diagnosis.criteria import (
     LEAST_MOTION,
     LEAST_ROWS,

@@ -1,14 +1,10 @@
 """A recording on one uniform grid, as the diagnosis sees it.
 
 Positions are joined by a cubic spline, commands are averaged as exactly as `Drive` does it.
-The bandwidth follows from the noise of the encoders: noise of density S in the position becomes a
-force of variance `M^2 (2 pi)^4 S f^5 / 5` below f. The cut-off is the frequency at which that
-reaches `NOISE_SHARE` of the commanded effort, or the highest that motion and rate justify.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -33,8 +29,6 @@ from sgp_ros.robots.observed_motion import ObservedMotion
 from sgp_ros.robots.robot import Robot
 
 SHORTEST_ROWS = 64
-NOISE_SHARE = 3e-6
-"""Share of the mean square of the effort that noise may take below the cut-off."""
 _COMMON_SHARE = 0.5
 _NO_EFFORTS = (
     'The commands are not efforts: the measured effort does not follow them. It is used instead, '
@@ -42,7 +36,7 @@ _NO_EFFORTS = (
 )
 VANISHING = 1e-9
 """Speed at which settled points are approached [rad/s or m/s]: only its direction counts."""
-LOWEST_CUTOFF_HZ, HIGHEST_CUTOFF_HZ = 3.0, 25.0
+HIGHEST_CUTOFF_HZ = 25.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,32 +181,6 @@ class Bandwidth:
 
     cutoff: float
     state_cutoff: float
-
-
-def choose_bandwidth(raw: RawTrajectory, tree: Tree) -> Bandwidth:
-    """Return the filters that noise, rate and motion of a recording require.
-
-    Rows of settled points are independent: nothing is filtered.
-    """
-    rate = 1.0 / raw.step
-    if raw.approach is not None:
-        return Bandwidth(0.45 * rate, 0.45 * rate)
-    highest = min(HIGHEST_CUTOFF_HZ, 0.15 * rate)
-    k = tree.size
-    motion = observe(raw, tree, Bandwidth(highest, min(2.0 * highest, 0.4 * rate)))
-    inertia = motion.mass_diagonal.mean(axis=0)
-    effort = np.maximum(motion.effort.var(axis=0), 0.0)
-    driven = np.where(tree.is_actuated[:k], effort, _driven(motion))
-    noise = inertia**2 * (2.0 * math.pi) ** 4 * raw.noise_density / 5.0
-    limits = (NOISE_SHARE * np.maximum(driven, 1e-30) / np.maximum(noise, 1e-30)) ** 0.2
-    limits = limits[motion.moves] if motion.moves.any() else limits
-    cutoff = float(np.clip(limits.min(), LOWEST_CUTOFF_HZ, highest))
-    return Bandwidth(cutoff, min(2.5 * cutoff, 0.4 * rate))
-
-
-def _driven(motion: ObservedMotion) -> np.ndarray:
-    force = motion.mass_diagonal * motion.acceleration
-    return np.asarray(force.var(axis=0))
 
 
 def observe(raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth) -> ObservedMotion:

@@ -17,15 +17,10 @@ import numpy as np
 from scipy import spatial, stats
 
 from sgp_ros.batch.zero_phase import ZeroPhase
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.rest import resting
-from sgp_ros.diagnosis.compare.trajectory import (
-    Bandwidth,
-    RawTrajectory,
-    choose_bandwidth,
-    observe,
-    parallel_filter,
-)
+from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, observe, parallel_filter
 from sgp_ros.diagnosis.criteria import CARRIED_ERROR, CARRIED_REST, LEAST_SHARE
 from sgp_ros.diagnosis.prove.prediction import FinalModel, accelerations
 from sgp_ros.diagnosis.prove.rollouts import cut, roll_out

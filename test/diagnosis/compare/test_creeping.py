@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.creeping import (
     creeping_friction,
     creeping_remark,
     with_creeping,
 )
 from sgp_ros.diagnosis.compare.equations import make_equations
-from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.physics.memory import bristle
 from sgp_ros.robots.stated_effects import read_effects

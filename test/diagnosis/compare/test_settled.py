@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from sgp_ros.batch.acceptance import USUAL
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.settled import approaches, collect_settled, every_fourth, shows
-from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, observe
+from sgp_ros.diagnosis.compare.trajectory import observe
 from sgp_ros.diagnosis.gathered import Knowledge, gather
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.engine.samples import JointSample, frozen_array

@@ -8,14 +8,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis.compare.bandwidth import LOWEST_CUTOFF_HZ, choose_bandwidth
 from sgp_ros.diagnosis.compare.effort_noise import effort_noise, measured_noise, noise_beside_laws
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.trajectory import (
     HIGHEST_CUTOFF_HZ,
-    LOWEST_CUTOFF_HZ,
     SHORTEST_ROWS,
     Bandwidth,
-    choose_bandwidth,
     collect,
     observe,
 )

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import make_equations
-from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.criteria import (
     COUNTED_SHARE,
     EVIDENCE,

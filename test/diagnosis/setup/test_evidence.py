@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
+from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.evidence import Probe
 from sgp_ros.diagnosis.setup.search import search

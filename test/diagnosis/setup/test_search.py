@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.compare.trajectory import choose_bandwidth, collect
+from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
+from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.criteria import DOUBTED
 from sgp_ros.diagnosis.result import Finding, Location, Parameter
 from sgp_ros.diagnosis.setup.correction import Correction
