@@ -129,9 +129,13 @@ def settled_of(several: Several) -> tuple[Several, Contrasts, Probabilities]:
 
 
 def _probable(equations: Equations, model: Model, chances: Probabilities) -> Model:
-    """Return a model without the effects that are not probable enough to be asserted."""
-    weak = [s for i, s in enumerate(model.effects) if chances.of(model, i) < LEAST_ASSERTED]
-    return without(equations, model, lambda s: s in weak)
+    """Return a model of the effects that are probable enough, and possible without the others."""
+    while True:
+        weak = [s for i, s in enumerate(model.effects) if chances.of(model, i) < LEAST_ASSERTED
+                or not s.is_possible(equations.motion)]  # fmt: skip
+        if not weak:
+            return model
+        model = without(equations, model, lambda s, weak=weak: s in weak)  # type: ignore[misc]
 
 
 def _is_probable(model: Model, chances: Probabilities) -> bool:

@@ -58,7 +58,7 @@ def is_credible(model: Model) -> bool:
     return is_finite and all(
         s.effect.is_inside(s, motion)
         and _is_confined(s, motion)
-        and _is_needed(s, equations)
+        and is_needed(s, equations)
         and shows_waves(s, equations)
         for s in model.effects
     )
@@ -89,7 +89,7 @@ def _delivers(model: Model) -> bool:
     return bool(((acting**2).mean(axis=0) > COUNTED_SHARE * equations.power)[laws].all())
 
 
-def _is_needed(s: EffectAt, equations: Equations) -> bool:
+def is_needed(s: EffectAt, equations: Equations) -> bool:
     """Return whether plain laws would leave more of a law than any adequate model may.
 
     A law with its shape at the lower bound is not needed: there it is a plain law.

@@ -14,10 +14,11 @@ import numpy as np
 
 from sgp_ros.diagnosis.criteria import ADEQUATE_REST, COUNTED_SHARE, PER_EFFECT, SLIGHT_REST
 from sgp_ros.diagnosis.explain.candidates import fit
-from sgp_ros.diagnosis.explain.credibility import gain, is_credible
+from sgp_ros.diagnosis.explain.credibility import gain, is_credible, is_needed
 from sgp_ros.diagnosis.explain.fitted_model import Model, adds_to_usual
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import distinct, screen
+from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import JOINT, MOTOR
@@ -79,10 +80,26 @@ Arranged = tuple[tuple[EffectAt, ...], int]
 
 
 def refitted(columns: Columns, model: Model, arranged: Arranged, *more: EffectAt) -> Model:
-    """Return a model with other effects, in which those of other blocks keep their shapes."""
+    """Return a model with other effects, in which those of other blocks keep their shapes.
+
+    Laws of the block that were richer because of one that went, such as friction that differed
+    with direction in place of a torque constant, become plain.
+    """
+
+    def fitted(effects: tuple[EffectAt, ...]) -> Model:
+        return fit(columns, effects, model.sigma, is_free=model.is_free, w=model.w, rounds=2,
+                   steps=4, still=still)  # fmt: skip
+
     effects, still = arranged
-    return fit(columns, (*effects, *more), model.sigma, is_free=model.is_free, w=model.w,
-               rounds=2, steps=4, still=still)  # fmt: skip
+    trial = fitted((*effects, *more))
+    equations = trial.frame.equations
+    vain = [s for s in trial.effects[still : len(effects)]
+            if not s.place.kind and not is_needed(s, equations)]  # fmt: skip
+    if not vain:
+        return trial
+    rest = tuple(s for s in trial.effects if s not in vain)
+    plain = (EffectAt(EFFECTS[s.effect.plain[0]], s.place) for s in vain)
+    return fitted((*rest, *(s for s in plain if all(s.key != o.key for o in rest))))
 
 
 def best_of(model: Model, trials: Iterable[Model], *, is_whole: bool = True) -> Model | None:

@@ -59,6 +59,53 @@ def test_what_is_improbable_is_not_asserted_beside_others(equations_for, viscous
     assert 'a simpler model is nearly as good' in why_not(pair, kept, scale)
 
 
+def test_beside_an_unknown_a_law_goes_that_is_impossible_without_an_improbable_one(
+    equations_for, viscous
+):
+    """Friction that only a negative drag made positive is driven without it."""
+    _, equations = equations_for(viscous)
+    numbers = replace(equations, d=equations.d + 0.1 * equations.filter(
+        equations.motion.direction))  # fmt: skip
+    pair = fitted(numbers, 'viscous_friction', 'coulomb_friction')
+    assert pair.effects[1].coefficients[0] < 0.0
+    chances = Probabilities({s.key: 0.9 for s in pair.effects}, np.zeros(1), pair, None)
+    kept = certainty._probable(numbers, pair, chances)
+    assert [s.name for s in kept.effects] == ['viscous_friction']
+    sound = fitted(equations, 'viscous_friction')
+    assert certainty._probable(equations, sound, chances) is sound
+
+
+def test_a_law_stays_without_which_its_joint_is_not_described(equations_for, monkeypatch):
+    """However improbable its name is: the drag would have to do what the dry friction does."""
+    world = simulate(
+        CHAINS[1], 4, 10.0, dry=lambda t, q, s: 0.5, force=lambda t, q, v: (-0.3 * v[0],)
+    )
+    _, equations = equations_for(world)
+    pair = fitted(equations, 'viscous_friction', 'coulomb_friction')
+    comparison = _comparison(equations, fitted(equations, 'spring'))
+    scale = Scale.of(equations, comparison)
+    decision = replace(decide(equations, comparison), verdict='missing_physics', model=pair)
+    p = dict(zip((s.key for s in pair.effects), (0.9, 0.3), strict=True))
+    chances = Probabilities(p, np.zeros(1), pair, scale)
+    monkeypatch.setattr(certainty, 'probabilities', lambda *_: chances)
+    kept, _, _ = settled(equations, comparison, decision)
+    assert kept.model is pair
+
+
+@pytest.mark.parametrize('is_free', [True, False])
+def test_a_gain_beside_free_bodies_is_as_sure_as_the_worst_joint(equations_for, viscous, is_free):
+    """Bodies are its measure, and take up what is not known elsewhere."""
+    _, equations = equations_for(viscous)
+    model = fitted(equations, 'torque_gain', is_free=is_free)
+    comparison = _comparison(equations, model)
+    bodies = replace(comparison.base, residual=10.0 * comparison.base.residual)
+    comparison = replace(comparison, nominal=bodies, parameters=bodies)
+    decided = replace(decide(equations, comparison), model=model, excess=np.array([0.0, 3.0]))
+    contrasts = certainty.Contrasts(equations, model)
+    chances = certainty.probabilities(equations, comparison, decided, contrasts)
+    assert (chances.of(model, 0) <= 0.1) is is_free
+
+
 @pytest.mark.parametrize(('gain', 'is_doubted'), [(0.5, False), (0.23, True)])
 def test_numbers_that_no_machine_has_are_doubted(equations_for, viscous, gain, is_doubted):
     """A torque constant that is half of what is stated happens; less than a quarter does not."""

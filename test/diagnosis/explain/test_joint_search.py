@@ -112,6 +112,25 @@ def test_a_rare_law_that_is_too_small_goes_and_takes_nothing_with_it(equations):
     assert large(columns, found) is found
 
 
+def test_a_law_that_another_makes_superfluous_becomes_plain(equations_for):
+    """A torque constant takes the place of a load, and friction need not differ with direction.
+
+    Of a law that is new no plain one is made: it is tried by itself.
+    """
+    world = simulate(
+        CHAINS[1], 4, 10.0, dry=lambda t, q, s: 0.5, force=lambda t, q, v: (-0.3 * v[0],)
+    )
+    columns = Columns(equations_for(world)[1])
+    richer, viscous = (EffectAt(EFFECTS[n], Place(0)) for n in (
+        'asymmetric_coulomb', 'viscous_friction'))  # fmt: skip
+    model = fit(columns, (richer,), np.ones(1))
+    trial = growth.refitted(columns, model, ((richer,), 0), viscous)
+    assert [s.name for s in trial.effects] == ['viscous_friction', 'coulomb_friction']
+    assert is_credible(trial)
+    new = growth.refitted(columns, model, ((viscous,), 0), richer)
+    assert [s.name for s in new.effects] == ['viscous_friction', 'asymmetric_coulomb']
+
+
 def test_a_gain_is_what_the_other_way_loses(equations):
     columns, base = _start(equations)
     (_, best), *_ = screen(columns, base, EFFECTS.values())
