@@ -18,7 +18,7 @@ from sgp_ros.diagnosis.criteria import (
     SHARE_TOLERANCE,
     SLIGHT_REST,
 )
-from sgp_ros.diagnosis.decide.decision import decide
+from sgp_ros.diagnosis.decide.decision import _opened, decide
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import added_inertia, fit
 from sgp_ros.diagnosis.explain.comparison import Comparison, compare_models
@@ -253,6 +253,25 @@ def test_what_is_known_of_a_joint_stands_beside_a_larger_unknown(half_known):
     assert decision.unknown == (0,)
     assert {(s.name, s.place.joint) for s in decision.model.effects} == {('viscous_friction', 1)}
     assert decision.model.effects[0].coefficients[0] == pytest.approx(0.2, rel=0.01)
+
+
+def test_a_joint_is_judged_by_what_there_was_to_explain_there(half_known):
+    """However much a law explains at another one."""
+    law, start = EffectAt(EFFECTS['viscous_friction'], Place(1)), np.ones(2)
+    model = fit(Columns(half_known), (law,), start)
+    scale = Scale.of(half_known, _comparison(half_known, model))
+    scale = replace(scale, base=np.array([model.left[0], 1e3]))
+    assert scale.excess(model)[0] > 10.0
+    assert scale.excess(model)[1] < 1.0
+
+
+def test_the_worst_joint_is_one_that_is_not_described(half_known):
+    """Not one of which more was explained."""
+    model = fitted(half_known, 'viscous_friction')
+    comparison = _comparison(half_known, model)
+    scale = replace(Scale.of(half_known, comparison), base=np.array([0.1, 5.0]))
+    found = _opened(half_known, scale, comparison, model, (), np.array([3.0, 0.0]))
+    assert (found.verdict, found.worst, found.unknown) == ('unexplained', 0, (0,))
 
 
 def test_noise_of_the_acceleration_makes_no_rotor_large(equations_for):
