@@ -118,6 +118,16 @@ def test_one_law_of_two_names_is_one(narrow):
         assert contrasts.stands_for(replace(dry, effects=(other,)), dry.effects[0]) == is_same
 
 
+def test_friction_that_grows_with_the_load_vouches_for_dry_friction(narrow):
+    """And for no other law."""
+    load = EffectAt(EFFECTS['load_friction'], Place(0), np.empty(0), np.array([0.4, 0.02]))
+    for name in ('coulomb_friction', 'viscous_friction'):
+        model = fitted(narrow, name)
+        rival = replace(model, effects=(load,))
+        is_vouched_for = Contrasts(narrow, model).stands_for(rival, model.effects[0])
+        assert is_vouched_for == (name == 'coulomb_friction')
+
+
 @pytest.mark.long
 def test_noise_does_not_hide_that_bodies_may_be_heavier(tmp_path):
     """Their residual of effort is larger because their inertia is: the motion fits as well."""
