@@ -42,6 +42,15 @@ def _comparison(equations, *models):
     return Comparison(*bases, models, ())
 
 
+@pytest.fixture(scope='module')
+def rubbing(equations_for):
+    """Equations of a joint with Coulomb friction of 0.5 N m and viscous of 0.3 N m s/rad."""
+    world = simulate(
+        CHAINS[1], 4, 10.0, dry=lambda t, q, s: 0.5, force=lambda t, q, v: (-0.3 * v[0],)
+    )
+    return equations_for(world)[1]
+
+
 def test_what_is_improbable_is_not_asserted_beside_others(equations_for, viscous, monkeypatch):
     """The rest is fitted again without it; the most probable one stays whatever it is."""
     _, equations = equations_for(viscous)
@@ -75,20 +84,16 @@ def test_beside_an_unknown_a_law_goes_that_is_impossible_without_an_improbable_o
     assert certainty._probable(equations, sound, chances) is sound
 
 
-def test_a_law_stays_without_which_its_joint_is_not_described(equations_for, monkeypatch):
+def test_a_law_stays_without_which_its_joint_is_not_described(rubbing, monkeypatch):
     """However improbable its name is: the drag would have to do what the dry friction does."""
-    world = simulate(
-        CHAINS[1], 4, 10.0, dry=lambda t, q, s: 0.5, force=lambda t, q, v: (-0.3 * v[0],)
-    )
-    _, equations = equations_for(world)
-    pair = fitted(equations, 'viscous_friction', 'coulomb_friction')
-    comparison = _comparison(equations, fitted(equations, 'spring'))
-    scale = Scale.of(equations, comparison)
-    decision = replace(decide(equations, comparison), verdict='missing_physics', model=pair)
+    pair = fitted(rubbing, 'viscous_friction', 'coulomb_friction')
+    comparison = _comparison(rubbing, fitted(rubbing, 'spring'))
+    scale = Scale.of(rubbing, comparison)
+    decision = replace(decide(rubbing, comparison), verdict='missing_physics', model=pair)
     p = dict(zip((s.key for s in pair.effects), (0.9, 0.3), strict=True))
     chances = Probabilities(p, np.zeros(1), pair, scale)
     monkeypatch.setattr(certainty, 'probabilities', lambda *_: chances)
-    kept, _, _ = settled(equations, comparison, decision)
+    kept, _, _ = settled(rubbing, comparison, decision)
     assert kept.model is pair
 
 
@@ -138,22 +143,16 @@ def _worth_of_gains(model):
     return 2.0 * ALIKE * any(s.effect.name == 'torque_gain' for s in model.effects)
 
 
-def test_a_plain_law_takes_the_place_of_a_richer_one_that_is_not_probable(
-    equations_for, monkeypatch
-):
+def test_a_plain_law_takes_the_place_of_a_richer_one_that_is_not_probable(rubbing, monkeypatch):
     """Friction that may differ with direction, or not, is friction."""
-    world = simulate(
-        CHAINS[1], 4, 10.0, dry=lambda t, q, s: 0.5, force=lambda t, q, v: (-0.3 * v[0],)
-    )
-    _, equations = equations_for(world)
-    pair = fitted(equations, 'viscous_friction', 'asymmetric_coulomb')
-    comparison = _comparison(equations, fitted(equations, 'spring'))
-    scale = Scale.of(equations, comparison)
-    decision = replace(decide(equations, comparison), verdict='missing_physics', model=pair)
+    pair = fitted(rubbing, 'viscous_friction', 'asymmetric_coulomb')
+    comparison = _comparison(rubbing, fitted(rubbing, 'spring'))
+    scale = Scale.of(rubbing, comparison)
+    decision = replace(decide(rubbing, comparison), verdict='missing_physics', model=pair)
     p = {'viscous_friction': 0.9, 'coulomb_friction': 0.8, 'asymmetric_coulomb': 0.3}
     chances = Probabilities({(n, Place(0)): x for n, x in p.items()}, np.zeros(1), pair, scale)
     monkeypatch.setattr(certainty, 'probabilities', lambda *_: chances)
-    kept, _, _ = settled(equations, comparison, decision)
+    kept, _, _ = settled(rubbing, comparison, decision)
     numbers = {s.name: s.coefficients[0] for s in kept.model.effects}
     assert numbers == pytest.approx({'viscous_friction': 0.3, 'coulomb_friction': 0.5}, rel=0.05)
 
