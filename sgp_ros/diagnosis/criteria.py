@@ -142,6 +142,8 @@ CLEARER = 2.0
 """Ratio of mean squared differences from which another motion separates models [1]. Convention."""
 CALM_SHARE = 0.002
 """Share left at which "no mismatch" is as likely wrong as right [1]. Half of `LEAST_SHARE`."""
+STANDING = 0.7
+"""Probability of friction that stands at a joint with something unknown [1]. Convention."""
 LEAST_ASSERTED = 0.5
 """Probability from which a finding is asserted beside others [1]. The schema."""
 MOST_CERTAIN = 0.99

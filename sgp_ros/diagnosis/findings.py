@@ -48,6 +48,9 @@ def asserted(
     common = [i for i, s in enumerate(model.effects) if not isinstance(s.effect, InRecording)]
     forces = [model.forces[i] for i in common]
     std = reported_std(model, Columns(equations), decision.unknown) if common else ()
+    for i in common:  # of friction beside something unknown, whose only number is its size
+        least = decision.standing.get(model.effects[i].key, 0.0)
+        std[i].update({name: max(x, least) for name, x in std[i].items()})
     findings = [
         doubted_if_none(_finding(decision, model, i, std[i], chances), model.effects[i])
         for i in common

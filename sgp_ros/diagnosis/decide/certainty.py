@@ -1,8 +1,7 @@
 """Probabilities of the verdict and of each finding.
 
 Scores of models differ by hundreds of nats where the signals are clean, yet the shape of a column
-is only approximate; so the odds of rivals are tempered: their difference in log rest counts, not
-the number of rows. `sgp_proof/concealed` measures how the probabilities keep what they say.
+is only approximate; so the odds of rivals are tempered: their difference in log rest counts.
 """
 
 from __future__ import annotations
@@ -24,12 +23,14 @@ from sgp_ros.diagnosis.criteria import (
     LEAST_SHARE,
     MOST_CERTAIN,
     PER_EFFECT,
+    STANDING,
     TEMPER,
 )
 from sgp_ros.diagnosis.decide.cross_validation import without
 from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision, calm
 from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
+from sgp_ros.diagnosis.decide.everyday import with_everyday
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
@@ -120,11 +121,11 @@ def _opens(scale: Scale, model: Model, fewer: Model) -> bool:
 
 def settled_of(several: Several) -> tuple[Several, Contrasts, Probabilities]:
     """Return what is asserted and how certain; of one recording without improbable findings."""
-    equations, comparison, decision = several.equations, several.comparison, several.decision
+    known, decision = (several.equations, several.comparison), several.decision
     if several.chances:
-        contrasts = Contrasts(equations, decision.model)
-        return several, contrasts, probabilities(equations, comparison, decision, contrasts)
-    decision, contrasts, chances = settled(equations, comparison, decision)
+        contrasts = Contrasts(several.equations, decision.model)
+        return several, contrasts, probabilities(*known, decision, contrasts)
+    decision, contrasts, chances = settled(*known, with_everyday(*known, decision))
     return replace(several, decision=decision, model=decision.model), contrasts, chances
 
 
@@ -189,7 +190,7 @@ def probabilities(
     asserted law does, on any motion, are one. An effect is only as certain as its joint is well
     described; one that acts on all joints, as the worst of them; a gain, whose measure are bodies
     that may differ, as the worst joint, known or not, for bodies take up what is not known there.
-    Unlikely numbers are doubted.
+    Unlikely numbers are doubted. Friction that stands beside something unknown is `STANDING`.
     """
     scale, asserted = Scale.of(equations, comparison), decision.model
     if any(s.effect.has_chosen_form for s in asserted.effects):
@@ -224,6 +225,7 @@ def probabilities(
             if model.is_free and s.effect.alike:
                 a = float(adequate.min())
             by_key[s.key] = by_key.get(s.key, 0.0) + float(p * a)
+    by_key |= dict.fromkeys(decision.standing, STANDING)
     far = {s.key for s in asserted.effects if _is_far(s)}
     return Probabilities(
         {key: min(p, DOUBTED if key in far else MOST_CERTAIN) for key, p in by_key.items()},

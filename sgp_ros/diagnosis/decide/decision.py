@@ -56,6 +56,7 @@ class Decision:
         tentative: best model where nothing is adequate.
         against: score of the best model without effects [nats].
         refusals: why models that could be asserted are not, by their keys.
+        standing: friction that stands at unknown joints: standard deviations, by its keys.
     """
 
     verdict: str
@@ -67,6 +68,7 @@ class Decision:
     tentative: Model | None = None
     against: float = 0.0
     refusals: Mapping[object, str] = field(default_factory=dict)
+    standing: Mapping[object, float] = field(default_factory=dict)
 
     def without(self, why: str) -> Decision:
         """Return the decision with the reason why its model is not asserted after all."""

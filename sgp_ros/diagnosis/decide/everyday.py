@@ -1,0 +1,161 @@
+"""Everyday friction of a joint beside something there that has no name.
+
+A joint that no model describes may still have the friction that every joint has. It stands where
+it does not lean on the rest: fitted in each half of each variable alone, beside bodies of any
+kind, it is nearly the force that it is in the whole. Where much of the rest is a friction, of
+another form or one that another variable changes, what is unknown is the friction itself.
+The intervals of its numbers hold those of all halves, for the rest that bends them is not noise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, INTERVAL, NEARLY
+from sgp_ros.diagnosis.decide.decision import Decision
+from sgp_ros.diagnosis.decide.scale import Scale
+from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.comparison import Comparison
+from sgp_ros.diagnosis.explain.credibility import is_credible
+from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.physics.catalogue import COULOMB_FRICTION, VISCOUS_FRICTION
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
+
+ROWS_PER_COLUMN = 4
+"""Least rows of a half for each column."""
+_KNOTS = 8
+_LEAST_DIRECTION = 1e-3
+"""Changes of the bodies that move a joint less, relative to the most, are left out [1]."""
+
+
+def with_everyday(equations: Equations, comparison: Comparison, decision: Decision) -> Decision:
+    """Return a decision with the everyday friction that stands at joints left unknown.
+
+    If what is named explains more than what is left, physics is missing, with an unknown beside.
+
+    Args:
+        equations: of one recording.
+        comparison: of models.
+        decision: on these.
+    """
+    if equations.motion.is_static or not decision.unknown:
+        return decision
+    found = {j: _standing(equations, decision.model, j) for j in decision.unknown}
+    standing = {s: std for laws in found.values() for s, std in laws.items()}
+    if not standing:
+        return decision
+    model = _with(equations, decision.model, standing)
+    if not is_credible(model):
+        return decision
+    decision = replace(decision, model=model, standing={s.key: x for s, x in standing.items()})
+    scale, unknown = Scale.of(equations, comparison), list(decision.unknown)
+    before, left = comparison.parameters.left[unknown].sum(), model.left[unknown].sum()
+    others = np.delete(scale.found(model), unknown).sum()
+    if decision.verdict == 'unexplained' and before - left + others > left:
+        decision = replace(decision, verdict='missing_physics', tentative=None)
+    return decision
+
+
+def _standing(equations: Equations, model: Model, joint: int) -> dict[EffectAt, float]:
+    """Return the friction that stands at a joint, with standard deviations of its numbers.
+
+    The one whose number has another sign in some half is left out.
+    """
+    place = Place(joint)
+    laws = [EffectAt(e, place) for e in (COULOMB_FRICTION, VISCOUS_FRICTION)]
+    laws = [s for s in laws if s.key not in model.key]
+    while laws:
+        trial = _with(equations, model, laws)
+        forces = [trial.parts[-len(laws) + i] for i in range(len(laws))]
+        numbers = np.array([float(s.coefficients[0]) for s in trial.effects[-len(laws) :]])
+        F = np.column_stack(forces)
+        y = trial.residual[:, joint] + F.sum(axis=1)
+        spread, apart = _in_halves(equations, joint, y, F, numbers)
+        is_there = numbers > spread
+        if is_there.all():
+            size = float((F.sum(axis=1) ** 2).mean()) / equations.power[joint]
+            is_steady = apart < NEARLY and size > COUNTED_SHARE
+            return dict(zip(laws, spread / INTERVAL, strict=True)) if is_steady else {}
+        laws = [s for s, kept in zip(laws, is_there, strict=True) if kept]
+    return {}
+
+
+def _with(equations: Equations, model: Model, laws: Iterable[EffectAt]) -> Model:
+    """Return a model fitted with more laws that have no shape."""
+    effects = (*model.effects, *laws)
+    return fit(Columns(equations), effects, model.sigma, is_free=model.is_free, w=model.w,
+               still=len(effects))  # fmt: skip
+
+
+def _in_halves(
+    equations: Equations, joint: int, y: np.ndarray, forces: np.ndarray, numbers: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Return how far the numbers of friction are from those of any half, and its force.
+
+    Args:
+        equations: of the recording.
+        joint: index.
+        y: what friction and the rest are together, (N,) [N m or N].
+        forces: of friction, (N, m).
+        numbers: that they have, (m,).
+
+    Returns:
+        Greatest difference of each number, (m,); of the force, relative. Infinite where the rows
+        of a half are too few, or where much of the rest is another friction: one of another form
+        over the speed, or with other numbers in one half.
+    """
+    _, sizes, directions = np.linalg.svd(equations.factors[joint].R, full_matrices=False)
+    bodies = equations.bases[joint] @ directions[sizes > _LEAST_DIRECTION * sizes.max()].T
+    A = np.column_stack([forces / numbers, bodies, np.ones(len(y))])
+    halves, force = list(_halves(equations, joint)), forces.sum(axis=1)
+    least = (1.0 - NEARLY) * _rest(A, y)
+    richer = (_of_speed(equations, joint), *(forces * half[:, None] for half in halves))
+    if any(_rest(np.column_stack([A, more]), y) < least for more in richer):
+        return np.zeros(len(numbers)), math.inf
+    far, apart = np.zeros(len(numbers)), 0.0
+    for half in (*halves, *(~x for x in halves)):
+        if half.sum() < ROWS_PER_COLUMN * A.shape[1]:
+            return far, math.inf
+        change = _solved(A[half], y[half])[: len(numbers)] - numbers
+        moved = forces[half] @ (change / numbers)
+        far = np.maximum(far, np.abs(change))
+        apart = max(apart, float(np.linalg.norm(moved) / np.linalg.norm(force[half])))
+    return far, apart
+
+
+def _solved(A: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return the least squares solution for columns of any scale."""
+    scale = np.sqrt((A**2).mean(axis=0)) + 1e-300
+    return np.asarray(np.linalg.lstsq(A / scale, y, rcond=1e-8)[0] / scale)
+
+
+def _rest(A: np.ndarray, y: np.ndarray) -> float:
+    r = y - A @ _solved(A, y)
+    return float(r @ r)
+
+
+def _of_speed(equations: Equations, joint: int) -> np.ndarray:
+    """Return the columns of a force of any form of a joint's speed against its motion."""
+    v = equations.motion.velocity[:, joint]
+    knots = np.quantile(np.abs(v), np.linspace(0.0, 1.0, _KNOTS))
+    hats = [np.interp(np.abs(v), knots, height) * np.sign(v) for height in np.eye(_KNOTS)]
+    return equations.compact(np.column_stack(hats), joint, is_inertial=False)
+
+
+def _halves(equations: Equations, joint: int) -> Iterator[np.ndarray]:
+    """Yield the rows of the upper half of each variable: of the motion, the load and time."""
+    motion, low = equations.motion, equations.filter
+    speed, rows = np.abs(low(motion.velocity)), np.arange(len(equations.d))
+    power = low(motion.acceleration[:, joint] * motion.velocity[:, joint])
+    load = np.abs(low(motion.nominal_effort[:, joint]))
+    own = [load, power, rows.astype(float)]
+    for x in (*motion.wrapped[low.rows].T, *speed.T, *own):
+        if np.ptp(x) > 0.0:
+            yield x > np.median(x)

@@ -1,0 +1,97 @@
+"""Everyday friction beside something unknown: when it is named, and when it is the unknown."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sgp_ros.diagnosis.criteria import INTERVAL, STANDING
+from sgp_ros.diagnosis.decide.certainty import probabilities
+from sgp_ros.diagnosis.decide.decision import Decision
+from sgp_ros.diagnosis.decide.equivalence import Contrasts
+from sgp_ros.diagnosis.decide.everyday import with_everyday
+from sgp_ros.diagnosis.explain.comparison import Comparison
+from sgp_ros.diagnosis.findings import asserted
+from sgp_ros.diagnosis.locate.dependence import dependences
+from test.diagnosis.fitted_models import fitted
+from test.diagnosis.worlds import CHAINS, simulate
+
+LEVEL, DAMPING = 0.4, 0.15
+"""Dry friction [N m], and friction per speed [N m s/rad]."""
+
+
+def _wave(size):
+    """Return a force of position and time, of no law of the list."""
+    return lambda t, q, v: (size * math.sin(7.0 * q[0]) * math.sin(1.3 * t) - DAMPING * v[0],)
+
+
+def _unexplained(equations):
+    """Return a comparison in which nothing describes the joint, and the decision on it."""
+    base = fitted(equations)
+    comparison = Comparison(base, fitted(equations, is_free=True), (), ())
+    return comparison, Decision('unexplained', base, (), np.array([9.0]), 0, (0,), base)
+
+
+def _decided(equations_for, **world):
+    equations = equations_for(simulate(CHAINS[1], 6, 30.0, **world))[1]
+    comparison, decision = _unexplained(equations)
+    return equations, comparison, with_everyday(equations, comparison, decision)
+
+
+@pytest.fixture(scope='module')
+def rubbed(equations_for):
+    return _decided(equations_for, force=_wave(0.5), dry=lambda t, q, s: LEVEL)
+
+
+def test_friction_is_named_with_intervals_that_hold_it(rubbed):
+    found = rubbed[2]
+    numbers = {s.name: float(s.coefficients[0]) for s in found.model.effects}
+    assert numbers.keys() == {'coulomb_friction', 'viscous_friction'}
+    for s in found.model.effects:
+        true = {'coulomb_friction': LEVEL, 'viscous_friction': DAMPING}[s.name]
+        assert numbers[s.name] == pytest.approx(true, abs=INTERVAL * found.standing[s.key])
+        assert found.standing[s.key] < 0.5 * true
+    assert found.unknown == (0,)
+
+
+def test_findings_have_its_probability_and_interval(rubbed):
+    equations, comparison, found = rubbed
+    chances = probabilities(equations, comparison, found, Contrasts(equations, found.model))
+    depends = dependences(equations, comparison.base.residual)
+    *named, unknown = asserted(equations, found, (), (), chances, depends)[0][::-1]
+    assert unknown.effect == 'unknown'
+    assert [f.probability for f in named] == [STANDING, STANDING]
+    wide = replace(found, standing=dict.fromkeys(found.standing, 1.0))
+    *named, _ = asserted(equations, wide, (), (), chances, depends)[0][::-1]
+    sizes = [next(iter(f.parameters.values())) for f in named]
+    assert [x.std for x in sizes] == [pytest.approx(1.0, rel=0.01)] * 2
+
+
+@pytest.mark.parametrize(('size', 'verdict'), [(0.3, 'missing_physics'), (2.5, 'unexplained')])
+def test_physics_is_missing_where_friction_explains_most(equations_for, size, verdict):
+    found = _decided(equations_for, force=_wave(size), dry=lambda t, q, s: 1.5 * LEVEL)[2]
+    assert found.verdict == verdict
+    assert found.standing
+
+
+@pytest.mark.parametrize(
+    'unknown',
+    [
+        {'force': lambda t, q, v: (-math.copysign(abs(v[0]) ** 0.4, v[0]),)},
+        {'dry': lambda t, q, s: LEVEL * math.exp(0.7 * q[0])},
+        {'force': _wave(6.0), 'dry': lambda t, q, s: 0.1 * LEVEL},
+        {'force': lambda t, q, v: (3.0 * math.sin(7.0 * q[0]),)},
+    ],
+    ids=['of_another_form', 'that_grows_with_position', 'hidden', 'absent'],
+)  # fmt: skip
+def test_friction_is_not_named_where_it_is_the_unknown_or_not_seen(equations_for, unknown):
+    assert not _decided(equations_for, **unknown)[2].standing
+
+
+def test_a_described_joint_stays_as_it_is(rubbed):
+    equations, comparison, found = rubbed
+    known = replace(found, unknown=(), standing={})
+    assert with_everyday(equations, comparison, known) is known
