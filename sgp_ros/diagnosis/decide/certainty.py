@@ -49,7 +49,6 @@ class Probabilities:
 
     by_key: dict[object, float]
     unknown: np.ndarray
-    asserted: Model
     scale: Scale
 
     def of(self, model: Model, index: int) -> float:
@@ -125,8 +124,12 @@ def settled_of(several: Several) -> tuple[Several, Contrasts, Probabilities]:
     if several.chances:
         contrasts = Contrasts(several.equations, decision.model)
         return several, contrasts, probabilities(*known, decision, contrasts)
-    decision, contrasts, chances = settled(*known, with_everyday(*known, decision))
-    return replace(several, decision=decision, model=decision.model), contrasts, chances
+    decision, contrasts, chances = settled(*known, decision)
+    whole = with_everyday(*known, decision)
+    if whole is not decision:
+        contrasts = Contrasts(several.equations, whole.model)
+        chances = replace(chances, by_key=chances.by_key | dict.fromkeys(whole.standing, STANDING))
+    return replace(several, decision=whole, model=whole.model), contrasts, chances
 
 
 def _probable(equations: Equations, model: Model, chances: Probabilities) -> Model:
@@ -190,7 +193,7 @@ def probabilities(
     asserted law does, on any motion, are one. An effect is only as certain as its joint is well
     described; one that acts on all joints, as the worst of them; a gain, whose measure are bodies
     that may differ, as the worst joint, known or not, for bodies take up what is not known there.
-    Unlikely numbers are doubted. Friction that stands beside something unknown is `STANDING`.
+    Unlikely numbers are doubted.
     """
     scale, asserted = Scale.of(equations, comparison), decision.model
     if any(s.effect.has_chosen_form for s in asserted.effects):
@@ -225,14 +228,10 @@ def probabilities(
             if model.is_free and s.effect.alike:
                 a = float(adequate.min())
             by_key[s.key] = by_key.get(s.key, 0.0) + float(p * a)
-    by_key |= dict.fromkeys(decision.standing, STANDING)
     far = {s.key for s in asserted.effects if _is_far(s)}
-    return Probabilities(
-        {key: min(p, DOUBTED if key in far else MOST_CERTAIN) for key, p in by_key.items()},
-        np.clip(decision.excess / (decision.excess + 1.0), 0.05, 0.97),
-        asserted,
-        scale,
-    )
+    stated = {key: min(p, DOUBTED if key in far else MOST_CERTAIN) for key, p in by_key.items()}
+    unknown = np.clip(decision.excess / (decision.excess + 1.0), 0.05, 0.97)
+    return Probabilities(stated, unknown, scale)
 
 
 def _is_far(s: EffectAt) -> bool:

@@ -59,7 +59,7 @@ def test_what_is_improbable_is_not_asserted_beside_others(equations_for, viscous
     scale = Scale.of(equations, comparison)
     decision = replace(decide(equations, comparison), verdict='missing_physics', model=pair)
     names = [s.key for s in pair.effects]
-    chances = Probabilities({names[0]: 0.3, names[1]: 9e-5}, np.zeros(1), pair, scale)
+    chances = Probabilities({names[0]: 0.3, names[1]: 9e-5}, np.zeros(1), scale)
     monkeypatch.setattr(certainty, 'probabilities', lambda *_: chances)
     kept, _, _ = settled(equations, comparison, decision)
     assert max(chances.by_key.values()) < LEAST_ASSERTED
@@ -77,7 +77,7 @@ def test_beside_an_unknown_a_law_goes_that_is_impossible_without_an_improbable_o
         equations.motion.direction))  # fmt: skip
     pair = fitted(numbers, 'viscous_friction', 'coulomb_friction')
     assert pair.effects[1].coefficients[0] < 0.0
-    chances = Probabilities({s.key: 0.9 for s in pair.effects}, np.zeros(1), pair, None)
+    chances = Probabilities({s.key: 0.9 for s in pair.effects}, np.zeros(1), None)
     kept = certainty._probable(numbers, pair, chances)
     assert [s.name for s in kept.effects] == ['viscous_friction']
     sound = fitted(equations, 'viscous_friction')
@@ -91,7 +91,7 @@ def test_a_law_stays_without_which_its_joint_is_not_described(rubbing, monkeypat
     scale = Scale.of(rubbing, comparison)
     decision = replace(decide(rubbing, comparison), verdict='missing_physics', model=pair)
     p = dict(zip((s.key for s in pair.effects), (0.9, 0.3), strict=True))
-    chances = Probabilities(p, np.zeros(1), pair, scale)
+    chances = Probabilities(p, np.zeros(1), scale)
     monkeypatch.setattr(certainty, 'probabilities', lambda *_: chances)
     kept, _, _ = settled(rubbing, comparison, decision)
     assert kept.model is pair
@@ -150,7 +150,7 @@ def test_a_plain_law_takes_the_place_of_a_richer_one_that_is_not_probable(rubbin
     scale = Scale.of(rubbing, comparison)
     decision = replace(decide(rubbing, comparison), verdict='missing_physics', model=pair)
     p = {'viscous_friction': 0.9, 'coulomb_friction': 0.8, 'asymmetric_coulomb': 0.3}
-    chances = Probabilities({(n, Place(0)): x for n, x in p.items()}, np.zeros(1), pair, scale)
+    chances = Probabilities({(n, Place(0)): x for n, x in p.items()}, np.zeros(1), scale)
     monkeypatch.setattr(certainty, 'probabilities', lambda *_: chances)
     kept, _, _ = settled(rubbing, comparison, decision)
     numbers = {s.name: s.coefficients[0] for s in kept.model.effects}
@@ -166,7 +166,7 @@ def test_of_two_models_worth_the_same_the_plainer_is_named(equations_for, monkey
     scale = Scale.of(equations, comparison)
     assert abs(scale.worth(richer) - scale.worth(other)) < ALIKE
     decision = replace(decide(equations, comparison), verdict='missing_physics', model=richer)
-    chances = Probabilities({richer.effects[0].key: 0.99}, np.zeros(1), richer, scale)
+    chances = Probabilities({richer.effects[0].key: 0.99}, np.zeros(1), scale)
     monkeypatch.setattr(certainty, 'probabilities', lambda *_: chances)
     kept, _, _ = settled(equations, comparison, decision)
     assert [s.name for s in kept.model.effects] == ['coulomb_friction']
@@ -183,7 +183,7 @@ def test_an_improbable_law_is_none_where_bodies_leave_no_physics(
     decision = decide(equations, comparison)
     for left, verdict in ((0.9 * LEAST_SHARE, 'parameters_only'), (0.1, 'missing_physics')):
         scale = replace(Scale.of(equations, comparison), base=np.array([left]))
-        chances = Probabilities({model.effects[0].key: 0.45}, np.zeros(1), model, scale)
+        chances = Probabilities({model.effects[0].key: 0.45}, np.zeros(1), scale)
         monkeypatch.setattr(certainty, 'probabilities', lambda *_, now=chances: now)
         assert settled(equations, comparison, decision)[0].verdict == verdict
 

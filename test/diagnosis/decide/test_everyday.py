@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.criteria import INTERVAL, STANDING
-from sgp_ros.diagnosis.decide.certainty import probabilities
+from sgp_ros.diagnosis.decide.certainty import settled_of
 from sgp_ros.diagnosis.decide.decision import Decision
-from sgp_ros.diagnosis.decide.equivalence import Contrasts
+from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.decide.everyday import with_everyday
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.findings import asserted
@@ -58,8 +58,11 @@ def test_friction_is_named_with_intervals_that_hold_it(rubbed):
 
 
 def test_findings_have_its_probability_and_interval(rubbed):
-    equations, comparison, found = rubbed
-    chances = probabilities(equations, comparison, found, Contrasts(equations, found.model))
+    equations, comparison, _ = rubbed
+    unexplained = _unexplained(equations)[1]
+    several = Several(equations, comparison, unexplained, unexplained.model, {})
+    several, _, chances = settled_of(several)
+    found = several.decision
     depends = dependences(equations, comparison.base.residual)
     *named, unknown = asserted(equations, found, (), (), chances, depends)[0][::-1]
     assert unknown.effect == 'unknown'
