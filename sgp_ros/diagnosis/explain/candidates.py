@@ -8,7 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.explain.fitted_model import Model, add_force, floors, price_of
+from sgp_ros.diagnosis.explain.fitted_model import (
+    Model,
+    add_force,
+    floors,
+    price_of,
+    shown_inertia,
+)
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.inertia_slope import InertiaSlope
 from sgp_ros.diagnosis.explain.regression import Columns, dry_joints
@@ -128,7 +134,7 @@ def _solved(
     size = sum(len(s.shape) for s in candidates) + len(c)
     score = (
         -0.5 * N * float(np.log(variance).sum())
-        + N * float(inertia.sum())
+        + N * shown_inertia(equations, inertia)
         - 0.5 * frame.weight * float(w @ w)
         - price_of(frame, size)
     )

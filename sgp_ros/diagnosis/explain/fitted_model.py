@@ -45,8 +45,8 @@ class Model:
 
     @property
     def log_inertia(self) -> float:
-        """Mean of log det(M / M nominal)."""
-        return float(self.inertia.sum())
+        """Mean of log det(M / M nominal) over the rows in which joints do not rest."""
+        return shown_inertia(self.frame.equations, self.inertia)
 
     @property
     def key(self) -> frozenset[tuple[str, Place]]:
@@ -225,6 +225,14 @@ def floors(equations: Equations, inertia: np.ndarray | None = None) -> np.ndarra
     whole = FLOOR_SHARE * equations.power + equations.model_error
     beyond = 0.0 if inertia is None else inertia - equations.carried
     return least_variance(whole, noise, beyond) + 1e-300
+
+
+def shown_inertia(equations: Equations, inertia: np.ndarray) -> float:
+    """Return the sum of the log of inertias (k,), each over the rows in which its joint moves.
+
+    What holds a joint at rest, friction above all, makes its motion the same with any inertia.
+    """
+    return float(inertia @ (1.0 - equations.rests.mean(axis=0).clip(max=1.0 - 1e-9)))
 
 
 def least_variance(whole: np.ndarray, noise: np.ndarray, beyond: np.ndarray | float) -> np.ndarray:
