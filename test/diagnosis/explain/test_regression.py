@@ -18,6 +18,7 @@ from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 from sgp_ros.rigid.rigid_body import torque_regressor
+from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
 
 NONE = np.zeros(0)
@@ -191,3 +192,16 @@ def test_slopes_of_motions_that_are_done_with_are_let_go(equations_for, heavy, m
     assert first.remembered == second.remembered == 0
     for one, other in zip(before, first.effort_slopes(1), strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_an_inertia_counts_only_where_its_joint_moves(equations_for, perfect):
+    """What holds a joint at rest would make its motion the same with any inertia."""
+    equations = equations_for(perfect[1])[1]
+    rests = np.zeros_like(equations.rests)
+    moving = fitted(replace(equations, rests=rests), 'armature')
+    rests = np.arange(len(rests))[:, None] < len(rests) // 4
+    resting = fitted(replace(equations, rests=rests), 'armature')
+    assert moving.log_inertia == pytest.approx(moving.inertia[0])
+    assert resting.log_inertia == pytest.approx(0.75 * resting.inertia[0], rel=1e-3)
+    price = len(equations.d) * (moving.log_inertia - resting.log_inertia)
+    assert moving.score - resting.score == pytest.approx(price)
