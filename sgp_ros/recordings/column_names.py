@@ -8,6 +8,7 @@ is left names the joint.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 TIME, POSITION, VELOCITY, EFFORT, CURRENT = 'time', 'position', 'velocity', 'effort', 'current'
@@ -21,7 +22,7 @@ _QUANTITIES = {
     'geschwindigkeit drehzahl',
     EFFORT: 'tau taus torque torques effort efforts eff effs force forces qfrc load moment trq '
     'drehmoment kraft',
-    CURRENT: 'i current currents amps curr strom',
+    CURRENT: 'i cur current currents amps curr strom',
     DUTY: 'pwm duty',
     KP: 'kp stiffness pgain',
     KD: 'kd dgain',
@@ -63,6 +64,9 @@ _FILLER = frozenset({
 })  # fmt: skip
 _PAIRS = {('p', 'gain'): KP, ('d', 'gain'): KD, ('q', 'dot'): VELOCITY, ('theta', 'dot'): VELOCITY,
           ('q', 'ddot'): OTHER, ('d', 'q'): VELOCITY, ('feed', 'forward'): OTHER}  # fmt: skip
+_PAIRS |= {(now, what): POSITION for now in ('cur', 'curr', 'current')
+           for what in ('pos', 'position', 'positions', 'angle', 'angles', 'state')}  # fmt: skip
+_OF_TIME = frozenset({'', 's', 'ms', 'us', 'ns'})
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,13 +91,22 @@ class Meaning:
         return '_'.join(w for w in self.rest if w.lower() not in _FILLER)
 
 
-def meaning(name: str) -> Meaning:
-    """Return what the name of a column says."""
+def meaning(name: str, joints: Iterable[str] = ()) -> Meaning:
+    """Return what the name of a column says.
+
+    Args:
+        name: of the column.
+        joints: names of known joints: beside other words they mean nothing else, as `U` and `T`.
+    """
     words, unit = _unit(_words(name))
     role, is_target = '', False
     rest: list[str] = []
-    i = 0
+    own, i = _own(words, unit, joints), 0
     while i < len(words):
+        if i in own:
+            rest.append(words[i])
+            i += 1
+            continue
         word = words[i].lower()
         pair = (word, words[i + 1].lower()) if i + 1 < len(words) else None
         if pair in _PAIRS:
@@ -114,6 +127,16 @@ def meaning(name: str) -> Meaning:
     if not unit and _EFFORTS & {word.lower() for word in words} == {'load'}:
         unit = '%'  # as servos log it, of the duty cycle: no torque
     return Meaning(role, is_target, tuple(rest), unit)
+
+
+def _own(words: list[str], unit: str, joints: Iterable[str]) -> range:
+    """Return where words name a joint; empty where they are all there is, and may be a time."""
+    for joint in sorted(map(_words, joints), key=len, reverse=True):
+        for i in range(len(words) - len(joint) + 1):
+            is_all = len(words) == len(joint) and unit in _OF_TIME
+            if joint and words[i : i + len(joint)] == joint and not is_all:
+                return range(i, i + len(joint))
+    return range(0)
 
 
 def _stronger(before: str, found: str) -> str:

@@ -83,7 +83,9 @@ class Guess:
     unsure: list[str] = field(default_factory=list)
 
 
-def entries_of(columns: Columns, rows: int, features: Mapping[str, Sequence[str]]) -> list[Entry]:
+def entries_of(
+    columns: Columns, rows: int, features: Mapping[str, Sequence[str]], joints: Sequence[str]
+) -> list[Entry]:
     """Return the columns of numbers, those of matrices one by one."""
     found = []
     for name, array in columns.items():
@@ -96,9 +98,9 @@ def entries_of(columns: Columns, rows: int, features: Mapping[str, Sequence[str]
             numbers = as_numbers(wide[:, i])
             if numbers is None:
                 continue
-            said, label = meaning(name), str(i) if array.ndim == 2 else ''
+            said, label = meaning(name, joints), str(i) if array.ndim == 2 else ''
             if len(parts) == wide.shape[1]:
-                inner = meaning(parts[i])
+                inner = meaning(parts[i], joints)
                 role = inner.role if inner.role not in {'', OTHER} else said.role
                 said = Meaning(role, said.is_target, inner.rest, inner.unit or said.unit)
                 label = inner.joint or parts[i]

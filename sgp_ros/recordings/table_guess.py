@@ -66,8 +66,9 @@ def guess_map(
     """
     guess = Guess()
     rows = _rows(columns)
-    seconds = guessed_times(columns, rows, rate_hz, guess)
-    entries = of_signals(entries_of(columns, rows, features or {}), guess)
+    known = [h.name for h in hints]
+    seconds = guessed_times(columns, rows, rate_hz, known, guess)
+    entries = of_signals(entries_of(columns, rows, features or {}, known), guess)
     entries = of_blocks(entries, hints, seconds, guess)
     positions = chosen(entries, POSITION, guess)
     if not positions:

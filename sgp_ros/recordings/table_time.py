@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -19,13 +19,16 @@ _APPROACHES = {'approach', 'side', 'direction'}
 _STEPS = {'dt', 'ts', 'step', 'timestep', 'sample_time'}
 
 
-def guessed_times(columns: Columns, rows: int, rate_hz: float | None, guess: Guess) -> np.ndarray:
+def guessed_times(
+    columns: Columns, rows: int, rate_hz: float | None, joints: Sequence[str], guess: Guess
+) -> np.ndarray:
     """Enter the time base into a guess and return the times [s], (n,).
 
     Args:
         columns: of the table by name.
         rows: n.
         rate_hz: where the table has no time; None for one that it states.
+        joints: names of the robot's joints, which are no times.
         guess: of the map, which is completed.
 
     Raises:
@@ -33,7 +36,7 @@ def guessed_times(columns: Columns, rows: int, rate_hz: float | None, guess: Gue
     """
     named = [
         name for name, x in columns.items()
-        if x.shape[:1] == (rows,) and x.size == rows and _may_be_time(meaning(name))
+        if x.shape[:1] == (rows,) and x.size == rows and _may_be_time(meaning(name, joints))
     ]  # fmt: skip
     named.sort(key=lambda n: (not meaning(n).role, 'des' in n.lower(), len(n)))
     named.sort(key=lambda n: 'header' not in n.lower())  # when it was measured, not when it came

@@ -75,6 +75,8 @@ def _read(path, folder, hints=HINTS, rate=None):
         ('Present_PWM', 'duty', False, 'Present', ''),
         ('wheel_rpm', '', False, 'wheel', 'rpm'),
         ('load_torque', 'effort', False, '', ''),
+        ('cur_lift', 'current', False, 'lift', ''),
+        ('current_pos_lift', 'position', False, 'lift', ''),
         ('goal_position', 'position', True, '', ''),
     ],
 )
@@ -135,6 +137,19 @@ def test_columns_that_hold_the_names_of_joints_are_theirs_in_any_order(tmp_path,
     order = [states[0].names.index(name) for name in names]
     np.testing.assert_allclose([s.position[order] for s in states], Q, atol=1e-12)
     assert not any('order of the robot' in said for said in summary.unsure)
+
+
+def test_joints_may_be_called_as_times_and_commands_are(tmp_path):
+    """`T` and `U` are axes of industrial arms; alone, `T` is a time all the same."""
+    hints = tuple(replace(hint, name=name) for hint, name in zip(HINTS, 'UT', strict=True))
+    table = np.column_stack([T, np.degrees(Q), TAU])
+    header = 'T,U_act_deg,T_act_deg,U_cur_A,T_cur_A'
+    np.savetxt(tmp_path / 'log.csv', table, delimiter=',', header=header, comments='')
+    _, states, commands = _read(tmp_path / 'log.csv', tmp_path, hints)
+    order = [states[0].names.index(name) for name in 'UT']
+    np.testing.assert_allclose([s.position[order] for s in states], Q, atol=1e-12)
+    np.testing.assert_allclose([s.effort[order] for s in states], TAU, atol=1e-12)
+    assert not commands
 
 
 def test_columns_of_joints_that_the_robot_lacks_are_left_out(tmp_path):
