@@ -252,7 +252,11 @@ def supported(equations: Equations, scale: Scale, ranked: Sequence[Model]) -> Mo
 
 
 def _pruned(columns: Columns, scale: Scale, model: Model) -> Model | None:
-    """Return a model without the effects that do not predict parts left out; None of no model."""
+    """Return a model without the effects that do not predict parts left out; None of no model.
+
+    Where a plain law predicts least beside a richer one that says the same, either may go.
+    """
+    equations = columns.equations(frozenset())
     while model.effects and is_credible(model):
         evidence = support(columns, model, scale.floor * scale.power, scale.rows)
         if evidence.min() > EVIDENCE:
@@ -260,5 +264,9 @@ def _pruned(columns: Columns, scale: Scale, model: Model) -> Model | None:
         if len(model.effects) <= 2:
             break
         weakest = model.effects[int(np.argmin(evidence))]
-        model = without(columns.equations(frozenset()), model, lambda s, out=weakest: s is out)  # type: ignore[misc]
+        richer = (s for s in model.effects
+                  if s.place == weakest.place and weakest.name in s.effect.plain)  # fmt: skip
+        trials = [without(equations, model, lambda s, out=out: s is out)  # type: ignore[misc]
+                  for out in (weakest, *richer)]  # fmt: skip
+        model = max(trials, key=lambda m: (is_credible(m), scale.worth(m)))
     return None
