@@ -12,6 +12,7 @@ from sgp_ros.diagnosis.criteria import (
     COUNTED_SHARE,
     INDEPENDENT_ROWS,
     MOST_OPPOSED,
+    NEARLY,
     PER_PARAMETER,
     SLIGHT_REST,
 )
@@ -21,6 +22,9 @@ from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.elasticity import has_rotor
 from sgp_ros.physics.parts import MOTOR
 from sgp_ros.robots.observed_motion import ObservedMotion
+
+_MANY = 20.0
+"""Whole waves that are more than a wave of three numbers could follow by chance."""
 
 
 def gain(trial: Model, model: Model, *, is_whole: bool = True) -> float:
@@ -106,8 +110,9 @@ def shows_waves(s: EffectAt, equations: Equations) -> bool:
     """Return whether a ripple is seen over whole waves, wherever it is seen.
 
     A short wave passes the filter only where the joint turns back. There it is one number for each
-    place, and would explain whatever else happens at rest. The way and the visits are weighted by
-    the power that passes.
+    place, and would explain whatever else happens at rest; unless it turns back in so many places
+    that they see all parts of the wave many times. The way and the visits are weighted by the
+    power that passes.
     """
     wave = s.effect.wave(equations.motion, s.place)
     if wave is None:
@@ -121,7 +126,8 @@ def shows_waves(s: EffectAt, equations: Equations) -> bool:
     turned = np.abs(np.angle(z[1:] * np.conj(z[:-1])))
     waves = float((np.minimum(power[1:], power[:-1]) * turned).sum()) / (2.0 * np.pi)
     visits = 0.5 * float(np.abs(np.diff(power)).sum())
-    return waves >= visits
+    is_spread = abs((np.abs(z) * z).sum()) < NEARLY * power.sum()
+    return waves >= visits or (waves > _MANY and is_spread)
 
 
 def _is_confined(s: EffectAt, motion: ObservedMotion) -> bool:
