@@ -46,6 +46,7 @@ _UNITS = {
     'rpm': 'rpm',
     'nm': 'N m', 'mnm': 'mN m', 'knm': 'kN m', 'n': 'N', 'kn': 'kN', 'mn': 'mN',
     'a': 'A', 'ma': 'mA', 'ticks': 'counts', 'pct': '%', 'percent': '%',
+    'prozent': '%', 'permille': '‰', 'permil': '‰', 'promille': '‰',
     'counts': 'counts', 'nmm': 'N mm', 'ncm': 'N cm', 'kgfcm': 'kgf cm', 'kgcm': 'kgf cm',
 }  # fmt: skip
 _PER_SECOND = {'degps': 'deg', 'radps': 'rad', 'mmps': 'mm', 'mps': 'm'}
@@ -54,7 +55,7 @@ _PREFIXED = r'(?<![A-Za-z])[mk](N|Nm|Nmm|A)(?![A-Za-z])'
 _LONG_UNITS = frozenset({
     'rad', 'deg', 'degrees', 'rpm', 'counts', 'ticks', 'mm', 'nm', 'nmm', 'ncm', 'kgfcm', 'kgcm',
     'mnm', 'knm',
-    'ms', 'ns', 'us', 'pct', 'percent',
+    'ms', 'ns', 'us', 'pct', 'percent', 'prozent', 'permille', 'permil', 'promille',
 })  # fmt: skip
 """Units that nothing else means, wherever they stand."""
 _FILLER = frozenset({
@@ -150,9 +151,9 @@ def _stronger(before: str, found: str) -> str:
 def _words(name: str) -> list[str]:
     bare = re.sub(_PREFIXED, lambda unit: unit[0].lower(), name)
     bare = re.sub(r'([a-z])([A-Z])', r'\1 \2', bare)
-    bare = re.sub(
-        r'([A-Za-z])(\d)', r'\1 \2', re.sub('°(?!C)', ' deg ', bare.replace('%', ' pct '))
-    )
+    for sign, unit in (('%', ' pct '), ('‰', ' permille '), ('°(?!C)', ' deg ')):
+        bare = re.sub(sign, unit, bare)
+    bare = re.sub(r'([A-Za-z])(\d)', r'\1 \2', bare)
     return [word for word in re.split(r'[^A-Za-z0-9]+', bare) if word]
 
 

@@ -180,8 +180,9 @@ def _add_efforts(
         if label not in joints:
             guess.unsure.append(f'The effort {e.column} belongs to no position column: ignored.')
             continue
-        unit, more = {CURRENT: 'A', DUTY: '%'}.get(role, e.said.unit), {}
-        if unit in {'A', '%'}:
+        named = {CURRENT: 'A', DUTY: '%'}.get(role, e.said.unit)
+        unit, more = 'A' if named == 'mA' else named, {}
+        if UNITS['effort'].get(unit, 1.0) is None:
             open_unit, more = unit, {'scale': 1e-3 if e.said.unit == 'mA' else 1.0}
         elif unit not in _EFFORTS:
             unit = 'N' if joints[label] in hinted and hinted[joints[label]].slides else 'N m'

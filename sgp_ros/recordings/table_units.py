@@ -22,7 +22,7 @@ UNITS: dict[str, dict[str, float | None]] = {
     'effort': {
         'N': 1.0, 'mN': 1e-3, 'kN': 1e3, 'N m': 1.0, 'Nm': 1.0, 'mN m': 1e-3, 'mNm': 1e-3,
         'kN m': 1e3, 'kNm': 1e3, 'N mm': 1e-3, 'N cm': 1e-2, 'kgf cm': _KGF * 1e-2, 'kgf': _KGF,
-        'A': None, 'V': None, '%': None, 'counts': None,
+        'A': None, 'V': None, '%': None, '‰': None, 'counts': None,
     },
 }  # fmt: skip
 """Unit to its factor to SI, per quantity; None where only a `scale` can tell."""

@@ -75,6 +75,9 @@ def _read(path, folder, hints=HINTS, rate=None):
         ('Present_PWM', 'duty', False, 'Present', ''),
         ('wheel_rpm', '', False, 'wheel', 'rpm'),
         ('load_torque', 'effort', False, '', ''),
+        ('A1_Moment_Prozent', 'effort', False, 'A_1', '%'),
+        ('torque_permille', 'effort', False, '', '‰'),
+        ('Moment [‰]', 'effort', False, '', '‰'),
         ('cur_lift', 'current', False, 'lift', ''),
         ('current_pos_lift', 'position', False, 'lift', ''),
         ('goal_position', 'position', True, '', ''),
@@ -291,11 +294,15 @@ def test_a_trace_with_german_words_is_read(tmp_path):
     assert 'torque of 1 A' in ' '.join(summary.unsure)
 
 
-def test_a_load_in_per_cent_asks_for_the_torque_of_one(tmp_path):
-    """As servos report it; the number goes into the map."""
-    path = _npz(tmp_path, t=T, q=Q, load_pct=100.0 * TAU)
+@pytest.mark.parametrize(
+    ('name', 'unit'),
+    [('load_pct', '%'), ('torque_permille', '‰'), ('torque_counts', 'counts')],
+)
+def test_an_effort_in_another_unit_asks_for_the_torque_of_one(tmp_path, name, unit):
+    """As servos and drives report it; the number goes into the map."""
+    path = _npz(tmp_path, t=T, q=Q, **{name: 100.0 * TAU})
     summary, states, _ = _read(path, tmp_path)
-    assert any('torque of 1 %' in said for said in summary.unsure)
+    assert any(f'torque of 1 {unit} in' in said for said in summary.unsure)
     np.testing.assert_allclose([s.effort for s in states], 100.0 * TAU)
 
 
