@@ -16,7 +16,7 @@ from sgp_ros.diagnosis.criteria import ADEQUATE_REST, COUNTED_SHARE, PER_EFFECT,
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible, is_needed
 from sgp_ros.diagnosis.explain.fitted_model import Model, adds_to_usual
-from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.diagnosis.explain.regression import Columns, dry_joints
 from sgp_ros.diagnosis.explain.screening import distinct, screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
@@ -190,3 +190,22 @@ def _with_two(
         return []
     ranked = sorted(filter(is_credible, trials), key=lambda t: -gain(t, model, is_whole=False))
     return [t for first in ranked[:AHEAD] for t in _counted(columns, first, block)]
+
+
+def two_for_one(columns: Columns, model: Model) -> Iterator[Model]:
+    """Yield models with two laws of a joint's speed in place of the only one of its friction.
+
+    Where that is not dry: one law alone may imitate dry friction and another one, and is better
+    than either.
+    """
+    dry = dry_joints(model.effects)
+    for block in blocks_of(model):
+        laws = tuple(e for e in block.effects if block.joints and e.drawn_over == 'velocity')
+        own = [s for s in model.effects if block.holds(s) and s.effect in laws]
+        if len(own) != 1 or own[0].place.joint in dry or block.left(model) < SLIGHT_REST:
+            continue
+        (s,) = own
+        without = refitted(columns, model, arrangement(model, block, s))
+        laws = tuple(e for e in laws if e is not s.effect and s.name not in e.plain)
+        others = Block(laws, block.joints)
+        yield from _with_two(columns, without, others, _counted(columns, without, others))

@@ -25,6 +25,7 @@ from sgp_ros.diagnosis.explain.growth import (
     blocks_of,
     grown,
     refitted,
+    two_for_one,
 )
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import distinct, may_be_two, screen
@@ -53,7 +54,8 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
         for block in blocks_of(model):
             model = _shrunk(columns, grown(columns, model, block), block)
         if model.key == before:
-            better = best_of(model, coupled(columns, model))
+            others = (*coupled(columns, model), *two_for_one(columns, model))
+            better = best_of(model, others)
             if better is None:
                 break
             model = better

@@ -181,6 +181,24 @@ def test_a_model_that_lost_an_effect_is_compared_again(damped, monkeypatch):
     assert supported(damped, scale, [rich, next_one]) is next_one
 
 
+def test_a_plain_law_may_stay_where_a_richer_one_says_as_much(equations_for, dry, monkeypatch):
+    """Each predicts nothing beside the other; the plain one knows that friction holds a joint."""
+    equations = equations_for(dry)[1]
+    rich = fitted(equations, 'coulomb_friction', 'hysteresis', 'armature')
+    bases = (fitted(equations, is_free=f) for f in (False, True))
+    scale = Scale.of(equations, Comparison(*bases, (), (rich,)))
+
+    def supports(_columns, model, *_):
+        return np.array([0.0 if 'hysteresis' in named(model) else 100.0 for _ in model.effects])
+
+    def named(model):
+        return {s.name for s in model.effects}
+
+    monkeypatch.setattr(cross_validation, 'support', supports)
+    monkeypatch.setattr(cross_validation, 'is_credible', lambda _model: True)
+    assert named(supported(equations, scale, [rich])) == {'coulomb_friction', 'armature'}
+
+
 def test_an_effect_without_support_is_not_asserted(equations_for):
     """A push in one stretch, which a periodic force fits a little and predicts nowhere else."""
     world = simulate(

@@ -12,6 +12,7 @@ from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 from test.diagnosis.fitted_models import fitted
+from test.diagnosis.worlds import CHAINS, simulate
 
 
 @pytest.mark.parametrize(('times', 'credible'), [(2.0, True), (1000.0, False)])
@@ -30,5 +31,15 @@ def test_a_motor_delivers_what_it_was_commanded(equations_for, perfect, times, c
 def test_a_ripple_is_seen_over_whole_waves(equations_for, perfect, periods, shown):
     """One so short that it passes the filter only where the joint turns back is none."""
     _, equations = equations_for(perfect[1])
+    ripple = EffectAt(EFFECTS['cogging'], Place(0), np.array([periods]))
+    assert shows_waves(ripple, equations) == shown
+
+
+@pytest.mark.parametrize(('periods', 'shown'), [(80.0, True), (300.0, False)])
+def test_a_short_ripple_is_seen_where_a_joint_turns_back_in_many_places(
+    equations_for, periods, shown
+):
+    """Sixty waves in parts, all parts of it alike, are more than it could follow by chance."""
+    equations = equations_for(simulate(CHAINS[1], 1, 60.0))[1]
     ripple = EffectAt(EFFECTS['cogging'], Place(0), np.array([periods]))
     assert shows_waves(ripple, equations) == shown

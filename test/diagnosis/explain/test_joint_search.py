@@ -23,7 +23,7 @@ from sgp_ros.diagnosis.explain.candidates import fit, split
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import beyond_plain, floors
 from sgp_ros.diagnosis.explain.frame import Frame
-from sgp_ros.diagnosis.explain.growth import Block, crossed, grown
+from sgp_ros.diagnosis.explain.growth import Block, crossed, grown, two_for_one
 from sgp_ros.diagnosis.explain.joint_search import (
     built_up,
     by_joint,
@@ -473,3 +473,21 @@ def test_a_joint_is_open_while_much_of_its_discrepancy_is_left(equations):
     assert Block((), (0,)).is_open(left)
     assert not Block((), (0,)).is_open(replace(base, residual=0.1 * equations.d))
     assert not Block((), None).is_open(left)
+
+
+def test_two_laws_of_the_speed_take_the_place_of_one_that_imitates_both(equations_for):
+    """Dry friction and drag by the square of the speed look like damping, each more than it."""
+    world = simulate(
+        CHAINS[1], 3, 20.0, force=lambda t, q, v: (-0.15 * abs(v[0]) * v[0],),
+        dry=lambda t, q, s: 0.3,
+    )  # fmt: skip
+    columns, model = _start(equations_for(world)[1])
+    alone = [
+        fit(columns, (EffectAt(EFFECTS[name], Place(0)),), model.sigma, is_free=True)
+        for name in ('viscous_friction', 'quadratic_drag', 'coulomb_friction')
+    ]
+    assert max(alone, key=lambda m: m.score) is alone[0]
+    found = max(two_for_one(columns, alone[0]), key=lambda m: gain(m, alone[0]))
+    assert {s.name for s in found.effects} == {'coulomb_friction', 'quadratic_drag'}
+    assert gain(found, alone[0]) > PER_EFFECT
+    assert not list(two_for_one(columns, alone[2]))
