@@ -195,7 +195,7 @@ def test_slopes_of_motions_that_are_done_with_are_let_go(equations_for, heavy, m
 
 
 def test_an_inertia_counts_only_where_its_joint_moves(equations_for, perfect):
-    """What holds a joint at rest would make its motion the same with any inertia."""
+    """A joint that is held at rest has the same motion with any inertia."""
     equations = equations_for(perfect[1])[1]
     rests = np.zeros_like(equations.rests)
     moving = fitted(replace(equations, rests=rests), 'armature')
