@@ -67,6 +67,12 @@ def within_accuracy(
     return model, np.where(stands, share, excess), share < 1.0
 
 
+def moving_bodies(equations: Equations, joint: int) -> np.ndarray:
+    """Return the forces of those changes of bodies that move a joint, (N, m) [N m or N]."""
+    _, sizes, directions = np.linalg.svd(equations.factors[joint].R, full_matrices=False)
+    return equations.bases[joint] @ directions[sizes > LEAST_DIRECTION * sizes.max()].T
+
+
 def _own(model: Model, joint: int) -> list[EffectAt]:
     """Return the laws of a joint alone."""
     return [s for s in model.effects
@@ -90,11 +96,9 @@ def _standing(equations: Equations, model: Model, joint: int) -> list[EffectAt]:
     The standard deviation is the greater of the posterior's and the jackknife's over parts left
     out, for what is correlated in time tells less than its rows.
     """
-    laws, base = _own(model, joint), equations.bases[joint]
-    rows = spread(np.arange(len(base)), MOST_ROWS)
+    laws, bodies = _own(model, joint), moving_bodies(equations, joint)
+    rows = spread(np.arange(len(bodies)), MOST_ROWS)
     forces = [f[:, joint] for s, f in zip(model.effects, model.forces, strict=True) if s in laws]
-    _, sizes, directions = np.linalg.svd(base, full_matrices=False)
-    bodies = base @ directions[sizes > LEAST_DIRECTION * sizes.max()].T
     F = np.column_stack([*forces, bodies])
     if not laws or len(rows) < ROWS_PER_COLUMN * F.shape[1]:
         return []
@@ -106,7 +110,7 @@ def _standing(equations: Equations, model: Model, joint: int) -> list[EffectAt]:
 
     known = data(spread(rows, max(LEARNED, ROWS_PER_COLUMN * F.shape[1])))
     start = screened(known, prior, initial_model(known, (tuple(range(U.shape[1])),)))
-    process, part = learn(known, prior, start).model, parts_of(len(base))[rows]
+    process, part = learn(known, prior, start).model, parts_of(len(bodies))[rows]
     whole = Posterior(process, data(rows), prior)
     own = slice(len(laws))
     others = [Posterior(process, data(rows[part != i]), prior).coefficients[own]

@@ -17,6 +17,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, INTERVAL, NEARLY
+from sgp_ros.diagnosis.decide.cancelling import moving_bodies
 from sgp_ros.diagnosis.decide.decision import Decision
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
@@ -31,8 +32,6 @@ from sgp_ros.physics.parts import Place
 ROWS_PER_COLUMN = 4
 """Least rows of a half for each column."""
 _KNOTS = 8
-_LEAST_DIRECTION = 1e-3
-"""Changes of the bodies that move a joint less, relative to the most, are left out [1]."""
 
 
 def with_everyday(equations: Equations, comparison: Comparison, decision: Decision) -> Decision:
@@ -111,9 +110,7 @@ def _in_halves(
         of a half are too few, or where much of the rest is another friction: one of another form
         over the speed, or with other numbers in one half.
     """
-    _, sizes, directions = np.linalg.svd(equations.factors[joint].R, full_matrices=False)
-    bodies = equations.bases[joint] @ directions[sizes > _LEAST_DIRECTION * sizes.max()].T
-    A = np.column_stack([forces / numbers, bodies, np.ones(len(y))])
+    A = np.column_stack([forces / numbers, moving_bodies(equations, joint), np.ones(len(y))])
     halves, force = list(_halves(equations, joint)), forces.sum(axis=1)
     least = (1.0 - NEARLY) * _rest(A, y)
     richer = (_of_speed(equations, joint), *(forces * half[:, None] for half in halves))
