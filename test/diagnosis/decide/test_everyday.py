@@ -57,6 +57,13 @@ def test_friction_is_named_with_intervals_that_hold_it(rubbed):
     assert found.unknown == (0,)
 
 
+def test_a_law_that_has_another_sign_in_some_half_is_left_out(equations_for):
+    """A joint without any damping beside the unknown has dry friction alone."""
+    force = lambda t, q, v: (0.5 * math.sin(7.0 * q[0]) * math.sin(1.3 * t),)  # noqa: E731
+    found = _decided(equations_for, force=force, dry=lambda t, q, s: LEVEL)[2]
+    assert [s.name for s in found.model.effects] == ['coulomb_friction']
+
+
 def test_findings_have_its_probability_and_interval(rubbed):
     equations, comparison, _ = rubbed
     unexplained = _unexplained(equations)[1]

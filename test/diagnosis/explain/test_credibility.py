@@ -43,3 +43,17 @@ def test_a_short_ripple_is_seen_where_a_joint_turns_back_in_many_places(
     equations = equations_for(simulate(CHAINS[1], 1, 60.0))[1]
     ripple = EffectAt(EFFECTS['cogging'], Place(0), np.array([periods]))
     assert shows_waves(ripple, equations) == shown
+
+
+@pytest.mark.parametrize(('drift', 'shown'), [(0.02, True), (0.0, False)])
+def test_a_ripple_is_not_seen_where_a_joint_turns_back_in_the_same_places(
+    equations_for, drift, shown
+):
+    """However often: it is one number for each place."""
+    equations = equations_for(simulate(CHAINS[1], 1, 60.0))[1]
+    motion = equations.motion
+    time = motion.time[:, None]
+    position = 0.5 * np.sin(2.0 * np.pi * time) + drift * time
+    swinging = replace(equations, motion=replace(motion, position=position))
+    ripple = EffectAt(EFFECTS['cogging'], Place(0), np.array([4.0 * np.pi * 6.0]))
+    assert shows_waves(ripple, swinging) == shown
