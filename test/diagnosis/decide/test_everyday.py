@@ -23,9 +23,9 @@ LEVEL, DAMPING = 0.4, 0.15
 """Dry friction [N m], and friction per speed [N m s/rad]."""
 
 
-def _wave(size):
-    """Return a force of position and time, of no law of the list."""
-    return lambda t, q, v: (size * math.sin(7.0 * q[0]) * math.sin(1.3 * t) - DAMPING * v[0],)
+def _wave(size, damping=DAMPING):
+    """Return a force of position and time, of no law of the list, beside damping."""
+    return lambda t, q, v: (size * math.sin(7.0 * q[0]) * math.sin(1.3 * t) - damping * v[0],)
 
 
 def _unexplained(equations):
@@ -59,8 +59,7 @@ def test_friction_is_named_with_intervals_that_hold_it(rubbed):
 
 def test_a_law_that_has_another_sign_in_some_half_is_left_out(equations_for):
     """A joint without any damping beside the unknown has dry friction alone."""
-    force = lambda t, q, v: (0.5 * math.sin(7.0 * q[0]) * math.sin(1.3 * t),)  # noqa: E731
-    found = _decided(equations_for, force=force, dry=lambda t, q, s: LEVEL)[2]
+    found = _decided(equations_for, force=_wave(0.5, damping=0.0), dry=lambda t, q, s: LEVEL)[2]
     assert [s.name for s in found.model.effects] == ['coulomb_friction']
 
 
