@@ -125,13 +125,15 @@ class Connected:
         has_efforts = self.equations.motion.has_all_efforts and not is_of_motion
         if has_efforts:
             model, scale = replace(model, inertia=model.delivered), replace(scale, carried=0.0)
-        if done is not None and has_efforts:
-            recorded = recorded[done.effort_order] / done.effort_scale**2
-        elif done is not None:
+        if done is not None and not has_efforts:
             stated = self.equations.loop.volume(0.0 * recorded, 1.0 / done.kp, 1.0 / done.kd)
             units = model.inertia - stated - np.log(np.abs(done.scale))
-            model = replace(model, inertia=noisy_volume(units, self.equations.noise_part))
-            recorded = recorded[done.effort_order]
+            shown = noisy_volume(units, self.equations.noise_part)
+            unit = np.log(np.abs(done.effort_scale))
+            model = replace(model, inertia=shown + unit)
+            scale = replace(scale, carried=scale.carried + unit)
+        if done is not None:
+            recorded = recorded[done.effort_order] / done.effort_scale**2
         return replace(scale, nominal=nominal, power=recorded).worth(model)
 
     def recorded(self, found: Predictions) -> Predictions:

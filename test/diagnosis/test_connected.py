@@ -84,6 +84,40 @@ def test_recorded_efforts_in_any_unit_are_explained_alike(monkeypatch):
     assert worth(square / 4.0, 1.0, delivered=0.5) == pytest.approx(plain)
 
 
+@dataclass(frozen=True)
+class _OfMotion(_AsGiven):
+    """A scale of the motion whose floor is a share of the efforts, larger beyond their inertia."""
+
+    def worth(self, model):
+        floor = 1e-5 * np.exp(2.0 * (model.inertia - self.carried))
+        share = model.mean_square / self.power + floor
+        return float((model.inertia - 0.5 * np.log(share)).sum())
+
+
+@pytest.mark.parametrize('noise_part', [0.0, 1.0])
+def test_a_unit_moves_as_bodies_that_are_as_much_heavier_do(monkeypatch, noise_part):
+    """Efforts in mN m: neither fits the motion better, also where next to nothing is left."""
+    size, recorded = np.full(2, np.log(1000.0)), np.array([1e8, 4e6])
+
+    def worth(model, carried, factor):
+        scale = _OfMotion(carried=carried)
+        monkeypatch.setattr(connected, 'Scale', SimpleNamespace(of=lambda *_: scale))
+        equations = SimpleNamespace(
+            motion=SimpleNamespace(has_all_efforts=True), noise_part=np.full(2, noise_part),
+            loop=SimpleNamespace(volume=lambda *_: np.zeros(2)),
+        )  # fmt: skip
+        decision = SimpleNamespace(model=model, tentative=None)
+        several = SimpleNamespace(decision=decision, comparison=SimpleNamespace(base=model))
+        done = replace(Correction.none(2), effort_scale=np.full(2, factor)) if factor else None
+        return Connected(None, equations, several, done).worth(0.0, recorded, is_of_motion=True)
+
+    left = 1e-6 * recorded
+    heavier = worth(_Residual(left, np.zeros(2), size), size, None)
+    assert worth(_Residual(left / 1e6, np.zeros(2), 0.0 * size), 0.0, 1e3) == pytest.approx(
+        heavier
+    )
+
+
 @pytest.mark.parametrize('share', [0.5, 2.0])
 def test_an_agreement_leaves_less_by_what_is_left_of_all_efforts(share):
     shares = np.array([[0.1, 0.2], [0.1, 0.2 * share]])
