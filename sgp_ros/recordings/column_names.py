@@ -22,7 +22,7 @@ _QUANTITIES = {
     'geschwindigkeit drehzahl',
     EFFORT: 'tau taus torque torques effort efforts eff effs force forces qfrc load moment trq '
     'drehmoment kraft',
-    CURRENT: 'i cur current currents amps curr strom',
+    CURRENT: 'i iq cur current currents amps curr strom',
     DUTY: 'pwm duty',
     KP: 'kp stiffness pgain',
     KD: 'kd dgain',
@@ -49,7 +49,7 @@ _UNITS = {
     'prozent': '%', 'permille': '‰', 'permil': '‰', 'promille': '‰',
     'counts': 'counts', 'nmm': 'N mm', 'ncm': 'N cm', 'kgfcm': 'kgf cm', 'kgcm': 'kgf cm',
 }  # fmt: skip
-_PER_SECOND = {'degps': 'deg', 'radps': 'rad', 'mmps': 'mm', 'mps': 'm'}
+_PER_SECOND = {'degps': 'deg', 'dps': 'deg', 'radps': 'rad', 'mmps': 'mm', 'mps': 'm'}
 _PREFIXED = r'(?<![A-Za-z])[mk](N|Nm|Nmm|A)(?![A-Za-z])'
 """Units with a capital inside, which begins no word."""
 _LONG_UNITS = frozenset({

@@ -79,6 +79,8 @@ def _read(path, folder, hints=HINTS, rate=None):
         ('torque_permille', 'effort', False, '', '‰'),
         ('Moment [‰]', 'effort', False, '', '‰'),
         ('cur_lift', 'current', False, 'lift', ''),
+        ('pan.iq_mA', 'current', False, 'pan', 'mA'),
+        ('pan.speed_dps', 'velocity', False, 'pan', 'deg/s'),
         ('current_pos_lift', 'position', False, 'lift', ''),
         ('goal_position', 'position', True, '', ''),
     ],
