@@ -38,6 +38,7 @@ from sgp_ros.recordings.table_entries import (
 from sgp_ros.recordings.table_gains import add_gains
 from sgp_ros.recordings.table_time import approach, guessed_times
 from sgp_ros.recordings.table_units import (
+    SCALED_AS,
     UNITS,
     as_numbers,
     follows,
@@ -180,17 +181,17 @@ def _add_efforts(
         if label not in joints:
             guess.unsure.append(f'The effort {e.column} belongs to no position column: ignored.')
             continue
-        named = {CURRENT: 'A', DUTY: '%'}.get(role, e.said.unit)
-        unit, more = 'A' if named == 'mA' else named, {}
+        usual = {CURRENT: 'A', DUTY: '%'}.get(role, e.said.unit)
+        unit, more = e.said.unit if e.said.unit in SCALED_AS else usual, {}
         if UNITS['effort'].get(unit, 1.0) is None:
-            open_unit, more = unit, {'scale': 1e-3 if e.said.unit == 'mA' else 1.0}
+            open_unit, more = unit, {'scale': 1.0}
         elif unit not in _EFFORTS:
             unit = 'N' if joints[label] in hinted and hinted[joints[label]].slides else 'N m'
         found[joints[label]]['effort'] = e.place(unit, **more)
     if open_unit:
         guess.unsure.append(
-            f'The efforts are in {open_unit}: enter the torque of 1 {open_unit} in N m as `scale` '
-            'in the map.'
+            f'The efforts are in {open_unit}: enter the torque of 1 '
+            f'{SCALED_AS.get(open_unit, (open_unit,))[0]} in N m as `scale` in the map.'
         )
 
 

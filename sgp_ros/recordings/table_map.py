@@ -28,7 +28,8 @@ Keys of a quantity: `column`, `unit`, `index` (which column of a matrix in NPZ o
     value in SI = scale * (column in unit) + offset
 
 Units are those of `table_units.UNITS`. counts, A, V and % need a `scale` that leads to SI, or to
-the unit of effort that the robot states. A member of a MAT structure is written `data.q`.
+the unit of effort that the robot states; mA the one of A. A member of a MAT structure is written
+`data.q`.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ from sgp_ros.markup import YAMLError, load_yaml
 from sgp_ros.recordings.command_types import COMMAND_TYPES
 from sgp_ros.recordings.messages import JOINT_STATE
 from sgp_ros.recordings.table_files import Columns
-from sgp_ros.recordings.table_units import TIME_UNITS, UNITS
+from sgp_ros.recordings.table_units import SCALED_AS, TIME_UNITS, UNITS
 from sgp_ros.recordings.typestore import new_message
 from sgp_ros.strangers import read_text
 
@@ -256,7 +257,7 @@ class _Check:
         factor = units[unit]
         if factor is None and 'scale' not in content:
             self.problems.append(f'{place}: unit {unit} needs a scale that converts it to SI')
-        return 1.0 if factor is None else factor
+        return SCALED_AS.get(unit, (unit, 1.0))[1] if factor is None else factor
 
     def _number(self, place: str, content: dict[str, object], key: str, default: float) -> float:
         value = content.get(key, default)

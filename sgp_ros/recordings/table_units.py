@@ -22,10 +22,12 @@ UNITS: dict[str, dict[str, float | None]] = {
     'effort': {
         'N': 1.0, 'mN': 1e-3, 'kN': 1e3, 'N m': 1.0, 'Nm': 1.0, 'mN m': 1e-3, 'mNm': 1e-3,
         'kN m': 1e3, 'kNm': 1e3, 'N mm': 1e-3, 'N cm': 1e-2, 'kgf cm': _KGF * 1e-2, 'kgf': _KGF,
-        'A': None, 'V': None, '%': None, '‰': None, 'counts': None,
+        'A': None, 'mA': None, 'V': None, '%': None, '‰': None, 'counts': None,
     },
 }  # fmt: skip
 """Unit to its factor to SI, per quantity; None where only a `scale` can tell."""
+SCALED_AS = {'mA': ('A', 1e-3)}
+"""Units whose `scale` is that of another one, times a factor: torque constants are per A."""
 
 TIME_UNITS = {'s': 1_000_000_000, 'ms': 1_000_000, 'us': 1000, 'ns': 1}
 

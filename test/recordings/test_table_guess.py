@@ -308,6 +308,14 @@ def test_an_effort_in_another_unit_asks_for_the_torque_of_one(tmp_path, name, un
     np.testing.assert_allclose([s.effort for s in states], 100.0 * TAU)
 
 
+def test_the_factor_of_a_current_is_per_ampere_in_ma_too(tmp_path):
+    """As torque constants are stated; the log of a drive counts milliamperes."""
+    path = _npz(tmp_path, t=T, q=Q, iq_mA=1e3 * TAU)
+    summary, states, _ = _read(path, tmp_path)
+    assert any('torque of 1 A in' in said for said in summary.unsure)
+    np.testing.assert_allclose([s.effort for s in states], TAU)
+
+
 def _bench(q):
     keys = ('timestamp', 'position', 'speed', 'load')
     rows = np.column_stack([T, q, DQ[:, 0], TAU[:, 0]]).tolist()
