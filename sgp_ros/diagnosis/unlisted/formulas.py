@@ -75,12 +75,12 @@ NEAREST = {
 _OF_GATE = {gate: 'sign' if gate == 'soft' else gate for gate in UNITS}
 _WAVES = (0.15, 4.5)
 """Periods of a sine within the range that was seen, least and greatest."""
-_NARROWEST, _WIDEST = 0.03, 3.0
-"""Widths in parts of the range that was seen."""
 _WIDE = 5.0
 """Range in which some part of every formula is not zero, in parts of the greatest value."""
 _PIECES = 100
 """Of a curve, even."""
+_NARROWEST, _WIDEST = 1.0 / _PIECES, 3.0
+"""Widths in parts of the range that was seen; a curve shows nothing narrower than its pieces."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.diagnosis.unlisted.assertion import with_laws
 from sgp_ros.diagnosis.unlisted.beside import law_of
 from sgp_ros.diagnosis.unlisted.curves import Curve, follow, hats, left_out
+from sgp_ros.diagnosis.unlisted.formulas import Range
 from sgp_ros.diagnosis.unlisted.sentences import of_position, of_velocity
 from sgp_ros.physics.formula import read_formula
 from test.diagnosis.worlds import CHAINS, simulate
@@ -55,6 +56,10 @@ def _cushion(_t, q, v):
     return (-1.5 * max(q[0] - 0.3, 0.0) * max(v[0], 0.0),)
 
 
+def _valve(_t, q, v):
+    return (-0.8 * (1.0 + math.tanh((q[1] - 0.1) / 0.03)) * v[0], 0.0)
+
+
 def _cable(_t, q, _s):
     return 0.3 * math.exp(0.6 * q[0])
 
@@ -78,6 +83,10 @@ def _found(equations_for, links, **what):
          'a*dq[joint0]/(1 + (dq[joint0]/v0)**2) + d*tanh(dq[joint0]/v_s)',
          {'a': -0.8, 'v0': 1.5, 'd': -0.3}),
         pytest.param(
+            _valve, 2, '(a*tanh((q[joint1] - x0)/w0) + d)*dq[joint0]',
+            {'a': -0.8, 'x0': 0.1, 'd': -0.8}, marks=pytest.mark.long,
+        ),
+        pytest.param(
             _contact, 1, 'a*(max(q[joint0] - x0, 0)/r)**p0', {'p0': 1.5, 'x0': 0.3},
             marks=pytest.mark.long,
         ),
@@ -97,7 +106,7 @@ def _found(equations_for, links, **what):
             marks=pytest.mark.long,
         ),
     ],
-    ids=['log friction', 'brake and friction', 'contact', 'play', 'spring between', 'hose',
+    ids=['log friction', 'brake and friction', 'valve', 'contact', 'play', 'spring between', 'hose',
          'cushion'],
 )  # fmt: skip
 def test_laws_are_found_with_their_numbers(equations_for, force, links, formula, numbers):
@@ -142,6 +151,16 @@ def test_a_curve_says_what_a_formula_leaves_of_all_rows(factor):
     left = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
     assert straight.left + curve.rest == pytest.approx(left @ left, rel=1e-3)
     assert right.left + curve.rest == pytest.approx(1000 * 1e-4, rel=0.15)
+
+
+def test_a_gate_of_a_fiftieth_of_the_range_has_a_width():
+    """No end of what is searched decides what follows a curve that shows it."""
+    nodes, seen = np.linspace(-1.0, 1.0, 101), Range(-1.0, 1.0, 'rad')
+    curve = Curve(nodes, np.eye(101), np.tanh((nodes - 0.3) / 0.04), 0.0)
+    read = read_formula('a*tanh((q[X] - x0)/w0)', is_law=True)
+    found = follow(read, curve, {name: seen.ends(name)[:2] for name in ('x0', 'w0')})
+    assert found is not None
+    assert found.numbers['w0'] == pytest.approx(0.04, rel=1e-3)
 
 
 def test_a_force_between_nodes_is_judged_on_parts_left_out():
