@@ -16,9 +16,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numba import njit
 
-from sgp_ros.physics.motion import RecordedCommands
-from sgp_ros.physics.ripple import Ripple
-
 _SHARPEN = (1.0, -1 / 12, 1 / 90)
 LEAD_S = 1.0
 """Time around a stretch of which the commands count: longer than delays and lags of drives."""
@@ -100,7 +97,7 @@ class Drive:
         i = np.maximum(np.searchsorted(knots, times, side='right') - 1, 0)
         if time_constant <= 0.0:
             return u[i]
-        y = _lagged(knots, u, time_constant)
+        y = lagged(knots, u, time_constant)
         return u[i] + (y[i] - u[i]) * np.exp(-np.maximum(times - knots[i], 0.0) / time_constant)
 
 
@@ -150,106 +147,10 @@ class WindowDrive:
         if time_constant <= 0.0:
             return np.array([held])
         T = time_constant
-        y = _lagged(knots, u, T)
+        y = lagged(knots, u, T)
         behind = (y[i] - u[i]) * np.exp(-np.maximum(start - knots[i], 0.0) / T)
         E = -np.expm1(-h / T)
         return np.array([held + float(behind @ (T * (a * E + b * (T * E - h * (1.0 - E)))))])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Servo:
-    """A drive that holds position targets: `tau = kp (q_des - q) + kd (dq_des - dq) + tau_ff`.
-
-    It is computed in the drive on its own fresh measurements, so a delay is one of the targets.
-
-    Attributes:
-        targets: positions, then velocities, of all joints, (c, 2 k) [rad or m]; with recorded
-            gains these behind them, (c, 4 k) [N m/rad, N m s/rad].
-        step: of the grids [s].
-        starts: rows at which the grids begin.
-        kp, kd: (k,) gains [N m/rad, N m s/rad], or factors of recorded ones [1].
-        position, velocity: (n, k) on the grids.
-        feedforward: (n, k) [N m or N].
-        is_recorded: whether the gains come with the targets.
-        ripple: that the samples show of targets held between them; None for none.
-    """
-
-    targets: RecordedCommands
-    step: float
-    starts: tuple[int, ...]
-    kp: np.ndarray
-    kd: np.ndarray
-    position: np.ndarray
-    velocity: np.ndarray
-    feedforward: np.ndarray
-    is_recorded: bool = False
-    ripple: Ripple | None = None
-
-    @property
-    def values(self) -> np.ndarray:
-        """Efforts on the grids, (n, k) [N m or N]."""
-        return np.column_stack([self.effort(j) for j in range(len(self.kp))])
-
-    def effort(
-        self, joint: int, *, delay: float = 0.0, time_constant: float = 0.0,
-        characteristic: Callable[[np.ndarray], np.ndarray] | None = None,
-    ) -> np.ndarray:  # fmt: skip
-        """Return the effort of one joint on the grids, as `Drive.effort`."""
-        proportional, damping = self.parts(joint, delay)
-        u = proportional + damping + self.feedforward[:, joint]
-        if characteristic is not None:
-            u = characteristic(u)
-        if time_constant <= 0.0:
-            return u
-        parts = [_lagged(self.step * np.arange(len(x)), x, time_constant)
-                 for x in np.split(u, self.starts[1:])]  # fmt: skip
-        return np.concatenate(parts)
-
-    def changed(self, change: Callable[[np.ndarray], np.ndarray], later: float) -> Servo:
-        """Return the drive with other targets, some time later [s]."""
-        return replace(self, targets=self.targets.changed(change, later))
-
-    @property
-    def rows(self) -> int:
-        """Number n of points of all grids."""
-        return len(self.position)
-
-    def on(self, stretches: Sequence[slice]) -> Servo:
-        """Return the drive on some stretches of the rows, see `Drive.on`."""
-        pick = np.concatenate([np.arange(s.start, s.stop) for s in stretches])
-        ends = np.cumsum([s.stop - s.start for s in stretches])
-        return replace(
-            self, targets=self.targets.on(stretches), starts=(0, *map(int, ends[:-1])),
-            position=self.position[pick], velocity=self.velocity[pick],
-            feedforward=self.feedforward[pick],
-        )  # fmt: skip
-
-    def parts(self, joint: int, delay: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return what kp and kd make of one joint, (n,) each [N m or N]."""
-        k = len(self.kp)
-        error = self.targets.effort(joint, delay=delay) - self.position[:, joint]
-        rate = self.targets.effort(k + joint, delay=delay) - self.velocity[:, joint]
-        if self.ripple is not None:
-            shown = self.ripple.at(joint, delay)
-            error, rate = error + shown, rate + self._slope(shown)
-        kp, kd = self.kp[joint], self.kd[joint]
-        if self.is_recorded:
-            kp = kp * self.targets.effort(2 * k + joint, delay=delay)
-            kd = kd * self.targets.effort(3 * k + joint, delay=delay)
-        return servo_parts(kp, kd, error, rate)
-
-    def _slope(self, x: np.ndarray) -> np.ndarray:
-        """Return the derivative of x (n,) on the grids."""
-        parts = [np.gradient(part, self.step) if len(part) > 1 else np.zeros(len(part))
-                 for part in np.split(x, self.starts[1:])]  # fmt: skip
-        return np.concatenate(parts)
-
-
-def servo_parts(
-    kp: np.ndarray, kd: np.ndarray, error: np.ndarray, rate: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return what the gains of a drive make of an error and of its rate [N m or N]."""
-    return kp * error, kd * rate
 
 
 def _averaged(
@@ -270,7 +171,7 @@ def _averaged(
     single = U[i] + u[i] * since
     double = V[i] + U[i] * since + 0.5 * u[i] * since**2
     if time_constant > 0.0:
-        y = _lagged(knots, u, time_constant)
+        y = lagged(knots, u, time_constant)
         now = u[i] + (y[i] - u[i]) * np.exp(-np.maximum(since, 0.0) / time_constant)
         double = double - time_constant * (
             single - time_constant * (now - y[0]) - y[0] * (t - origin)
@@ -288,7 +189,7 @@ def _averaged(
 
 
 @njit(cache=True)
-def _lagged(knots: np.ndarray, u: np.ndarray, time_constant: float) -> np.ndarray:
+def lagged(knots: np.ndarray, u: np.ndarray, time_constant: float) -> np.ndarray:
     """Return the output of the lag when each command begins, (c,); it starts settled."""
     y = np.empty(len(u))
     y[0] = u[0]

@@ -34,7 +34,7 @@ class Ripple:
     Attributes:
         phase: (n,) part of h since the target in force, without a delay [1].
         hold: h, the time for which a target holds [s].
-        harmonics: (m, n, k) complex amplitudes [rad or m].
+        harmonics: (m, k, n) complex amplitudes [rad or m].
     """
 
     phase: np.ndarray
@@ -70,13 +70,15 @@ class Ripple:
             w = 2.0 * np.pi * m / h
             loop = np.diag(kp + 1j * w * kd) - w * w * mass
             answer = np.linalg.solve(loop, (kp * slope)[..., None])[..., 0]
-            found.append(h / (np.pi * m) * answer)
+            found.append(h / (np.pi * m) * answer.T)
         return cls((rows - times[at]) / h, h, np.array(found))
 
     def at(self, joint: int, delay: float) -> np.ndarray:
         """Return what the samples show of one joint behind targets of a delay, (n,) [rad or m]."""
         turns = np.exp(2j * np.pi * (self.phase - delay / self.hold))
-        powers = turns ** np.arange(1, len(self.harmonics) + 1)[:, None]
         before = np.arange(len(turns)) - math.ceil(delay / self.hold - 1e-6)
-        there = self.harmonics[:, np.clip(before, 0, len(turns) - 1), joint]
-        return np.asarray((powers * there).sum(axis=0).imag)
+        before = np.clip(before, 0, len(turns) - 1)
+        shown = np.zeros(len(turns), dtype=np.complex128)
+        for there in self.harmonics[::-1, joint]:
+            shown = (shown + there[before]) * turns
+        return np.asarray(shown.imag)

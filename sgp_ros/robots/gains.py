@@ -19,7 +19,7 @@ import yaml
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.markup import load_yaml
-from sgp_ros.physics.drive import servo_parts
+from sgp_ros.physics.servo import servo_parts
 from sgp_ros.strangers import GREATEST, is_usable, read_text
 
 _KEYS = ('kp', 'kd', 'feedforward')

@@ -13,10 +13,10 @@ from functools import cached_property
 import numpy as np
 
 from sgp_ros.physics.catalogue import EFFECTS
-from sgp_ros.physics.drive import Servo
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.motion import Commands, RecordedCommands
+from sgp_ros.physics.servo import Servo
 from sgp_ros.rigid.rigid_body import inverse_dynamics, mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
 

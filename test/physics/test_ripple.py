@@ -5,8 +5,9 @@ import pytest
 from scipy.linalg import expm
 
 from sgp_ros.batch.zero_phase import ZeroPhase
-from sgp_ros.physics.drive import Drive, Servo
+from sgp_ros.physics.drive import Drive
 from sgp_ros.physics.ripple import Ripple
+from sgp_ros.physics.servo import Servo
 
 _M, _FREQUENCY_HZ, _RATIO, _FINE = 0.3, 8.0, 0.8, 20
 KP = _M * (2.0 * np.pi * _FREQUENCY_HZ) ** 2

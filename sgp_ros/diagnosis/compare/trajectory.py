@@ -18,10 +18,11 @@ from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import EFFORT, POSITION, Event
 from sgp_ros.errors import RecordingError
-from sgp_ros.physics.drive import Drive, Servo
+from sgp_ros.physics.drive import Drive
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.motion import RecordedCommands
 from sgp_ros.physics.ripple import Ripple
+from sgp_ros.physics.servo import Servo
 from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.gains import Gains

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
-from sgp_ros.physics.drive import Servo
+from sgp_ros.physics.servo import Servo
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 _LINES = 16

@@ -21,8 +21,8 @@ from sgp_ros.diagnosis.explain.joint_search import built_up, by_joint, large, us
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import COMMAND_DELAY
-from sgp_ros.physics.drive import Servo
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.servo import Servo
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 _CARRYING = 3

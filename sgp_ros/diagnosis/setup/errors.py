@@ -15,7 +15,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.physics.catalogue import COMMAND_DELAY
-from sgp_ros.physics.drive import Servo
+from sgp_ros.physics.servo import Servo
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 BASE, ALL = 'base', 'all'

@@ -33,7 +33,7 @@ from sgp_ros.diagnosis.compare.volume import Loop, log_inertia, noisy_volume, pa
 from sgp_ros.diagnosis.criteria import FORCE_ACCURACY, INDEPENDENT_ROWS, SHAPE_ERROR
 from sgp_ros.diagnosis.setup.correction import Acting, Correction, delayed
 from sgp_ros.diagnosis.setup.unknowns import EVERYDAY, PLAIN, Agreement, Unknowns
-from sgp_ros.physics.drive import Servo
+from sgp_ros.physics.servo import Servo
 from sgp_ros.rigid.rigid_body import mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
