@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 from sgp_ros.diagnosis.compare.equations import Equations
@@ -71,13 +71,22 @@ def common_models(real: Side, sim: Side, *, is_free: bool) -> tuple[Model, Model
         is_free: whether bodies may differ from those of the robot file.
     """
 
-    def fitted(effects: Iterable[EffectAt]) -> tuple[float, tuple[Model, Model]]:
+    def fitted(effects: Collection[EffectAt]) -> tuple[float, tuple[Model, Model]]:
         ours, theirs = (side.fitted(tuple(effects), is_free=is_free) for side in (real, sim))
         return real.scale.worth(ours) + sim.scale.worth(theirs), (ours, theirs)
 
     union = {s.key: s for s in (*sim.named, *real.named)}
     structures = {tuple(s.key for s in x): x for x in (real.named, sim.named, union.values())}
-    best = max(map(fitted, structures.values()), key=lambda x: x[0])[1]
+    most = max(map(fitted, structures.values()), key=lambda x: x[0])
+    both = {s.key for s in real.named} & {s.key for s in sim.named}
+    while True:  # laws named on one side each may be one
+        effects = most[1][0].effects
+        fewer = [fitted([e for e in effects if e is not s]) for s in effects if s.key not in both]
+        less = max(fewer, key=lambda x: x[0], default=most)
+        if less[0] <= most[0]:
+            break
+        most = less
+    best = most[1]
     wrong = _impossible(best)
     if wrong:
         everyday = [EffectAt(e, Place(s.place.joint)) for s in wrong for e in PLAIN]

@@ -66,6 +66,23 @@ def test_a_law_that_one_side_hardly_has_stays():
     assert _names(models) == [{'stribeck_friction'}] * 2
 
 
+def test_one_law_that_each_side_names_otherwise_is_there_once():
+    """Dry friction that falls with the speed includes dry friction that does not."""
+    real = _side('real', (_at('coulomb_friction'), _at('viscous_friction')), 0.001)
+    sim = _side('sim', (_at('stribeck_friction', [0.4]), _at('constant_load')), 0.001)
+
+    def worth(model):
+        names = {s.name.removesuffix('_friction') for s in model.effects}
+        kinds = {'coulomb', 'stribeck'} & names, {'viscous'} & names, {'constant_load'} & names
+        return 10.0 * sum(map(bool, kinds)) - len(names)
+
+    real.scale = sim.scale = SimpleNamespace(worth=worth)
+    ours, theirs = _names(common_models(real, sim, is_free=True))
+    assert ours == theirs
+    assert {'viscous_friction', 'constant_load'} < ours
+    assert len(ours) == 3
+
+
 def test_shapes_of_laws_that_only_the_other_side_names_stay(equations_for, viscous):
     """An end stop that the motion of a simulation does not reach has no place of its own there."""
     _, equations = equations_for(viscous)
