@@ -21,7 +21,13 @@ from sgp_ros.diagnosis.decide.differences import in_halves
 from sgp_ros.diagnosis.gathered import Recordings
 from sgp_ros.diagnosis.result import Equivalent
 from sgp_ros.diagnosis.setup.evidence import Probe
-from sgp_ros.diagnosis.setup.said import equal_errors, error_finding, price_of, setup_advice
+from sgp_ros.diagnosis.setup.said import (
+    clear,
+    equal_errors,
+    error_finding,
+    price_of,
+    setup_advice,
+)
 from sgp_ros.diagnosis.setup.search import Connection, search
 from sgp_ros.diagnosis.unlisted.statement import extended
 from sgp_ros.physics.catalogue import TORQUE_GAIN
@@ -51,12 +57,12 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
     known = plain
     if recordings.learned.gains is not None:
         # gains can be separated from bodies only where these are known
-        by_gains = search(Probe(recordings.learned, tree, bandwidth, knows_bodies=True))
+        by_gains = clear(search(Probe(recordings.learned, tree, bandwidth, knows_bodies=True)))
         known = _connected(plain, by_gains, tree, each)
         is_body = plain.verdict == 'parameters_only'
         if by_gains.is_enough or (known.findings and not is_body):
             return known
-    found = search(Probe(recordings.learned, tree, bandwidth))
+    found = clear(search(Probe(recordings.learned, tree, bandwidth)))
     if not known.findings:
         return _connected(plain, found, tree, each)
     # what other bodies leave is too small to tell them from other gains

@@ -12,6 +12,7 @@ from sgp_ros.diagnosis.compare.bodies import SPREAD
 from sgp_ros.diagnosis.criteria import (
     ALIKE,
     DOUBTED,
+    INTERVAL,
     MOST_CERTAIN,
     NEARLY,
     PER_EFFECT,
@@ -22,7 +23,7 @@ from sgp_ros.diagnosis.criteria import (
 )
 from sgp_ros.diagnosis.result import Equivalent, Finding, Location, Parameter
 from sgp_ros.diagnosis.setup.errors import EFFORT_SCALE
-from sgp_ros.diagnosis.setup.search import Connection
+from sgp_ros.diagnosis.setup.search import Connection, Tried
 from sgp_ros.physics.catalogue import TORQUE_GAIN
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.motion import Structure
@@ -46,21 +47,36 @@ def setup_advice(found: Connection) -> str:
     return f'Check the set-up: {errors} would reduce the residual, but not enough to be asserted.'
 
 
-def error_finding(found: Connection, number: int, gain: float) -> Finding:
-    """Return an error with its probability against its rivals and against no error.
+def clear(found: Connection) -> Connection:
+    """Return the errors with a number whose 95 % interval leaves out that of no error."""
+    for i in reversed(range(len(found.errors))):
+        e = found.errors[i]
+        beyond = np.abs(e.numbers - e.hypothesis.neutral) > INTERVAL * _deviations(e)
+        if e.numbers.size and not beyond.any():
+            found = found.without(i)
+    return found
+
+
+def _deviations(e: Tried) -> np.ndarray:
+    """Return the standard deviations of the numbers of an error, (m,).
 
     Gains of drives are found with the bodies of the robot file, whose errors are theirs too.
     """
+    of_bodies = STATED_ERROR * SPREAD if e.hypothesis.is_of_gains else 0.0
+    return np.asarray(np.hypot(e.std, of_bodies * e.numbers))
+
+
+def error_finding(found: Connection, number: int, gain: float) -> Finding:
+    """Return an error with its probability against its rivals and against no error."""
     e = found.errors[number]
     rivals = [r.worth - e.worth for r in found.rivals[number]]
     odds = math.exp(-TEMPER * gain) + math.exp(-TEMPER * e.needed)
     odds += sum(math.exp(min(TEMPER * r, 50.0)) for r in rivals)
-    of_bodies = STATED_ERROR * SPREAD if e.hypothesis.is_of_gains else 0.0
-    deviations = np.where(e.std > 0.0, np.hypot(e.std, of_bodies * e.numbers), np.inf)
+    stds = np.where((e.std > 0.0) & np.isfinite(e.std), _deviations(e), np.nan)
     numbers: dict[str, Parameter] = {
-        name: Parameter(float(x), float(s) if math.isfinite(s) else None, unit)
+        name: Parameter(float(x), None if math.isnan(s) else float(s), unit)
         for name, x, s, unit in zip(
-            e.hypothesis.names, e.numbers, deviations, e.hypothesis.units, strict=True
+            e.hypothesis.names, e.numbers, stds, e.hypothesis.units, strict=True
         )
     }
     words = {name: Parameter(word) for name, word in e.hypothesis.words.items()}

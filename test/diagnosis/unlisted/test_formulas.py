@@ -106,8 +106,8 @@ def _found(equations_for, links, **what):
             marks=pytest.mark.long,
         ),
     ],
-    ids=['log friction', 'brake and friction', 'valve', 'contact', 'play', 'spring between', 'hose',
-         'cushion'],
+    ids=['log friction', 'brake and friction', 'valve', 'contact', 'play', 'spring between',
+         'hose', 'cushion'],
 )  # fmt: skip
 def test_laws_are_found_with_their_numbers(equations_for, force, links, formula, numbers):
     """Of one joint, of what it did before, of two joints; alone and in a sum."""
