@@ -88,9 +88,7 @@ def against_simulation(
         share = (force**2).mean(axis=0) / (power if force.ndim == 2 else power[joint])
         finding = replace(finding, share=float(np.max(share)))
         is_different = finding.share > COUNTED_SHARE and finding.probability > 0.5
-        (findings if is_different else shared).append(
-            _with_reason(finding, is_different=is_different)
-        )
+        (findings if is_different else shared).append(_judged(finding, is_different=is_different))
     found = _reference(equations, findings, shared, ours.w - theirs.w)
     bodies = parameter_errors(equations, ours, unstated, theirs) if found.has_other_bodies else ()
     return replace(found, bodies=bodies)
@@ -128,7 +126,7 @@ def against_model(
             force = here.force(motion) - there.force(motion)
         share = float(((force**2).mean(axis=0) / power).max())
         is_different = share > COUNTED_SHARE and finding.probability > 0.5
-        finding = _with_reason(replace(finding, share=share), is_different=is_different)
+        finding = _judged(replace(finding, share=share), is_different=is_different)
         (findings if is_different else shared).append(finding)
     with_all = real.estimates(models[1]) if theirs else {}
     for there in theirs.values():
@@ -139,7 +137,7 @@ def against_model(
             findings.append(_absent(there, equations, apart, share))
         else:  # too little to be seen, or bodies say the same: the simulation may be right
             said = stated_parameters(there, motion, {})
-            found = _plain(there, said, equations, MOST_CERTAIN)
+            found = _plain(there, said, equations, 1.0 if share <= COUNTED_SHARE else 1.0 - apart)
             shared.append(replace(found, share=share, in_simulation=said))
     return _reference(equations, findings, shared, ours.w)
 
@@ -154,7 +152,7 @@ def _reference(
     findings.sort(key=lambda f: -f.probability)
     verdict = 'missing_physics' if findings else calm
     stated = [f.probability for f in findings]
-    stated = stated or [1.0 - f.probability for f in shared if f.share > COUNTED_SHARE]
+    stated = stated or [f.probability for f in shared if f.share > COUNTED_SHARE]
     certainty = min([*stated, MOST_CERTAIN])
     return Reference(verdict, tuple(findings), tuple(shared), certainty, is_other)
 
@@ -168,10 +166,13 @@ def _sized(found: Finding, law: EffectAt) -> Finding:
     return replace(found, in_simulation=theirs, difference=apart)
 
 
-def _with_reason(found: Finding, *, is_different: bool) -> Finding:
-    """Return a finding with the reason why it is shared although its numbers differ."""
-    is_slight = not is_different and found.probability > 0.5
-    return replace(found, why='they differ by too little to count') if is_slight else found
+def _judged(found: Finding, *, is_different: bool) -> Finding:
+    """Return a finding; if shared, as probable as it is alike, or why its numbers may differ."""
+    if is_different:
+        return found
+    if found.probability > 0.5:
+        return replace(found, why='they differ by too little to count')
+    return replace(found, probability=min(1.0 - found.probability, MOST_CERTAIN))
 
 
 def _plain(

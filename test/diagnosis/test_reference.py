@@ -8,7 +8,7 @@ import pytest
 
 from sgp_ros.cli import main
 from sgp_ros.diagnosis.decide.differences import decide_several
-from sgp_ros.diagnosis.reference import _sized, against_model, against_simulation
+from sgp_ros.diagnosis.reference import _judged, _sized, against_model, against_simulation
 from sgp_ros.diagnosis.result import Finding, Location, Parameter
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
@@ -28,6 +28,7 @@ def test_a_law_of_the_simulation_that_bodies_may_be_is_not_said_to_be_absent(equ
     found = against_model(equations, several, [rotor, rub])
     assert [f.effect for f in found.findings] == ['viscous_friction']
     assert [f.effect for f in found.shared] == ['armature']
+    assert found.shared[0].probability > 0.5
 
 
 @pytest.mark.parametrize('is_same', [True, False])
@@ -42,6 +43,21 @@ def test_bodies_are_compared_with_those_of_the_simulation(equations_for, heavy, 
     assert found.verdict == ('no_mismatch' if is_same else 'parameters_only')
     assert bool(found.bodies) is not is_same
     assert found.findings == ()
+
+
+@pytest.mark.parametrize(
+    ('apart', 'is_different', 'probability', 'has_reason'),
+    [(0.9, True, 0.9, False), (0.9, False, 0.9, True), (0.05, False, 0.95, False),
+     (0.0, False, 0.99, False)],
+)  # fmt: skip
+def test_what_both_have_is_as_probable_as_it_is_alike(
+    apart, is_different, probability, has_reason
+):
+    """A difference that is seen, but counts too little, is said with its reason."""
+    found = Finding('knee', 'armature', {}, Location(), 1.0, apart, 1.0)
+    judged = _judged(found, is_different=is_different)
+    assert judged.probability == pytest.approx(probability)
+    assert bool(judged.why) is has_reason
 
 
 def test_a_law_that_the_simulation_is_not_known_to_have_has_no_place_there():
