@@ -227,23 +227,23 @@ class Equations:
         pushed = (replace(still, acceleration=np.tile(unit, (len(q), 1))) for unit in units)
         return still, *pushed
 
-    def inertia(self, w: np.ndarray, added: np.ndarray) -> np.ndarray:
+    def inertia(self, w: np.ndarray, added: np.ndarray, passed: np.ndarray) -> np.ndarray:
         """Return the log of the inertia at each joint, relative to the nominal one, (k,).
 
-        Of changed bodies and what is added to M, see `log_inertia`. The motion is measured, so a
-        model of other inertia must not gain from residuals in smaller units of effort, except
-        from noise of measured efforts, and as far as gains of drives leave it, see `Loop`.
+        Of changed bodies and what is added to M. The motion is measured, so a model of other
+        inertia must not gain from smaller residuals, but of noise and behind gains, see `Loop`.
 
         Args:
             w: (p,) instants and change of the bodies.
             added: (k, k), or (`POSES`, k, k) for the poses [kg m^2 or kg].
+            passed: (k,) what motors pass on of changes of what their drives ask for.
         """
         if self.motion.is_static:  # efforts are measured there, no motion is predicted
             return np.zeros(self.motion.tree.size)
         tree = self.with_bodies(self.poses[0], w).tree
         M = mass_matrix(tree, tree.parameters, self.poses[0].position) + added
         log = log_inertia(M, self._nominal_mass)
-        return noisy_volume(self.loop.volume(log), self.noise_part)
+        return noisy_volume(self.loop.volume(log, passed, passed), self.noise_part)
 
     @cached_property
     def _nominal_mass(self) -> np.ndarray:

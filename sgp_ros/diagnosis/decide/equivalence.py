@@ -192,7 +192,7 @@ def _without_prior(equations: Equations, parameters: Model) -> Model:
     w = np.linalg.lstsq(
         base.reshape(N * k, p), (equations.d / parameters.sigma).ravel(), rcond=1e-6
     )[0]
-    inertia = equations.inertia(w, np.zeros((k, k)))
+    inertia = equations.inertia(w, np.zeros((k, k)), np.ones(k))
     return replace(
         parameters, w=w, inertia=inertia,
         residual=equations.d - equations.force_of(w),

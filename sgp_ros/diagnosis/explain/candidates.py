@@ -19,8 +19,13 @@ from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.inertia_slope import InertiaSlope
 from sgp_ros.diagnosis.explain.regression import Columns, dry_joints
 from sgp_ros.diagnosis.explain.shape_search import Bench, searched
+from sgp_ros.physics.catalogue import TORQUE_GAIN
 from sgp_ros.physics.effect_at import EffectAt, in_series
 from sgp_ros.physics.elasticity import with_rotors
+from sgp_ros.physics.servo import Servo
+
+_SMALL = 1e-3
+"""Change of a command for a slope, in parts of its root mean square."""
 
 
 def fit(
@@ -110,6 +115,23 @@ def added_inertia(candidates: Sequence[EffectAt], equations: Equations) -> np.nd
     return added
 
 
+def passed_on(candidates: Sequence[EffectAt], equations: Equations) -> np.ndarray:
+    """Return what motors pass on of changes of what drives with gains ask for, (k,) factors."""
+    motion = equations.motion
+    passed = np.ones(motion.tree.size)
+    if not isinstance(motion.drive, Servo):
+        return passed
+    for s in candidates:
+        change = s.characteristic
+        if s.effect is TORQUE_GAIN:
+            passed[s.place.joint] *= abs(1.0 + float(s.coefficients[0]))
+        elif change is not None:
+            u = motion.effort[:, s.place.joint]
+            h = _SMALL * max(float(np.sqrt((u**2).mean())), 1e-300)
+            passed[s.place.joint] *= float(np.abs(change(u + h) - change(u - h)).mean()) / (2 * h)
+    return passed
+
+
 def _solved(
     bench: Bench, columns: Columns, candidates: tuple[EffectAt, ...], w_before: np.ndarray | None
 ) -> Model:
@@ -128,7 +150,7 @@ def _solved(
     w = frame.parameters(left)
     residual = left - equations.force_of(w)
     mean = (residual**2).mean(axis=0)
-    inertia = equations.inertia(w, added_inertia(placed, equations))
+    inertia = equations.inertia(w, added_inertia(placed, equations), passed_on(placed, equations))
     variance = mean + floors(equations, inertia)
     N = len(residual)
     size = sum(len(s.shape) for s in candidates) + len(c)

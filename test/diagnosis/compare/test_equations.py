@@ -171,12 +171,12 @@ def test_more_inertia_costs_what_its_determinant_says(equations_for, perfect):
     _, equations = equations_for(perfect[1])
     link = CHAINS[1][0]
     inertia = link.inertia + link.mass * link.centre**2
-    w = np.zeros(10)
-    assert equations.inertia(w, np.zeros((1, 1))) == pytest.approx(0.0, abs=1e-12)
-    assert equations.inertia(w, np.full((1, 1), inertia)) == pytest.approx(np.log(2.0))
-    assert equations.inertia(w, np.full((1, 1), -2.0 * inertia)) == -np.inf
+    w, one = np.zeros(10), np.ones(1)
+    assert equations.inertia(w, np.zeros((1, 1)), one) == pytest.approx(0.0, abs=1e-12)
+    assert equations.inertia(w, np.full((1, 1), inertia), one) == pytest.approx(np.log(2.0))
+    assert equations.inertia(w, np.full((1, 1), -2.0 * inertia), one) == -np.inf
     w[0] = 1.0
-    assert equations.inertia(w, np.zeros((1, 1))) == pytest.approx(np.log(1.25))
+    assert equations.inertia(w, np.zeros((1, 1)), one) == pytest.approx(np.log(1.25))
 
 
 def test_floors_are_those_of_the_inertia_that_the_efforts_show(equations_for, perfect, tmp_path):

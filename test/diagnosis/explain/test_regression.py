@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.compare import equations as compared
 from sgp_ros.diagnosis.criteria import INDEPENDENT_ROWS
-from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.candidates import fit, passed_on
 from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.regression import Columns
@@ -17,6 +18,7 @@ from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
+from sgp_ros.physics.servo import Servo
 from sgp_ros.rigid.rigid_body import torque_regressor
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
@@ -205,3 +207,21 @@ def test_an_inertia_counts_only_where_its_joint_moves(equations_for, perfect):
     assert resting.log_inertia == pytest.approx(0.75 * resting.inertia[0], rel=1e-3)
     price = len(equations.d) * (moving.log_inertia - resting.log_inertia)
     assert moving.score - resting.score == pytest.approx(price)
+
+
+@pytest.mark.parametrize('has_gains', [True, False])
+def test_a_motor_that_passes_nothing_on_leaves_no_stiffness(has_gains):
+    """A drive at its limit does not hold the motion, nor does one whose motor gives nothing."""
+    effort = np.random.default_rng(0).normal(size=(200, 4))
+    servo = Servo(None, 0.01, (0,), np.ones(4), np.ones(4), effort, effort, effort)
+    motion = SimpleNamespace(
+        drive=servo if has_gains else None, effort=effort, tree=SimpleNamespace(size=4)
+    )
+    half = replace(_candidate('torque_gain', 1), coefficients=np.array([-0.5]))
+    laws = [
+        half,
+        _candidate('saturation', 2, [1e-9]),
+        _candidate('saturation', 3, [9.0]),
+    ]
+    passed = passed_on(laws, SimpleNamespace(motion=motion))
+    assert passed == pytest.approx([1.0, 0.5, 0.0, 1.0] if has_gains else [1.0] * 4, abs=1e-6)
