@@ -132,7 +132,7 @@ class Equations:
     @cached_property
     def effort(self) -> np.ndarray:
         """Efforts behind the filter, (N, k) [N m or N]."""
-        return self.filter(self.motion.effort)
+        return self.filter(self.motion.effort * self.moving)
 
     @property
     def base(self) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.explain.credibility import _delivers, is_credible, shows_waves
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
@@ -25,6 +26,18 @@ def test_a_motor_delivers_what_it_was_commanded(equations_for, perfect, times, c
     assert gain == pytest.approx(1.0 / times, rel=0.02)
     assert _delivers(model) == credible
     assert is_credible(model) == credible
+
+
+def test_a_motor_that_is_off_delivers_nothing_where_its_joint_rests_either(equations_for, perfect):
+    """Rows in which friction may hold the joint count neither as commanded nor as delivered."""
+    _, equations = equations_for(perfect[1])
+    moving = np.ones_like(equations.moving)
+    moving[: len(moving) // 3] = 0.0
+    held = replace(equations, moving=moving)
+    model = fitted(held, 'torque_gain')
+    all_of_it = Columns(held).local(model.effects[0], held, held.motion)[..., 0]
+    assert _delivers(replace(model, parts=(-0.5 * all_of_it,)))
+    assert not _delivers(replace(model, parts=(-all_of_it,)))
 
 
 @pytest.mark.parametrize(('periods', 'shown'), [(1.0, True), (8.0, True), (300.0, False)])
