@@ -131,7 +131,7 @@ class Equations:
 
     @cached_property
     def effort(self) -> np.ndarray:
-        """Efforts behind the filter, (N, k) [N m or N]."""
+        """Efforts behind the filter while joints may move, (N, k) [N m or N]."""
         return self.filter(self.motion.effort * self.moving)
 
     @property

@@ -82,15 +82,19 @@ def _delivers(model: Model) -> bool:
     A law that takes nearly all of a command away leaves the motion as unexplained as it was: the
     command is in another unit.
     """
-    equations = model.frame.equations
     laws = [s.place.joint for s in model.effects if s.effect.site == MOTOR and s.place.joint >= 0]
-    if not laws:
-        return True
-    acting = equations.effort.copy()
+    return bool((acting_share(model) > COUNTED_SHARE)[laws].all())
+
+
+def acting_share(model: Model) -> np.ndarray:
+    """Return what motors deliver of what is asked for while joints may move, (k,) mean squares."""
+    asked = model.frame.equations.effort
+    acting = asked.copy()
     for s, part in zip(model.effects, model.parts, strict=True):
         if s.effect.site == MOTOR:
             add_force(acting, s.place.joint, part)
-    return bool(((acting**2).mean(axis=0) > COUNTED_SHARE * equations.power)[laws].all())
+    given, wanted = ((x**2).mean(axis=0) for x in (acting, asked))
+    return np.asarray(np.divide(given, wanted, out=np.ones_like(given), where=wanted > 0.0))
 
 
 def is_needed(s: EffectAt, equations: Equations) -> bool:

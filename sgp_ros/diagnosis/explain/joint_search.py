@@ -16,7 +16,7 @@ import numpy as np
 from sgp_ros.diagnosis.compare.settled import shows
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, SLIGHT_REST
 from sgp_ros.diagnosis.explain.candidates import fit
-from sgp_ros.diagnosis.explain.credibility import gain, is_credible
+from sgp_ros.diagnosis.explain.credibility import acting_share, gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.growth import (
     Block,
@@ -89,7 +89,8 @@ def usual(
         columns: of the recording.
         base: without effects.
         first: effects beside them.
-        least: share of the mean squared effort that each must have.
+        least: share of the mean squared effort that each must have; of the effort that the motor
+            delivers, where a late one asks for more.
     """
     motion = base.frame.equations.motion
     effects = first + tuple(
@@ -104,7 +105,8 @@ def usual(
         pairs = list(zip(model.effects, model.filtered_shares, strict=True))
         kept = [s for s, _ in pairs if s.is_possible(motion)]
         if len(kept) == len(pairs):
-            kept = [s for s, share in pairs if share > least]
+            seen = np.minimum(acting_share(model), 1.0)
+            kept = [s for s, x in pairs if x > least * (s.place.joint < 0 or seen[s.place.joint])]
         if len(kept) == len(pairs):
             return model
         effects = tuple(EffectAt(s.effect, s.place, s.shape) for s in kept)

@@ -18,7 +18,7 @@ from sgp_ros.diagnosis.criteria import (
     SLIGHT_REST,
 )
 from sgp_ros.diagnosis.decide.cross_validation import support
-from sgp_ros.diagnosis.explain import growth
+from sgp_ros.diagnosis.explain import growth, joint_search
 from sgp_ros.diagnosis.explain.candidates import fit, split
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import beyond_plain, floors
@@ -235,6 +235,15 @@ def test_several_waves_are_found_at_one_joint(equations_for):
     assert is_credible(both)
     near = both.effects[0].with_shape(both.effects[1].shape + 0.1)
     assert not is_credible(replace(both, effects=(near, both.effects[1])))
+
+
+def test_usual_laws_count_where_the_motor_delivers_little_of_what_is_asked(monkeypatch, equations):
+    """A late target asks for many times the effort that moves the robot."""
+    columns = Columns(equations)
+    base = fit(columns, (), np.sqrt((equations.d**2).mean(axis=0)), is_free=True)
+    assert usual(columns, base, least=1.0).effects == ()
+    monkeypatch.setattr(joint_search, 'acting_share', lambda _model: np.full(2, 1e-3))
+    assert usual(columns, base, least=1.0).effects != ()
 
 
 def test_the_usual_laws_of_every_joint_are_those_that_can_be_there(equations):
