@@ -15,7 +15,7 @@ instants of new targets, and by more at other phases.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -72,6 +72,10 @@ class Ripple:
             answer = np.linalg.solve(loop, (kp * slope)[..., None])[..., 0]
             found.append(h / (np.pi * m) * answer.T)
         return cls((rows - times[at]) / h, h, np.array(found))
+
+    def on(self, pick: np.ndarray) -> Ripple:
+        """Return the ripple at some of the samples, by their indices."""
+        return replace(self, phase=self.phase[pick], harmonics=self.harmonics[:, :, pick])
 
     def at(self, joint: int, delay: float) -> np.ndarray:
         """Return what the samples show of one joint behind targets of a delay, (n,) [rad or m]."""

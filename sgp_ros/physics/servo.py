@@ -84,6 +84,7 @@ class Servo:
             self, targets=self.targets.on(stretches), starts=(0, *map(int, ends[:-1])),
             position=self.position[pick], velocity=self.velocity[pick],
             feedforward=self.feedforward[pick],
+            ripple=None if self.ripple is None else self.ripple.on(pick),
         )  # fmt: skip
 
     def parts(self, joint: int, delay: float = 0.0) -> tuple[np.ndarray, np.ndarray]:

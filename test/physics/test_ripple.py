@@ -47,6 +47,23 @@ def test_a_drive_is_right_once_the_ripple_is_known(delay_steps):
     assert left[1] < left[0] / 3.0
 
 
+def test_stretches_of_a_recording_keep_their_ripple():
+    """Long recordings are looked at in stretches, each with rows before it that are not used."""
+    t, delay = np.arange(400) / 50.0, 0.05
+    targets = np.sin(3.0 * t)[:, None]
+    gains, mass = (np.array([KP]), np.array([KD])), np.full((400, 1, 1), _M)
+    ripple = Ripple.of(t, targets, t, 0.02, gains, mass)
+    assert ripple is not None
+    commands = Drive(t, np.column_stack([targets, 0.0 * t]), ((0.0, 400),), 0.02)
+    servo = Servo(commands, 0.02, (0,), *gains, 0.9 * targets, 0.0 * targets, 0.0 * targets,
+                  ripple=ripple)  # fmt: skip
+    stretches = slice(60, 140), slice(250, 350)
+    part, whole = servo.on(stretches).effort(0, delay=delay), servo.effort(0, delay=delay)
+    for s, at in zip(stretches, (0, 80), strict=True):
+        np.testing.assert_allclose(part[at + 10 : at + s.stop - s.start - 10],
+                                   whole[s.start + 10 : s.stop - 10], atol=1e-9 * KP)  # fmt: skip
+
+
 def test_fast_samples_show_no_ripple():
     """Nor do samples at another rate than that of the targets, which see all phases."""
     t = np.arange(1000) / 500.0
