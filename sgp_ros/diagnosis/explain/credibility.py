@@ -83,7 +83,7 @@ def _delivers(model: Model) -> bool:
     command is in another unit.
     """
     laws = [s.place.joint for s in model.effects if s.effect.site == MOTOR and s.place.joint >= 0]
-    return bool((acting_share(model) > COUNTED_SHARE)[laws].all())
+    return not laws or bool((acting_share(model) > COUNTED_SHARE)[laws].all())
 
 
 def acting_share(model: Model) -> np.ndarray:
