@@ -72,13 +72,10 @@ def error_finding(found: Connection, number: int, gain: float) -> Finding:
     rivals = [r.worth - e.worth for r in found.rivals[number]]
     odds = math.exp(-TEMPER * gain) + math.exp(-TEMPER * e.needed)
     odds += sum(math.exp(min(TEMPER * r, 50.0)) for r in rivals)
-    stds = np.where((e.std > 0.0) & np.isfinite(e.std), _deviations(e), np.nan)
-    numbers: dict[str, Parameter] = {
-        name: Parameter(float(x), None if math.isnan(s) else float(s), unit)
-        for name, x, s, unit in zip(
-            e.hypothesis.names, e.numbers, stds, e.hypothesis.units, strict=True
-        )
-    }
+    stds = [float(s) if 0.0 < own < math.inf else None
+            for own, s in zip(e.std, _deviations(e), strict=True)]  # fmt: skip
+    named = zip(e.hypothesis.names, e.numbers, stds, e.hypothesis.units, strict=True)
+    numbers = {name: Parameter(float(x), std, unit) for name, x, std, unit in named}
     words = {name: Parameter(word) for name, word in e.hypothesis.words.items()}
     return Finding(
         e.hypothesis.joint, e.hypothesis.effect, {**numbers, **words}, Location(), gain,
