@@ -93,8 +93,8 @@ def test_gains_are_asserted_only_where_bodies_do_not_explain_as_much(
     }
     for name, stub in {
         'compared': lambda *_: plain, 'choose_bandwidth': lambda *_: None,
-        'Probe': lambda *_, knows_bodies=False: knows_bodies, 'search': found.get,
-        'clear': lambda found: found,
+        'Probe': lambda *_, knows_bodies=False: knows_bodies, 'search': lambda probe: probe,
+        'clear': found.get,
         '_connected': lambda plain, found, *_: replace(plain, findings=found.errors),
     }.items():  # fmt: skip
         monkeypatch.setattr(connecting, name, stub)
