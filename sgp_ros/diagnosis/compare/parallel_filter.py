@@ -70,6 +70,10 @@ class ParallelFilter:
         found = _weighed(self.taps, x.reshape(len(x), -1), self.rows - len(self.taps) // 2)
         return found.reshape(len(found), *x.shape[1:])
 
+    def at(self, rows: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Return x (n, c) filtered, at rows (N,) that lie half a filter within their stretch."""
+        return _weighed(self.taps, x, rows - len(self.taps) // 2)
+
     def blocks(self, most: int) -> Iterator[tuple[slice, slice]]:
         """Yield rows in, and the rows out that follow from them, `most` of these at a time."""
         half, at = len(self.taps) // 2, 0

@@ -7,6 +7,7 @@ the origins of joints displaced in the axes of their parent links.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,9 +35,9 @@ class Acting:
         parts = (kp * self.proportional) ** 2 + (kd * self.damping) ** 2 + self.other**2
         return np.asarray(np.maximum(parts.mean(axis=0), 1e-300))
 
-    def rows(self, rows: np.ndarray) -> Acting:
-        """Return some of the rows."""
-        return Acting(self.proportional[rows], self.damping[rows], self.other[rows])
+    def each(self, change: Callable[[np.ndarray], np.ndarray]) -> Acting:
+        """Return the parts (n, k), each changed."""
+        return Acting(change(self.proportional), change(self.damping), change(self.other))
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,10 @@ place of bodies and friction. Viscous friction is left out there: with `kd` it i
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -43,6 +46,8 @@ _STRETCHES = 4
 """Parts of the recording, spread evenly, that are looked at."""
 _PER_PERIOD = 8.0
 """Rows per period of the cut-off before the filter."""
+_WIDE = 2.5
+"""Cut-off before rows are left out, by that of the filter: motion passes, what would alias not."""
 _ROUNDS = 4
 _KEPT = 50
 """Clock offsets of which the efforts are remembered."""
@@ -71,7 +76,7 @@ class Probe:
 
     Attributes:
         full: its motion at the full rate.
-        motion: the same, thinned.
+        motion: the same, smoothed so that no noise is aliased, and thinned.
     """
 
     def __init__(
@@ -80,15 +85,17 @@ class Probe:
         motion = observe(raw, tree, bandwidth)
         every = max(1, int(1.0 / (raw.step * _PER_PERIOD * bandwidth.cutoff)))
         self._raw, self.every = raw, every
-        kept = _spread(raw, every)
+        wide = _WIDE * bandwidth.cutoff if every > 1 and not motion.is_static else math.inf
+        smooth = ParallelFilter(1.0 / raw.step, wide, raw.segments)
+        kept = _spread(raw.segments, every, len(smooth.taps) // 2)
         ends = np.cumsum([len(rows) for rows in kept])
         segments = [slice(int(e) - len(rows), int(e)) for e, rows in zip(ends, kept, strict=True)]
-        self.rows = np.concatenate(kept)
-        pick = self.rows
+        pick = np.concatenate(kept)
+        thinned = self._thinned = partial(smooth.at, pick)
         self.motion = replace(
             motion, time=motion.time[pick], step=motion.step * every,
-            position=motion.position[pick], velocity=motion.velocity[pick],
-            acceleration=motion.acceleration[pick], effort=motion.effort[pick], drive=None,
+            position=thinned(motion.position), velocity=thinned(motion.velocity),
+            acceleration=thinned(motion.acceleration), effort=thinned(motion.effort), drive=None,
             starts=tuple(s.start for s in segments),
         )  # fmt: skip
         self.full = motion
@@ -104,8 +111,7 @@ class Probe:
         cancelled = np.maximum(inertial / self.power - 1.0, 0.0)
         self._inaccuracy = np.minimum(FORCE_ACCURACY**2 * cancelled, _MOST_INACCURATE)
         d = self.motion.nominal_effort - self.motion.effort - self.motion.stated_force
-        # rows that are left out alias the noise
-        noise = every * measured_noise(raw, motion, bandwidth)
+        noise = measured_noise(raw, motion, bandwidth)
         self._noise_part = part_of_noise(noise, self.filter(d))
         self._pose = np.linspace(0, len(pick) - 1, 24).astype(int)
         self._M = mass_matrix(tree, tree.parameters, self.motion.position[self._pose])
@@ -123,7 +129,7 @@ class Probe:
         if clock not in self._known:
             if len(self._known) > _KEPT:
                 self._known.clear()
-            self._known[clock] = self._taken(clock).rows(self.rows)
+            self._known[clock] = self._taken(clock).each(self._thinned)
         return self._known[clock]
 
     def _taken(self, clock: float) -> Acting:
@@ -277,9 +283,12 @@ class Probe:
         return value, left, share, b[:p] if count else np.zeros(p)
 
 
-def _spread(raw: RawTrajectory, every: int) -> list[np.ndarray]:
-    """Return rows of stretches that are spread over a recording, every `every`-th each."""
-    whole = [np.arange(s.start, s.stop, every) for s in raw.segments]
+def _spread(segments: Sequence[slice], every: int, margin: int) -> list[np.ndarray]:
+    """Return rows of stretches that are spread over a recording, every `every`-th each.
+
+    None are within a margin of the ends of segments.
+    """
+    whole = [np.arange(s.start + margin, s.stop - margin, every) for s in segments]
     total = sum(len(rows) for rows in whole)
     if total <= _MOST_ROWS:
         return whole

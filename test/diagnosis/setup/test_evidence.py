@@ -88,6 +88,20 @@ def test_efforts_read_within_a_period_of_the_positions_have_no_other_clock(
     assert [e.hypothesis.effect for e in errors] == expected
 
 
+def test_noise_does_not_alias_where_rows_are_left_out(tmp_path):
+    """That of a controller's feedback said as much of another clock as of the right one."""
+    world = simulate(CHAINS[2], 5, 12.0)
+    noise = 0.1 * world.command.std(axis=0)
+    noisy = world.command + np.random.default_rng(4).normal(0.0, noise, world.command.shape)
+    robot, tree = robot_of(tmp_path, CHAINS[2])
+    raw = collect(events_of(replace(world, command=noisy)), robot)
+    probe = Probe(raw, tree, replace(choose_bandwidth(raw, tree), cutoff=3.0))
+    assert probe.every == 8
+    inside = noise**2 * 2.0 * 3.0 * PERIOD
+    left = probe.agreement(Correction.none(2), unknowns=0).left
+    assert (left < 1.6 * inside / probe.power).all()
+
+
 @pytest.mark.parametrize('k', [1, 2])
 def test_a_load_is_no_error_of_the_connection(tmp_path, k):
     """As heavy as the last link: a scale of the efforts would leave less to bodies."""
