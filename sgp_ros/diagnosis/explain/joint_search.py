@@ -8,13 +8,14 @@ effects and bodies follows.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.settled import shows
-from sgp_ros.diagnosis.criteria import COUNTED_SHARE, SLIGHT_REST
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, EVIDENCE, SLIGHT_REST
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import acting_share, gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
@@ -30,6 +31,7 @@ from sgp_ros.diagnosis.explain.growth import (
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import distinct, may_be_two, screen
 from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import PLACES, Place
 
@@ -118,14 +120,37 @@ def built_up(columns: Columns, model: Model) -> Model:
     At one joint after the other another law would first imitate it: a play, a lag, a delay.
     """
     motion = model.frame.equations.motion
-    richer = {e.plain: e for e in motion.catalogue.values() if e.has_memory and not e.has_source}
-    swapped = model.effects
-    for s in swapped:
-        law = richer.get((s.name,))
-        if law is not None:
-            built = EffectAt(law, s.place, _BUILT_UP * law.starts(motion, s.place)[0])
-            swapped = tuple(built if o is s else o for o in swapped)
-    return fit(columns, swapped, model.sigma, is_free=model.is_free, w=model.w)
+    (law,) = (e for e in _richer_laws(model) if e.has_memory)
+    return _swapped(columns, model, lambda place: EffectAt(
+        law, place, _BUILT_UP * law.starts(motion, place)[0]), law.plain)  # fmt: skip
+
+
+def richer(columns: Columns, model: Model) -> Iterator[Model]:
+    """Yield a model with a richer law in place of the plain one of every joint, as far as needed.
+
+    Such as friction that differs with direction. Bodies that may differ imitate those of all
+    joints together, and none alone is worth more beside such bodies.
+    """
+    for law in _richer_laws(model):
+        if law.shape_names() or not any(s.name in law.plain for s in model.effects):
+            continue
+        trial = _swapped(columns, model, partial(EffectAt, law), law.plain)
+        if trial.score > model.score + EVIDENCE:
+            yield from filter(is_credible, [without_vain(columns, trial)])
+
+
+def _richer_laws(model: Model) -> Iterator[Effect]:
+    """Yield the laws that add one number to a plain law of the same joint."""
+    laws = model.frame.equations.motion.catalogue.values()
+    return (e for e in laws if len(e.plain) == 1 and not e.has_source)
+
+
+def _swapped(
+    columns: Columns, model: Model, other: Callable[[Place], EffectAt], plain: tuple[str, ...]
+) -> Model:
+    """Return a model with another law in place of each plain one."""
+    effects = tuple(other(s.place) if s.name in plain else s for s in model.effects)
+    return fit(columns, effects, model.sigma, is_free=model.is_free, w=model.w)
 
 
 def _shrunk(columns: Columns, model: Model, block: Block) -> Model:

@@ -17,7 +17,14 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible, ranked
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.growth import crossed
-from sgp_ros.diagnosis.explain.joint_search import built_up, by_joint, large, usual, without_vain
+from sgp_ros.diagnosis.explain.joint_search import (
+    built_up,
+    by_joint,
+    large,
+    richer,
+    usual,
+    without_vain,
+)
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import COMMAND_DELAY
@@ -52,7 +59,8 @@ def more(columns: Columns, nominal: Model, base: Model, compared: Sequence[Model
     is_bent = best.is_free and best.strain > BENT_BODIES
     stated = _as_stated(columns, best, of_file) if is_bent else []
     if (best.left < limit).all() and best.strain < PER_EFFECT:
-        return ranked([*stated, *_everyday(columns, best, nominal.sigma)])
+        models = [*stated, *_everyday(columns, best, nominal.sigma)]
+        return ranked([*models, *_richer(columns, [best, *models])])
     everyday = usual(columns, fit(columns, (), nominal.sigma, is_free=True))
     loaded = _loaded(columns, everyday)
     starts = [best] if loaded else [best, everyday]
@@ -64,7 +72,14 @@ def more(columns: Columns, nominal: Model, base: Model, compared: Sequence[Model
     ends = [stated, loaded, *(by_joint(columns, start) for start in starts)]
     models = _crossed(columns, [end for end in ends if end])
     models += [*_carrying(columns, models), *_freed(columns, models)]
+    models += _richer(columns, models)
     return ranked(m for m in models if len(m.effects) > 2)
+
+
+def _richer(columns: Columns, models: list[Model]) -> list[Model]:
+    """Return the best model with richer laws at every joint at once, where it lacks some."""
+    best = max(models, key=lambda m: gain(m, models[0]), default=None)
+    return [] if best is None else list(richer(columns, best))
 
 
 def _everyday(columns: Columns, best: Model, sigma: np.ndarray) -> Iterator[Model]:

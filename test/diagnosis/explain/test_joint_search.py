@@ -29,6 +29,7 @@ from sgp_ros.diagnosis.explain.joint_search import (
     by_joint,
     coupled,
     large,
+    richer,
     uncoupled,
     usual,
 )
@@ -270,6 +271,25 @@ def test_friction_that_builds_up_at_every_joint_is_found_at_once(tmp_path):
     for joint, (level, way) in truth.items():
         assert found[joint].coefficients[0] == pytest.approx(level, rel=0.05)
         assert found[joint].shape[0] == pytest.approx(way, rel=0.3)
+
+
+@pytest.mark.parametrize('excess', [0.3, 0.0])
+def test_friction_that_differs_with_direction_is_tried_at_all_joints_at_once(
+    equations_for, excess
+):
+    """Other bodies hold up what both are more one way; the joint that has none stays plain."""
+
+    def force(_t, _q, v):
+        one_way = 0.5 * np.tanh(v[0] / 1e-3) + excess
+        return -one_way, -0.3 * np.tanh(v[1] / 1e-3)
+
+    _, equations = equations_for(simulate(CHAINS[2], 7, 10.0, force=force))
+    columns, base = _start(equations)
+    plain = [EffectAt(EFFECTS['coulomb_friction'], Place(j)) for j in (0, 1)]
+    model = fit(columns, tuple(plain), base.sigma)
+    found = [_keys(m) for m in richer(columns, model) if gain(m, model) > 0.0]
+    expected = [{('asymmetric_coulomb', 0), ('coulomb_friction', 1)}]
+    assert found == (expected if excess else [])
 
 
 def test_a_coupling_law_takes_the_place_of_all_that_stands_for_it(equations_for):
