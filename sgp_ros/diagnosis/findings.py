@@ -28,8 +28,9 @@ from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.locate.remainder import Remainder, region
 from sgp_ros.diagnosis.result import Difference, Finding, Location, Parameter, ParameterError
 from sgp_ros.diagnosis.shown import Dependence
-from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
+from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG, VISCOUS_FRICTION
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.servo import Servo
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 MOST_ALTERNATIVES = 8
@@ -52,9 +53,12 @@ def asserted(
         least = decision.standing.get(model.effects[i].key, 0.0)
         std[i].update({name: max(x, least) for name, x in std[i].items()})
     findings = [
-        doubted_if_none(_finding(decision, model, i, std[i], chances), model.effects[i])
+        doubted_if_late(
+            doubted_if_none(_finding(decision, model, i, std[i], chances), model.effects[i]),
+            model.effects[i], equations.motion,
+        )
         for i in common
-    ]
+    ]  # fmt: skip
     findings += [
         _unknown(equations, decision, j, remainders, chances, depends) for j in decision.unknown
     ]
@@ -124,6 +128,22 @@ def doubted_if_none(finding: Finding, effect: EffectAt) -> Finding:
     if not (all(away) if effect.effect.has_chosen_form else any(away) or not away):
         why = 'the 95 % interval of its size includes zero'
     return replace(finding, probability=chance, why=why) if why else finding
+
+
+def doubted_if_late(finding: Finding, effect: EffectAt, motion: ObservedMotion) -> Finding:
+    """Return a finding, doubted if it is friction that a drive takes off by acting late.
+
+    A drive computes its effort from states up to one sample old, and holds it: it drives on with
+    `kp T v` of a lag T.
+    """
+    drive = motion.drive
+    if effect.effect is not VISCOUS_FRICTION or not isinstance(drive, Servo) or drive.is_recorded:
+        return finding
+    lag = -float(effect.coefficients[0]) / float(drive.kp[effect.place.joint])
+    if not 0.0 < lag < motion.step:
+        return finding
+    why = f'a drive that acts on states {1e3 * lag:.2g} ms old would do the same'
+    return replace(finding, probability=min(finding.probability, DOUBTED), why=why)
 
 
 def _differ(sizes: Sequence[Parameter]) -> bool:

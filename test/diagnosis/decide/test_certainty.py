@@ -28,11 +28,12 @@ from sgp_ros.diagnosis.decide.decision import UNKNOWN, decide
 from sgp_ros.diagnosis.decide.reasons import why_not
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.comparison import Comparison
-from sgp_ros.diagnosis.findings import doubted_if_none
+from sgp_ros.diagnosis.findings import doubted_if_late, doubted_if_none
 from sgp_ros.diagnosis.result import Finding, Location, Parameter
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
+from sgp_ros.physics.servo import Servo
 from test.diagnosis.fitted_models import fitted, with_coefficients
 from test.diagnosis.worlds import CHAINS, simulate
 
@@ -200,6 +201,24 @@ def test_a_finding_too_small_to_count_is_doubted(equations_for, viscous):
     assert 'too small' in doubted.why
     sure = replace(finding, effect='spring', share=0.1, probability=0.97)
     assert certainty_of([doubted, sure], _comparison(equations)) == 0.97
+
+
+@pytest.mark.parametrize(
+    ('change', 'step', 'is_doubted'),
+    [(-0.06, 0.005, True), (-0.06, 0.0004, False), (0.06, 0.005, False)],
+)
+def test_friction_that_a_drive_takes_off_by_acting_late_is_doubted(change, step, is_doubted):
+    """By kp times the lag, which is part of a sample; not friction that is there."""
+    one = np.ones((1, 1))
+    drive = Servo(None, step, (0,), 110.0 * one[0], one[0], one, one, one)
+    known = {'b': Parameter(change, 0.001, 'N m s/rad')}
+    finding = Finding('joint0', 'viscous_friction', known, Location(), 1.0, 0.99, 0.1)
+    s = EffectAt(EFFECTS['viscous_friction'], Place(0), coefficients=np.array([change]))
+    doubted = doubted_if_late(finding, s, SimpleNamespace(drive=drive, step=step))
+    assert (doubted.probability <= DOUBTED) is is_doubted
+    assert ('0.55 ms old' in doubted.why) is is_doubted
+    effort = SimpleNamespace(drive=None, step=step)
+    assert doubted_if_late(finding, s, effort) is finding
 
 
 @pytest.mark.parametrize(('std', 'is_doubted'), [(0.3, True), (0.2, False), (0.05, False)])
