@@ -46,10 +46,13 @@ class Side:
         return cls(equations, scale, Columns(equations), model.effects)
 
     def fitted(self, effects: tuple[EffectAt, ...], *, is_free: bool) -> Model:
-        """Return a model of effects; the shapes of those that are not named here stay."""
+        """Return a model of effects.
+
+        The shapes of those that are not named here stay, but where a shape is the only size.
+        """
         start, own = first_scale(self.equations), {s.key: s for s in self.named}
-        others = tuple(s for s in effects if s.key not in own)
-        ordered = (*others, *(own[s.key] for s in effects if s.key in own))
+        others = tuple(s for s in effects if s.key not in own and not s.effect.is_given)
+        ordered = (*others, *(own.get(s.key, s) for s in effects if s not in others))
         still = len(others)
         return fit(self.columns, ordered, start, is_free=is_free, steps=_STEPS, still=still)
 

@@ -97,3 +97,16 @@ def test_shapes_of_laws_that_only_the_other_side_names_stay(equations_for, visco
                steps=common_structure._STEPS)  # fmt: skip
     moved = next(s for s in free.effects if s.name == 'cogging')
     assert moved.shape != pytest.approx([7.3], rel=1e-6)
+
+
+def test_the_only_size_of_a_law_that_the_other_side_names_is_found(equations_for, viscous):
+    """A base that leans is not level by its shape alone: a simulation stands as it is."""
+    _, equations = equations_for(viscous)
+    place = EFFECTS['gravity_tilt'].places(equations.motion)[0]
+    leaning = EffectAt(EFFECTS['gravity_tilt'], place, np.array([0.0, 0.2]))
+    named = (EffectAt(EFFECTS['viscous_friction'], Place(0)),)
+    model = Side(equations, None, Columns(equations), named).fitted(
+        (*named, leaning), is_free=False
+    )
+    found = next(s for s in model.effects if s.name == 'gravity_tilt')
+    assert abs(found.shape[1]) < 0.01
