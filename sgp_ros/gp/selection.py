@@ -11,10 +11,11 @@ without data.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sgp_ros.errors import NumericalError
 from sgp_ros.gp.kernel import Kernel
 from sgp_ros.gp.kernels import Linear
 from sgp_ros.gp.learning import initial_model, learn, screened
@@ -22,6 +23,8 @@ from sgp_ros.gp.model import CoefficientPrior, Model, Observations
 
 MARGIN = 3.0
 """Evidence that an input must be worth [nat]: a Bayes factor of twenty."""
+_LOUDER = 10.0
+"""Factor by which the noise of a start grows whose covariance has no factor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +114,17 @@ def _fit_linear(data: Observations, prior: CoefficientPrior, model: Model) -> tu
 
 
 def _fit(data: Observations, prior: CoefficientPrior, start: Model) -> tuple[Model, float]:
-    learned = learn(data, prior, start)
+    """Fit from a start, with more noise where so little leaves the covariance no factor.
+
+    What an input explained is noise without it.
+    """
+    try:
+        learned = learn(data, prior, start)
+    except NumericalError:
+        noise = _LOUDER * start.noise[0]
+        if not 0.0 < noise < data.y.var():
+            raise
+        return _fit(data, prior, replace(start, noise=(noise,)))
     return learned.model, learned.log_evidence
 
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sgp_ros.errors import NumericalError
 from sgp_ros.gp.kernels import Linear, SquaredExponential
-from sgp_ros.gp.model import CoefficientPrior, Observations
-from sgp_ros.gp.selection import select_inputs
+from sgp_ros.gp.learning import learn
+from sgp_ros.gp.model import CoefficientPrior, Model, Observations
+from sgp_ros.gp.selection import _fit, select_inputs
 
 
 def _data(seed, residual, n=150):
@@ -66,6 +68,21 @@ def test_choice_costs_little_evidence():
     data = _data(1, lambda U: np.sin(2.0 * U[:, 1]))
     selection = select_inputs(data, CoefficientPrior.flat(1), 0, (0, 1, 2))
     assert selection.evidence > selection.evidence_of_all - 3.0 * len(selection.path)
+
+
+def test_a_start_whose_covariance_has_no_factor_begins_with_more_noise():
+    """Rounding of a short length scale counts more there than the noise beside other inputs."""
+    rng = np.random.default_rng(3)
+    U = np.repeat(rng.normal(30.0, 3.0, (40, 1)), 5, axis=0)
+    U = U + 1e-8 * rng.normal(size=U.shape)
+    y = 10.0 * np.sin(2.0 * U) + rng.normal(size=U.shape)
+    data, prior = Observations(U, U[:, None, :0], y), CoefficientPrior.flat(0)
+    start = Model((SquaredExponential(150.0, (3e-4,), (0,)),), (1e-6,))
+    with pytest.raises(NumericalError, match='no positive definite'):
+        learn(data, prior, start)
+    model, evidence = _fit(data, prior, start)
+    assert np.isfinite(evidence)
+    assert model.noise[0] > 0.1
 
 
 def test_an_observation_matrix_is_refused():
