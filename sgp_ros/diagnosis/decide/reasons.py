@@ -78,7 +78,6 @@ def why_not(model: Model, decision: Decision, scale: Scale) -> str:
 
 def _losses(model: Model, against: Model, scale: Scale) -> dict[str, float]:
     """Return by how much a model is worth less than another, by cause [nats]."""
-    unlikely = (sum(s.effect.surprise(s) for s in m.effects) for m in (model, against))
     fit = scale.likelihood(against) - scale.likelihood(model)
     more = 'it needs more' if fit < 0.0 else 'it fits no better and needs more'
     justified = ' than the improvement justifies' if fit < 0.0 else ''
@@ -88,7 +87,7 @@ def _losses(model: Model, against: Model, scale: Scale) -> dict[str, float]:
         - against.strain,
         f'{more} parameters{justified}': PER_PARAMETER * (model.freedom - against.freedom),
         f'{more}, or rarer, effects{justified}': model.law_price - against.law_price,
-        'it needs effects of an unlikely size': next(unlikely) - next(unlikely),
+        'it needs effects of an unlikely size': model.surprise - against.surprise,
     }
 
 

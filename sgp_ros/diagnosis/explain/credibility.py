@@ -9,6 +9,7 @@ import numpy as np
 from sgp_ros.batch.least_squares import correlation_factor
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import (
+    ADEQUATE_REST,
     COUNTED_SHARE,
     INDEPENDENT_ROWS,
     MOST_OPPOSED,
@@ -45,7 +46,7 @@ def gain(trial: Model, model: Model, *, is_whole: bool = True) -> float:
     factors = np.array([correlation_factor(r, x) if is_whole else 1.0
                         for r, x in zip(of.residual.T, apart, strict=True)])  # (k,)  # fmt: skip
     rows = np.minimum(len(of.residual) / factors, INDEPENDENT_ROWS)
-    prior = model.strain - trial.strain
+    prior = model.strain + model.surprise - trial.strain - trial.surprise
     inertia = float(rows.mean()) * (trial.log_inertia - model.log_inertia)
     price = trial.law_price - model.law_price + PER_PARAMETER * (trial.size - model.size)
     return float(rows @ np.log(model.sigma / trial.sigma)) + inertia + prior - price
@@ -107,7 +108,18 @@ def is_needed(s: EffectAt, equations: Equations) -> bool:
     if s.is_least(equations.motion):
         return False
     left = beyond_plain(s, s.columns(equations.motion) @ s.coefficients, equations)
-    return float((left**2).mean()) > SLIGHT_REST * float(equations.power[s.place.joint])
+    j = s.place.joint
+    return float((left**2).mean()) > float(slight_rest(equations)[j] * equations.power[j])
+
+
+def slight_rest(equations: Equations) -> np.ndarray:
+    """Return the share of each effort that is slight beside what the nominal robot leaves, (k,).
+
+    No more than an adequate model may leave of that, where it counts as physics at all.
+    """
+    nominal = (equations.d**2).mean(axis=0) / equations.power
+    adequate = np.minimum(ADEQUATE_REST * nominal, SLIGHT_REST)
+    return np.where(nominal > COUNTED_SHARE, adequate, SLIGHT_REST)
 
 
 def shows_waves(s: EffectAt, equations: Equations) -> bool:

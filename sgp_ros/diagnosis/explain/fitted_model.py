@@ -99,6 +99,11 @@ class Model:
         return sum((not s.is_further_wave) + _extra_laws(s) for s in self.effects)
 
     @property
+    def surprise(self) -> float:
+        """Price of numbers that laws seldom have [nats]."""
+        return sum(s.effect.surprise(s) for s in self.effects)
+
+    @property
     def law_price(self) -> float:
         """Price of the laws, higher where few joints have them [nats].
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.criteria import ADEQUATE_REST, COUNTED_SHARE, PER_EFFECT, SLIGHT_REST
 from sgp_ros.diagnosis.explain.candidates import fit
-from sgp_ros.diagnosis.explain.credibility import gain, is_credible, is_needed
+from sgp_ros.diagnosis.explain.credibility import gain, is_credible, is_needed, slight_rest
 from sgp_ros.diagnosis.explain.fitted_model import Model, adds_to_usual
 from sgp_ros.diagnosis.explain.regression import Columns, dry_joints
 from sgp_ros.diagnosis.explain.screening import distinct, screen
@@ -53,6 +53,12 @@ class Block:
         equations, j = model.frame.equations, list(self.joints)
         nominal = (equations.d[:, j] ** 2).mean(axis=0) / equations.power[j]
         return bool((model.left[j] > np.maximum(COUNTED_SHARE, ADEQUATE_REST * nominal)).any())
+
+    def is_slight(self, model: Model) -> bool:
+        """Return whether what a model leaves here is slight."""
+        if self.joints is None:
+            return self.left(model) < SLIGHT_REST
+        return bool((model.left < slight_rest(model.frame.equations))[list(self.joints)].all())
 
     def left(self, model: Model) -> float:
         """Return the greatest share of the mean squared effort that a model leaves here."""
@@ -169,7 +175,7 @@ def _counted(columns: Columns, model: Model, block: Block) -> list[Model]:
     laws = block.effects
     if left < COUNTED_SHARE and strain < PER_EFFECT:
         laws = tuple(e for e in laws if adds_to_usual(e))
-    if not laws or (left < SLIGHT_REST and strain < PER_EFFECT):
+    if not laws or (block.is_slight(model) and strain < PER_EFFECT):
         return []
     trials = _tried(columns, model, block, distinct(screen(columns, model, laws, block.joints)))
     if left < COUNTED_SHARE:

@@ -7,7 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.explain.credibility import _delivers, is_credible, shows_waves
+from sgp_ros.diagnosis.criteria import ADEQUATE_REST, COUNTED_SHARE, SLIGHT_REST
+from sgp_ros.diagnosis.explain.credibility import (
+    _delivers,
+    gain,
+    is_credible,
+    shows_waves,
+    slight_rest,
+)
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
@@ -38,6 +45,31 @@ def test_a_motor_that_is_off_delivers_nothing_where_its_joint_rests_either(equat
     all_of_it = Columns(held).local(model.effects[0], held, held.motion)[..., 0]
     assert _delivers(replace(model, parts=(-0.5 * all_of_it,)))
     assert not _delivers(replace(model, parts=(-all_of_it,)))
+
+
+def test_a_size_that_laws_seldom_have_takes_off_a_gain(equations_for, perfect):
+    """A motor with a twentieth of its torque fits what it likes where bodies follow."""
+    _, equations = equations_for(perfect[1])
+    model = fitted(equations, 'torque_gain')
+    (s,) = model.effects
+    weak = replace(model, effects=(replace(s, coefficients=np.array([-0.95])),))
+    assert weak.surprise > 50.0
+    assert gain(weak, model) == pytest.approx(model.surprise - weak.surprise)
+
+
+@pytest.mark.parametrize(
+    ('nominal', 'slight'),
+    [
+        (0.5, SLIGHT_REST),
+        (4.0 * COUNTED_SHARE, 4.0 * ADEQUATE_REST * COUNTED_SHARE),
+        (0.5 * COUNTED_SHARE, SLIGHT_REST),
+    ],
+)
+def test_what_is_slight_is_so_beside_what_there_is(equations_for, perfect, nominal, slight):
+    """A twenty-fifth of a small friction is the rise of another one towards rest."""
+    _, equations = equations_for(perfect[1])
+    one = np.sqrt(nominal * equations.power) * np.ones_like(equations.d)
+    assert slight_rest(replace(equations, d=one))[0] == pytest.approx(slight)
 
 
 @pytest.mark.parametrize(('periods', 'shown'), [(1.0, True), (8.0, True), (300.0, False)])
