@@ -16,10 +16,10 @@ DUTY, COMMAND, KP, KD, OTHER = 'duty', 'command', 'kp', 'kd', 'other'
 
 _QUANTITIES = {
     TIME: 't ts time times timestamp timestamps stamp stamps sec secs seconds clock zeit',
-    POSITION: 'q qs pos position positions qpos angle angles theta jointpos encoder enc state '
-    'winkel lage',
-    VELOCITY: 'dq qd qdot vel velocity velocities qvel dtheta omega speed thetadot jointvel '
-    'geschwindigkeit drehzahl',
+    POSITION: 'q qs pos position positions qpos angle angles theta phi psi alpha beta jointpos '
+    'encoder enc state winkel lage',
+    VELOCITY: 'dq qd qdot vel velocity velocities qvel dtheta dphi dalpha omega speed thetadot '
+    'phidot alphadot jointvel geschwindigkeit drehzahl',
     EFFORT: 'tau taus torque torques effort efforts eff effs force forces qfrc load moment trq '
     'drehmoment kraft',
     CURRENT: 'i iq cur current currents amps curr strom',
@@ -63,8 +63,9 @@ _FILLER = frozenset({
     'measured', 'meas', 'act', 'raw', 'list', 'sensor', 'log', 'the', 'value', 'values', 'j',
     'ist',
 })  # fmt: skip
-_PAIRS = {('p', 'gain'): KP, ('d', 'gain'): KD, ('q', 'dot'): VELOCITY, ('theta', 'dot'): VELOCITY,
+_PAIRS = {('p', 'gain'): KP, ('d', 'gain'): KD, ('q', 'dot'): VELOCITY,
           ('q', 'ddot'): OTHER, ('d', 'q'): VELOCITY, ('feed', 'forward'): OTHER}  # fmt: skip
+_PAIRS |= {(angle, 'dot'): VELOCITY for angle in ('theta', 'phi', 'psi', 'alpha', 'beta')}
 _PAIRS |= {(now, what): POSITION for now in ('cur', 'curr', 'current')
            for what in ('pos', 'position', 'positions', 'angle', 'angles', 'state')}  # fmt: skip
 _OF_TIME = frozenset({'', 's', 'ms', 'us', 'ns'})

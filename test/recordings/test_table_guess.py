@@ -63,6 +63,8 @@ def _read(path, folder, hints=HINTS, rate=None):
         ('p_gain', 'kp', False, '', ''),
         ('knee.eff', 'effort', False, 'knee', ''),
         ('ddq', 'other', False, '', ''),
+        ('alpha_pend', 'position', False, 'pend', ''),
+        ('phi_dot_arm', 'velocity', False, 'arm', ''),
         ('M_boom [Nm]', 'effort', False, 'boom', 'N m'),
         ('boom_m', '', False, 'boom', 'm'),
         ('moment_mNm', 'effort', False, '', 'mN m'),
@@ -142,6 +144,16 @@ def test_columns_that_hold_the_names_of_joints_are_theirs_in_any_order(tmp_path,
     order = [states[0].names.index(name) for name in names]
     np.testing.assert_allclose([s.position[order] for s in states], Q, atol=1e-12)
     assert not any('order of the robot' in said for said in summary.unsure)
+
+
+def test_an_angle_beside_a_greek_one_of_the_same_joint_may_be_its_acceleration(tmp_path):
+    """`theta`, `omega`, `alpha` of a textbook: the position is the first, and that is said."""
+    table = np.column_stack([T, Q[:, 0], np.gradient(Q[:, 0], T), 50.0 * Q[:, 0], TAU[:, 0]])
+    np.savetxt(tmp_path / 'log.csv', table, delimiter=',', header='t,theta,omega,alpha,tau',
+               comments='')  # fmt: skip
+    summary, states, _ = _read(tmp_path / 'log.csv', tmp_path, HINTS[:1])
+    np.testing.assert_allclose([s.position[0] for s in states], Q[:, 0], atol=1e-12)
+    assert any('not from alpha' in said for said in summary.unsure)
 
 
 def test_joints_may_be_called_as_times_and_commands_are(tmp_path):
