@@ -177,7 +177,7 @@ def examine(
     first = next(iter(events.values())) if is_met else []
     known, _, _ = on_one_clock(next(iter(events.values())), USUAL)
     start_ns = min(e.stamp_ns for e in known if isinstance(e, JointSample))
-    given = Given(bags[0], robot, chosen.gains)
+    given = Given(bags[0], robot, chosen.gains, bags[-1] if len(bags) > 1 else None)
     return Examined(nominal, found, first, given, source, gains, start_ns, checks)
 
 

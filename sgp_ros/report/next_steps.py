@@ -27,11 +27,13 @@ class Given(NamedTuple):
         bag: the recording.
         robot: built-in name or file.
         gains: file of gains; None without.
+        last: the last of several recordings; None of one.
     """
 
     bag: str
     robot: str
     gains: str | None = None
+    last: str | None = None
 
     def words(self, bag: str) -> str:
         """Return the words for a recording of the same machine."""
@@ -50,7 +52,11 @@ def after_diagnosis(verdict: str, given: Given, out: Path, *, has_setup_error: b
         return [('Nothing to correct. A larger or faster motion may show more:', other)]
     if verdict == 'unexplained':
         learn = f'sgp replay {quote(bag)} --robot {diagnosed}'
-        return [('Learn the unexplained part with a Gaussian process:', learn)]
+        steps = [('Learn the unexplained part with a Gaussian process:', learn)]
+        if given.last is not None:
+            apart = f'sgp diagnose {given.words(given.last)} --sim {quote(bag)}'
+            steps.insert(0, ('Look for what the last recording has and the first has not:', apart))
+        return steps
     steps = [
         ('Check the corrected robot on another recording:',
          f'sgp replay {_OTHER} --robot {diagnosed}'),

@@ -124,6 +124,16 @@ def test_the_next_step_hands_the_robot_back_in_its_format(robot, to):
     assert f'--to {to} --ranges' in steps[-1][1]
 
 
+@pytest.mark.parametrize('last', [None, 'c.mcap'])
+def test_of_several_unexplained_recordings_the_last_is_compared_with_the_first(last):
+    """What only one of them has is found so, also where no list has it."""
+    given = Given('a.mcap', 'arm.urdf', 'gains.yaml', last)
+    steps = after_diagnosis('unexplained', given, Path('out'), has_setup_error=False)
+    apart = 'sgp diagnose c.mcap --robot arm.urdf --gains gains.yaml --sim a.mcap'
+    assert (apart in [command for _, command in steps]) is (last is not None)
+    assert steps[-1][1].startswith('sgp replay')
+
+
 def test_the_title_names_an_error_of_the_set_up_before_missing_physics():
     """As the sentence below it does."""
     found = replace(diagnosis('missing_physics', [COULOMB]), setup=(SPRING,))
