@@ -129,6 +129,5 @@ class Scale:
 
     def worth(self, model: Model) -> float:
         """Return the fit of a model, less the price of its freedom [nats]."""
-        unlikely = sum(s.effect.surprise(s) for s in model.effects)
         price = model.law_price + PER_PARAMETER * model.freedom
-        return self.fit(model) - price - unlikely
+        return self.fit(model) - price - model.surprise

@@ -39,12 +39,11 @@ _CARRYING = 3
 def more(columns: Columns, nominal: Model, base: Model, compared: Sequence[Model]) -> list[Model]:
     """Return models of a search joint by joint, where the best credible model does not suffice.
 
-    It does not if its residual counts as physics, if it is not adequate, or if its bodies or laws
-    are so unlikely that they may imitate missing physics. The search starts from that model and
-    from the laws that nearly every joint has, with bodies that may differ, or with a load; and
-    from friction that builds up at every joint, where no more is missing. Bodies that change at
-    all may imitate a rotor, a load, a spring: it starts from the best model with those of the
-    file, too.
+    It does not if its residual counts as physics, if it is not adequate, or if its bodies are so
+    unlikely that they may imitate missing physics. The search starts from that model and from the
+    laws that nearly every joint has, with bodies that may differ, or with a load; and from
+    friction that builds up at every joint, where no more is missing. Bodies that change at all may
+    imitate a rotor, a load, a spring: it starts from the best model with those of the file, too.
 
     Args:
         columns: of the recording.
@@ -59,7 +58,7 @@ def more(columns: Columns, nominal: Model, base: Model, compared: Sequence[Model
     of_file = next((m for m in sound if not m.is_free), nominal)
     is_bent = best.is_free and best.strain > BENT_BODIES
     stated = _as_stated(columns, best, of_file) if is_bent else []
-    if (best.left < limit).all() and best.strain + best.surprise < PER_EFFECT:
+    if (best.left < limit).all() and best.strain < PER_EFFECT:
         models = [*stated, *_everyday(columns, best, nominal.sigma)]
         return ranked([*models, *_richer(columns, [best, *models])])
     everyday = usual(columns, fit(columns, (), nominal.sigma, is_free=True))
