@@ -69,7 +69,10 @@ def run_import(
 def _hints(robot: Robot | None) -> list[JointHint]:
     if robot is None:
         return []
-    return [JointHint(j.name, j.kind == 'prismatic', j.lower, j.upper) for j in robot.joints]
+    return [
+        JointHint(j.name, j.kind == 'prismatic', j.lower, j.upper, j.is_actuated)
+        for j in robot.joints
+    ]
 
 
 def _counts(summary: ImportSummary) -> str:

@@ -42,12 +42,14 @@ class JointHint:
         name: of the joint.
         slides: whether it is prismatic.
         lower, upper: range [rad or m], infinite for none.
+        is_driven: whether it has a motor.
     """
 
     name: str
     slides: bool = False
     lower: float = -np.inf
     upper: float = np.inf
+    is_driven: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,21 +170,26 @@ def of_signals(entries: Sequence[Entry], guess: Guess) -> list[Entry]:
 
 
 def of_one_joint(
-    entries: Sequence[Entry], positions: Mapping[str, Entry], guess: Guess
-) -> list[Entry]:
+    entries: Sequence[Entry], positions: Mapping[str, Entry], hints: Sequence[JointHint],
+    guess: Guess,
+) -> list[Entry]:  # fmt: skip
     """Give what stands alone of its quantity to the only joint, whatever it is called.
 
-    A table of one pendulum may say `Angle` and `Motor torque cmd`.
+    A table of one pendulum may say `Angle` and `Motor torque cmd`. Of a robot with one motor, what
+    a motor does belongs to its joint.
     """
-    if len(positions) != 1:
+    driven = [h.name for h in hints if h.is_driven]
+    one = [x for x in positions if len(positions) == 1 or (len(driven) == 1 and _same(x, *driven))]
+    if len(one) != 1:
         return list(entries)
-    (label,) = positions
+    (label,), found = one, []
+    others = {'', OTHER} if len(positions) == 1 else {'', OTHER, POSITION, VELOCITY}
     groups = [(e.said.role, e.said.is_target) for e in entries]
-    found = []
     for e, group in zip(entries, groups, strict=True):
-        is_alone = e.said.role not in {'', OTHER} and groups.count(group) == 1 and e.label != label
+        is_alone = e.said.role not in others and groups.count(group) == 1 and e.label != label
         if is_alone and e.said.joint and label:
-            guess.unsure.append(f'{e.column} is taken as that of {label}, the only position.')
+            what = 'position' if len(positions) == 1 else 'joint with a motor'
+            guess.unsure.append(f'{e.column} is taken as that of {label}, the only {what}.')
         found.append(replace(e, label=label) if is_alone else e)
     return found
 

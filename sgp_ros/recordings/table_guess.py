@@ -80,7 +80,7 @@ def guess_map(
             'a name such as q, position, joint1_pos',
             'rename a column, or write a map (docs/import.md)',
         )  # fmt: skip
-    entries = of_one_joint(entries, positions, guess)
+    entries = of_one_joint(entries, positions, hints, guess)
     joints = joint_names(positions, columns, hints, guess)
     entries, positions = of_robot(entries, positions, joints, guess)
     hinted = {h.name: h for h in hints}

@@ -185,6 +185,19 @@ def test_columns_of_joints_that_the_robot_lacks_are_left_out(tmp_path):
         _read(path, tmp_path, (*HINTS, JointHint('knee')))
 
 
+@pytest.mark.parametrize('is_driven', [False, True])
+def test_what_a_motor_does_belongs_to_the_only_joint_that_has_one(tmp_path, is_driven):
+    """Of a pendulum on a driven arm `motor_torque` names no joint, and need not."""
+    path = _npz(tmp_path, t=T, shoulder_pos=Q[:, 0], elbow_pos=Q[:, 1], motor_torque=TAU[:, 0])
+    hints = (HINTS[0], replace(HINTS[1], is_driven=is_driven))
+    summary, states, _ = _read(path, tmp_path, hints)
+    at = states[0].names.index('shoulder')
+    efforts = [] if states[0].effort is None else [s.effort[at] for s in states]
+    has_torque = bool(efforts) and bool(np.isfinite(efforts).all())
+    assert has_torque is not is_driven
+    assert any('motor_torque belongs to no position' in x for x in summary.unsure) is is_driven
+
+
 @pytest.mark.parametrize(
     ('header', 'said'),
     [
