@@ -25,9 +25,16 @@ from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.physics.catalogue import COULOMB_FRICTION, VISCOUS_FRICTION
+from sgp_ros.diagnosis.explain.uncertainty import reported_std
+from sgp_ros.physics.catalogue import (
+    COMMAND_DELAY,
+    COULOMB_FRICTION,
+    EFFECTS,
+    VISCOUS_FRICTION,
+)
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
+from sgp_ros.physics.servo import Servo
 
 ROWS_PER_COLUMN = 4
 """Least rows of a half for each column."""
@@ -44,8 +51,10 @@ def with_everyday(equations: Equations, comparison: Comparison, decision: Decisi
         comparison: of models.
         decision: on these.
     """
-    if equations.motion.is_static or not decision.unknown:
+    if equations.motion.is_static:
         return decision
+    if not decision.unknown:
+        return _beside_delay(equations, decision)
     found = {j: _standing(equations, decision.model, j) for j in decision.unknown}
     standing = {s: std for laws in found.values() for s, std in laws.items()}
     if not standing:
@@ -60,6 +69,44 @@ def with_everyday(equations: Equations, comparison: Comparison, decision: Decisi
     if decision.verdict == 'unexplained' and before - left + others > left:
         decision = replace(decision, verdict='missing_physics', tentative=None)
     return decision
+
+
+def _beside_delay(equations: Equations, decision: Decision) -> Decision:
+    """Return a decision whose delay of targets stands beside the everyday laws of all joints.
+
+    Targets that are late by T act much as viscous friction kp T and as a rotor: the delay takes
+    the place of all of these that are not worth their price. They count where it moves beyond its
+    error.
+    """
+    motion, model = equations.motion, decision.model
+    delays = [i for i, s in enumerate(model.effects) if s.effect is COMMAND_DELAY]
+    if not delays or not isinstance(motion.drive, Servo):
+        return decision
+    columns = Columns(equations)
+    laws = [
+        EffectAt(law, place) for law in EFFECTS.values() if law.is_usual
+        for place in law.places(motion)
+        if motion.moves[place.joint] and (law.name, place) not in model.key
+    ]  # fmt: skip
+    whole = model
+    while laws:
+        whole = fit(
+            columns, (*model.effects, *laws), model.sigma, is_free=model.is_free, w=model.w
+        )
+        fitted = {s.key: s for s in whole.effects}
+        kept = [s for s in laws if fitted[s.key].is_possible(motion)]
+        if len(kept) == len(laws):
+            break
+        laws = kept
+    now = {s.key: s.shape for s in whole.effects}
+    std = reported_std(model, columns)
+    moved = any(
+        float(abs(now[s.key] - s.shape)[0]) > INTERVAL * std[i]['delay']
+        for i, s in enumerate(model.effects) if i in delays
+    )  # fmt: skip
+    if not moved or not is_credible(whole):
+        return decision
+    return replace(decision, model=whole, standing={s.key: 0.0 for s in laws})
 
 
 def _standing(equations: Equations, model: Model, joint: int) -> dict[EffectAt, float]:

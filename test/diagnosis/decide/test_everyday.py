@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.criteria import INTERVAL, STANDING
+from sgp_ros.diagnosis.decide import everyday
 from sgp_ros.diagnosis.decide.certainty import settled_of
 from sgp_ros.diagnosis.decide.decision import Decision
 from sgp_ros.diagnosis.decide.differences import Several
@@ -16,6 +17,9 @@ from sgp_ros.diagnosis.decide.everyday import with_everyday
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.findings import asserted
 from sgp_ros.diagnosis.locate.dependence import dependences
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.servo import Servo
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
 
@@ -104,3 +108,35 @@ def test_a_described_joint_stays_as_it_is(rubbed):
     equations, comparison, found = rubbed
     known = replace(found, unknown=(), standing={})
     assert with_everyday(equations, comparison, known) is known
+
+
+@pytest.mark.parametrize(
+    ('later', 'std', 'is_adopted'), [(0.003, 1e-4, True), (0.003, 0.01, False), (0.0, 1e-4, False)]
+)
+def test_a_delay_of_targets_stands_beside_friction_of_all_joints(
+    monkeypatch, equations_for, perfect, later, std, is_adopted
+):
+    """It takes the place of those that are too small to be worth it; impossible ones go."""
+    equations = equations_for(perfect[1])[1]
+    one = np.ones((1, 1))
+    servo = Servo(None, 0.005, (0,), one[0], one[0], one, one, one)
+    driven = replace(equations, motion=replace(equations.motion, drive=servo))
+    law = EFFECTS['command_delay']
+    delay = EffectAt(law, law.places(equations.motion)[0], np.array([0.016]), np.ones(1))
+    model = replace(fitted(equations), effects=(delay,))
+    numbers = {'viscous_friction': 0.1, 'coulomb_friction': -0.4, 'armature': 0.02}
+
+    def fit(_columns, effects, *_, **__):
+        first, *laws = effects
+        sized = [replace(s, coefficients=np.array([numbers[s.name]])) for s in laws]
+        return replace(model, effects=(first.with_shape(first.shape - later), *sized))
+
+    monkeypatch.setattr(everyday, 'fit', fit)
+    monkeypatch.setattr(everyday, 'is_credible', lambda _model: True)
+    monkeypatch.setattr(everyday, 'reported_std', lambda *_: ({'delay': std},))
+    decision = Decision('missing_physics', model, (), np.zeros(1), 0)
+    found = with_everyday(driven, None, decision)
+    names = [s.name for s in found.model.effects]
+    assert names == ['command_delay', *(['viscous_friction', 'armature'] * is_adopted)]
+    assert len(found.standing) == 2 * is_adopted
+    assert with_everyday(equations, None, decision) is decision
