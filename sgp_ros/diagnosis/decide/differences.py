@@ -83,7 +83,7 @@ def decide_several(equations: Equations, count: int, progress: Callable[[float],
     left = replace(equations, d=equations.d - _force(model, own))
     comparison = compare_models(left, lambda share: progress(0.5 + 0.4 * share))
     decision = decide(left, comparison)
-    model = search.fitted(decision.model, (*decision.model.effects, *own))
+    model = search.possible(search.fitted(decision.model, (*decision.model.effects, *own)))
     if decision.verdict != 'unexplained':
         model = search.extended(model)
     chances: dict[object, float] = {s.key: search.chance(model, s) for s in _own(model.effects)}
@@ -190,6 +190,23 @@ class _Search:
         )  # fmt: skip
         return fit(self.columns, effects, model.sigma, is_free=model.is_free, w=model.w, rounds=2,
                    steps=8)  # fmt: skip
+
+    def possible(self, model: Model) -> Model:
+        """Return the model with plain laws for common ones that are impossible beside the others.
+
+        They were chosen for what the differences leave, and are fitted with these.
+        """
+        motion = model.frame.equations.motion
+        while True:
+            common = [s for s in model.effects if not isinstance(s.effect, InRecording)]
+            wrong = [s for s in common if not s.is_possible(motion)]
+            if not wrong:
+                return model
+            kept = {s.key: s for s in model.effects if s not in wrong}
+            plain = [EffectAt(EFFECTS[n], Place(s.place.joint)) for s in wrong
+                     for n in s.effect.plain[:1]]  # fmt: skip
+            effects = {s.key: s for s in plain} | kept
+            model = self.fitted(model, tuple(effects.values()))
 
     def chance(self, model: Model, one: EffectAt) -> float:
         """Return the probability of an effect in one recording, against none and others there."""
