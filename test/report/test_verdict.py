@@ -126,7 +126,7 @@ def test_the_next_step_hands_the_robot_back_in_its_format(robot, to):
 
 @pytest.mark.parametrize('last', [None, 'c.mcap'])
 def test_of_several_unexplained_recordings_the_last_is_compared_with_the_first(last):
-    """What only one of them has is found so, also where no list has it."""
+    """A law that only one of them has is found so, also where no list has it."""
     given = Given('a.mcap', 'arm.urdf', 'gains.yaml', last)
     steps = after_diagnosis('unexplained', given, Path('out'), has_setup_error=False)
     apart = 'sgp diagnose c.mcap --robot arm.urdf --gains gains.yaml --sim a.mcap'
