@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -271,6 +272,16 @@ def test_friction_that_builds_up_at_every_joint_is_found_at_once(tmp_path):
     for joint, (level, way) in truth.items():
         assert found[joint].coefficients[0] == pytest.approx(level, rel=0.05)
         assert found[joint].shape[0] == pytest.approx(way, rel=0.3)
+
+
+@pytest.mark.parametrize(('nominal', 'is_slight'), [(0.01, False), (0.05, True)])
+def test_a_joint_is_looked_at_again_for_a_part_of_its_own_friction(equations, nominal, is_slight):
+    """Three parts in ten thousand of the effort are much where friction is a hundredth of it."""
+    d = np.sqrt(nominal * equations.power) * np.ones_like(equations.d)
+    frame = SimpleNamespace(equations=replace(equations, d=d))
+    model = SimpleNamespace(left=np.full(2, 0.75 * SLIGHT_REST), frame=frame)
+    assert Block((), (1,)).is_slight(model) is is_slight
+    assert Block((), None).is_slight(model)
 
 
 @pytest.mark.parametrize('excess', [0.3, 0.0])
