@@ -24,14 +24,10 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.joint_search import usual
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
-from sgp_ros.physics.catalogue import (
-    COMMAND_DELAY,
-    COULOMB_FRICTION,
-    EFFECTS,
-    VISCOUS_FRICTION,
-)
+from sgp_ros.physics.catalogue import COMMAND_DELAY, COULOMB_FRICTION, VISCOUS_FRICTION
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 from sgp_ros.physics.servo import Servo
@@ -79,34 +75,22 @@ def _beside_delay(equations: Equations, decision: Decision) -> Decision:
     error.
     """
     motion, model = equations.motion, decision.model
-    delays = [i for i, s in enumerate(model.effects) if s.effect is COMMAND_DELAY]
-    if not delays or not isinstance(motion.drive, Servo):
+    has_delay = any(s.effect is COMMAND_DELAY for s in model.effects)
+    if not has_delay or not isinstance(motion.drive, Servo):
         return decision
     columns = Columns(equations)
-    laws = [
-        EffectAt(law, place) for law in EFFECTS.values() if law.is_usual
-        for place in law.places(motion)
-        if motion.moves[place.joint] and (law.name, place) not in model.key
-    ]  # fmt: skip
-    whole = model
-    while laws:
-        whole = fit(
-            columns, (*model.effects, *laws), model.sigma, is_free=model.is_free, w=model.w
-        )
-        fitted = {s.key: s for s in whole.effects}
-        kept = [s for s in laws if fitted[s.key].is_possible(motion)]
-        if len(kept) == len(laws):
-            break
-        laws = kept
+    whole = usual(columns, model, model.effects, least=0.0)
     now = {s.key: s.shape for s in whole.effects}
-    std = reported_std(model, columns)
-    moved = any(
-        float(abs(now[s.key] - s.shape)[0]) > INTERVAL * std[i]['delay']
-        for i, s in enumerate(model.effects) if i in delays
-    )  # fmt: skip
-    if not moved or not is_credible(whole):
+    if not model.key <= now.keys() or not is_credible(whole):
         return decision
-    return replace(decision, model=whole, standing={s.key: 0.0 for s in laws})
+    known = zip(model.effects, reported_std(model, columns), strict=True)
+    moved = [
+        float(abs(now[s.key] - s.shape)[0]) > INTERVAL * std['delay']
+        for s, std in known if s.effect is COMMAND_DELAY
+    ]  # fmt: skip
+    if not any(moved):
+        return decision
+    return replace(decision, model=whole, standing=dict.fromkeys(now.keys() - model.key, 0.0))
 
 
 def _standing(equations: Equations, model: Model, joint: int) -> dict[EffectAt, float]:

@@ -90,18 +90,20 @@ def usual(
     Args:
         columns: of the recording.
         base: without effects.
-        first: effects beside them.
+        first: effects beside them, each in the place of its plain law.
         least: share of the mean squared effort that each must have; of the effort that the motor
             delivers, where a late one asks for more.
     """
     motion = base.frame.equations.motion
+    held = {(name, s.place.joint) for s in first for name in (s.name, *s.effect.plain[:1])}
     effects = first + tuple(
         EffectAt(law, place)
         for law in EFFECTS.values()
         if law.is_usual
         for place in law.places(motion)
         if motion.moves[place.joint] and shows(law, place, motion)
-    )
+        and (law.name, place.joint) not in held
+    )  # fmt: skip
     while True:
         model = fit(columns, effects, base.sigma, is_free=base.is_free, w=base.w)
         pairs = list(zip(model.effects, model.filtered_shares, strict=True))

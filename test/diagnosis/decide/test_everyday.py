@@ -19,6 +19,7 @@ from sgp_ros.diagnosis.findings import asserted
 from sgp_ros.diagnosis.locate.dependence import dependences
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 from sgp_ros.physics.servo import Servo
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
@@ -116,7 +117,7 @@ def test_a_described_joint_stays_as_it_is(rubbed):
 def test_a_delay_of_targets_stands_beside_friction_of_all_joints(
     monkeypatch, equations_for, perfect, later, std, is_adopted
 ):
-    """It takes the place of those that are too small to be worth it; impossible ones go."""
+    """It takes the place of those that are too small to be worth it."""
     equations = equations_for(perfect[1])[1]
     one = np.ones((1, 1))
     servo = Servo(None, 0.005, (0,), one[0], one[0], one, one, one)
@@ -124,19 +125,19 @@ def test_a_delay_of_targets_stands_beside_friction_of_all_joints(
     law = EFFECTS['command_delay']
     delay = EffectAt(law, law.places(equations.motion)[0], np.array([0.016]), np.ones(1))
     model = replace(fitted(equations), effects=(delay,))
-    numbers = {'viscous_friction': 0.1, 'coulomb_friction': -0.4, 'armature': 0.02}
+    rotor = EffectAt(EFFECTS['armature'], Place(0), coefficients=np.array([0.02]))
 
-    def fit(_columns, effects, *_, **__):
-        first, *laws = effects
-        sized = [replace(s, coefficients=np.array([numbers[s.name]])) for s in laws]
-        return replace(model, effects=(first.with_shape(first.shape - later), *sized))
+    def usual(_columns, base, first, least):
+        assert base is model
+        assert not least
+        return replace(model, effects=(first[0].with_shape(first[0].shape - later), rotor))
 
-    monkeypatch.setattr(everyday, 'fit', fit)
+    monkeypatch.setattr(everyday, 'usual', usual)
     monkeypatch.setattr(everyday, 'is_credible', lambda _model: True)
     monkeypatch.setattr(everyday, 'reported_std', lambda *_: ({'delay': std},))
     decision = Decision('missing_physics', model, (), np.zeros(1), 0)
     found = with_everyday(driven, None, decision)
     names = [s.name for s in found.model.effects]
-    assert names == ['command_delay', *(['viscous_friction', 'armature'] * is_adopted)]
-    assert len(found.standing) == 2 * is_adopted
+    assert names == ['command_delay', *(['armature'] * is_adopted)]
+    assert list(found.standing) == [rotor.key] * is_adopted
     assert with_everyday(equations, None, decision) is decision

@@ -257,6 +257,16 @@ def test_the_usual_laws_of_every_joint_are_those_that_can_be_there(equations):
     assert min(found.filtered_shares) > COUNTED_SHARE
 
 
+def test_no_usual_law_stands_beside_one_that_holds_it(equations_for):
+    """Two Coulomb frictions of one joint would share one number as they like."""
+    world = simulate(CHAINS[1], 7, 10.0, force=lambda t, q, v: (-0.5 * np.tanh(v[0] / 1e-3),))
+    columns, base = _start(equations_for(world)[1])
+    stribeck = EffectAt(EFFECTS['stribeck_friction'], Place(0), np.array([0.3]))
+    plain = ('coulomb_friction', 0)
+    assert plain in _keys(usual(columns, base, least=-1.0))
+    assert plain not in _keys(usual(columns, base, (stribeck,), least=-1.0))
+
+
 @pytest.mark.long
 def test_friction_that_builds_up_at_every_joint_is_found_at_once(tmp_path):
     """At one joint after the other a play or a lag would first imitate it."""
