@@ -72,7 +72,7 @@ def is_credible(model: Model) -> bool:
 def is_sound(model: Model) -> bool:
     """Return whether effects do not merely cancel each other, or the bodies."""
     equations = model.frame.equations
-    nominal = float(((equations.d**2).mean(axis=0) / equations.power).sum())
+    nominal = float(nominal_share(equations).sum())
     there = max(min(model.net_share, nominal), 1e-12)
     return sum(model.filtered_shares) < MOST_OPPOSED * there
 
@@ -112,12 +112,17 @@ def is_needed(s: EffectAt, equations: Equations) -> bool:
     return float((left**2).mean()) > float(slight_rest(equations)[j] * equations.power[j])
 
 
+def nominal_share(equations: Equations) -> np.ndarray:
+    """Return the share of each effort that the nominal robot leaves, (k,)."""
+    return np.asarray((equations.d**2).mean(axis=0) / equations.power)
+
+
 def slight_rest(equations: Equations) -> np.ndarray:
     """Return the share of each effort that is slight beside what the nominal robot leaves, (k,).
 
     No more than an adequate model may leave of that, where it counts as physics at all.
     """
-    nominal = (equations.d**2).mean(axis=0) / equations.power
+    nominal = nominal_share(equations)
     adequate = np.minimum(ADEQUATE_REST * nominal, SLIGHT_REST)
     return np.where(nominal > COUNTED_SHARE, adequate, SLIGHT_REST)
 

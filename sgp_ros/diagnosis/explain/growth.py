@@ -14,7 +14,13 @@ import numpy as np
 
 from sgp_ros.diagnosis.criteria import ADEQUATE_REST, COUNTED_SHARE, PER_EFFECT, SLIGHT_REST
 from sgp_ros.diagnosis.explain.candidates import fit
-from sgp_ros.diagnosis.explain.credibility import gain, is_credible, is_needed, slight_rest
+from sgp_ros.diagnosis.explain.credibility import (
+    gain,
+    is_credible,
+    is_needed,
+    nominal_share,
+    slight_rest,
+)
 from sgp_ros.diagnosis.explain.fitted_model import Model, adds_to_usual
 from sgp_ros.diagnosis.explain.regression import Columns, dry_joints
 from sgp_ros.diagnosis.explain.screening import distinct, screen
@@ -50,9 +56,9 @@ class Block:
         """Return whether it is a joint of which much of the discrepancy is left."""
         if self.joints is None:
             return False
-        equations, j = model.frame.equations, list(self.joints)
-        nominal = (equations.d[:, j] ** 2).mean(axis=0) / equations.power[j]
-        return bool((model.left[j] > np.maximum(COUNTED_SHARE, ADEQUATE_REST * nominal)).any())
+        adequate = ADEQUATE_REST * nominal_share(model.frame.equations)
+        is_open = model.left > np.maximum(COUNTED_SHARE, adequate)
+        return bool(is_open[list(self.joints)].any())
 
     def is_slight(self, model: Model) -> bool:
         """Return whether what a model leaves here is slight."""
