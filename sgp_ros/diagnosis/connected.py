@@ -10,7 +10,9 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import Equations, make_equations
+from sgp_ros.diagnosis.compare.several import alone
 from sgp_ros.diagnosis.compare.sufficiency import require_rows
+from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.diagnosis.compare.volume import noisy_volume
 from sgp_ros.diagnosis.criteria import NEARLY
 from sgp_ros.diagnosis.decide.differences import Several, decide_several
@@ -154,6 +156,12 @@ def compared(
         state_cutoff = bandwidth.state_cutoff * most_hz / bandwidth.cutoff
         bandwidth = replace(bandwidth, cutoff=most_hz, state_cutoff=state_cutoff)
     require_rows(recordings.learned, bandwidth)
-    equations = make_equations(recordings.learned, tree, bandwidth, recordings.unstated)
-    several = decide_several(equations, len(recordings.names), progress)
+
+    def equations_of(raw: RawTrajectory) -> Equations:
+        return make_equations(raw, tree, bandwidth, recordings.unstated)
+
+    equations, count = equations_of(recordings.learned), len(recordings.names)
+    several = decide_several(
+        equations, count, progress, lambda r: equations_of(alone(recordings.learned, r))
+    )
     return Connected(recordings, equations, several, remarks=recordings.remarks)

@@ -17,7 +17,6 @@ from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import joint_name
 from sgp_ros.diagnosis.connected import Connected, compared
 from sgp_ros.diagnosis.criteria import ALIKE, MOST_CERTAIN, NEARLY, PER_EFFECT, TEMPER
-from sgp_ros.diagnosis.decide.differences import in_halves
 from sgp_ros.diagnosis.gathered import Recordings
 from sgp_ros.diagnosis.result import Equivalent
 from sgp_ros.diagnosis.setup.evidence import Probe
@@ -34,6 +33,17 @@ from sgp_ros.physics.catalogue import TORQUE_GAIN
 from sgp_ros.rigid.tree import Tree
 
 _CORRECTED = 'All other results are for the recording corrected in this way.'
+
+
+def in_halves(progress: Callable[[float], None]) -> Iterator[Callable[[float], None]]:
+    """Yield the progress of one comparison after the other; how many come is not known ahead.
+
+    Each of them is half of what is left, so that the whole goes on and never back.
+    """
+    left = 1.0
+    while True:
+        left *= 0.5
+        yield lambda share, left=left: progress(1.0 - left * (2.0 - share))  # type: ignore[misc]
 
 
 def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None]) -> Connected:

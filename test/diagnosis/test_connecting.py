@@ -10,7 +10,7 @@ import pytest
 
 from sgp_ros.diagnosis import connecting
 from sgp_ros.diagnosis.connected import Connected
-from sgp_ros.diagnosis.decide.differences import in_halves
+from sgp_ros.diagnosis.connecting import in_halves
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.search import Connection, Tried
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.compare.several import join
+from sgp_ros.diagnosis.compare.several import alone, join
 from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
@@ -16,19 +16,26 @@ from test.diagnosis.worlds import CHAINS, Link, events_of, simulate
 SECONDS = 6.0
 LOAD, ARM = 0.5, 0.35
 """Point mass [kg] and its distance from the joint [m]."""
+FAR = 0.2, 0.7
+"""One whose inertia differs more than its weight, as no torque constant does."""
 GAIN = 0.86
 
 
-def _loaded(link):
+def _loaded(link, load=LOAD, arm=ARM):
     """Return a link that carries a point mass."""
-    mass = link.mass + LOAD
-    centre = (link.mass * link.centre + LOAD * ARM) / mass
-    inertia = link.inertia + link.mass * (link.centre - centre) ** 2 + LOAD * (ARM - centre) ** 2
+    mass = link.mass + load
+    centre = (link.mass * link.centre + load * arm) / mass
+    inertia = link.inertia + link.mass * (link.centre - centre) ** 2 + load * (arm - centre) ** 2
     return Link(mass, centre, inertia, link.length, link.damping)
 
 
 def _friction(level):
     return {'dry': lambda t, q, s: level}
+
+
+def _oil(b):
+    """Return the options of a world with viscous friction b [N m s/rad]."""
+    return {'force': lambda _t, _q, v: (-b * v[0],)}
 
 
 def _weak(commands, _now):
@@ -40,6 +47,10 @@ WORLDS = {
     'alike': ((CHAINS[1], _friction(0.4)), (CHAINS[1], _friction(0.4))),
     'payload': ((CHAINS[1], _friction(0.4)), ((_loaded(CHAINS[1][0]),), _friction(0.4))),
     'friction': ((CHAINS[1], _friction(0.6)), (CHAINS[1], _friction(0.3))),
+    'much': (
+        (CHAINS[1], _friction(0.4) | _oil(0.1)),
+        ((_loaded(CHAINS[1][0], *FAR),), _friction(0.9) | _oil(0.5)),
+    ),
     'motor': ((CHAINS[1], _friction(0.4)), (CHAINS[1], _friction(0.4) | {'motor': _weak})),
 }
 """Chain and options of the first and the second recording."""
@@ -127,6 +138,22 @@ def test_a_torque_constant_differs_once_a_motor_was_replaced(found):
     assert gain.probability > 0.5
 
 
+@pytest.mark.long
+def test_much_that_differs_at_once_is_told_apart(found):
+    """Load and friction, each of which is told as a torque constant while others are not there."""
+    one = found('much')
+    levels = {f.effect: f.parameters for f in one.findings}
+    assert levels.keys() == {'coulomb_friction', 'viscous_friction'}
+    assert levels['coulomb_friction']['level'].value == pytest.approx(0.4, rel=0.02)
+    assert levels['viscous_friction']['b'].value == pytest.approx(0.1, rel=0.05)
+    later = {f.effect: f.parameters for f in one.differences if f.recording == 'warm'}
+    assert later.keys() == {'coulomb_friction', 'viscous_friction', 'payload'}
+    assert later['coulomb_friction']['level'].value == pytest.approx(0.9, rel=0.02)
+    assert later['viscous_friction']['b'].value == pytest.approx(0.5, rel=0.03)
+    mass, z = (later['payload'][name].value for name in ('mass', 'z'))
+    assert mass * z == pytest.approx(-FAR[0] * FAR[1], rel=0.03)
+
+
 def test_recordings_of_different_rates_lie_on_the_grid_of_the_slower(robots):
     robot, _ = robots[1]
     world = simulate(CHAINS[1], 11, 2.0)
@@ -141,5 +168,12 @@ def test_recordings_of_different_rates_lie_on_the_grid_of_the_slower(robots):
     assert first[0] == second[0] == 0.0
     slower = collect(every, robot, least_step=slow.step)
     np.testing.assert_array_equal(both.drive.effort(0)[: len(first)], slower.drive.effort(0))
+    for i, one in enumerate((slower, slow)):
+        again = alone(both, i)
+        for x, y in ((again.time, one.time), (again.position, one.position),
+                     (again.drive.effort(0), one.drive.effort(0))):  # fmt: skip
+            np.testing.assert_array_equal(x, y)
+        assert again.segments == one.segments
+        assert again.recording is None
     with pytest.raises(ValueError, match='one step'):
         join([collect(every, robot), slow])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -110,6 +110,31 @@ def join(raws: Sequence[RawTrajectory]) -> RawTrajectory:
         recording=np.repeat(np.arange(len(raws)), np.diff(starts)),
         approach=_joined([raw.approach for raw in raws]),
         gains=first.gains if is_driven else None,
+    )  # fmt: skip
+
+
+def alone(raw: RawTrajectory, recording: int) -> RawTrajectory:
+    """Return one of several recordings that were joined.
+
+    Args:
+        raw: the joined ones.
+        recording: index.
+    """
+    assert raw.recording is not None
+    rows = np.flatnonzero(raw.recording == recording)
+    first, end = int(rows[0]), int(rows[-1]) + 1
+
+    def own(x: np.ndarray | None) -> np.ndarray | None:
+        return None if x is None else x[first:end]
+
+    return replace(
+        raw, time=raw.time[first:end], position=raw.position[first:end],
+        velocity=own(raw.velocity), effort=own(raw.effort), approach=own(raw.approach),
+        drive=raw.drive.parts[recording] if isinstance(raw.drive, SeveralDrives) else None,
+        segments=tuple(
+            slice(s.start - first, s.stop - first) for s in raw.segments if first <= s.start < end
+        ),
+        recording=None,
     )  # fmt: skip
 
 

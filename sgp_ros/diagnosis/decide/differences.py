@@ -15,7 +15,7 @@ common models are compared anew, and differences are looked for again beside the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,12 +24,13 @@ from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, DOUBTED, EVIDENCE, MOST_CERTAIN, TEMPER
 from sgp_ros.diagnosis.decide.cross_validation import support
 from sgp_ros.diagnosis.decide.decision import Decision, decide, refused
+from sgp_ros.diagnosis.decide.each_alone import models_of_each, put_together
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison, compare_models
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.in_recording import InRecording, may_differ
+from sgp_ros.diagnosis.explain.in_recording import InRecording, may_differ, own_laws, within
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
@@ -61,13 +62,19 @@ class Several:
     chances: dict[object, float]
 
 
-def decide_several(equations: Equations, count: int, progress: Callable[[float], None]) -> Several:
+def decide_several(
+    equations: Equations,
+    count: int,
+    progress: Callable[[float], None],
+    alone: Callable[[int], Equations] | None = None,
+) -> Several:
     """Compare models on several recordings and return what is common and what differs.
 
     Args:
         equations: of all recordings.
         count: of the recordings.
         progress: called with the share that is done.
+        alone: gives the equations of each recording; not asked where a common model explains all.
     """
     part = 1.0 if count == 1 else 0.4
     comparison = compare_models(equations, lambda share: progress(part * share))
@@ -75,9 +82,14 @@ def decide_several(equations: Equations, count: int, progress: Callable[[float],
     if count == 1:
         return Several(equations, comparison, decision, decision.model, {})
     search = _Search(Columns(equations), Scale.of(equations, comparison), count)
-    model = search.extended(_start(comparison, decision, search.scale))
+    model = _start(comparison, decision, search.scale)
+    is_explained = decision.verdict != 'unexplained'
+    if is_explained or alone is None:
+        model = search.extended(model)
+    if alone is not None and (own_laws(model.effects) or not is_explained):
+        model = max(model, search.from_each(model, alone), key=search.worth)
     progress(0.5)
-    own = _own(model.effects)
+    own = own_laws(model.effects)
     if not own:
         return Several(equations, comparison, decision, decision.model, {})
     left = replace(equations, d=equations.d - _force(model, own))
@@ -86,43 +98,18 @@ def decide_several(equations: Equations, count: int, progress: Callable[[float],
     model = search.possible(search.fitted(decision.model, (*decision.model.effects, *own)))
     if decision.verdict != 'unexplained':
         model = search.extended(model)
-    chances: dict[object, float] = {s.key: search.chance(model, s) for s in _own(model.effects)}
+    chances: dict[object, float] = {
+        s.key: search.chance(model, s) for s in own_laws(model.effects)
+    }
     if decision.verdict == 'unexplained':  # what is unknown may differ by chance
         chances = {key: min(p, DOUBTED) for key, p in chances.items()}
     return Several(left, comparison, decision, model, chances)
-
-
-def in_halves(progress: Callable[[float], None]) -> Iterator[Callable[[float], None]]:
-    """Yield the progress of one comparison after the other; how many come is not known ahead.
-
-    Each of them is half of what is left, so that the whole goes on and never back.
-    """
-    left = 1.0
-    while True:
-        left *= 0.5
-        yield lambda share, left=left: progress(1.0 - left * (2.0 - share))  # type: ignore[misc]
 
 
 def _start(comparison: Comparison, decision: Decision, scale: Scale) -> Model:
     """Return the best common model, adequate or not: differences may spoil it."""
     models = (comparison.base, *comparison.singles, *comparison.pairs, *comparison.more)
     return max((decision.model, *models), key=scale.worth)
-
-
-def _own(effects: Iterable[EffectAt]) -> tuple[EffectAt, ...]:
-    """Return the effects that act in one recording alone."""
-    return tuple(s for s in effects if isinstance(s.effect, InRecording))
-
-
-def _within(model: Model, recording: int) -> Model:
-    """Return the model as one recording alone shows it, with laws that hold everywhere."""
-    effects = []
-    for s in model.effects:
-        if not isinstance(s.effect, InRecording):
-            effects.append(s)
-        elif s.effect.recording == recording:
-            effects.append(replace(s, effect=s.effect.law))
-    return replace(model, effects=tuple(effects))
 
 
 def _force(model: Model, some: tuple[EffectAt, ...]) -> np.ndarray:
@@ -163,19 +150,28 @@ class _Search:
     scale: Scale
     count: int
 
+    def from_each(self, model: Model, alone: Callable[[int], Equations]) -> Model:
+        """Return what models of each recording alone make, extended; without any, the model."""
+        models = models_of_each(map(alone, range(self.count)))
+        if not models:
+            return model
+        first = next(iter(models.values()))
+        return self.extended(self.fitted(first, put_together(models)))
+
     def extended(self, model: Model) -> Model:
         """Return the model with all differences that are worth their price."""
         while True:
-            trials = [*self._moved(model), *self._shared(model), *self._simpler(model)]
+            trials = [*self._moved(model), *self._shared(model), *self._simpler(model),
+                      *self._fewer(model)]  # fmt: skip
             for r in range(self.count):
                 trials += self._added(model, r)
             trials = [m for m in trials if m.is_possible() and np.isfinite(m.score)]
-            best = max(trials, key=self._worth, default=model)
-            if self._worth(best) <= self._worth(model) + ALIKE or not self._holds(best):
+            best = max(trials, key=self.worth, default=model)
+            if self.worth(best) <= self.worth(model) + ALIKE or not self._holds(best):
                 return model
             model = best
 
-    def _worth(self, model: Model) -> float:
+    def worth(self, model: Model) -> float:
         """Return the worth of a model; between equal ones, more common laws win."""
         own = [s.effect.recording for s in model.effects if isinstance(s.effect, InRecording)]
         return self.scale.worth(model) - 4.0 * ALIKE * len(own) - 2.0 * ALIKE * own.count(0)
@@ -213,9 +209,9 @@ class _Search:
         assert isinstance(one.effect, InRecording)
         without = self.fitted(model, tuple(s for s in model.effects if s.key != one.key))
         r = one.effect.recording
-        said = Contrasts(self.columns.equations(frozenset()), _within(model, r))
+        said = Contrasts(self.columns.equations(frozenset()), within(model, r))
         others = (m for m in self._added(without, r) if m.key != model.key and m.is_possible())
-        rivals = [without, *(m for m in others if not said.is_same_law(_within(m, r)))]
+        rivals = [without, *(m for m in others if not said.is_same_law(within(m, r)))]
         worth = np.array([self.scale.worth(m) for m in rivals]) - self.scale.worth(model)
         odds = float(np.exp(np.minimum(TEMPER * worth, 50.0)).sum())
         return min(1.0 / (1.0 + odds), MOST_CERTAIN)
@@ -254,6 +250,13 @@ class _Search:
                     others = (*model.effects[:i], *model.effects[i + 1 :])
                     found.append(self.fitted(model, (common, *others)))
         return found
+
+    def _fewer(self, model: Model) -> list[Model]:
+        """Return the model without each of the laws in one recording."""
+        return [
+            self.fitted(model, tuple(other for other in model.effects if other is not s))
+            for s in own_laws(model.effects)
+        ]
 
     def _simpler(self, model: Model) -> list[Model]:
         """Return the model with a law of one number in place of each richer one."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
 
+from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.physics.effect import Effect
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.motion import SeenMotion
 from sgp_ros.physics.parts import Place, Placed, Quantity, Value
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -98,3 +100,19 @@ def may_differ(law: Effect) -> bool:
     is_gain = law.effort_columns('') and len(law.quantities) == 1
     of_motor = law.has_source or law.is_of_command or (law.effort_columns('') and not is_gain)
     return law.is_force and not of_motor and (not law.shape_names() or law.is_on_tree)
+
+
+def own_laws(effects: Iterable[EffectAt]) -> tuple[EffectAt, ...]:
+    """Return the effects that act in one recording alone."""
+    return tuple(s for s in effects if isinstance(s.effect, InRecording))
+
+
+def within(model: Model, recording: int) -> Model:
+    """Return a model as one recording alone shows it, with laws that hold everywhere."""
+    effects = []
+    for s in model.effects:
+        if not isinstance(s.effect, InRecording):
+            effects.append(s)
+        elif s.effect.recording == recording:
+            effects.append(replace(s, effect=s.effect.law))
+    return replace(model, effects=tuple(effects))

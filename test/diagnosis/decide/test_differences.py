@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from sgp_ros.diagnosis.decide import differences
+from sgp_ros.diagnosis.decide.each_alone import put_together
 from sgp_ros.diagnosis.explain.in_recording import InRecording
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
@@ -48,3 +49,31 @@ def test_common_laws_that_are_impossible_beside_differences_become_plain(monkeyp
     assert all(s.is_possible(MOTION) for s in found.effects if s is not later)
     right = _model(_at('asymmetric_coulomb', [13.0, 21.0]), later)
     assert search.possible(right) is right
+
+
+def _alone(*laws):
+    """Return the model of a recording alone, of laws with their shares of the squared effort."""
+    effects, shares = zip(*laws, strict=True)
+    equations = SimpleNamespace(power=np.ones(1))
+    forces = tuple(np.full((4, 1), share**0.5) for share in shares)
+    frame = SimpleNamespace(equations=equations)
+    return SimpleNamespace(effects=effects, forces=forces, frame=frame)
+
+
+def test_models_of_each_recording_are_put_together():
+    """Laws of most are common; what few have, or other numbers that count, act there alone."""
+    dry, oil = 'coulomb_friction', 'viscous_friction'
+    first = _alone((_at(dry, [1.0]), 0.2), (_at(oil, [0.5]), 0.1))
+    same = _alone((_at(dry, [1.05]), 0.2), (_at(oil, [1.0]), 0.3))  # 0.05: 0.0005 of the effort
+    loaded = _alone((_at(dry, [1.0]), 0.2), (_at('constant_load', [2.0]), 0.4))
+    slight = _alone((_at(dry, [1.0]), 0.2), (_at('constant_load', [0.1]), 0.0009))
+    found = put_together({0: first, 1: same, 2: loaded, 4: slight})
+    said = [
+        (s.effect.law.name, s.effect.recording) if isinstance(s.effect, InRecording)
+        else (s.effect.name, None) for s in found
+    ]  # fmt: skip
+    assert said == [(dry, None), (oil, 0), (oil, 1), ('constant_load', 2)]
+    assert found[0].coefficients == [1.0]
+    found = put_together({0: first, 1: same})
+    assert [s.effect.name for s in found] == [dry, oil, f'{oil} in 1']
+    assert put_together({}) == ()
