@@ -1,8 +1,8 @@
 """Meaning of the name of a column: a quantity, a joint, a unit, measured or asked for.
 
-Names are cut into words at dots, slashes, underscores, brackets, changes of case and before
-digits. Words that name a quantity, a unit or a target, in English or German, are taken out; what
-is left names the joint.
+Names are cut into words at dots, slashes, underscores, brackets, changes of case, before digits
+and between two known words, as in `actcur`. Words that name a quantity, a unit or a target, in
+English or German, are taken out; what is left names the joint.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ DUTY, COMMAND, KP, KD, OTHER = 'duty', 'command', 'kp', 'kd', 'other'
 
 _QUANTITIES = {
     TIME: 't ts time times timestamp timestamps stamp stamps sec secs seconds clock zeit',
-    POSITION: 'q qs pos position positions qpos angle angles theta phi psi alpha beta jointpos '
+    POSITION: 'q qs pos position positions qpos ang angle angles theta phi psi alpha beta '
     'encoder enc state winkel lage',
     VELOCITY: 'dq qd qdot vel velocity velocities qvel dtheta dphi dalpha omega speed thetadot '
-    'phidot alphadot jointvel geschwindigkeit drehzahl',
+    'phidot alphadot rate geschwindigkeit drehzahl',
     EFFORT: 'tau taus torque torques effort efforts eff effs force forces qfrc load moment trq '
     'drehmoment kraft',
     CURRENT: 'i iq cur current currents amps curr strom',
@@ -31,8 +31,8 @@ _QUANTITIES = {
 }
 _WORDS = {word: role for role, words in _QUANTITIES.items() for word in words.split()}
 _EFFORTS = frozenset(_QUANTITIES[EFFORT].split())
-_MOMENT = 'M'
-"""Symbol of a torque, as a capital."""
+_SYMBOLS = {'M': EFFORT, 'F': EFFORT}
+"""Those that are capitals."""
 _TARGETS = frozenset({
     'des', 'desired', 'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'ref',
     'reference', 'setpoint', 'goal', 'action', 'actions', 'ctrl', 'control', 'u', 'sp', 'd',
@@ -63,6 +63,8 @@ _FILLER = frozenset({
     'measured', 'meas', 'act', 'raw', 'list', 'sensor', 'log', 'the', 'value', 'values', 'j',
     'ist',
 })  # fmt: skip
+_KNOWN = frozenset({w for w in {*_WORDS, *_FILLER, *_TARGETS} if len(w) > 2})
+"""Words that are seen where they stand close to another one."""
 _PAIRS = {('p', 'gain'): KP, ('d', 'gain'): KD, ('q', 'dot'): VELOCITY,
           ('q', 'ddot'): OTHER, ('d', 'q'): VELOCITY, ('feed', 'forward'): OTHER}  # fmt: skip
 _PAIRS |= {(angle, 'dot'): VELOCITY for angle in ('theta', 'phi', 'psi', 'alpha', 'beta')}
@@ -119,8 +121,8 @@ def meaning(name: str, joints: Iterable[str] = ()) -> Meaning:
             is_target = True
         elif word in _WORDS and not (word in {'i', 'd', 't', 'index'} and role):
             role = _stronger(role, _WORDS[word])
-        elif words[i] == _MOMENT:
-            role = _stronger(role, EFFORT)
+        elif words[i] in _SYMBOLS:
+            role = _stronger(role, _SYMBOLS[words[i]])
         else:
             rest.append(words[i])
         i += 1
@@ -132,8 +134,14 @@ def meaning(name: str, joints: Iterable[str] = ()) -> Meaning:
 
 
 def _own(words: list[str], unit: str, joints: Iterable[str]) -> range:
-    """Return where words name a joint; empty where they are all there is, and may be a time."""
-    for joint in sorted(map(_words, joints), key=len, reverse=True):
+    """Return where words name a joint; empty where they are all there is, and may be a time.
+
+    `joint_t` is also met as `T`.
+    """
+    names = sorted(map(_words, joints), key=len, reverse=True)
+    bare = [[w.upper() for w in name if w.lower() not in _FILLER] for name in names]
+    letters = [name for name in bare if len(name) == 1 and name[0].isalpha()]
+    for joint in (*names, *letters):
         for i in range(len(words) - len(joint) + 1):
             is_all = len(words) == len(joint) and unit in _OF_TIME
             if joint and words[i : i + len(joint)] == joint and not is_all:
@@ -155,7 +163,19 @@ def _words(name: str) -> list[str]:
     for sign, unit in (('%', ' pct '), ('‰', ' permille '), ('°(?!C)', ' deg ')):
         bare = re.sub(sign, unit, bare)
     bare = re.sub(r'([A-Za-z])(\d)', r'\1 \2', bare)
-    return [word for word in re.split(r'[^A-Za-z0-9]+', bare) if word]
+    return [part for word in re.split(r'[^A-Za-z0-9]+', bare) if word for part in _parts(word)]
+
+
+def _parts(word: str) -> list[str]:
+    """Return two known words, one of which is a quantity, that are one word; or the word."""
+    low = word.lower()
+    if low in _KNOWN or low in _UNITS:
+        return [word]
+    for i in range(3, len(low) - 2):
+        both = {low[:i], low[i:]}
+        if both <= _KNOWN and both & _WORDS.keys():
+            return [word[:i], word[i:]]
+    return [word]
 
 
 def _unit(words: list[str]) -> tuple[list[str], str]:
@@ -169,7 +189,7 @@ def _unit(words: list[str]) -> tuple[list[str], str]:
             return words[:-2], f'{unit}/s'
     if len(words) > 2 and ends[-1] == 'm' and ends[0] in {'n', 'kn', 'mn'}:
         return words[:-2], f'{_UNITS[ends[0]]} m'
-    if len(words) > 1 and words[-1].lower() in _UNITS:
+    if len(words) > 1 and words[-1].lower() in _UNITS and words[-1] != 'a':
         return words[:-1], _UNITS[words[-1].lower()]
     inside = [i for i, w in enumerate(words) if w.lower() in _LONG_UNITS]
     if len(inside) == 1 and len(words) > 1:

@@ -29,6 +29,7 @@ _SYMBOL = re.compile(r'([uyz])[_.]?(\d*)')
 _ROLES = {
     **dict.fromkeys(('rad', 'deg', 'mm'), POSITION),
     **dict.fromkeys(('rad/s', 'deg/s', 'rpm', 'm/s', 'mm/s'), VELOCITY),
+    'A': CURRENT, 'mA': CURRENT,
     **dict.fromkeys(('N m', 'mN m', 'kN m', 'N mm', 'N cm', 'kgf cm', 'mN', 'kN'), EFFORT),
 }  # fmt: skip
 """Units that only one quantity of a joint has."""
@@ -179,16 +180,17 @@ def of_one_joint(
     a motor does belongs to its joint.
     """
     driven = [h.name for h in hints if h.is_driven]
-    one = [x for x in positions if len(positions) == 1 or (len(driven) == 1 and _same(x, *driven))]
+    is_only = len(positions) == 1 >= len(hints)
+    one = [x for x in positions if is_only or (len(driven) == 1 and _same(x, *driven))]
     if len(one) != 1:
         return list(entries)
     (label,), found = one, []
-    others = {'', OTHER} if len(positions) == 1 else {'', OTHER, POSITION, VELOCITY}
+    others = {'', OTHER} if is_only else {'', OTHER, POSITION, VELOCITY}
     groups = [(e.said.role, e.said.is_target) for e in entries]
     for e, group in zip(entries, groups, strict=True):
         is_alone = e.said.role not in others and groups.count(group) == 1 and e.label != label
         if is_alone and e.said.joint and label:
-            what = 'position' if len(positions) == 1 else 'joint with a motor'
+            what = 'position' if is_only else 'joint with a motor'
             guess.unsure.append(f'{e.column} is taken as that of {label}, the only {what}.')
         found.append(replace(e, label=label) if is_alone else e)
     return found
@@ -276,7 +278,7 @@ def of_robot(
 
 def _listed(columns: Columns, hints: Sequence[JointHint]) -> list[str]:
     """Return the joints in the order of the columns, where the table lists them."""
-    texts = {n: [str(t) for t in x.ravel()] for n, x in columns.items() if x.dtype.kind == 'U'}
+    texts = {n: [*map(str, x.ravel())] for n, x in columns.items() if x.dtype.kind == 'U'}
     for listed in texts.values():
         known = [next((h.name for h in hints if _same(t, h.name)), '') for t in listed]
         if all(known) and len(set(known)) == len(listed):
@@ -293,8 +295,6 @@ def _same(label: str, name: str) -> bool:
 
 def _within(column: str, joints: Sequence[str]) -> list[str]:
     """Return the longest of the joints' names that stand in a column's name as words."""
-    found = [
-        name for name in joints
-        if re.search(rf'(?<![^\W_]){re.escape(name)}(?![^\W_])', column, re.IGNORECASE)
-    ]  # fmt: skip
+    word = r'(?<![^\W_]){}(?![^\W_])'
+    found = [x for x in joints if re.search(word.format(re.escape(x)), column, re.IGNORECASE)]
     return [max(found, key=len)] if found else []

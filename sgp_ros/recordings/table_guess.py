@@ -83,6 +83,11 @@ def guess_map(
     entries = of_one_joint(entries, positions, hints, guess)
     joints = joint_names(positions, columns, hints, guess)
     entries, positions = of_robot(entries, positions, joints, guess)
+    missing = [name for name in known if name not in joints.values()]
+    if missing:
+        guess.unsure.append(
+            f'No column of positions was recognised for {", ".join(missing)}: enter it in the map.'
+        )
     hinted = {h.name: h for h in hints}
     units = _position_units(positions, joints, hinted, guess)
     found: dict[str, dict[str, Any]] = {

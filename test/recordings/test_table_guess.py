@@ -85,6 +85,14 @@ def _read(path, folder, hints=HINTS, rate=None):
         ('pan.speed_dps', 'velocity', False, 'pan', 'deg/s'),
         ('current_pos_lift', 'position', False, 'lift', ''),
         ('goal_position', 'position', True, '', ''),
+        ('ax1_actcur_A', 'current', False, 'ax_1', 'A'),
+        ('ax1_actpos_deg', 'position', False, 'ax_1', 'deg'),
+        ('lift_poscmd', 'position', True, 'lift', ''),
+        ('posture', '', False, 'posture', ''),
+        ('ang_boom', 'position', False, 'boom', ''),
+        ('F_trolley [N]', 'effort', False, 'trolley', 'N'),
+        ('flap_rate_deg_s', 'velocity', False, 'flap', 'deg/s'),
+        ('joint_a', '', False, 'a', ''),
     ],
 )
 def test_names_tell_quantity_joint_and_unit(name, role, is_target, joint, unit):
@@ -156,14 +164,15 @@ def test_an_angle_beside_a_greek_one_of_the_same_joint_may_be_its_acceleration(t
     assert any('not from alpha' in said for said in summary.unsure)
 
 
-def test_joints_may_be_called_as_times_and_commands_are(tmp_path):
+@pytest.mark.parametrize('names', [('U', 'T'), ('joint_u', 'joint_t')])
+def test_joints_may_be_called_as_times_and_commands_are(tmp_path, names):
     """`T` and `U` are axes of industrial arms; alone, `T` is a time all the same."""
-    hints = tuple(replace(hint, name=name) for hint, name in zip(HINTS, 'UT', strict=True))
+    hints = tuple(replace(hint, name=name) for hint, name in zip(HINTS, names, strict=True))
     table = np.column_stack([T, np.degrees(Q), TAU])
     header = 'T,U_act_deg,T_act_deg,U_cur_A,T_cur_A'
     np.savetxt(tmp_path / 'log.csv', table, delimiter=',', header=header, comments='')
     _, states, commands = _read(tmp_path / 'log.csv', tmp_path, hints)
-    order = [states[0].names.index(name) for name in 'UT']
+    order = [states[0].names.index(name) for name in names]
     np.testing.assert_allclose([s.position[order] for s in states], Q, atol=1e-12)
     np.testing.assert_allclose([s.effort[order] for s in states], TAU, atol=1e-12)
     assert not commands
@@ -183,6 +192,27 @@ def test_columns_of_joints_that_the_robot_lacks_are_left_out(tmp_path):
     assert said == 'The robot has no joint of right_shoulder_pos, right_elbow_pos: ignored.'
     with pytest.raises(RecordingError, match='positions of 4 joints'):
         _read(path, tmp_path, (*HINTS, JointHint('knee')))
+
+
+def test_a_joint_without_a_column_is_said_and_its_force_is_not_that_of_another(tmp_path):
+    """Of a crane whose trolley is not recognised the sway has no motor, nor has it a force."""
+    path = _npz(tmp_path, t=T, elbow_pos=Q[:, 1], rail=Q[:, 0], F_motor=TAU[:, 0])
+    summary, states, _ = _read(path, tmp_path, (HINTS[0], replace(HINTS[1], is_driven=False)))
+    assert states[0].effort is None or not np.isfinite(states[0].effort).any()
+    said = ' '.join(summary.unsure)
+    assert 'No column of positions was recognised for shoulder: enter it in the map.' in said
+    assert 'F_motor belongs to no position' in said
+
+
+@pytest.mark.parametrize('unit', ['A', 'mA'])
+def test_a_unit_of_currents_says_what_a_column_holds(tmp_path, unit):
+    """`motor_mA` is what the only motor draws."""
+    table = np.column_stack([T, Q[:, 0], TAU[:, 0]])
+    header = f'time,flap_angle,drive_{unit}'
+    np.savetxt(tmp_path / 'log.csv', table, delimiter=',', header=header, comments='')
+    summary, states, _ = _read(tmp_path / 'log.csv', tmp_path, (JointHint('flap'),))
+    assert all(np.isfinite(s.effort).all() for s in states)
+    assert any(f'The efforts are in {unit}' in x for x in summary.unsure)
 
 
 @pytest.mark.parametrize('is_driven', [False, True])
