@@ -8,7 +8,7 @@ asserted only where they, with whatever physics is left, are worth more than all
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,7 +27,7 @@ from sgp_ros.diagnosis.setup.said import (
     price_of,
     setup_advice,
 )
-from sgp_ros.diagnosis.setup.search import Connection, search
+from sgp_ros.diagnosis.setup.search import Connection, Tried, search
 from sgp_ros.diagnosis.unlisted.statement import extended
 from sgp_ros.physics.catalogue import TORQUE_GAIN
 from sgp_ros.rigid.tree import Tree
@@ -76,7 +76,7 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
     if not known.findings:
         return _connected(plain, found, tree, each)
     # what other bodies leave is too small to tell them from other gains
-    return _beside(plain, by_gains, 0.0) if found.is_enough else known
+    return _beside(plain, by_gains.errors, 0.0) if found.is_enough else known
 
 
 def with_laws(connected: Connected) -> Connected:
@@ -128,14 +128,18 @@ def _connected(
             on_band = compared(plain.recordings, tree, next(each), cutoff)
             gain = _gain(on_band, corrected, price)
     if gain < (-ALIKE if _stands_for_gains(plain, found) else PER_EFFECT):
-        return plain if gain + rare < -ALIKE else _beside(plain, found, gain, _named(corrected))
+        is_alike = gain + rare >= -ALIKE
+        return _beside(plain, found.errors, gain, _named(corrected)) if is_alike else plain
     errors = tuple(error_finding(found, i, gain) for i in range(len(found.errors)))
     least = min(range(len(errors)), key=lambda i: errors[i].probability)
     if len(errors) > 1 and errors[least].probability < MOST_CERTAIN:
-        fewer = found.without(least)
-        without = _undone(plain, fewer, tree, each)
-        if _gain(without, corrected, price - price_of(fewer)[0]) < PER_EFFECT:
-            return _connected(plain, fewer, tree, each, without)
+        fewer, dropped = found.without(least), found.errors[least]
+        without, (less, common) = _undone(plain, fewer, tree, each), price_of(fewer)
+        gain = _gain(without, corrected, price - less)
+        if gain < PER_EFFECT:
+            kept = _connected(plain, fewer, tree, each, without)
+            is_alike = gain + rare - common >= -ALIKE
+            return _beside(kept, [dropped], gain, _named(corrected)) if is_alike else kept
     return replace(
         corrected, findings=errors,
         equivalents=equal_errors(found), delay_std=found.delay_std, uncorrected=plain, price=price,
@@ -200,14 +204,14 @@ def _named(connected: Connected) -> frozenset[tuple[str, str]]:
 
 
 def _beside(
-    plain: Connected, found: Connection, gain: float,
+    plain: Connected, errors: Sequence[Tried], gain: float,
     common: frozenset[tuple[str, str]] = frozenset(),
 ) -> Connected:  # fmt: skip
-    """Return the recording as it is, with errors of the connection that explain as much."""
-    named = tuple((e.hypothesis.joint, e.hypothesis.effect) for e in found.errors)
+    """Return what is decided with further errors of the connection that would explain as much."""
+    named = tuple((e.hypothesis.joint, e.hypothesis.effect) for e in errors)
     return replace(
-        plain, equivalents=(Equivalent(named, '', 1.0),),
+        plain, equivalents=(*plain.equivalents, Equivalent(named, '', 1.0)),
         rivals=tuple(joint for joint, _ in named),
-        has_rival_gains=any(e.hypothesis.is_of_gains for e in found.errors),
+        has_rival_gains=any(e.hypothesis.is_of_gains for e in errors),
         trust=1.0 / (1.0 + math.exp(TEMPER * gain)), common=common,
     )  # fmt: skip

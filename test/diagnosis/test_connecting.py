@@ -11,6 +11,7 @@ import pytest
 from sgp_ros.diagnosis import connecting
 from sgp_ros.diagnosis.connected import Connected
 from sgp_ros.diagnosis.connecting import in_halves
+from sgp_ros.diagnosis.criteria import ALIKE
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.search import Connection, Tried
 
@@ -129,12 +130,15 @@ def test_efforts_and_motion_must_both_be_better_explained(of_efforts, of_motion,
 
 
 @pytest.mark.parametrize(('certain', 'without', 'kept'),
-                         [(0.5, 4.0, ['sign']), (0.5, 30.0, ['sign', 'scale']),
+                         [(0.5, 4.0, ['sign']), (0.5, -4.0, ['sign']), (0.5, -21.0, ['sign']),
+                          (0.5, 30.0, ['sign', 'scale']),
                           (0.99, 4.0, ['sign', 'scale'])])  # fmt: skip
 def test_an_error_that_is_not_certain_must_be_worth_it_beside_physics(
     monkeypatch, certain, without, kept
 ):
     """A scale of positions, which a torque constant undoes, explains nothing beside friction.
+
+    Where it explains as much, and is only rarer, it is said beside the others.
 
     Args:
         monkeypatch: of pytest.
@@ -145,7 +149,11 @@ def test_an_error_that_is_not_certain_must_be_worth_it_beside_physics(
 
     def tried(name, clock):
         hypothesis = SimpleNamespace(
-            effect=name, names=(), is_of_gains=False, applied=lambda c, _: replace(c, clock=1.0)
+            effect=name,
+            joint='all',
+            names=(),
+            is_of_gains=False,
+            applied=lambda c, _: replace(c, clock=1.0),
         )
         none = Correction.none(1)
         return Tried(hypothesis, np.zeros(0), np.zeros(0), replace(none, clock=clock), None)
@@ -156,7 +164,8 @@ def test_an_error_that_is_not_certain_must_be_worth_it_beside_physics(
     monkeypatch.setattr(Tried, 'remedy', '')
     monkeypatch.setattr(Correction, 'tree', lambda _self, tree: tree)
     for name, stub in {
-        'compared': lambda *_: _of(10.0), '_gain': gain, 'price_of': lambda _: (10.0, 0.0),
+        'compared': lambda *_: _of(10.0), '_gain': gain, '_named': lambda _: frozenset(),
+        'price_of': lambda found: (10.0, 10.0 * (len(found.errors) - 1)),
         'equal_errors': lambda _: (), '_stands_for_gains': lambda *_: False,
         'error_finding': lambda found, i, _gain: SimpleNamespace(
             effect=found.errors[i].hypothesis.effect, probability=(0.99, certain)[i]),
@@ -166,6 +175,8 @@ def test_an_error_that_is_not_certain_must_be_worth_it_beside_physics(
     said = connecting._connected(_of(10.0), found, None, in_halves(lambda _: None))
     assert [f.effect for f in said.findings] == kept
     assert said.correction.clock == len(kept)
+    is_said = len(kept) == 1 and without > -ALIKE - 10.0
+    assert [e.effects for e in said.equivalents] == [(('all', 'scale'),)] * is_said
 
 
 @pytest.mark.parametrize(('unknown', 'left', 'may_be'), [((), 0.9, False), ((1,), 0.1, False),
