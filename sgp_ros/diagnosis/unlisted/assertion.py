@@ -17,6 +17,7 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import ALIKE, LACKING, LEAST_LAW, NEARLY, SIGNIFICANT
 from sgp_ros.diagnosis.decide.certainty import probabilities
+from sgp_ros.diagnosis.decide.cross_validation import structure
 from sgp_ros.diagnosis.decide.decision import Decision, decide, refused
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, moved
 from sgp_ros.diagnosis.decide.scale import Scale
@@ -62,9 +63,12 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
         decision: on these.
     """
     found, columns = Explained(comparison, decision, (), {}), Columns(equations)
+    scale = Scale.of(equations, comparison)
+    coloured = _coloured(equations, scale, decision.model)
+    open_ = {*decision.unknown, *coloured, *_remembering(decision.model)}
     for joint in _joints(equations, comparison, decision):
         listed = found.decision.tentative or found.decision.model
-        scale, is_open = Scale.of(equations, comparison), joint in decision.unknown
+        is_open = joint in open_
         if not is_open and not promises(columns, listed, joint):
             continue
         searched = search(columns, scale, listed, joint, is_open=is_open)
@@ -75,6 +79,22 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
         if not searched.is_slight or law_of(more.decision.model, joint) is not None:
             found = more
     return found
+
+
+def _coloured(equations: Equations, scale: Scale, model: Model) -> list[int]:
+    """Return the joints where more is left than noise: none that the motion at the time predicts.
+
+    A force that remembers the motion looks like that beside listed laws, as a disturbance does.
+    """
+    if (scale.excess(model) < 1.0).all():
+        return []
+    share = structure(equations, model.residual)
+    return [*map(int, np.flatnonzero(scale.excess(model, np.stack([share, share])) >= 1.0))]
+
+
+def _remembering(model: Model) -> list[int]:
+    """Return the joints with a listed law that remembers the way; one that forgets looks alike."""
+    return [s.place.joint for s in model.effects if s.effect.has_memory]
 
 
 def _joints(equations: Equations, comparison: Comparison, decision: Decision) -> list[int]:

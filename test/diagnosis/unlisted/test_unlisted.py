@@ -395,3 +395,37 @@ def test_a_law_is_looked_for_where_a_force_of_any_form_promises_one(
     _, equations = equations_for(simulate(CHAINS[1], 5, 8.0, force=force))
     listed = fitted(equations, 'viscous_friction')
     assert promises(Columns(equations), listed, 0) is is_promised
+
+
+@pytest.mark.parametrize(('share', 'joints'), [(0.9, [1]), (0.1, [])])
+def test_more_than_noise_that_is_left_is_looked_at(monkeypatch, share, joints):
+    """A force that remembers the motion is predicted by rows before, not by the motion now."""
+    monkeypatch.setattr(assertion, 'structure', lambda *_: np.array([1.0, share]))
+    left = np.array([0.5, 4.0])  # relative to what an adequate model may
+    scale = SimpleNamespace(
+        excess=lambda _model, part=None: left if part is None else (part * left).max(axis=0)
+    )
+    model = SimpleNamespace(residual=None)
+    assert assertion._coloured(None, scale, model) == joints
+    left[1] = 0.9
+    monkeypatch.setattr(assertion, 'structure', None)  # not asked
+    assert assertion._coloured(None, scale, model) == []
+
+
+def test_a_law_may_stand_for_a_listed_one_that_remembers(monkeypatch, equations_for):
+    """Hysteresis, which a force that forgets looks like, is asked again beside friction."""
+    _, equations = equations_for(simulate(CHAINS[1], 12, 6.0, force=_brake))
+    comparison = compare_models(equations, lambda _share: None)
+    decision = decide(equations, comparison)
+    asked = []
+    monkeypatch.setattr(assertion, 'promises', lambda *_: True)
+    monkeypatch.setattr(assertion, 'search', lambda *_args, is_open: asked.append(is_open))
+    for name in ('hysteresis', 'coulomb_friction'):
+        shape = np.full(len(EFFECTS[name].shape_names()), 0.1)
+        one = EffectAt(EFFECTS[name], Place(0), shape, np.ones(1))
+        model = fit(Columns(equations), (one,), comparison.base.sigma, rounds=1, steps=0)
+        monkeypatch.setattr(assertion, '_coloured', lambda *_: [])
+        with_laws(
+            equations, comparison, replace(decision, model=model, unknown=(), tentative=None)
+        )
+    assert asked == [True, False]
