@@ -150,6 +150,8 @@ def test_much_that_differs_at_once_is_told_apart(found):
     assert later.keys() == {'coulomb_friction', 'viscous_friction', 'payload'}
     assert later['coulomb_friction']['level'].value == pytest.approx(0.9, rel=0.02)
     assert later['viscous_friction']['b'].value == pytest.approx(0.5, rel=0.03)
+    proof = one.proofs['train']  # roll-outs of each recording are with its own load
+    assert proof.rollout_after['joint0'] < 0.02 * proof.rollout_before['joint0']
     mass, z = (later['payload'][name].value for name in ('mass', 'z'))
     assert mass * z == pytest.approx(-FAR[0] * FAR[1], rel=0.03)
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.explain.fitted_model import Model, extra_force
+from sgp_ros.diagnosis.explain.in_recording import InRecording
 from sgp_ros.diagnosis.locate.remainder import Remainder
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.elasticity import JointElasticity
@@ -241,10 +242,11 @@ def dynamics_of(
     tree = equations.with_bodies(motion, model.w).tree
     bristles = tuple(filter(_creeps, (*model.effects, *motion.known)))
     rotors, inertial = np.zeros(tree.size), (*model.effects, *motion.known)
-    for s in (s for s in inertial if s.effect.is_inertial):
+    for s in (s for s in inertial if s.effect.is_inertial and _is_always(s)):
         rotors[s.place.joint] += s.coefficients[0]
     return DiagnosedDynamics(
-        _part(model, _is_local), tree, changed_tree(tree, model.effects), rotors, motion.step,
+        _part(model, _is_local), tree, changed_tree(tree, [*filter(_is_always, model.effects)]),
+        rotors, motion.step,
         remainders, tuple(filter(_is_local, motion.known)), bristles,
     )  # fmt: skip
 
@@ -271,8 +273,12 @@ def _creeps(s: EffectAt) -> bool:
 
 
 def _is_local(s: EffectAt) -> bool:
-    is_rigid = s.effect.is_on_tree or s.effect.is_inertial
+    is_rigid = (s.effect.is_on_tree or s.effect.is_inertial) and _is_always(s)
     return not (s.effect.has_memory or s.before or is_rigid)
+
+
+def _is_always(s: EffectAt) -> bool:
+    return not isinstance(s.effect, InRecording)
 
 
 def _sees_acceleration(s: EffectAt) -> bool:
