@@ -29,6 +29,7 @@ from sgp_ros.diagnosis.locate.remainder import Remainder, region
 from sgp_ros.diagnosis.result import Difference, Finding, Location, Parameter, ParameterError
 from sgp_ros.diagnosis.shown import Dependence
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG, VISCOUS_FRICTION
+from sgp_ros.physics.drive import Drive
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.servo import Servo
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -212,7 +213,7 @@ def stated_parameters(
 
 
 def bound_remarks(decision: Decision) -> tuple[str, ...]:
-    """Say which numbers of asserted effects are where their search ends."""
+    """Say which numbers of asserted effects are where their search ends, or hang on a habit."""
     motion = decision.model.frame.equations.motion
     remarks = []
     for s in decision.model.effects:
@@ -224,6 +225,13 @@ def bound_remarks(decision: Decision) -> tuple[str, ...]:
                 f'{", ".join(names)} of {where}: at the limit of what this recording can '
                 'determine, so no interval is given; the true value may lie beyond.'
             )
+    drive = motion.drive
+    if isinstance(drive, Drive) and any(s.effect.is_late for s in decision.model.effects):
+        period = 1e3 * float(np.median(np.diff(drive.times)))
+        remarks.append(
+            f'Commands are taken to hold until the next one, {period:.3g} ms later. If they are '
+            f'samples of a faster controller, the delay is {0.5 * period:.3g} ms longer.'
+        )
     return tuple(remarks)
 
 

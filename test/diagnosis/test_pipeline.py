@@ -71,6 +71,15 @@ def test_planted_physics_is_named_with_its_numbers(diagnosed, name):
             assert parameter.unit
 
 
+def test_a_delay_comes_with_how_long_commands_are_held(diagnosed):
+    """Samples of a faster controller do not hold that long, which the log does not tell."""
+    said = [r for r in diagnosed('command_delay').remarks if 'taken to hold' in r]
+    assert len(said) == 1
+    assert 'until the next one, 5 ms later' in said[0]
+    assert 'the delay is 2.5 ms longer' in said[0]
+    assert not any('taken to hold' in r for r in diagnosed('cogging').remarks)
+
+
 @pytest.mark.parametrize('name', PLANTED)
 def test_what_is_said_of_a_diagnosis_is_consistent(diagnosed, name):
     """Probabilities are such, the asserted is more probable than what lost, shares are shares."""
