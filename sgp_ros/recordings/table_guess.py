@@ -8,7 +8,7 @@ decision that another log could prove wrong is returned in words.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -83,11 +83,7 @@ def guess_map(
     entries = of_one_joint(entries, positions, hints, guess)
     joints = joint_names(positions, columns, hints, guess)
     entries, positions = of_robot(entries, positions, joints, guess)
-    missing = [name for name in known if name not in joints.values()]
-    if missing:
-        guess.unsure.append(
-            f'No column of positions was recognised for {", ".join(missing)}: enter it in the map.'
-        )
+    guess.unsure += _missing(known, joints.values())
     hinted = {h.name: h for h in hints}
     units = _position_units(positions, joints, hinted, guess)
     found: dict[str, dict[str, Any]] = {
@@ -114,6 +110,13 @@ def guess_map(
             'enter it in the map, or list joints without a motor as `passive` in a robot YAML.'
         )
     return guess
+
+
+def _missing(known: Sequence[str], found: Collection[str]) -> list[str]:
+    """Return a sentence on joints of the robot without a column."""
+    missing = ', '.join(name for name in known if name not in found)
+    said = f'No column of positions was recognised for {missing}: enter it in the map.'
+    return [said] * bool(missing)
 
 
 def _with_widths(columns: Columns, texts: Sequence[str]) -> list[str]:
