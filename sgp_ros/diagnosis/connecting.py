@@ -16,9 +16,17 @@ import numpy as np
 from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import joint_name
 from sgp_ros.diagnosis.connected import Connected, compared
-from sgp_ros.diagnosis.criteria import ALIKE, MOST_CERTAIN, NEARLY, PER_EFFECT, TEMPER
+from sgp_ros.diagnosis.criteria import (
+    ALIKE,
+    INTERVAL,
+    MOST_CERTAIN,
+    NEARLY,
+    PER_EFFECT,
+    TEMPER,
+)
 from sgp_ros.diagnosis.gathered import Recordings
 from sgp_ros.diagnosis.result import Equivalent
+from sgp_ros.diagnosis.setup.errors import EFFORT_SCALE
 from sgp_ros.diagnosis.setup.evidence import Probe
 from sgp_ros.diagnosis.setup.said import (
     clear,
@@ -115,6 +123,8 @@ def _connected(
     if not found.errors:
         return plain
     corrected = corrected or _undone(plain, found, tree, each)
+    if _is_taken_back(corrected, found):
+        return plain
     is_free = any(len(e.numbers) for e in found.errors)  # and may imitate a law
     if is_free and _may_be_a_law(plain, corrected):
         said = (setup_advice(found),) * (plain.verdict == 'unexplained')
@@ -154,6 +164,20 @@ def _undone(
     correction = found.errors[-1].correction
     recordings, whole = plain.recordings.corrected(correction), correction.tree(tree)
     return replace(compared(recordings, whole, next(each)), correction=correction)
+
+
+def _is_taken_back(corrected: Connected, found: Connection) -> bool:
+    """Return whether the gain of a motor undoes the scale of its effort: neither is there then."""
+    scales = {e.hypothesis.joint: e for e in found.errors if e.hypothesis.effect == EFFORT_SCALE}
+    if not scales:
+        return False
+    motion, model = corrected.equations.motion, corrected.several.decision.model
+    gains = {joint_name(motion, s.place.joint): 1.0 + float(s.coefficients[0])
+             for s in model.effects if s.effect is TORQUE_GAIN}  # fmt: skip
+    return any(
+        abs(gains[joint] - e.numbers[0]) < INTERVAL * e.std[0]
+        for joint, e in scales.items() if joint in gains
+    )  # fmt: skip
 
 
 def _may_be_a_law(plain: Connected, corrected: Connected) -> bool:

@@ -14,6 +14,9 @@ from sgp_ros.diagnosis.connecting import in_halves
 from sgp_ros.diagnosis.criteria import ALIKE
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.search import Connection, Tried
+from sgp_ros.physics.catalogue import TORQUE_GAIN
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.parts import Place
 
 
 def _of(cutoff, verdict='missing_physics'):
@@ -35,7 +38,7 @@ def _found(monkeypatch, compare, numbers):
         'setup_advice': lambda _: 'advice',
     }.items():  # fmt: skip
         monkeypatch.setattr(connecting, name, stub)
-    hypothesis = SimpleNamespace(names=numbers, is_of_gains=False)
+    hypothesis = SimpleNamespace(effect='', names=numbers, is_of_gains=False)
     correction = SimpleNamespace(tree=lambda tree: tree)
     error = SimpleNamespace(
         correction=correction, numbers=numbers, remedy='', hypothesis=hypothesis
@@ -177,6 +180,26 @@ def test_an_error_that_is_not_certain_must_be_worth_it_beside_physics(
     assert said.correction.clock == len(kept)
     is_said = len(kept) == 1 and without > -ALIKE - 10.0
     assert [e.effects for e in said.equivalents] == [(('all', 'scale'),)] * is_said
+
+
+@pytest.mark.parametrize(('joint', 'gain', 'is_undone'), [('elbow', 1.57, True),
+                                                        ('elbow', 1.2, False),
+                                                        ('shoulder', 1.57, False)])  # fmt: skip
+def test_a_scale_that_a_torque_constant_takes_back_is_none(joint, gain, is_undone):
+    """Efforts divided by 1.56 and multiplied by 1.57 are as they were recorded."""
+    joints = ('shoulder', 'elbow')
+    motion = SimpleNamespace(tree=SimpleNamespace(joint_names=joints))
+    motor = EffectAt(TORQUE_GAIN, Place(joints.index(joint)), coefficients=np.array([gain - 1.0]))
+    corrected = SimpleNamespace(
+        equations=SimpleNamespace(motion=motion),
+        several=SimpleNamespace(decision=SimpleNamespace(model=SimpleNamespace(effects=(motor,)))),
+    )
+    scale = SimpleNamespace(
+        hypothesis=SimpleNamespace(effect='effort_scale', joint='elbow'),
+        numbers=np.array([1.56]), std=np.array([0.1]),
+    )  # fmt: skip
+    found = SimpleNamespace(errors=(scale,))
+    assert connecting._is_taken_back(corrected, found) is is_undone
 
 
 @pytest.mark.parametrize(('unknown', 'left', 'may_be'), [((), 0.9, False), ((1,), 0.1, False),
