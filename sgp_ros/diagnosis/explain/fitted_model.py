@@ -45,7 +45,7 @@ class Model:
 
     @property
     def log_inertia(self) -> float:
-        """Mean of log det(M / M nominal) over the rows in which joints do not rest."""
+        """Mean of log det(M / M nominal) over the rows in which joints may move."""
         return shown_inertia(self.frame.equations, self.inertia)
 
     @property
@@ -233,11 +233,12 @@ def floors(equations: Equations, inertia: np.ndarray | None = None) -> np.ndarra
 
 
 def shown_inertia(equations: Equations, inertia: np.ndarray) -> float:
-    """Return the sum of the log of inertias (k,), each over the rows in which its joint moves.
+    """Return the sum of the log of inertias (k,), each over the rows in which its joint may move.
 
-    What holds a joint at rest, friction above all, makes its motion the same with any inertia.
+    Where dry friction holds a joint, its motion is the same with any inertia. A model without dry
+    friction lets it move in all rows, also in those in which an encoder shows no motion.
     """
-    return float(inertia @ (1.0 - equations.rests.mean(axis=0).clip(max=1.0 - 1e-9)))
+    return float(inertia @ equations.moving.mean(axis=0).clip(min=1e-9))
 
 
 def least_variance(whole: np.ndarray, noise: np.ndarray, beyond: np.ndarray | float) -> np.ndarray:

@@ -196,13 +196,12 @@ def test_slopes_of_motions_that_are_done_with_are_let_go(equations_for, heavy, m
         np.testing.assert_array_equal(one, other)
 
 
-def test_an_inertia_counts_only_where_its_joint_moves(equations_for, perfect):
-    """A joint that is held at rest has the same motion with any inertia."""
+def test_an_inertia_counts_only_where_its_joint_may_move(equations_for, perfect):
+    """Where dry friction holds a joint, its motion is the same with any inertia."""
     equations = equations_for(perfect[1])[1]
-    rests = np.zeros_like(equations.rests)
-    moving = fitted(replace(equations, rests=rests), 'armature')
-    rests = np.arange(len(rests))[:, None] < len(rests) // 4
-    resting = fitted(replace(equations, rests=rests), 'armature')
+    moving = fitted(equations, 'armature')
+    held = np.arange(len(equations.moving))[:, None] < len(equations.moving) // 4
+    resting = fitted(replace(equations, moving=1.0 - held), 'armature')
     assert moving.log_inertia == pytest.approx(moving.inertia[0])
     assert resting.log_inertia == pytest.approx(0.75 * resting.inertia[0], rel=1e-3)
     price = len(equations.d) * (moving.log_inertia - resting.log_inertia)
