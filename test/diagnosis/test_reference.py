@@ -21,7 +21,7 @@ ANSWERS = CASES.parent / 'answers'
 def test_a_law_of_the_simulation_that_bodies_may_be_is_not_said_to_be_absent(equations_for, heavy):
     """A rotor of one joint and a link with more inertia are one, unlike friction."""
     _, equations = equations_for(heavy[1])
-    several = decide_several(equations, 1, lambda _share: None)
+    several = decide_several(equations, 1, lambda _share: None, lambda _: equations)
     assert several.decision.model.is_free
     rotor = EffectAt(EFFECTS['armature'], Place(0), coefficients=np.array([0.03]))
     rub = EffectAt(EFFECTS['viscous_friction'], Place(0), coefficients=np.array([0.5]))
@@ -38,7 +38,7 @@ def test_bodies_are_compared_with_those_of_the_simulation(equations_for, heavy, 
         equations_for(heavy[1]),
         equations_for((heavy if is_same else perfect)[1]),
     )
-    ours, theirs = (decide_several(x, 1, lambda _share: None) for x in (real, sim))
+    ours, theirs = (decide_several(x, 1, lambda _share: None, lambda _: real) for x in (real, sim))
     found = against_simulation(real, ours, sim, theirs)
     assert found.verdict == ('no_mismatch' if is_same else 'parameters_only')
     assert bool(found.bodies) is not is_same

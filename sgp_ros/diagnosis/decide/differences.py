@@ -66,7 +66,7 @@ def decide_several(
     equations: Equations,
     count: int,
     progress: Callable[[float], None],
-    alone: Callable[[int], Equations] | None = None,
+    alone: Callable[[int], Equations],
 ) -> Several:
     """Compare models on several recordings and return what is common and what differs.
 
@@ -84,9 +84,9 @@ def decide_several(
     search = _Search(Columns(equations), Scale.of(equations, comparison), count)
     model = _start(comparison, decision, search.scale)
     is_explained = decision.verdict != 'unexplained'
-    if is_explained or alone is None:
+    if is_explained:
         model = search.extended(model)
-    if alone is not None and (own_laws(model.effects) or not is_explained):
+    if own_laws(model.effects) or not is_explained:
         model = max(model, search.from_each(model, alone), key=search.worth)
     progress(0.5)
     own = own_laws(model.effects)
@@ -151,10 +151,10 @@ class _Search:
     count: int
 
     def from_each(self, model: Model, alone: Callable[[int], Equations]) -> Model:
-        """Return what models of each recording alone make, extended; without any, the model."""
+        """Return what models of each recording alone make, extended; without any, this one is."""
         models = models_of_each(map(alone, range(self.count)))
         if not models:
-            return model
+            return self.extended(model)
         first = next(iter(models.values()))
         return self.extended(self.fitted(first, put_together(models)))
 
