@@ -213,7 +213,7 @@ def stated_parameters(
 
 
 def bound_remarks(decision: Decision) -> tuple[str, ...]:
-    """Say which numbers of asserted effects are where their search ends, or hang on a habit."""
+    """Say which numbers of asserted effects are where their search ends, or what they rest on."""
     motion = decision.model.frame.equations.motion
     remarks = []
     for s in decision.model.effects:
