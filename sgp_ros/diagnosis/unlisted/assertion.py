@@ -63,10 +63,11 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
         decision: on these.
     """
     found, columns = Explained(comparison, decision, (), {}), Columns(equations)
-    scale = Scale.of(equations, comparison)
-    coloured = _coloured(equations, scale, decision.model)
+    scale, joints = Scale.of(equations, comparison), _joints(equations, comparison, decision)
+    named = [j for j in joints if j not in decision.unknown]
+    coloured = _coloured(equations, scale, decision.model, named)
     open_ = {*decision.unknown, *coloured, *_remembering(decision.model)}
-    for joint in _joints(equations, comparison, decision):
+    for joint in joints:
         listed = found.decision.tentative or found.decision.model
         is_open = joint in open_
         if not is_open and not promises(columns, listed, joint):
@@ -81,15 +82,16 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
     return found
 
 
-def _coloured(equations: Equations, scale: Scale, model: Model) -> list[int]:
-    """Return the joints where more is left than noise: none that the motion at the time predicts.
+def _coloured(equations: Equations, scale: Scale, model: Model, named: list[int]) -> list[int]:
+    """Return the named joints where more is left than noise, though no law of the motion now.
 
     A force that remembers the motion looks like that beside listed laws, as a disturbance does.
     """
-    if (scale.excess(model) < 1.0).all():
+    if (scale.excess(model)[named] < 1.0).all():
         return []
     share = structure(equations, model.residual)
-    return [*map(int, np.flatnonzero(scale.excess(model, np.stack([share, share])) >= 1.0))]
+    excess = scale.excess(model, np.stack([share, share]))
+    return [j for j in named if excess[j] >= 1.0]
 
 
 def _remembering(model: Model) -> list[int]:

@@ -406,10 +406,10 @@ def test_more_than_noise_that_is_left_is_looked_at(monkeypatch, share, joints):
         excess=lambda _model, part=None: left if part is None else (part * left).max(axis=0)
     )
     model = SimpleNamespace(residual=None)
-    assert assertion._coloured(None, scale, model) == joints
-    left[1] = 0.9
+    assert assertion._coloured(None, scale, model, [1, 0]) == joints
     monkeypatch.setattr(assertion, 'structure', None)  # not asked
-    assert assertion._coloured(None, scale, model) == []
+    assert assertion._coloured(None, scale, model, [0]) == []
+    assert assertion._coloured(None, scale, model, []) == []
 
 
 def test_a_law_may_stand_for_a_listed_one_that_remembers(monkeypatch, equations_for):
