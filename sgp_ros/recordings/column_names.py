@@ -61,10 +61,10 @@ _LONG_UNITS = frozenset({
 _FILLER = frozenset({
     'joint', 'joints', 'states', 'observation', 'obs', 'data', 'msg', 'robot', 'motor', 'actual',
     'measured', 'meas', 'act', 'raw', 'list', 'sensor', 'log', 'the', 'value', 'values', 'j',
-    'ist',
+    'ist', 'est', 'estimated',
 })  # fmt: skip
-_KNOWN = frozenset({w for w in {*_WORDS, *_FILLER, *_TARGETS} if len(w) > 2})
-"""Words that are seen where they stand close to another one."""
+_KNOWN = frozenset({w for w in {*_WORDS, *_FILLER, *_TARGETS} if len(w) > 2 or w == 'j'})
+"""Words that are seen where they stand close to another one, as in `jpos`."""
 _PAIRS = {('p', 'gain'): KP, ('d', 'gain'): KD, ('q', 'dot'): VELOCITY,
           ('q', 'ddot'): OTHER, ('d', 'q'): VELOCITY, ('feed', 'forward'): OTHER}  # fmt: skip
 _PAIRS |= {(angle, 'dot'): VELOCITY for angle in ('theta', 'phi', 'psi', 'alpha', 'beta')}
@@ -159,7 +159,7 @@ def _stronger(before: str, found: str) -> str:
 
 def _words(name: str) -> list[str]:
     bare = re.sub(_PREFIXED, lambda unit: unit[0].lower(), name)
-    bare = re.sub(r'([a-z])([A-Z])', r'\1 \2', bare)
+    bare = re.sub(r'([a-z])([A-Z])|([A-Z])([A-Z][a-z]{2})', r'\1\3 \2\4', bare)
     for sign, unit in (('%', ' pct '), ('‰', ' permille '), ('°(?!C)', ' deg ')):
         bare = re.sub(sign, unit, bare)
     bare = re.sub(r'([A-Za-z])(\d)', r'\1 \2', bare)
@@ -171,7 +171,7 @@ def _parts(word: str) -> list[str]:
     low = word.lower()
     if low in _KNOWN or low in _UNITS:
         return [word]
-    for i in range(3, len(low) - 2):
+    for i in (1, *range(3, len(low) - 2)):
         both = {low[:i], low[i:]}
         if both <= _KNOWN and both & _WORDS.keys():
             return [word[:i], word[i:]]

@@ -13,6 +13,7 @@ from sgp_ros.errors import RecordingError
 from sgp_ros.recordings.column_names import TIME, meaning
 from sgp_ros.recordings.model_files import require_unpacked
 from sgp_ros.recordings.table_apart import READERS, load_apart, require_bounded
+from sgp_ros.recordings.table_folder import load_folder
 from sgp_ros.recordings.table_formats import refuse
 from sgp_ros.recordings.table_text import load_text
 from sgp_ros.recordings.table_units import as_numbers
@@ -37,7 +38,8 @@ def load_columns(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]
     Times of a CSV file that a float cannot hold stay texts.
 
     Args:
-        path: with one of `ENDINGS`; of text, the first row names the columns.
+        path: with one of `ENDINGS`, of text, the first row names the columns; or a folder of
+            tables, see `table_folder`.
         remarks: what is left out of it is appended here.
 
     Raises:
@@ -45,7 +47,11 @@ def load_columns(path: Path, remarks: list[str]) -> tuple[Columns, Sequence[int]
         TooMuchError: more than `ROWS` or `CELLS`, or beyond another bound.
     """
     refuse(path)
-    if not path.exists() or path.is_dir():
+    if path.is_dir() and not (path / 'metadata.yaml').exists():
+        columns = load_folder(path, lambda file: load_columns(file, remarks)[0], remarks)
+        require_bounded(path, columns)
+        return columns, ()
+    if not path.is_file():
         raise RecordingError(f'no table at {path}', 'a CSV, NPZ or MAT file', 'check the path')
     require_file(path, 'TABLE_MB')
     with readable(path, RecordingError, f'one of {", ".join(ENDINGS)}'):

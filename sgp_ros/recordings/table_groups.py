@@ -15,6 +15,8 @@ _PART = re.compile(
     r'(.+)[._ -](train|training|test|val|valid|validation|estimation)', re.IGNORECASE
 )
 """Name of a column whose last word tells which recording it belongs to."""
+_LISTED = 8
+"""Recordings of a file that are listed."""
 _SLIM = 20
 """Columns per row from which on a matrix lies on its side, if no time tells its length."""
 
@@ -23,7 +25,8 @@ def one_recording(path: Path, columns: Columns, group: str | None, *, is_guessed
     """Return the columns of a recording, one row a time.
 
     Groups with times and positions of their own are recordings, such as `sim.q` and `real.q`;
-    so are columns whose names differ in a last word alone, such as `q_train` and `q_test`.
+    so are columns whose names differ in a last word alone, such as `q_train` and `q_test`, and
+    the parts 0, 1, ... of arrays of three dimensions.
 
     Args:
         path: of the file.
@@ -35,11 +38,11 @@ def one_recording(path: Path, columns: Columns, group: str | None, *, is_guessed
         RecordingError: there are several and none is chosen, or there is no such group.
     """
     groups = _groups(columns)
-    parts = _parts(columns)
+    parts = _parts(columns) or _episodes(columns)
     several = [name for name, found in groups.items() if _is_recording(found)] + [*parts]
     if group is None and is_guessed and len(several) > 1:
         raise RecordingError(
-            f'{path.name} contains several recordings: {", ".join(several)}', 'one',
+            f'{path.name} contains several recordings: {_list(several)}', 'one',
             f'choose it, such as by --group {several[0]}',
         )  # fmt: skip
     if group is None:
@@ -47,7 +50,7 @@ def one_recording(path: Path, columns: Columns, group: str | None, *, is_guessed
     found = parts.get(group) or groups.get(group)
     if not found:
         known = sorted({*groups, *parts})
-        raise RecordingError(f'{path.name} has no group {group!r}', f'one of {known}')
+        raise RecordingError(f'{path.name} has no group {group!r}', f'one of {_list(known)}')
     return _upright(found)
 
 
@@ -81,6 +84,26 @@ def _parts(columns: Columns) -> dict[str, Columns]:
         return {}
     rest = {name: x for name, x in columns.items() if _PART.fullmatch(name) is None}
     return {word: rest | x for word, x in found.items()}
+
+
+def _episodes(columns: Columns) -> dict[str, Columns]:
+    """Return the parts of arrays (k, n, m) by their number; none without such arrays.
+
+    Columns of fewer dimensions belong to each of them, but for those with k rows.
+    """
+    sizes = {len(x) for x in columns.values() if x.ndim == 3}
+    if len(sizes) != 1:
+        return {}
+    (count,) = sizes
+    return {
+        str(i): {name: x[i] if len(x) == count else x for name, x in columns.items()}
+        for i in range(count)
+    }
+
+
+def _list(names: list[str]) -> str:
+    more = f', ... ({len(names)} in all)' if len(names) > _LISTED else ''
+    return ', '.join(names[:_LISTED]) + more
 
 
 def _upright(columns: Columns) -> Columns:

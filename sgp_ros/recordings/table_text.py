@@ -205,7 +205,7 @@ def _require_numbers(
 
 def _column(cells: np.ndarray) -> np.ndarray:
     """Return a column (n,) of texts; of lists in its cells, the matrix (n, m)."""
-    if not all(cell.startswith('[') and cell.endswith(']') for cell in cells):
+    if {cell[:1] + cell[-1:] for cell in cells} not in ({'[]'}, {'()'}):
         return cells
     rows = [cell[1:-1].replace(',', ' ').replace(';', ' ').split() for cell in cells]
     if len({len(row) for row in rows}) > 1:
@@ -213,6 +213,6 @@ def _column(cells: np.ndarray) -> np.ndarray:
     try:
         numbers = np.array(rows, dtype=np.float64)
     except ValueError:
-        return np.array(rows, dtype=str)
+        return np.char.strip(np.array(rows, dtype=str), '\'"')
     is_exact = '_' not in ''.join(cells) and not np.any(np.abs(numbers) >= _FINE)
     return numbers if is_exact else np.array(rows, dtype=str)

@@ -93,11 +93,39 @@ def _read(path, folder, hints=HINTS, rate=None):
         ('F_trolley [N]', 'effort', False, 'trolley', 'N'),
         ('flap_rate_deg_s', 'velocity', False, 'flap', 'deg/s'),
         ('joint_a', '', False, 'a', ''),
+        ('jpos.1', 'position', False, '1', ''),
+        ('AIPos.A1', 'position', False, 'AI_A_1', ''),
+        ('motorState[0].tauEst', 'effort', False, '0', ''),
+        ('jacket', '', False, 'jacket', ''),
     ],
 )
 def test_names_tell_quantity_joint_and_unit(name, role, is_target, joint, unit):
     said = meaning(name)
     assert (said.role, said.is_target, said.joint, said.unit) == (role, is_target, joint, unit)
+
+
+def test_lists_in_round_brackets_beside_names_are_read(tmp_path):
+    """As Python prints the tuples of a message."""
+    rows = [
+        f'{t},"[\'elbow\', \'shoulder\']","{tuple(map(float, q[::-1]))}"'
+        for t, q in zip(T, Q, strict=True)
+    ]
+    (tmp_path / 'log.csv').write_text('\n'.join(['Time,name,position', *rows]))
+    _, states, _ = _read(tmp_path / 'log.csv', tmp_path)
+    assert states[0].names == ('elbow', 'shoulder')
+    np.testing.assert_allclose([s.position for s in states], Q[:, ::-1])
+
+
+def test_one_of_the_parts_of_three_dimensional_arrays_is_chosen(tmp_path):
+    def parts(x):
+        return np.stack([x[:100], 2.0 * x[100:]])
+
+    path = _npz(tmp_path, measured_angles=parts(Q), measured_velocities=parts(DQ))
+    with pytest.raises(RecordingError, match=r'several recordings: 0, 1; .* --group 0'):
+        import_table(path, None, tmp_path, HINTS, 200.0)
+    summary = import_table(path, None, tmp_path / 'one', HINTS, 200.0, group='1')
+    first = next(iter(open_recording(summary.path).events()))
+    np.testing.assert_allclose(first.position, 2.0 * Q[100])
 
 
 def test_a_log_of_position_control_is_read_with_its_gains(tmp_path):
