@@ -17,7 +17,7 @@ DUTY, COMMAND, KP, KD, OTHER = 'duty', 'command', 'kp', 'kd', 'other'
 _QUANTITIES = {
     TIME: 't ts time times timestamp timestamps stamp stamps sec secs seconds clock zeit',
     POSITION: 'q qs pos position positions qpos ang angle angles theta phi psi alpha beta '
-    'encoder enc state winkel lage',
+    'encoder enc winkel lage',
     VELOCITY: 'dq qd qdot vel velocity velocities qvel dtheta dphi dalpha omega speed thetadot '
     'phidot alphadot rate geschwindigkeit drehzahl',
     EFFORT: 'tau taus torque torques effort efforts eff effs force forces qfrc load moment trq '
@@ -39,6 +39,8 @@ _TARGETS = frozenset({
     'soll', 'set',
 })  # fmt: skip
 _PLAIN_TARGETS = _TARGETS - {'d'}
+_STATE = 'state'
+"""Of a joint, its position, where nothing else says more."""
 _UNITS = {
     's': 's', 'ms': 'ms', 'us': 'us', 'ns': 'ns', 'nsec': 'ns', 'nanosec': 'ns', 'msec': 'ms',
     'rad': 'rad', 'radians': 'rad', 'deg': 'deg', 'degs': 'deg', 'degree': 'deg',
@@ -103,7 +105,7 @@ def meaning(name: str, joints: Iterable[str] = ()) -> Meaning:
         joints: names of known joints: beside other words they mean nothing else, as `U` and `T`.
     """
     words, unit = _unit(_words(name))
-    role, is_target = '', False
+    role, is_target, is_state = '', False, False
     rest: list[str] = []
     own, i = _own(words, unit, joints), 0
     while i < len(words):
@@ -123,11 +125,13 @@ def meaning(name: str, joints: Iterable[str] = ()) -> Meaning:
             role = _stronger(role, _WORDS[word])
         elif words[i] in _SYMBOLS:
             role = _stronger(role, _SYMBOLS[words[i]])
+        elif word == _STATE:
+            is_state = True
         else:
             rest.append(words[i])
         i += 1
-    if not role and is_target:
-        role = COMMAND
+    if not role:
+        role = POSITION if is_state else COMMAND if is_target else ''
     if not unit and _EFFORTS & {word.lower() for word in words} == {'load'}:
         unit = '%'  # as servos log it, of the duty cycle: no torque
     return Meaning(role, is_target, tuple(rest), unit)
@@ -150,7 +154,7 @@ def _own(words: list[str], unit: str, joints: Iterable[str]) -> range:
 
 
 def _stronger(before: str, found: str) -> str:
-    """Return which of two quantities a name means: `state` of a position is its position."""
+    """Return which of two quantities a name means: a velocity of an angle is a velocity."""
     if not before or OTHER in {before, found}:
         return OTHER if before and OTHER in {before, found} else found
     order = (KP, KD, VELOCITY, EFFORT, CURRENT, DUTY, POSITION, TIME)

@@ -30,12 +30,10 @@ from sgp_ros.recordings.table_entries import (
     JointHint,
     chosen,
     entries_of,
-    joint_names,
-    of_one_joint,
-    of_robot,
     of_signals,
 )
 from sgp_ros.recordings.table_gains import add_gains
+from sgp_ros.recordings.table_joints import joint_names, of_one_joint, of_robot
 from sgp_ros.recordings.table_time import approach, guessed_times
 from sgp_ros.recordings.table_units import (
     SCALED_AS,

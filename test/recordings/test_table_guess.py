@@ -97,6 +97,7 @@ def _read(path, folder, hints=HINTS, rate=None):
         ('AIPos.A1', 'position', False, 'AI_A_1', ''),
         ('motorState[0].tauEst', 'effort', False, '0', ''),
         ('jacket', '', False, 'jacket', ''),
+        ('state.time [s]', 'time', False, '', 's'),
     ],
 )
 def test_names_tell_quantity_joint_and_unit(name, role, is_target, joint, unit):
@@ -113,6 +114,15 @@ def test_lists_in_round_brackets_beside_names_are_read(tmp_path):
     (tmp_path / 'log.csv').write_text('\n'.join(['Time,name,position', *rows]))
     _, states, _ = _read(tmp_path / 'log.csv', tmp_path)
     assert states[0].names == ('elbow', 'shoulder')
+    np.testing.assert_allclose([s.position for s in states], Q[:, ::-1])
+
+
+def test_joints_of_another_driver_are_those_of_the_robot_with_their_numbers(tmp_path):
+    hints = (JointHint('lab_joint1'), JointHint('lab_joint2'))
+    names = np.array(['fer_joint2', 'fer_joint1'])
+    summary, states, _ = _read(_npz(tmp_path, t=T, q=Q, joint_names=names), tmp_path, hints)
+    assert any('fer_joint1 is lab_joint1' in said for said in summary.unsure)
+    assert states[0].names == ('lab_joint1', 'lab_joint2')
     np.testing.assert_allclose([s.position for s in states], Q[:, ::-1])
 
 
