@@ -20,7 +20,7 @@ from sgp_ros.diagnosis.criteria import (
 )
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.credibility import is_credible
-from sgp_ros.diagnosis.explain.fitted_model import Model, least_variance
+from sgp_ros.diagnosis.explain.fitted_model import Model, least_variance, shown_inertia
 from sgp_ros.physics.parts import JOINT, MOTOR
 
 
@@ -125,7 +125,8 @@ class Scale:
         """Return the fit without that prior [nats]."""
         floor = least_variance(self.floor, self.noise / self.power, model.inertia - self.carried)
         share = model.mean_square / self.power + floor
-        return self.rows * (model.log_inertia - 0.5 * float(np.log(share).sum()))
+        shown = shown_inertia(model.frame.equations, model.inertia, self.carried)
+        return self.rows * (shown - 0.5 * float(np.log(share).sum()))
 
     def worth(self, model: Model) -> float:
         """Return the fit of a model, less the price of its freedom [nats]."""

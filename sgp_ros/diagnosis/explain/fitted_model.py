@@ -232,13 +232,23 @@ def floors(equations: Equations, inertia: np.ndarray | None = None) -> np.ndarra
     return least_variance(whole, noise, beyond) + 1e-300
 
 
-def shown_inertia(equations: Equations, inertia: np.ndarray) -> float:
+def shown_inertia(
+    equations: Equations, inertia: np.ndarray, held: np.ndarray | float | None = None
+) -> float:
     """Return the sum of the log of inertias (k,), each over the rows in which its joint may move.
 
-    Where dry friction holds a joint, its motion is the same with any inertia. A model without dry
+    Where dry friction holds a joint, its motion is the same with any inertia, and predicted no
+    worse than by a model that lets it move, with the inertia that there is. A model without dry
     friction lets it move in all rows, also in those in which an encoder shows no motion.
+
+    Args:
+        equations: of the model.
+        inertia: logs of those of the model.
+        held: log of the inertia of joints that are held, (k,); None for what efforts show.
     """
-    return float(inertia @ equations.moving.mean(axis=0).clip(min=1e-9))
+    moving = equations.moving.mean(axis=0).clip(min=1e-9)
+    held = equations.carried if held is None else held
+    return float((inertia * moving + held * (1.0 - moving)).sum())
 
 
 def least_variance(whole: np.ndarray, noise: np.ndarray, beyond: np.ndarray | float) -> np.ndarray:
