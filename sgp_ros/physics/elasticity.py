@@ -19,6 +19,7 @@ from sgp_ros.physics.drawing import Drawn, Scene, UnsuitableError
 from sgp_ros.physics.effect import Effect, Numbers
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.hidden_states import behind, derivatives, on_spring, resonator, smooth
+from sgp_ros.physics.memory import BEYOND
 from sgp_ros.physics.motion import SeenMotion, Structure
 from sgp_ros.physics.parts import (
     MOTOR,
@@ -39,8 +40,6 @@ _SOFTEST_HZ = 1.0
 """Frequency of the link on its spring below which no joint is a joint."""
 _SOFT = 0.9
 """Part of that softness from which on a fit has run into its bound."""
-_BEYOND = 0.1
-"""By which the share of the motor may leave what makes sense: neither end is a bound."""
 _MOST_BESIDE = 20.0
 """Largest motor that the nominal robot lacks, relative to the link."""
 BARE = 'motor beside'
@@ -262,7 +261,7 @@ class JointElasticity(Effect):
         if place.kind == BARE:
             high[0] = _MOST_BESIDE * free
         if is_on_motor(place):
-            low, high = [*low, -_BEYOND], [*high, 1.0 + _BEYOND]
+            low, high = [*low, -BEYOND], [*high, 1.0 + BEYOND]
         return np.array(low), np.array(high)
 
     def scales(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:

@@ -13,6 +13,8 @@ from sgp_ros.physics.motion import SeenMotion
 from sgp_ros.physics.parts import MOTOR, Place, Placed, Quantity, Value, relative_scales
 
 _POSES = 200
+BEYOND = 0.1
+"""By which friction of a motor may leave what makes sense: that there is none is no bound."""
 _MOST_OF_LINK = 0.9
 
 
@@ -104,13 +106,29 @@ def _second_difference(x: np.ndarray, step: float) -> np.ndarray:
     return np.diff(np.pad(x, 1, mode='edge'), 2) / step**2
 
 
+def _most_lost(motion: SeenMotion, joint: int) -> np.ndarray:
+    """Return the root mean square of an effort, and its ratio to that of the velocity, (2,)."""
+    effort, v = (np.sqrt((x[:, joint] ** 2).mean()) for x in (motion.effort, motion.velocity))
+    return np.array([effort, effort / v if v > 0.0 else 0.0]) + 1e-12
+
+
+def _lost(motion: SeenMotion, joint: int) -> np.ndarray:
+    """Return dry and viscous friction of a joint, (2,), as far as a regression shows them."""
+    q, v, a = (x[:, joint] for x in (motion.position, motion.velocity, motion.acceleration))
+    x = np.column_stack([motion.direction[:, joint], v, a, np.ones(len(q)), np.sin(q), np.cos(q)])
+    missing = motion.effort[:, joint] - motion.nominal_effort[:, joint]
+    found = np.linalg.lstsq(x, missing, rcond=1e-9)[0][:2]
+    return np.asarray(found.clip(0.0, _most_lost(motion, joint)))
+
+
 class Backlash(Effect):
     """Play between motor and link.
 
-    Encoder and damping sit on the motor, of inertia `share M`; shape is (share, gap). Where it
-    leads the link by delta, the nominal model asks for `(1 - share) M d^2 delta/dt^2` too much.
-    In contact the force between them is `(1 - share) tau + share h`; when it changes its sign,
-    the two fly freely to the other side, with the relative acceleration
+    Encoder and damping sit on the motor, of inertia `share M`, with friction of its own; shape is
+    (share, gap, dry friction and viscous friction of the motor). Where it leads the link by delta,
+    the nominal model asks for `(1 - share) M d^2 delta/dt^2` too much. With tau the effort less
+    what the motor loses, the force between them in contact is `(1 - share) tau + share h`; when it
+    changes its sign, the two fly freely to the other side, with the relative acceleration
     `tau / (share M) + h / ((1 - share) M)`.
     """
 
@@ -123,6 +141,8 @@ class Backlash(Effect):
         Quantity('gap', 'rad', low=0.0, is_positive=True, is_sought=True),
         Quantity('motor_inertia', 'kg m2', 1e-12, is_positive=True, is_optional=True,
                  is_scored=False),
+        Quantity('motor_coulomb', 'N m', is_optional=True, is_scored=False),
+        Quantity('motor_viscous', 'N m s/rad', is_optional=True, is_scored=False),
     )  # fmt: skip
     site = MOTOR
     drawn_over = 'seconds'
@@ -132,11 +152,12 @@ class Backlash(Effect):
     has_memory = True
 
     def model(self, numbers: Numbers, kind: str = '') -> tuple[np.ndarray, np.ndarray]:
-        """Return the gap alone.
+        """Return the gap and the friction of the motor alone.
 
         The motor's share of the inertia changes with the pose: its inertia does not say it.
         """
-        return np.array([math.nan, numbers['gap']]), np.ones(1)
+        lost = [numbers.get(x, 0.0) for x in ('motor_coulomb', 'motor_viscous')]
+        return np.array([math.nan, numbers['gap'], *lost]), np.ones(1)
 
     def report(self, at: Placed, motion: SeenMotion) -> dict[str, Value]:
         """Return gap and the motor's inertia, its share of what the joint has over the motion.
@@ -146,31 +167,37 @@ class Backlash(Effect):
         joint, rows = at.place.joint, slice(None, None, max(1, len(motion.time) // _POSES))
         least = motion.free_inertia(joint, rows)
         inertia = float(at.shape[0]) * float(np.mean(motion.mass_diagonal[:, joint]))
-        return {'gap': float(at.shape[1]), 'motor_inertia': min(inertia, _MOST_OF_LINK * least)}
+        return {'gap': float(at.shape[1]), 'motor_inertia': min(inertia, _MOST_OF_LINK * least),
+                'motor_coulomb': float(at.shape[2]),
+                'motor_viscous': float(at.shape[3])}  # fmt: skip
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
         return True
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
-        j = place.joint
-        share = shape[0]
-        inertia = motion.mass_diagonal[:, j]
-        damped = motion.tree.damping[j] * motion.velocity[:, j]
+        j, (share, gap, coulomb, viscous) = place.joint, shape
+        inertia, v = motion.mass_diagonal[:, j], motion.velocity[:, j]
+        damped = motion.tree.damping[j] * v
         link = motion.nominal_effort[:, j] - inertia * motion.acceleration[:, j] - damped
-        pressed = (1.0 - share) * (motion.effort[:, j] - damped) + share * link
+        lost = damped + coulomb * motion.direction[:, j] + viscous * v
+        pressed = (1.0 - share) * (motion.effort[:, j] - lost) + share * link
         relative = pressed / np.maximum(share * (1.0 - share) * inertia, 1e-12)
-        lead = _play(pressed, relative, float(shape[1]), motion.step)
+        lead = _play(pressed, relative, float(gap), motion.step)
         return ((1.0 - share) * inertia * _second_difference(lead, motion.step))[:, None]
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
+        """Return motors of some sizes, without friction and with all that the joint shows."""
         span = float(np.ptp(motion.position[:, place.joint]))
         widths = np.geomspace(0.0005, 0.3, 9) * span
         shares = (0.06, 0.12, 0.18, 0.24, 0.3, 0.37, 0.45, 0.55, 0.7)
-        return np.array([[share, width] for share in shares for width in widths])
+        some = ((np.zeros(2), shares), (_lost(motion, place.joint), shares[1::2]))
+        return np.array([[share, width, *lost] for lost, of in some for share in of
+                         for width in widths])  # fmt: skip
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
         most = float(np.ptp(motion.position[:, place.joint]))
-        return np.array([0.01, 1e-9]), np.array([0.95, most])
+        lost = _most_lost(motion, place.joint)
+        return np.array([0.01, 1e-9, *-BEYOND * lost]), np.array([0.95, most, *lost])
 
     def draw(self, scene: Scene) -> Drawn:
         """Return play of a motor whose link carries no other."""

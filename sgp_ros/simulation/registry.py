@@ -21,7 +21,12 @@ SIMULATORS: dict[str, Simulator] = {
 _EDGE = EffectParameter('edge', 'rad', low=0.0, default=0.0)
 _CONTACT_HZ = EffectParameter('contact_hz', 'Hz', low=1.0, default=60.0)
 _MOTOR_FRICTION = EffectParameter('motor_friction', '1', kinds=('motor',), default=0.0)
+_OF_MOTOR = tuple(
+    EffectParameter(name, unit, default=0.0)
+    for name, unit in (('motor_coulomb', 'N m'), ('motor_viscous', 'N m s/rad'))
+)
 
+# simulated friction is all on the link, whatever part of it a diagnosis gave the motor
 LAWS: dict[str, Law] = {
     'viscous_friction': Law(friction.viscous),
     'coulomb_friction': Law(friction.coulomb),
@@ -49,12 +54,11 @@ LAWS: dict[str, Law] = {
     'actuator_lag': Law(actuation.lag),
     'saturation': Law(actuation.saturation),
     'torque_gain': Law(actuation.gain),
-    'backlash': Law(actuation.backlash, own=(_CONTACT_HZ,)),
+    'backlash': Law(actuation.backlash, own=(_CONTACT_HZ, *_OF_MOTOR)),
     'encoder_eccentricity': Law(actuation.eccentricity),
     'velocity_filter_lag': Law(actuation.velocity_lag),
     'coupled_friction': Law(friction.coupled),
     'motor_speed_limit': Law(actuation.speed_limit),
-    # simulated friction is all on the link, whatever share a diagnosis gave the motor
     'joint_elasticity': Law(actuation.elasticity, own=(_MOTOR_FRICTION,)),
     'mount_elasticity': Law(changed=mounted),
 }

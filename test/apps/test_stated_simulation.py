@@ -107,7 +107,7 @@ def sized(effect, force):
     """Return the values of an effect on a robot with forces of this size."""
     values = dict(EFFECT_VALUES[effect])
     for quantity in CATALOGUE[effect].stated_quantities(values.get('kind', '')):
-        if 'N' in quantity.unit:
+        if 'N' in quantity.unit and quantity.name in values:
             values[quantity.name] *= force
     return values
 

@@ -323,8 +323,9 @@ def test_friction_opposes_the_motion_as_the_formulas_say(j):
         ('hysteresis', [0.05], [0.3], {}, {'level': 0.3, 'presliding': 0.05}),
         ('coupled_friction', [-2.0], [0.3, 0.1], {'source': 2},
          {'ratio': -2.0, 'coulomb': 0.3, 'viscous': 0.1, 'source_joint': 'j2'}),
-        ('backlash', [0.1, 0.01], [1.0], {},
-         {'gap': 0.01, 'motor_inertia': 0.1 * float(np.mean(MOTION.mass_diagonal[:, 0]))}),
+        ('backlash', [0.1, 0.01, 0.2, 0.4], [1.0], {},
+         {'gap': 0.01, 'motor_coulomb': 0.2, 'motor_viscous': 0.4,
+          'motor_inertia': 0.1 * float(np.mean(MOTION.mass_diagonal[:, 0]))}),
     ],
     ids=lambda x: x if isinstance(x, str) else '',
 )  # fmt: skip
@@ -643,7 +644,7 @@ def _pressed(effort):
 
 def test_the_motor_behind_play_has_less_inertia_than_the_joint_moves_alone():
     """With more, what is left for the link would be no mass matrix and could not be simulated."""
-    values, _ = report('backlash', 0, [0.9, 0.01], [1.0])
+    values, _ = report('backlash', 0, [0.9, 0.01, 0.0, 0.0], [1.0])
     M = mass_matrix(TREE, TREE.parameters, MOTION.position)
     M[:, 0, 0] -= values['motor_inertia']
     assert np.linalg.eigvalsh(M).min() > 0.0
@@ -652,12 +653,44 @@ def test_the_motor_behind_play_has_less_inertia_than_the_joint_moves_alone():
 def test_play_exerts_no_force_while_the_gear_presses():
     """In contact motor and link move as one; a change of sign lets them fly, then stops them."""
     steady = _pressed(np.full(50, 2.0))
-    assert not columns('backlash', 0, [0.3, 0.01], motion=steady).any()
-    turned = columns('backlash', 0, [0.3, 0.01], motion=_pressed(np.repeat([2.0, -2.0], 25)))
+    assert not columns('backlash', 0, [0.3, 0.01, 0.0, 0.0], motion=steady).any()
+    turned = columns(
+        'backlash', 0, [0.3, 0.01, 0.0, 0.0], motion=_pressed(np.repeat([2.0, -2.0], 25))
+    )
     assert not turned[:23].any()
     assert turned[23:].any()
     # the link is left behind, then caught up with: the impulses cancel
     assert abs(turned.sum()) < 1e-9 * np.abs(turned).sum() + 1e-12
+
+
+def test_play_behind_a_motor_with_friction_follows_from_its_motion():
+    """Efforts that friction on the motor takes up turn the gear over at other times."""
+    t, step, half, J, M, b = 0.0, 1e-5, 0.02, 0.02, 0.08, 0.3
+    q, v, theta, w, kept = 0.0, 0.0, half, 0.0, []
+    for i in range(400_000):
+        u = 1.5 * np.sin(9.0 * t)
+        twist, spin = theta - q, w - v
+        press = 2e3 * (twist - np.clip(twist, -half, half)) + 4.0 * spin * (abs(twist) > half)
+        if i % 100 == 0:
+            kept.append((theta, w, (u - press - b * w) / J, u - b * w, u))
+        v, w = v + step * (press - 0.1 * q) / M, w + step * (u - press - b * w) / J
+        q, theta, t = q + step * v, theta + step * w, t + step
+    theta, w, a, driven, u = np.array(kept).T
+    body = MOTION.tree.parameters.copy()
+    motion = replace(
+        _pressed(u), position=np.column_stack([theta, *np.zeros((3, len(u)))]),
+        velocity=np.column_stack([w, *np.zeros((3, len(u)))]),
+        acceleration=np.column_stack([a, *np.zeros((3, len(u)))]), step=1e-3,
+    )  # fmt: skip
+    inertia = float(motion.mass_diagonal[0, 0])
+    scaled = replace(motion, tree=replace(motion.tree, parameters=body * (J + M) / inertia))
+    needed = driven - (J + M) * a
+    share = J / (J + M)
+    rest = {}
+    for lost in (0.0, b):
+        left = needed + columns('backlash', 0, [share, 2.0 * half, 0.0, lost], motion=scaled)[:, 0]
+        rest[lost] = np.std(np.convolve(left, np.full(40, 1.0 / 40.0), 'valid'))
+    assert rest[b] < 0.5 * rest[0.0]
 
 
 def _shown(true, j, size, periods=3.0, phase=0.4):
@@ -744,7 +777,7 @@ def test_bodies_without_mass_give_numbers():
     motion = replace(MOTION, tree=empty)
     last = Place(TREE.size - 1)
     assert np.isfinite(EFFECTS['payload'].starts(motion, last)).all()
-    assert np.isfinite(columns('backlash', 0, [0.3, 0.01], motion=motion)).all()
+    assert np.isfinite(columns('backlash', 0, [0.3, 0.01, 0.0, 0.0], motion=motion)).all()
 
 
 def test_numbers_that_any_recording_allows_have_a_price():

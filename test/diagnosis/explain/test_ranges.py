@@ -125,7 +125,7 @@ def _truth(name, numbers):
     given = {k: x for k, x in numbers.items() if k != 'motor_share'}
     truth = EffectAt.stated(effect, joint, given | words, seen.tree)
     if share is not None:
-        truth = truth.with_shape(np.array([share, numbers['gap']]))
+        truth = truth.with_shape(np.array([share, numbers['gap'], 0.0, 0.0]))
     return truth
 
 

@@ -171,7 +171,10 @@ def test_what_remembers_the_motion_is_iterated_to_a_fixed_point(
 ):
     """Play, whose force follows the motion before; one round tells nothing of convergence."""
     _, equations = equations_for(perfect[1])
-    start, play = np.sqrt((equations.d**2).mean(axis=0)), _candidate('backlash', 0, 0.3, 0.02)
+    start, play = (
+        np.sqrt((equations.d**2).mean(axis=0)),
+        _candidate('backlash', 0, 0.3, 0.02, 0.0, 0.0),
+    )
     model = fit(Columns(equations), (play,), start, is_free=False, still=1)
     small = with_coefficients(model, np.ones(1))
     windows = cut(equations.motion, TRIM)
