@@ -19,7 +19,7 @@ from sgp_ros.physics.drawing import Drawn, Scene, UnsuitableError
 from sgp_ros.physics.effect import Effect, Numbers
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.hidden_states import behind, derivatives, on_spring, resonator, smooth
-from sgp_ros.physics.memory import BEYOND
+from sgp_ros.physics.memory import BARE, BEYOND
 from sgp_ros.physics.motion import SeenMotion, Structure
 from sgp_ros.physics.parts import (
     MOTOR,
@@ -42,8 +42,6 @@ _SOFT = 0.9
 """Part of that softness from which on a fit has run into its bound."""
 _MOST_BESIDE = 20.0
 """Largest motor that the nominal robot lacks, relative to the link."""
-BARE = 'motor beside'
-"""Encoder on a motor whose inertia the nominal robot lacks: an `armature` of the joint has it."""
 _SETTLING = 0.2
 """Longest ratio of damping to stiffness, relative to the period of the softest spring."""
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numba import njit
 
 from sgp_ros.physics.drawing import Drawn, JointScene, Scene, UnsuitableError
 from sgp_ros.physics.effect import Effect, Numbers
-from sgp_ros.physics.motion import SeenMotion
+from sgp_ros.physics.motion import SeenMotion, Structure
 from sgp_ros.physics.parts import MOTOR, Place, Placed, Quantity, Value, relative_scales
 
 _POSES = 200
+BARE = 'motor beside'
+"""Encoder on a motor whose inertia the nominal robot lacks: an `armature` of the joint has it."""
 BEYOND = 0.1
 """By which friction of a motor may leave what makes sense: that there is none is no bound."""
 _MOST_OF_LINK = 0.9
@@ -106,6 +109,12 @@ def _second_difference(x: np.ndarray, step: float) -> np.ndarray:
     return np.diff(np.pad(x, 1, mode='edge'), 2) / step**2
 
 
+def _whole(motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+    """Return the inertia of motor and link, (n,)."""
+    inertia = motion.mass_diagonal[:, place.joint]
+    return np.asarray(inertia / (1.0 - shape[0]) if place.kind == BARE else inertia)
+
+
 def _most_lost(motion: SeenMotion, joint: int) -> np.ndarray:
     """Return the root mean square of an effort, and its ratio to that of the velocity, (2,)."""
     effort, v = (np.sqrt((x[:, joint] ** 2).mean()) for x in (motion.effort, motion.velocity))
@@ -129,7 +138,8 @@ class Backlash(Effect):
     the nominal model asks for `(1 - share) M d^2 delta/dt^2` too much. With tau the effort less
     what the motor loses, the force between them in contact is `(1 - share) tau + share h`; when it
     changes its sign, the two fly freely to the other side, with the relative acceleration
-    `tau / (share M) + h / ((1 - share) M)`.
+    `tau / (share M) + h / ((1 - share) M)`. Where the nominal robot lacks the motor (`BARE`), its
+    M is that of the link alone.
     """
 
     name = 'backlash'
@@ -151,6 +161,17 @@ class Backlash(Effect):
     sees_acceleration = True
     has_memory = True
 
+    def places(self, motion: SeenMotion) -> list[Place]:
+        """Return motors with and without a rotor in the robot file."""
+        found = super().places(motion)
+        return [*found, *(replace(p, kind=BARE) for p in found)]
+
+    def stated_quantities(self, kind: str = '') -> tuple[Quantity, ...]:
+        return super().stated_quantities()
+
+    def stated_words(self, place: Place, tree: Structure) -> dict[str, str]:
+        return super().stated_words(replace(place, kind=''), tree)
+
     def model(self, numbers: Numbers, kind: str = '') -> tuple[np.ndarray, np.ndarray]:
         """Return the gap and the friction of the motor alone.
 
@@ -166,8 +187,9 @@ class Backlash(Effect):
         """
         joint, rows = at.place.joint, slice(None, None, max(1, len(motion.time) // _POSES))
         least = motion.free_inertia(joint, rows)
-        inertia = float(at.shape[0]) * float(np.mean(motion.mass_diagonal[:, joint]))
-        return {'gap': float(at.shape[1]), 'motor_inertia': min(inertia, _MOST_OF_LINK * least),
+        inertia = float(at.shape[0]) * float(np.mean(_whole(motion, at.place, at.shape)))
+        most = math.inf if at.place.kind == BARE else _MOST_OF_LINK * least
+        return {'gap': float(at.shape[1]), 'motor_inertia': min(inertia, most),
                 'motor_coulomb': float(at.shape[2]),
                 'motor_viscous': float(at.shape[3])}  # fmt: skip
 
@@ -176,9 +198,10 @@ class Backlash(Effect):
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         j, (share, gap, coulomb, viscous) = place.joint, shape
-        inertia, v = motion.mass_diagonal[:, j], motion.velocity[:, j]
+        inertia, v = _whole(motion, place, shape), motion.velocity[:, j]
         damped = motion.tree.damping[j] * v
-        link = motion.nominal_effort[:, j] - inertia * motion.acceleration[:, j] - damped
+        nominal = motion.mass_diagonal[:, j] * motion.acceleration[:, j]
+        link = motion.nominal_effort[:, j] - nominal - damped
         lost = damped + coulomb * motion.direction[:, j] + viscous * v
         pressed = (1.0 - share) * (motion.effort[:, j] - lost) + share * link
         relative = pressed / np.maximum(share * (1.0 - share) * inertia, 1e-12)
@@ -190,7 +213,8 @@ class Backlash(Effect):
         span = float(np.ptp(motion.position[:, place.joint]))
         widths = np.geomspace(0.0005, 0.3, 9) * span
         shares = (0.06, 0.12, 0.18, 0.24, 0.3, 0.37, 0.45, 0.55, 0.7)
-        some = ((np.zeros(2), shares), (_lost(motion, place.joint), shares[1::2]))
+        some = ((np.zeros(2), shares if place.kind != BARE else ()),
+                (_lost(motion, place.joint), shares[1::2]))  # fmt: skip
         return np.array([[share, width, *lost] for lost, of in some for share in of
                          for width in widths])  # fmt: skip
 

@@ -19,8 +19,9 @@ from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import ARMATURE, EFFECTS, VISCOUS_FRICTION
 from sgp_ros.physics.drive import Drive
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.elasticity import BARE, twist_of
+from sgp_ros.physics.elasticity import twist_of
 from sgp_ros.physics.hidden_states import behind, resonator
+from sgp_ros.physics.memory import BARE
 from sgp_ros.physics.parts import Place
 from sgp_ros.rigid.tree import read_urdf
 from sgp_ros.robots.observed_motion import ObservedMotion

@@ -11,7 +11,7 @@ import pytest
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.drive import Drive
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.elasticity import BARE
+from sgp_ros.physics.memory import BARE
 from sgp_ros.physics.parts import Place
 from sgp_ros.rigid.tree import read_urdf
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -97,7 +97,8 @@ def test_what_was_reported_is_stated_at_the_same_place(effect, place):
     joint = names.get(place.joint) or MOTION.tree.joint_names[place.joint]
     words = effect.stated_words(place, MOTION.tree)
     assert words.items() >= {k: v for k, v in report.items() if isinstance(v, str)}.items()
-    stated = replace(place, kind='motor') if place.kind == BARE else place
+    own = 'motor' if effect.kinds else ''
+    stated = replace(place, kind=own) if place.kind == BARE else place
     assert EffectAt.stated(effect, joint, numbers | words, MOTION.tree).place == stated
 
 

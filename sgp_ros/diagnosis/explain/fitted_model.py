@@ -238,13 +238,8 @@ def shown_inertia(
     """Return the sum of the log of inertias (k,), each over the rows in which its joint may move.
 
     Where dry friction holds a joint, its motion is the same with any inertia, and predicted no
-    worse than by a model that lets it move, with the inertia that there is. A model without dry
-    friction lets it move in all rows, also in those in which an encoder shows no motion.
-
-    Args:
-        equations: of the model.
-        inertia: logs of those of the model.
-        held: log of the inertia of joints that are held, (k,); None for what efforts show.
+    worse than by a model that lets it move: the log is `held` (k,), usually what efforts show. A
+    model without dry friction lets it move in all rows, also where an encoder shows no motion.
     """
     moving = equations.moving.mean(axis=0).clip(min=1e-9)
     held = equations.carried if held is None else held
