@@ -103,16 +103,18 @@ def bodies(machine):
 
 def equivalents(machine):
     """Return what this motion cannot tell from the findings."""
-    return '\n'.join(
+    sentences = (
         equivalence_sentence(
             Equivalent(
                 tuple((x['joint'], x['effect']) for x in e['effects']),
                 e['separating_motion'],
                 e['contrast'],
-            )
+            ),
+            [(f['joint'], f['effect']) for f in machine['findings']],
         )
         for e in machine['equivalents']
     )
+    return '\n'.join(dict.fromkeys(sentences))
 
 
 def scores(machine):

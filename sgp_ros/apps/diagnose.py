@@ -29,7 +29,7 @@ from sgp_ros.report.diagnosis_proof import interval_text
 from sgp_ros.report.diagnosis_text import (
     chance,
     differences_text,
-    equivalence_sentence,
+    equivalence_sentences,
     parameter_errors_text,
     phrase,
     visibility_sentences,
@@ -249,8 +249,8 @@ def print_diagnosis(found: Diagnosis) -> None:
     if found.findings:
         for f in found.alternatives[:_RIVALS]:
             print(f'  not       p {chance(f.probability)}  {f.joint}: {phrase(f)}: {f.why}')
-    for e in found.equivalents:
-        print(f'  or        {equivalence_sentence(e)}')
+    for sentence in equivalence_sentences(found):
+        print(f'  or        {sentence}')
     for line in differences_text(found):
         print(f'  differs   {line}')
     if found.parameter_errors:

@@ -176,20 +176,42 @@ def differences_text(found: Diagnosis) -> list[str]:
     return lines
 
 
-def equivalence_sentence(found: Equivalent) -> str:
-    """Say which effects this motion cannot separate from the findings, and which motion would."""
-    parts = [
-        f'{plain_name(effect)} {_PLACES.get(joint, f"on {joint}")}'
-        for joint, effect in found.effects
-    ]
-    others = f'{", ".join(parts[:-1])} and {parts[-1]} together' if parts[1:] else ''.join(parts)
-    text = f'On this motion {others or "another set of bodies"} would fit equally well'
+def equivalence_sentences(found: Diagnosis) -> list[str]:
+    """Return a sentence for each explanation that does as well as the findings, none twice."""
+    asserted = [(f.joint, f.effect) for f in found.findings]
+    return list(dict.fromkeys(equivalence_sentence(e, asserted) for e in found.equivalents))
+
+
+def equivalence_sentence(found: Equivalent, asserted: Sequence[tuple[str, str]] = ()) -> str:
+    """Say what would do in place of which findings on this motion, and which motion would tell.
+
+    Args:
+        found: another explanation.
+        asserted: joint and effect of the findings.
+    """
+    new = [x for x in found.effects if x not in asserted]
+    gone = [x for x in asserted if x not in found.effects]
+    if len(gone) == len(asserted):
+        others = _listed(new) or 'another set of bodies'
+    elif gone:
+        others = f'{_listed(new) or "no effect, with other bodies,"} in place of {_listed(gone)}'
+    else:
+        others = f'{_listed(new) or "other bodies"} beside what is found'
+    text = f'On this motion {others} would fit equally well'
     if not found.motion:
         return f'{text}; no motion tried can separate them: measure one of them separately.'
     factor = f'{found.contrast:.0f}' if found.contrast < 1e4 else 'more than 10000'
     return (
         f'{text}; {found.motion} separates them: their efforts then differ {factor} times as much.'
     )
+
+
+def _listed(effects: Sequence[tuple[str, str]]) -> str:
+    """Return effects at their joints, such as `a spring on elbow and a delay on all joints`."""
+    parts = [
+        f'{plain_name(effect)} {_PLACES.get(joint, f"on {joint}")}' for joint, effect in effects
+    ]
+    return f'{", ".join(parts[:-1])} and {parts[-1]}' if parts[1:] else ''.join(parts)
 
 
 def percent(share: float) -> str:

@@ -168,12 +168,16 @@ def test_a_share_below_one_is_never_called_all(share):
 def test_what_cannot_be_separated_is_said_with_the_motion_that_would(tmp_path):
     pair = Equivalent((('elbow', 'spring'), ('base', 'gravity_tilt')), 'a motion twice as wide', 7)
     sentence = equivalence_sentence(pair)
-    assert 'a spring on elbow and a base that is not level at the base together' in sentence
+    assert 'a spring on elbow and a base that is not level at the base would' in sentence
     assert 'would fit equally well' in sentence
     assert 'a motion twice as wide separates them' in sentence
     assert ' 7 times' in sentence
     never = equivalence_sentence(Equivalent((), '', 1.0))
     assert 'another set of bodies would fit equally well; no motion tried' in never
+    other = equivalence_sentence(pair, [('elbow', 'spring'), ('elbow', 'backlash')])
+    assert 'motion a base that is not level at the base in place of backlash on elbow' in other
+    more = equivalence_sentence(pair, [('elbow', 'spring')])
+    assert 'motion a base that is not level at the base beside what is found would' in more
     found = replace(diagnosis('parameters_only'), equivalents=(pair,))
     write_diagnosis(tmp_path, found)
     assert sentence in (tmp_path / 'report.html').read_text()
