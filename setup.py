@@ -77,6 +77,7 @@ setup(
             'gpytorch>=1.11',
             'mujoco[sysid]>=4',
             'pysindy>=2',
+            'pyoperon>=0.6',
         ],
         'test': [
             'mujoco>=3.2',

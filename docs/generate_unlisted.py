@@ -64,7 +64,12 @@ def _baselines(rows):
     own = {'found': [r['found'] for r in rows], 'right_joint': [r['right_joint'] for r in rows],
            'wrong': [r['wrong'] for r in rows], 'far': far}  # fmt: skip
     tools = {'`sgp diagnose`': own}
-    for tool, name in (('lasso', 'Lasso'), ('stlsq', 'PySINDy'), ('process', 'Gaussian process')):
+    for tool, name in (
+        ('lasso', 'Lasso'),
+        ('stlsq', 'PySINDy'),
+        ('operon', 'Operon'),
+        ('process', 'Gaussian process'),
+    ):
         tools[name] = {
             key: [r[tool][key] for r in others] for key in own if key in others[0][tool]
         }

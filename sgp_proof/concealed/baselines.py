@@ -5,7 +5,8 @@
 Each gets what `sgp diagnose` has at the same stage: smoothed motion, the rows of a low-passed
 regression, and the effort that the nominal robot does not explain. Sparse regression chooses from
 a generous library at each joint: Lasso with cross-validated penalty (scikit-learn), sequentially
-thresholded least squares (PySINDy; its threshold by the last quarter of the rows). A Gaussian
+thresholded least squares (PySINDy; its threshold by the last quarter of the rows). Symbolic
+regression (Operon) looks for one formula of all positions and velocities at each joint. A Gaussian
 process without names (scikit-learn, squared exponential with a length for each position and
 velocity, on at most 600 rows) only predicts. Formulas are scored as those of any tool are.
 """
@@ -15,6 +16,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
+import re
 import time
 import warnings
 from pathlib import Path
@@ -44,6 +46,10 @@ SHARE = 0.004
 ROWS, SEED = 600, 0
 THRESHOLDS = np.geomspace(1e-3, 0.3, 9)
 """Of scaled columns, in parts of the root mean square of what is to be explained."""
+
+SYMBOLS = 'add,sub,mul,div,sin,tanh,abs,sqrt,constant,variable'
+LONGEST, BUDGET_S = 25, 20
+"""Of a formula of symbolic regression: its nodes, and the time for each joint [s]."""
 
 
 def library(joints):
@@ -126,6 +132,41 @@ def _sparse(method, texts, train, far):
     return findings, left
 
 
+def _states(equations):
+    """Return positions and velocities of all joints at the rows of the regression, (N, 2 k)."""
+    motion, rows = equations.motion, equations.filter.rows
+    return np.hstack([motion.position[rows], motion.velocity[rows]])
+
+
+def formula_of(text, joints):
+    """Return a formula of Operon in X1, X2, ..., as one of positions and velocities of joints."""
+    signals = [f'{x}[{name}]' for x in ('q', 'dq') for name in joints]
+    return re.sub(r'X(\d+)', lambda m: signals[int(m[1]) - 1], text)
+
+
+def _symbolic(train, far):
+    """Return what symbolic regression says of one world: findings, and what it leaves far away."""
+    from pyoperon.sklearn import SymbolicRegressor  # noqa: PLC0415 - an extra
+
+    names, k = train.motion.tree.moving_names, train.d.shape[1]
+    x, x_far = _states(train), _states(far)
+    findings, left = {}, np.empty(k)
+    for j in range(k):
+        scale = np.sqrt((train.d[:, j] ** 2).mean()) + 1e-12
+        search = SymbolicRegressor(allowed_symbols=SYMBOLS, max_length=LONGEST,
+                                   max_time=BUDGET_S, random_state=SEED)  # fmt: skip
+        search.fit(x, train.d[:, j] / scale)
+        share = float(((scale * search.predict(x)) ** 2).mean() / train.power[j])
+        left[j] = ((far.d[:, j] - scale * search.predict(x_far)) ** 2).mean()
+        if share > SHARE:
+            text = formula_of(search.get_model_string(search.model_, 9), names)
+            findings[names[j]] = {
+                'formula': f'tau_x[{names[j]}] = c*({text})', 'share': share, 'terms': 1,
+                'parameters': {'c': {'value': float(scale)}},
+            }  # fmt: skip
+    return findings, left
+
+
 def _process(train, far):
     """Return what a Gaussian process without names leaves far away, (k,)."""
     from sklearn.gaussian_process import GaussianProcessRegressor  # noqa: PLC0415 - an extra
@@ -135,11 +176,7 @@ def _process(train, far):
         WhiteKernel,
     )
 
-    def inputs(equations):
-        motion, rows = equations.motion, equations.filter.rows
-        return np.hstack([motion.position[rows], motion.velocity[rows]])
-
-    x, x_far = inputs(train), inputs(far)
+    x, x_far = _states(train), _states(far)
     size = x.std(axis=0) + 1e-12
     some = np.linspace(0, len(x) - 1, min(len(x), ROWS)).astype(int)
     left = np.empty(train.d.shape[1])
@@ -175,9 +212,12 @@ def judged(folder, answer):
     tree = nominal_tree(robot)
     train, far = (equations_of(folder / f'{n}.mcap', robot, tree) for n in ('real', 'real_far'))
     texts, found = library(list(train.motion.tree.moving_names)), {}
-    for name, method in (('lasso', lasso), ('stlsq', stlsq)):
+    for name, method in (
+        ('lasso', lambda *x: _sparse(lasso, texts, *x)),
+        ('stlsq', lambda *x: _sparse(stlsq, texts, *x)), ('operon', _symbolic),
+    ):  # fmt: skip
         begin = time.process_time()
-        findings, left = _sparse(method, texts, train, far)
+        findings, left = method(train, far)
         found[name] = score(answer, findings, left, far)
         found[name]['cpu_s'] = round(time.process_time() - begin, 1)
     begin = time.process_time()
@@ -200,7 +240,7 @@ def summary(rows):
             'far_worse': float(np.mean([r[tool]['far'] > 1.0 for r in rows])),
             'cpu_s': rate(tool, 'cpu_s'),
         }
-        for tool in ('lasso', 'stlsq', 'process')
+        for tool in ('lasso', 'stlsq', 'operon', 'process')
     }  # fmt: skip
 
 

@@ -23,6 +23,8 @@ from sgp_ros.recordings.table_units import as_numbers
 
 Columns = dict[str, np.ndarray]
 _SYMBOL = re.compile(r'([uyz])[_.]?(\d*)')
+_OF_SLIDES = {'x': POSITION, 'dx': VELOCITY, 'vx': VELOCITY, 'xdot': VELOCITY}
+"""Symbols of a joint that slides, where a name says no quantity."""
 _ROLES = {
     **dict.fromkeys(('rad', 'deg', 'mm'), POSITION),
     **dict.fromkeys(('rad/s', 'deg/s', 'rpm', 'm/s', 'mm/s'), VELOCITY),
@@ -142,6 +144,24 @@ def _labelled(entries: list[Entry]) -> list[Entry]:
                 own = replace(e.said, rest=e.said.rest[common:])
                 label = own.joint or '_'.join(own.rest) or label
             found.append(Entry(e.column, e.index, e.said, label, e.numbers))
+    return found
+
+
+def of_slides(entries: Sequence[Entry], hints: Sequence[JointHint], guess: Guess) -> list[Entry]:
+    """Let `x` be positions and `dx` velocities of a robot with a joint that slides."""
+    if not any(h.slides for h in hints):
+        return list(entries)
+    found = []
+    for e in entries:
+        symbols = [w for w in e.said.rest if w.lower() in _OF_SLIDES]
+        if e.said.role not in {'', COMMAND} or len(symbols) != 1:
+            found.append(e)
+            continue
+        rest = tuple(w for w in e.said.rest if w not in symbols)
+        said = replace(e.said, role=_OF_SLIDES[symbols[0].lower()], rest=rest)
+        found.append(replace(e, said=said, label=said.joint))
+        what = f'{"target " * said.is_target}{said.role}'
+        guess.unsure.append(f'{e.column} is taken as the {what} of a joint that slides.')
     return found
 
 

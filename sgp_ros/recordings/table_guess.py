@@ -31,6 +31,7 @@ from sgp_ros.recordings.table_entries import (
     chosen,
     entries_of,
     of_signals,
+    of_slides,
 )
 from sgp_ros.recordings.table_gains import add_gains
 from sgp_ros.recordings.table_joints import joint_names, of_one_joint, of_robot
@@ -67,7 +68,8 @@ def guess_map(
     rows = _rows(columns)
     known = [h.name for h in hints]
     seconds = guessed_times(columns, rows, rate_hz, known, guess)
-    entries = of_signals(entries_of(columns, rows, features or {}, known), guess)
+    entries = of_slides(entries_of(columns, rows, features or {}, known), hints, guess)
+    entries = of_signals(entries, guess)
     entries = of_blocks(entries, hints, seconds, guess)
     positions = chosen(entries, POSITION, guess)
     if not positions:

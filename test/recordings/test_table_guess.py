@@ -117,6 +117,18 @@ def test_lists_in_round_brackets_beside_names_are_read(tmp_path):
     np.testing.assert_allclose([s.position for s in states], Q[:, ::-1])
 
 
+def test_x_is_the_position_of_a_joint_that_slides(tmp_path):
+    path = _npz(tmp_path, t=T, x=Q[:, 0], dx=DQ[:, 0], x_ref=LATE[:, 0], F=TAU[:, 0])
+    summary, states, commands = _read(path, tmp_path, (JointHint('carriage', slides=True),))
+    assert 'x is taken as the position of a joint that slides.' in summary.unsure
+    np.testing.assert_allclose([s.position[0] for s in states], Q[:, 0])
+    np.testing.assert_allclose([s.velocity[0] for s in states], DQ[:, 0])
+    np.testing.assert_allclose([s.effort[0] for s in states], TAU[:, 0])
+    np.testing.assert_allclose([c.effort[0] for c in commands], LATE[:, 0])
+    with pytest.raises(RecordingError, match='no column of positions'):
+        _read(path, tmp_path, (JointHint('arm'),))
+
+
 def test_joints_of_another_driver_are_those_of_the_robot_with_their_numbers(tmp_path):
     hints = (JointHint('lab_joint1'), JointHint('lab_joint2'))
     names = np.array(['fer_joint2', 'fer_joint1'])

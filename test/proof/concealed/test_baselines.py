@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sgp_proof.concealed.baselines import columns, lasso, library, score
+from sgp_proof.concealed.baselines import columns, formula_of, lasso, library, score
 from sgp_ros.physics.formula import read_formula
 
 P = {'kind': 'magnetic_brake', 'a': 0.5, 'v': 1.5, 'reach': 1.0, 'source': -1.0, 'source_v': 1.0}
@@ -43,6 +43,15 @@ def test_a_sparse_law_is_found():
     y = -0.7 * X[:, texts.index('dq[elbow]**3')]
     c = lasso(X / size, y) / size
     assert c[texts.index('dq[elbow]**3')] == pytest.approx(-0.7, rel=0.05)
+
+
+def test_a_formula_of_symbolic_regression_is_one_of_the_grammar():
+    text = formula_of('((-0.0044) + (1.9767 * (abs((X4 * 2.71)) - sin(X1))))', ['hip', 'elbow'])
+    assert text == '((-0.0044) + (1.9767 * (abs((dq[elbow] * 2.71)) - sin(q[hip]))))'
+    motion = _motion(['hip', 'elbow'])
+    q, v = motion.position[:, 0], motion.velocity[:, 1]
+    expected = 1.9767 * (np.abs(2.71 * v) - np.sin(q)) - 0.0044
+    np.testing.assert_allclose(columns([text], motion)[:, 0], expected)
 
 
 @pytest.mark.parametrize(('found', 'is_right'), [(-0.5 * 2.0 / 1.5, True), (-0.9, False)])
