@@ -36,6 +36,8 @@ _MOST_OF_LINK = 0.95
 _LEAST_OF_LINK = 0.005
 _LEAST_STIFFNESS = 0.1
 """Of spring and gravity together, relative to the spring alone."""
+_MOST_OF_MOTOR = 0.5
+"""Of what a joint moves alone in the robot file, from which on a rotor beside it is the motor."""
 _SOFTEST_HZ = 1.0
 """Frequency of the link on its spring below which no joint is a joint."""
 _SOFT = 0.9
@@ -113,6 +115,12 @@ def _rotors(effects: Sequence[EffectAt]) -> dict[Place, float]:
 def has_rotor(place: Place, effects: Sequence[EffectAt]) -> bool:
     """Return whether the motor of a spring is in the nominal robot, or among these effects."""
     return place.kind != BARE or Place(place.joint) in _rotors(effects)
+
+
+def is_bare(joint: int, effects: Sequence[EffectAt], motion: SeenMotion) -> bool:
+    """Return whether effects add most of a motor to a joint, whose file then has none."""
+    rotor = _rotors(effects).get(Place(joint), 0.0)
+    return rotor > _MOST_OF_MOTOR * motion.free_inertia(joint, _some(motion))
 
 
 def with_rotors(effects: Sequence[EffectAt]) -> tuple[EffectAt, ...]:

@@ -13,7 +13,8 @@ from sgp_ros.diagnosis.explain.products import Products, Rest
 from sgp_ros.diagnosis.explain.regression import Columns, Seen, dry_joints
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt, in_series
-from sgp_ros.physics.elasticity import has_rotor
+from sgp_ros.physics.elasticity import has_rotor, is_bare, is_on_motor
+from sgp_ros.physics.memory import BARE
 from sgp_ros.physics.parts import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -80,9 +81,15 @@ def distinct(found: Iterable[Trial], count: int | None = None) -> list[EffectAt]
 def _free_places(effect: Effect, model: Model, motion: ObservedMotion) -> Iterator[Place]:
     """Yield the places of a law that the model does not have yet; further ones too for a wave.
 
-    And a second one for friction of two joints: a differential has two motors.
+    And a second one for friction of two joints: a differential has two motors. What is behind a
+    motor is behind the one that the model has.
     """
-    for place in effect.places(motion):
+    places = effect.places(motion)
+    is_of_motor = any(p.kind == BARE for p in places)
+    for place in places:
+        is_stated = is_of_motor and is_on_motor(place) and place.kind != BARE
+        if is_stated and is_bare(place.joint, model.effects, motion):
+            continue
         here = [s.place.number for s in model.effects if _is_like(s, effect, place)]
         if not here:
             yield place
