@@ -27,7 +27,7 @@ from sgp_ros.diagnosis.compare.trajectory import (
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.locate.remainder import Remainder
 from sgp_ros.diagnosis.prove.prediction import FinalModel
-from sgp_ros.diagnosis.prove.rollouts import RolloutWindows, cut, roll_outs, substeps
+from sgp_ros.diagnosis.prove.rollouts import RolloutWindows, cut, roll_outs, work
 from sgp_ros.diagnosis.shown import Overlay, Replay
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.gains import Gains
@@ -35,7 +35,7 @@ from sgp_ros.robots.observed_motion import ObservedMotion
 
 _HORIZONS_S = {'open_0.5': 0.5, 'open_2': 2.0}
 _LONGEST_S = 10.0
-"""Of a replay, which is integrated step by step; less of a stiff model."""
+"""Of a replay, which is integrated step by step; less of a stiff one, or one that remembers."""
 _KEPT_S = 60.0
 _FAR = 10.0
 """Ranges of the recording beyond which a replay is not stable."""
@@ -99,8 +99,8 @@ class _View:
         gains = self.raw.gains
         known = None if gains is None or gains.is_recorded else gains
         short = cut(self.motion, trim, min(_HORIZONS_S.values()))
-        stiff = [substeps(short, s.model, final.equations, s.remainders) for s in sides]
-        longest = _LONGEST_S / max(stiff) if len(short.first) else _LONGEST_S
+        steps = [work(short, s.model, final.equations, s.remainders, known) for s in sides]
+        longest = _LONGEST_S / max(steps) if len(short.first) else _LONGEST_S
         return replays(self.motion, trim, known, longest)
 
 
@@ -144,14 +144,18 @@ _Mode = tuple[str, RolloutWindows, Gains | None]
 
 
 def replays(motion: ObservedMotion, trim: int, gains: Gains | None, longest: float) -> list[_Mode]:
-    """Return each replay that has a window and is not too long, the whole if others are not."""
+    """Return each replay that has a window and is not too long, the whole if others are not.
+
+    In closed loop, which users of position control see, there is one of two seconds in any case.
+    """
     end = motion.starts[1] if len(motion.starts) > 1 else len(motion.time)
-    whole = min((end - 2 * trim - 2) * motion.step, longest)
+    least = longest if gains is None else max(longest, *_HORIZONS_S.values())
+    whole = min((end - 2 * trim - 2) * motion.step, least)
     found: list[_Mode] = []
     for name, horizon in _HORIZONS_S.items():
         if horizon <= longest:
             found.append((name, cut(motion, trim, horizon), None))
-    if whole > 0.0 and max(_HORIZONS_S.values()) <= longest:
+    if whole > 0.0 and max(_HORIZONS_S.values()) <= least:
         windows = cut(motion, trim, whole)
         one = RolloutWindows(motion, windows.first[:1], windows.stride, windows.steps)
         # under the efforts of a drive alone, every model soon leaves what that drive followed

@@ -1,8 +1,7 @@
 """Roll-outs of a diagnosed model from measured states under recorded commands.
 
-A one-step error says little: the state hardly moves in a step. Windows of 0.3 s are simulated all
-at once from where they start, and compared with what was measured. The yardstick is the error of
-holding the position at the start of the window: 1 means no knowledge of the robot.
+A one-step error says little. Windows of 0.3 s are simulated all at once from where they start, and
+compared with what was measured. The yardstick is the error of holding the first position.
 
 The force of an effect that remembers depends on the motion before. Friction that creeps has a
 state; the force of others is taken along the motion that was rolled out last, and the windows are
@@ -36,7 +35,7 @@ from sgp_ros.robots.observed_motion import ObservedMotion
 HORIZON_S = 0.3
 STEP_S = 0.005
 MOST_WINDOWS = 200
-MOST_ROUNDS = 12
+MOST_ROUNDS, _USUAL_ROUNDS = 12, 3
 CONVERGED = 1e-3
 """Largest change of a round, in root mean square ways of each joint within the windows."""
 _MOST_SUBSTEPS = 20
@@ -157,12 +156,13 @@ def roll_outs(
     return [(one.q, one.ended) for one in sets]
 
 
-def substeps(
+def work(
     windows: RolloutWindows, model: Model, equations: Equations,
-    remainders: tuple[Remainder, ...] = (),
+    remainders: tuple[Remainder, ...] = (), gains: Gains | None = None,
 ) -> int:  # fmt: skip
-    """Return how many substeps a step of a roll-out takes: what is to be integrated is stiff."""
-    return _Set(windows, model, equations, remainders, None).substeps
+    """Return how many substeps a step of a roll-out takes, in all rounds that it usually needs."""
+    rounds = _USUAL_ROUNDS if remembers(model, windows.motion) else 1
+    return rounds * _Set(windows, model, equations, remainders, gains).substeps
 
 
 class _Set:

@@ -14,7 +14,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.prove import rollouts
 from sgp_ros.diagnosis.prove.dynamics import dynamics_of
 from sgp_ros.diagnosis.prove.overlay import replays
-from sgp_ros.diagnosis.prove.rollouts import cut, roll_out, substeps
+from sgp_ros.diagnosis.prove.rollouts import cut, roll_out, work
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
@@ -214,7 +214,7 @@ def test_stiff_friction_is_integrated_in_smaller_steps(equations_for, perfect):
     q, ends = roll_out(windows, stiff, equations)
     assert ends.all()
     assert np.ptp(q[:, 5:], axis=1).max() < 0.05 * np.sqrt(windows.held.max())
-    assert substeps(windows, stiff, equations) > 4 * substeps(windows, model, equations)
+    assert work(windows, stiff, equations) > 4 * work(windows, model, equations)
 
 
 def test_replays_of_a_stiff_model_are_the_short_ones(equations_for, perfect):
