@@ -2,9 +2,9 @@
 
 The twist of the spring follows from the torque in it, `(K + D d/dt) delta = tau`, and this torque
 from the balance of the side without friction: of the link, where the encoder is on it; else of
-the motor, whose friction is then looked for on the link, or of the link, which swings on the
-spring under a motor that moves as measured. Derivatives are taken up to the bandwidth of the
-motion, see `smooth`. Source: Spong 1987.
+the motor, whose friction is then looked for on the link, or of the link, on its spring under a
+motor that moves as measured. Derivatives reach up to the bandwidth of the motion, see `smooth`.
+Source: Spong 1987.
 """
 
 from __future__ import annotations
@@ -37,13 +37,11 @@ _LEAST_OF_LINK = 0.005
 _LEAST_STIFFNESS = 0.1
 """Of spring and gravity together, relative to the spring alone."""
 _MOST_OF_MOTOR = 0.5
-"""Of what a joint moves alone in the robot file, from which on a rotor beside it is the motor."""
+"""Of the inertia in the robot file, from which on a rotor beside it is the motor."""
 _SOFTEST_HZ = 1.0
 """Frequency of the link on its spring below which no joint is a joint."""
-_SOFT = 0.9
-"""Part of that softness from which on a fit has run into its bound."""
-_MOST_BESIDE = 20.0
-"""Largest motor that the nominal robot lacks, relative to the link."""
+_SOFT, _MOST_BESIDE = 0.9, 20.0
+"""Part of that softness at which a fit is at its bound; largest motor beside, over the link."""
 _SETTLING = 0.2
 """Longest ratio of damping to stiffness, relative to the period of the softest spring."""
 
@@ -108,30 +106,35 @@ def _of_softness(motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndar
     return np.asarray(force[:, :, None])
 
 
-def _rotors(effects: Sequence[EffectAt]) -> dict[Place, float]:
-    return {s.place: float(s.coefficients[0]) for s in effects if s.effect.is_inertial}
-
-
 def has_rotor(place: Place, effects: Sequence[EffectAt]) -> bool:
     """Return whether the motor of a spring is in the nominal robot, or among these effects."""
-    return place.kind != BARE or Place(place.joint) in _rotors(effects)
+    return place.kind != BARE or Place(place.joint) in {s.place for s in effects
+                                                        if s.effect.is_inertial}  # fmt: skip
 
 
 def is_bare(joint: int, effects: Sequence[EffectAt], motion: SeenMotion) -> bool:
     """Return whether effects add most of a motor to a joint, whose file then has none."""
-    rotor = _rotors(effects).get(Place(joint), 0.0)
-    return rotor > _MOST_OF_MOTOR * motion.free_inertia(joint, _some(motion))
+    added = sum(float(s.coefficients[0]) for s in effects
+                if s.effect.is_inertial and s.place == Place(joint))  # fmt: skip
+    return added > _MOST_OF_MOTOR * motion.free_inertia(joint, _some(motion))
+
+
+def tied(effects: Sequence[EffectAt]) -> list[tuple[int, int]]:
+    """Return the indices of springs and of the rotors beside them: their J is one number."""
+    rotors = {s.place: i for i, s in enumerate(effects) if s.effect.is_inertial}
+    return [
+        (i, rotors[own]) for i, s in enumerate(effects)
+        if isinstance(s.effect, JointElasticity) and s.place.kind == BARE
+        and (own := Place(s.place.joint)) in rotors and effects[rotors[own]].coefficients[0] > 0.0
+    ]  # fmt: skip
 
 
 def with_rotors(effects: Sequence[EffectAt]) -> tuple[EffectAt, ...]:
     """Return effects with one J, that of the rotor, where it is beside its spring."""
-    rotors = _rotors(effects)
-    return tuple(
-        s.with_shape(np.array([rotors[own], *s.shape[1:]]))
-        if s.place.kind == BARE and rotors.get(own := Place(s.place.joint), 0.0) > 0.0
-        else s
-        for s in effects
-    )
+    found = list(effects)
+    for i, rotor in tied(effects):
+        found[i] = found[i].with_shape(np.array([*found[rotor].coefficients, *found[i].shape[1:]]))
+    return tuple(found)
 
 
 def _word(kind: str) -> str:
@@ -141,8 +144,8 @@ def _word(kind: str) -> str:
 
 def _with_friction_on_motor(at: Placed) -> np.ndarray | None:
     """Return the shape with friction on the motor in place of the link."""
-    is_open = is_on_motor(at.place) and at.shape[3] < 0.5
-    return np.array([*at.shape[:3], 1.0]) if is_open else None
+    is_link = is_on_motor(at.place) and at.shape[3] < 0.5
+    return np.array([*at.shape[:3], 1.0]) if is_link else None
 
 
 class JointElasticity(Effect):

@@ -17,6 +17,7 @@ from sgp_ros.diagnosis.compare.volume import Loop
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
+from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.physics.catalogue import ARMATURE, EFFECTS, VISCOUS_FRICTION
 from sgp_ros.physics.drive import Drive
 from sgp_ros.physics.effect_at import EffectAt
@@ -142,6 +143,8 @@ def test_a_rotor_that_the_robot_file_lacks_is_told_from_the_link():
     assert numbers['stiffness'] == pytest.approx(stiffness, rel=0.1)
     assert numbers['encoder'] == 'motor'
     assert float(model.mean_square[ELBOW] / (found.d[:, ELBOW] ** 2).mean()) < 0.01
+    of_rotor, of_spring = reported_std(model, columns)
+    assert of_spring['motor_inertia'] == pytest.approx(of_rotor['inertia'])  # one number
 
 
 @pytest.mark.parametrize('entry', [1, 2])

@@ -10,7 +10,7 @@ values follow by the delta method.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +22,7 @@ from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.regression import Columns, shape_bounds, shape_scales, with_shapes
 from sgp_ros.diagnosis.explain.shape_search import UNSEEN
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.elasticity import tied
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 
@@ -69,6 +70,8 @@ def covariance(model: Model, columns: Columns, unknown: Collection[int] = ()) ->
             slopes.append(((fa - fb) / max(a - b, 1e-300))[:, :, None])
         parts.append(frame.projected(np.concatenate(slopes, axis=2)))
     J = np.concatenate(parts, axis=1) if parts else np.zeros((model.residual.size, 0))
+    ties = _ties(model.effects)
+    J = J @ ties
     scale = np.sqrt((J * J).sum(axis=0))
     is_seen = scale > UNSEEN * scale.max(initial=0.0)
     scale[~is_seen] = np.inf
@@ -77,8 +80,21 @@ def covariance(model: Model, columns: Columns, unknown: Collection[int] = ()) ->
     C = np.zeros_like(inverse) if model.is_free else _of_stated_bodies(model, J, inverse)
     J *= np.sqrt(_inflation(model, unknown, len(J)))[:, None]
     C = (C + inverse @ (J.T @ J) @ inverse) / scale / scale[:, None]
-    spans = np.concatenate([np.zeros(len(scale) - len(low)), high - low])
-    return np.asarray(C + np.diag(np.where(is_seen, 0.0, spans**2 / 12.0)))
+    spans = np.concatenate([np.zeros(len(ties) - len(low)), high - low])
+    spans = (ties * spans[:, None]).max(axis=0, initial=0.0)
+    return np.asarray(ties @ (C + np.diag(np.where(is_seen, 0.0, spans**2 / 12.0))) @ ties.T)
+
+
+def _ties(effects: Sequence[EffectAt]) -> np.ndarray:
+    """Return what each independent number moves, (c + s, at most that): a rotor its spring's J."""
+    coefficients = [0 if s.effect.is_given else len(s.coefficients) for s in effects]
+    shapes = [len(s.shape) for s in effects]
+    found = np.eye(sum(coefficients) + sum(shapes))
+    springs = []
+    for spring, rotor in tied(effects):
+        springs.append(sum(coefficients) + sum(shapes[:spring]))
+        found[springs[-1], sum(coefficients[:rotor])] = 1.0
+    return np.delete(found, springs, axis=1)
 
 
 def _of_stated_bodies(model: Model, J: np.ndarray, inverse: np.ndarray) -> np.ndarray:
