@@ -64,12 +64,10 @@ def guess_map(
     Raises:
         RecordingError: no time or no positions can be recognised.
     """
-    guess = Guess()
-    rows = _rows(columns)
-    known = [h.name for h in hints]
+    guess, rows, known = Guess(), _rows(columns), [h.name for h in hints]
     seconds = guessed_times(columns, rows, rate_hz, known, guess)
-    entries = of_slides(entries_of(columns, rows, features or {}, known), hints, guess)
-    entries = of_signals(entries, guess)
+    entries = entries_of(columns, rows, features or {}, known)
+    entries = of_signals(of_slides(entries, hints, guess), guess)
     entries = of_blocks(entries, hints, seconds, guess)
     positions = chosen(entries, POSITION, guess)
     if not positions:
