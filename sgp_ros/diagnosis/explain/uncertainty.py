@@ -41,7 +41,7 @@ def _force(
 def covariance(model: Model, columns: Columns, unknown: Collection[int] = ()) -> np.ndarray:
     """Return the covariance of all free coefficients, then all shapes, (c + s, c + s).
 
-    A shape that nothing depends on may lie anywhere within its bounds. `unknown` are joints which
+    A shape may lie anywhere within its bounds, if the rows do not tell. `unknown` are joints that
     the model does not describe: what is left there says nothing of the others.
     """
     frame = Frame.of(model.frame.equations, model.sigma, is_free=model.is_free, weight=1.0)
@@ -60,12 +60,8 @@ def covariance(model: Model, columns: Columns, unknown: Collection[int] = ()) ->
             for sign in (1.0, -1.0):
                 y = x.copy()
                 y[i] = np.clip(y[i] + sign * h, low[i], high[i])
-                moved.append(
-                    (
-                        y[i],
-                        _force(columns, frame, with_shapes(model.effects, y), model.w),
-                    )
-                )
+                force = _force(columns, frame, with_shapes(model.effects, y), model.w)
+                moved.append((y[i], force))
             (a, fa), (b, fb) = moved
             slopes.append(((fa - fb) / max(a - b, 1e-300))[:, :, None])
         parts.append(frame.projected(np.concatenate(slopes, axis=2)))
@@ -76,12 +72,16 @@ def covariance(model: Model, columns: Columns, unknown: Collection[int] = ()) ->
     is_seen = scale > UNSEEN * scale.max(initial=0.0)
     scale[~is_seen] = np.inf
     J = J / scale
-    inverse = np.linalg.pinv(J.T @ J, rcond=1e-10)
+    n = len(ties) - len(low)  # coefficients
+    spans = np.concatenate([np.zeros(n), high - low])
+    spans = (ties * spans[:, None]).max(axis=0, initial=0.0)
+    width = np.where(is_seen, spans, 0.0) * np.where(is_seen, scale, 1.0)
+    width[:n] = 0.0
+    known = np.diag(np.divide(12.0, width**2, out=np.zeros_like(width), where=width > 0.0))
+    inverse = np.linalg.pinv(J.T @ J + known, rcond=1e-10)
     C = np.zeros_like(inverse) if model.is_free else _of_stated_bodies(model, J, inverse)
     J *= np.sqrt(_inflation(model, unknown, len(J)))[:, None]
-    C = (C + inverse @ (J.T @ J) @ inverse) / scale / scale[:, None]
-    spans = np.concatenate([np.zeros(len(ties) - len(low)), high - low])
-    spans = (ties * spans[:, None]).max(axis=0, initial=0.0)
+    C = (C + inverse @ (J.T @ J + known) @ inverse) / scale / scale[:, None]
     return np.asarray(ties @ (C + np.diag(np.where(is_seen, 0.0, spans**2 / 12.0))) @ ties.T)
 
 

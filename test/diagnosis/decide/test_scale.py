@@ -20,10 +20,11 @@ def _scale(noise):
     )  # fmt: skip
 
 
-def _model(inertia, mean_square):
-    return SimpleNamespace(
-        inertia=inertia, log_inertia=float(inertia.sum()), mean_square=mean_square
-    )  # fmt: skip
+def _model(inertia, mean_square, moving=1.0):
+    """Return a model whose second joint is held by dry friction in part of the rows."""
+    rows = np.column_stack([np.ones(10), np.arange(10) < 10 * moving])
+    frame = SimpleNamespace(equations=SimpleNamespace(moving=rows))
+    return SimpleNamespace(inertia=inertia, mean_square=mean_square, frame=frame)
 
 
 @pytest.mark.parametrize('noise', [0.0, 0.01])
@@ -35,6 +36,16 @@ def test_heavier_bodies_or_efforts_in_another_unit_fit_alike(noise):
     other = replace(scale, noise=scale.noise / 1.7**2, error=scale.error - noise * POWER)
     other = replace(other, error=other.error + other.noise)
     assert other.likelihood(lighter) == pytest.approx(scale.likelihood(heavier), abs=1e-9)
+
+
+def test_friction_that_holds_a_joint_takes_nothing_of_its_inertia():
+    """Behind a large rotor, a model without that friction would else be worth more."""
+    scale, inertia = (
+        replace(_scale(0.0 * POWER), carried=np.array([0.0, 5.0])),
+        np.array([0.0, 5.0]),
+    )
+    free, held = (_model(inertia, 0.012 * POWER, moving) for moving in (1.0, 0.4))
+    assert scale.likelihood(held) == pytest.approx(scale.likelihood(free))
 
 
 def test_the_least_variance_grows_with_inertia_but_for_noise(equations_for, perfect):
