@@ -77,10 +77,13 @@ def covariance(model: Model, columns: Columns, unknown: Collection[int] = ()) ->
     spans = (ties * spans[:, None]).max(axis=0, initial=0.0)
     width = np.where(is_seen, spans, 0.0) * np.where(is_seen, scale, 1.0)
     width[:n] = 0.0
+    wider = _inflation(model, unknown, len(J))
     known = np.diag(np.divide(12.0, width**2, out=np.zeros_like(width), where=width > 0.0))
+    known *= wider.max(initial=1.0)  # against rows that count as fewer
     inverse = np.linalg.pinv(J.T @ J + known, rcond=1e-10)
     C = np.zeros_like(inverse) if model.is_free else _of_stated_bodies(model, J, inverse)
-    J *= np.sqrt(_inflation(model, unknown, len(J)))[:, None]
+    J *= np.sqrt(wider)[:, None]
+    known *= wider.max(initial=1.0)
     C = (C + inverse @ (J.T @ J + known) @ inverse) / scale / scale[:, None]
     return np.asarray(ties @ (C + np.diag(np.where(is_seen, 0.0, spans**2 / 12.0))) @ ties.T)
 
