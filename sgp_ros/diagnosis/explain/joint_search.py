@@ -177,7 +177,8 @@ def _changes(
 ) -> Iterator[Model]:
     """Yield the model without each effect of a block, and with the best other law in its place.
 
-    Among simple laws, one with one number replaces one with several.
+    Among simple laws, one with one number replaces one with several. A law that couples two joints
+    may be in place of one of either.
     """
     for s in model.effects:
         if not block.holds(s):
@@ -193,9 +194,9 @@ def _changes(
             is_simple and (len(e.quantities) > 1 or e.shape_names()))]  # fmt: skip
         is_richer = len(s.effect.quantities) > 1
         if others and (is_richer or not is_simple):
-            joints = (s.place.joint,) if is_own else None
-            found = distinct(screen(columns, without, others, joints), 1)
-            yield from (refitted(columns, model, arranged, other) for other in found)
+            ends = [(j,) for j in (s.place.joint, s.place.source) if j >= 0] if is_own else [None]
+            found = [distinct(screen(columns, without, others, joints), 1) for joints in ends]
+            yield from (refitted(columns, model, arranged, *other) for other in found if other)
 
 
 def uncoupled(columns: Columns, without: Model, coupled: EffectAt) -> Iterator[Model]:

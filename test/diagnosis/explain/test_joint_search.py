@@ -337,6 +337,17 @@ def test_a_coupling_law_takes_the_place_of_all_that_stands_for_it(equations_for)
     assert _keys(found) in ({('coupled_friction', j), ('viscous_friction', 0)} for j in (0, 1))
 
 
+def test_a_law_of_the_source_takes_the_place_of_one_that_couples(equations):
+    """A spring of one joint is hardly less than one that depends a little on another."""
+    columns, pair = _pair(equations)
+    coupling = EffectAt(EFFECTS['joint_coupling'], Place(1, 'spring', source=0), np.array([-4.0]))
+    others = (pair.effects[1], EffectAt(EFFECTS['viscous_friction'], Place(1)))
+    model = fit(columns, (*others, coupling), pair.sigma, is_free=True)
+    blocks = growth.blocks_of(model)
+    rivals = [_keys(t) for b in blocks for t in joint_search._changes(columns, model, b)]
+    assert TRUTH in rivals
+
+
 def test_both_motors_of_a_differential_are_found(equations_for):
     """One turns with the sum of the joints, one with the difference; each has its friction."""
 
