@@ -13,6 +13,8 @@ from dataclasses import dataclass
 
 TIME, POSITION, VELOCITY, EFFORT, CURRENT = 'time', 'position', 'velocity', 'effort', 'current'
 DUTY, COMMAND, KP, KD, OTHER = 'duty', 'command', 'kp', 'kd', 'other'
+STATE = 'state'
+"""Of a joint, its position, where nothing else says more; of a program, a number."""
 
 _QUANTITIES = {
     TIME: 't ts time times timestamp timestamps stamp stamps sec secs seconds clock zeit',
@@ -27,7 +29,8 @@ _QUANTITIES = {
     KP: 'kp stiffness pgain',
     KD: 'kd dgain',
     OTHER: 'ddq qdd qddot acc accel acceleration accelerations qacc temperature temp voltage '
-    'index frame episode task reward done error ff feedforward',
+    'index frame episode task reward done error ff feedforward tcp eef cartesian wrench ext '
+    'external execution scaling fraction momentum',
 }
 _WORDS = {word: role for role, words in _QUANTITIES.items() for word in words.split()}
 _EFFORTS = frozenset(_QUANTITIES[EFFORT].split())
@@ -39,8 +42,6 @@ _TARGETS = frozenset({
     'soll', 'set',
 })  # fmt: skip
 _PLAIN_TARGETS = _TARGETS - {'d'}
-_STATE = 'state'
-"""Of a joint, its position, where nothing else says more."""
 _UNITS = {
     's': 's', 'ms': 'ms', 'us': 'us', 'ns': 'ns', 'nsec': 'ns', 'nanosec': 'ns', 'msec': 'ms',
     'rad': 'rad', 'radians': 'rad', 'deg': 'deg', 'degs': 'deg', 'degree': 'deg',
@@ -80,7 +81,8 @@ class Meaning:
     """Meaning of a name.
 
     Attributes:
-        role: the quantity; `command` where only that it is asked for; empty for nothing known.
+        role: the quantity; `command` where only that it is asked for, `state` where only that it
+            is one; empty for nothing known.
         is_target: whether it is asked for, not measured.
         rest: words that are left, in their order.
         unit: as in a map; empty where none is said.
@@ -125,13 +127,13 @@ def meaning(name: str, joints: Iterable[str] = ()) -> Meaning:
             role = _stronger(role, _WORDS[word])
         elif words[i] in _SYMBOLS:
             role = _stronger(role, _SYMBOLS[words[i]])
-        elif word == _STATE:
+        elif word == STATE:
             is_state = True
         else:
             rest.append(words[i])
         i += 1
     if not role:
-        role = POSITION if is_state else COMMAND if is_target else ''
+        role = STATE if is_state else COMMAND if is_target else ''
     if not unit and _EFFORTS & {word.lower() for word in words} == {'load'}:
         unit = '%'  # as servos log it, of the duty cycle: no torque
     return Meaning(role, is_target, tuple(rest), unit)

@@ -15,6 +15,7 @@ from sgp_ros.recordings.column_names import (
     EFFORT,
     OTHER,
     POSITION,
+    STATE,
     VELOCITY,
     Meaning,
     meaning,
@@ -110,7 +111,7 @@ def entries_of(
                 said = replace(said, unit=meaning(f'value [{units[i]}]').unit)
             index = i if array.ndim == 2 else None
             found.append(Entry(name, index, said, label, numbers))
-    return _labelled(_named_by_units(found))
+    return _labelled(_of_states(_named_by_units(found)))
 
 
 def _named_by_units(entries: list[Entry]) -> list[Entry]:
@@ -122,6 +123,17 @@ def _named_by_units(entries: list[Entry]) -> list[Entry]:
         is_open = e.said.role in {'', COMMAND} and role and (role, e.said.is_target) not in named
         found.append(replace(e, said=replace(e.said, role=role)) if is_open else e)
     return found
+
+
+def _of_states(entries: list[Entry]) -> list[Entry]:
+    """Let states be positions where no name says `position`; else they are of something else."""
+    named = {(e.said.role, e.said.is_target) for e in entries}
+    roles = {x: OTHER if (POSITION, x) in named else POSITION for x in (False, True)}
+    return [
+        replace(e, said=replace(e.said, role=roles[e.said.is_target]))
+        if e.said.role == STATE else e
+        for e in entries
+    ]  # fmt: skip
 
 
 def _labelled(entries: list[Entry]) -> list[Entry]:

@@ -66,6 +66,9 @@ def joint_names(
         is_each = len(set(unique.values())) == len(unique)
         if is_each and len(unique) in {len(labels), len(hints)}:
             return unique
+    numbered = [x for x in labels if x.isdigit()]
+    if len(labels) > len(hints) == len(numbered):
+        labels = numbered  # others, such as that of a gripper, are not the robot's
     if len(labels) == len(hints):
         plain = sorted(labels, key=int) if all(x.isdigit() for x in labels) else labels
         order = _by_numbers(plain, said_names, hints)

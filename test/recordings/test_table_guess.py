@@ -56,7 +56,7 @@ def _read(path, folder, hints=HINTS, rate=None):
         ('pos_deg_j2', 'position', False, '2', 'deg'),
         ('tau_des_Nm', 'effort', True, '', 'N m'),
         ('joint1_current_mA', 'current', False, '1', 'mA'),
-        ('observation.state', 'position', False, '', ''),
+        ('observation.state', 'state', False, '', ''),
         ('action', 'command', True, '', ''),
         ('ts', 'time', False, '', ''),
         ('target_velocity', 'velocity', True, '', ''),
@@ -242,6 +242,23 @@ def test_columns_of_joints_that_the_robot_lacks_are_left_out(tmp_path):
     assert said == 'The robot has no joint of right_shoulder_pos, right_elbow_pos: ignored.'
     with pytest.raises(RecordingError, match='positions of 4 joints'):
         _read(path, tmp_path, (*HINTS, JointHint('knee')))
+
+
+def test_what_a_program_a_tool_and_a_gripper_do_is_not_of_the_joints_of_an_arm(tmp_path):
+    """Beside numbered joints; a state of its own is a position where no name says more."""
+    arm = {f'actual_{k}_{i}': a[:, i] for k, a in (('q', Q), ('qd', DQ), ('current', TAU))
+           for i in range(2)}  # fmt: skip
+    tool = {f'actual_TCP_force_{i}': 9.0 * T for i in range(6)}
+    path = _npz(tmp_path, timestamp=T, **tool, **arm, runtime_state=2.0 + 0.0 * T,
+                gripper_pos=0.1 * T)  # fmt: skip
+    summary, states, _ = _read(path, tmp_path)
+    np.testing.assert_allclose([s.position for s in states], Q)
+    np.testing.assert_allclose([s.effort for s in states], TAU)
+    assert not any('runtime_state' in said for said in summary.unsure)
+    assert 'The robot has no joint of gripper_pos: ignored.' in summary.unsure
+    unknown, _, _ = _read(_npz(tmp_path, timestamp=T, **arm, runtime_state=2.0 + 0.0 * T),
+                          tmp_path, ())  # fmt: skip
+    assert unknown.joints == ('joint_1', 'joint_2')
 
 
 def test_a_joint_without_a_column_is_said_and_its_force_is_not_that_of_another(tmp_path):
