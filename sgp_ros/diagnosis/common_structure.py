@@ -65,8 +65,10 @@ class Side:
 def common_models(real: Side, sim: Side, *, is_free: bool) -> tuple[Model, Model]:
     """Return the models of both in the structure that is worth most on the two together.
 
-    A law that cannot be on one side, such as friction that drives one way because bodies hold a
-    load up, gives way to everyday laws.
+    What a law costs is paid once: one that is zero in the simulation is no law of it. Of a law of
+    one side and a plain one of the other that it stands for, both have the same one. A law that
+    cannot be on one side, such as friction that drives one way because bodies hold a load up,
+    gives way to everyday laws.
 
     Args:
         real: the machine.
@@ -76,10 +78,14 @@ def common_models(real: Side, sim: Side, *, is_free: bool) -> tuple[Model, Model
 
     def fitted(effects: Collection[EffectAt]) -> tuple[float, tuple[Model, Model]]:
         ours, theirs = (side.fitted(tuple(effects), is_free=is_free) for side in (real, sim))
-        return real.scale.worth(ours) + sim.scale.worth(theirs), (ours, theirs)
+        worth = real.scale.worth(ours) + sim.scale.worth(theirs) + ours.law_price
+        return worth, (ours, theirs)
 
     union = {s.key: s for s in (*sim.named, *real.named)}
-    structures = {tuple(s.key for s in x): x for x in (real.named, sim.named, union.values())}
+    laws = tuple(union.values())
+    fuller = tuple(s for s in laws if not any(o.stands_for(s) for o in laws))
+    plainer = tuple(s for s in laws if not any(s.stands_for(o) for o in laws))
+    structures = {tuple(s.key for s in x): x for x in (real.named, sim.named, fuller, plainer)}
     most = max(map(fitted, structures.values()), key=lambda x: x[0])
     both = {s.key for s in real.named} & {s.key for s in sim.named}
     while True:  # laws named on one side each may be one

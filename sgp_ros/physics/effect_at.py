@@ -119,6 +119,15 @@ class EffectAt:
         """Whether the stated numbers say what it does; of backlash they do not say enough."""
         return bool(np.isfinite(self.shape).all() and np.isfinite(self.coefficients).all())
 
+    def stands_for(self, plain: EffectAt) -> bool:
+        """Return whether it takes the place of a plain law of its joint, which it is with more.
+
+        Dry friction of a joint that builds up has one level; a part of it that does not build up
+        would be told as a second friction.
+        """
+        is_one = self.effect.plain == (plain.name,) and not self.effect.has_source
+        return is_one and self.place.joint == plain.place.joint
+
     def columns(self, motion: SeenMotion) -> np.ndarray:
         """Return the force per coefficient, (n, m) on the joint of the place or (n, k, m)."""
         seen = behind(motion, self.place.joint, self.before)

@@ -21,6 +21,7 @@ NUMBERS = {
     'coulomb_friction': {'real': [24.0], 'sim': [24.0]},
     'constant_load': {'real': [11.0], 'sim': [-31.0]},
     'viscous_friction': {'real': [60.0], 'sim': [60.0]},
+    'hysteresis': {'real': [24.0], 'sim': [24.0]},
     'stribeck_friction': {'real': [0.34, 0.75], 'sim': [0.34, 0.32]},
 }
 """Numbers that a fit of each law finds: bodies hold a load up that the simulation has not."""
@@ -30,7 +31,7 @@ def _at(name, shape=()):
     return EffectAt(EFFECTS[name], Place(0), np.array(shape))
 
 
-def _side(which, named, share=0.1):
+def _side(which, named, share=0.1, price=0.0):
     """A recording on which every structure is worth the less the more laws it has."""
     motion = SimpleNamespace(stated_number=lambda _number, _joint: 0.0)
 
@@ -40,7 +41,9 @@ def _side(which, named, share=0.1):
             EffectAt(s.effect, s.place, s.shape, np.array(NUMBERS[s.name][which])) for s in effects
         )
         frame = SimpleNamespace(equations=SimpleNamespace(motion=motion))
-        return SimpleNamespace(effects=laws, shares=(share,) * len(laws), frame=frame)
+        return SimpleNamespace(
+            effects=laws, shares=(share,) * len(laws), frame=frame, law_price=price * len(laws)
+        )
 
     scale = SimpleNamespace(worth=lambda m: -len(m.effects))
     return SimpleNamespace(named=named, fitted=fitted, scale=scale)
@@ -81,6 +84,30 @@ def test_one_law_that_each_side_names_otherwise_is_there_once():
     assert ours == theirs
     assert {'viscous_friction', 'constant_load'} < ours
     assert len(ours) == 3
+
+
+@pytest.mark.parametrize(('price', 'is_kept'), [(10.0, True), (0.0, False)])
+def test_what_a_law_of_the_machine_alone_costs_is_paid_once(price, is_kept):
+    """Worth 9 nats there and -10 in the simulation, where it is zero and costs its price."""
+    real, sim = (_side(x, (_at('coulomb_friction'),), 0.001, price) for x in ('real', 'sim'))
+    real.named = (*real.named, _at('viscous_friction'))
+    for side, gained in ((real, 9.0), (sim, -10.0)):
+        side.scale = SimpleNamespace(
+            worth=lambda m, x=gained: x * any(s.name == 'viscous_friction' for s in m.effects)
+        )
+    found = _names(common_models(real, sim, is_free=True))
+    assert found == [{'coulomb_friction', *['viscous_friction'] * is_kept}] * 2
+
+
+@pytest.mark.parametrize('best', ['hysteresis', 'coulomb_friction'])
+def test_of_a_plain_law_and_one_that_stands_for_it_both_have_the_same(best):
+    """Dry friction builds up on the machine, not in the simulation: it has one level on each."""
+    real = _side('real', (_at('hysteresis', [0.01]),), 0.001)
+    sim = _side('sim', (_at('coulomb_friction'),), 0.001)
+    real.scale = sim.scale = SimpleNamespace(
+        worth=lambda m: 5.0 * len(m.effects) + any(s.name == best for s in m.effects)
+    )
+    assert _names(common_models(real, sim, is_free=True)) == [{best}] * 2
 
 
 def test_shapes_of_laws_that_only_the_other_side_names_stay(equations_for, viscous):

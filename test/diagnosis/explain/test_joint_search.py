@@ -348,6 +348,24 @@ def test_a_law_of_the_source_takes_the_place_of_one_that_couples(equations):
     assert TRUTH in rivals
 
 
+def test_dry_friction_of_a_joint_has_one_level(equations):
+    """A law takes the place of the plain one that it stands for, and that does not come back."""
+    columns, pair = _pair(equations)
+    dry, built = (EffectAt(EFFECTS[n], Place(1)) for n in ('coulomb_friction', 'hysteresis'))
+    plain = fit(columns, (*pair.effects, dry), pair.sigma, is_free=True)
+    fuller = replace(plain, effects=(*pair.effects, built.with_shape(np.array([0.01]))))
+    laws = [dry.effect, built.effect]
+    beside, inside = (
+        {s.name for _, s in screen(columns, plain, laws, (1,), is_in_place=x)}
+        for x in (False, True)
+    )
+    assert beside == set()
+    assert inside == {'hysteresis'}
+    assert screen(columns, fit(columns, fuller.effects, pair.sigma), laws, (1,)) == []
+    found = growth._tried(columns, plain, Block((built.effect,), (1,)), [fuller.effects[-1]])
+    assert [_keys(m) for m in found] == [_keys(fuller)]
+
+
 def test_both_motors_of_a_differential_are_found(equations_for):
     """One turns with the sum of the joints, one with the difference; each has its friction."""
 
