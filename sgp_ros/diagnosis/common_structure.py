@@ -14,7 +14,7 @@ from sgp_ros.diagnosis.explain.fitted_model import Model, first_scale
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.unlisted.beside import PLAIN
-from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.effect_at import EffectAt, one_of_each
 from sgp_ros.physics.parts import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -83,9 +83,10 @@ def common_models(real: Side, sim: Side, *, is_free: bool) -> tuple[Model, Model
 
     union = {s.key: s for s in (*sim.named, *real.named)}
     laws = tuple(union.values())
-    fuller = tuple(s for s in laws if not any(o.stands_for(s) for o in laws))
     plainer = tuple(s for s in laws if not any(s.stands_for(o) for o in laws))
-    structures = {tuple(s.key for s in x): x for x in (real.named, sim.named, fuller, plainer)}
+    structures = {
+        tuple(s.key for s in x): x for x in (real.named, sim.named, one_of_each(laws), plainer)
+    }
     most = max(map(fitted, structures.values()), key=lambda x: x[0])
     both = {s.key for s in real.named} & {s.key for s in sim.named}
     while True:  # laws named on one side each may be one

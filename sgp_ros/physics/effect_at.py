@@ -237,3 +237,8 @@ def in_series(effects: Sequence[EffectAt], known: Sequence[EffectAt] = ()) -> tu
         if i >= 0:
             found[i] = chained
     return tuple(found)
+
+
+def one_of_each(effects: Sequence[EffectAt]) -> tuple[EffectAt, ...]:
+    """Return effects without the plain ones that another one of them stands for."""
+    return tuple(s for s in effects if not any(o.stands_for(s) for o in effects))

@@ -14,7 +14,7 @@ from sgp_ros.diagnosis.explain.joint_search import uncoupled
 from sgp_ros.diagnosis.explain.more_effects import more
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
-from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.effect_at import EffectAt, one_of_each
 
 FIRST, SECOND, PARENTS = 12, 5, 6
 """Screened candidates that are fitted alone, as a second effect; effects that get a second."""
@@ -81,6 +81,7 @@ def compare_models(equations: Equations, progress: Callable[[float], None]) -> C
         pairs += _fitted(columns, single, [(*single.effects, s) for s in second], MOST_PAIRS)
         progress(0.45 + 0.55 * (number + 1) / len(parents))
     pairs = ranked([*pairs, *_exchanged(columns, ranked(pairs))])
+    pairs = [m for m in pairs if one_of_each(m.effects) == m.effects]
     pairs = ranked([*pairs, *_plain(columns, (*singles[:1], *pairs[:1]))])
     longer = more(columns, plain.nominal, plain.base, (*singles, *pairs))
     return replace(plain, singles=tuple(singles), pairs=tuple(pairs), more=tuple(longer))

@@ -141,14 +141,12 @@ def crossed(columns: Columns, model: Model, others: Iterable[Model]) -> Model:
 def _tried(columns: Columns, model: Model, block: Block, found: list[EffectAt]) -> list[Model]:
     """Return the models with each of the best candidates.
 
-    A law takes the place of the plain one that it stands for. Laws that take the command away,
-    where the bodies may vanish too, promise most and say nothing: they take no other candidate's
-    turn.
+    Laws that take the command away, where the bodies may vanish too, promise most and say nothing:
+    they take no other candidate's turn.
     """
-    trials, turns = list[Model](), 0
+    arranged, trials, turns = arrangement(model, block), list[Model](), 0
     for s in found[:MOST_TRIALS]:
-        plain = next((o for o in model.effects if s.stands_for(o)), None)
-        trials.append(refitted(columns, model, arrangement(model, block, plain), s))
+        trials.append(refitted(columns, model, arranged, s))
         turns += not _takes_commands(model, s) or is_credible(trials[-1])
         if turns == TRIALS:
             break
@@ -185,8 +183,7 @@ def _counted(columns: Columns, model: Model, block: Block) -> list[Model]:
         laws = tuple(e for e in laws if adds_to_usual(e))
     if not laws or (block.is_slight(model) and strain < PER_EFFECT):
         return []
-    found = screen(columns, model, laws, block.joints, is_in_place=True)
-    trials = _tried(columns, model, block, distinct(found))
+    trials = _tried(columns, model, block, distinct(screen(columns, model, laws, block.joints)))
     if left < COUNTED_SHARE:
         trials = [t for t in trials if adds_to_usual(t.effects[-1].effect)
                   or strain - t.strain > PER_EFFECT]  # fmt: skip

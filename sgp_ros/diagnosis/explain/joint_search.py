@@ -32,7 +32,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import distinct, may_be_two, screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
-from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.effect_at import EffectAt, one_of_each
 from sgp_ros.physics.parts import PLACES, Place
 
 SWEEPS = 4
@@ -63,7 +63,8 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
             model = better
     if model is start and len(model.effects) <= 2:
         return []
-    model = fit(columns, model.effects, model.sigma, is_free=model.is_free, w=model.w, rounds=2,
+    effects = one_of_each(model.effects)
+    model = fit(columns, effects, model.sigma, is_free=model.is_free, w=model.w, rounds=2,
                 steps=6)  # fmt: skip
     rivals = [t for block in blocks_of(model) for t in _changes(columns, model, block)]
     return [m for m in (model, large(columns, model), *rivals) if m.effects and is_credible(m)]

@@ -28,7 +28,7 @@ from sgp_ros.diagnosis.explain.joint_search import (
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import COMMAND_DELAY
-from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.effect_at import EffectAt, one_of_each
 from sgp_ros.physics.servo import Servo
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -73,7 +73,8 @@ def more(columns: Columns, nominal: Model, base: Model, compared: Sequence[Model
     models = _crossed(columns, [end for end in ends if end])
     models += [*_carrying(columns, models), *_freed(columns, models)]
     models += _richer(columns, models)
-    return ranked(m for m in models if len(m.effects) > 2)
+    single = (m for m in models if one_of_each(m.effects) == m.effects)
+    return ranked(m for m in single if len(m.effects) > 2)
 
 
 def _richer(columns: Columns, models: list[Model]) -> list[Model]:

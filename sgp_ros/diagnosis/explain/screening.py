@@ -33,8 +33,6 @@ def screen(
     model: Model,
     effects: Iterable[Effect],
     joints: Collection[int] | None = None,
-    *,
-    is_in_place: bool = False,
 ) -> list[Trial]:
     """Return candidates with the gain in score they promise, best first.
 
@@ -45,7 +43,6 @@ def screen(
         model: so far.
         effects: that could be added.
         joints: indices of the places that are looked at; None for all.
-        is_in_place: whether laws are meant, too, that would take the place of one of the model.
     """
     rows, columns = columns.rows, columns.sample
     held = dry_joints(model.effects)
@@ -57,10 +54,6 @@ def screen(
             continue
         for place in _free_places(effect, model, columns.equations(held).motion):
             if joints is not None and place.joint not in joints:
-                continue
-            if not is_in_place and any(
-                EffectAt(effect, place).stands_for(s) for s in model.effects
-            ):
                 continue
             is_shown = shows(effect, place, columns.equations(held).motion)
             if not (is_shown and has_rotor(place, model.effects)):
@@ -89,10 +82,9 @@ def _free_places(effect: Effect, model: Model, motion: ObservedMotion) -> Iterat
     """Yield the places of a law that the model does not have yet; further ones too for a wave.
 
     And a second one for friction of two joints: a differential has two motors. What is behind a
-    motor is behind the one that the model has. None where another law stands for it.
+    motor is behind the one that the model has.
     """
-    places = [p for p in effect.places(motion)
-              if not any(s.stands_for(EffectAt(effect, p)) for s in model.effects)]  # fmt: skip
+    places = effect.places(motion)
     is_of_motor = any(p.kind == BARE for p in places)
     for place in places:
         is_stated = is_of_motor and is_on_motor(place) and place.kind != BARE

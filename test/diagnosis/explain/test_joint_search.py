@@ -38,7 +38,7 @@ from sgp_ros.diagnosis.explain.more_effects import _carrying
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import are_apart, distinct, screen
 from sgp_ros.physics.catalogue import EFFECTS
-from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.effect_at import EffectAt, one_of_each
 from sgp_ros.physics.parts import Place
 from test.diagnosis.worlds import CHAINS, heavier, recorded, simulate
 from test.simulation.trees import arm
@@ -348,22 +348,18 @@ def test_a_law_of_the_source_takes_the_place_of_one_that_couples(equations):
     assert TRUTH in rivals
 
 
-def test_dry_friction_of_a_joint_has_one_level(equations):
-    """A law takes the place of the plain one that it stands for, and that does not come back."""
+def test_dry_friction_of_a_joint_has_one_level(monkeypatch, equations):
+    """Where it builds up a part of it that does not is no second friction."""
     columns, pair = _pair(equations)
-    dry, built = (EffectAt(EFFECTS[n], Place(1)) for n in ('coulomb_friction', 'hysteresis'))
-    plain = fit(columns, (*pair.effects, dry), pair.sigma, is_free=True)
-    fuller = replace(plain, effects=(*pair.effects, built.with_shape(np.array([0.01]))))
-    laws = [dry.effect, built.effect]
-    beside, inside = (
-        {s.name for _, s in screen(columns, plain, laws, (1,), is_in_place=x)}
-        for x in (False, True)
+    dry, built = (
+        EffectAt(EFFECTS[n], Place(1), np.array(x))
+        for n, x in (('coulomb_friction', []), ('hysteresis', [0.01]))
     )
-    assert beside == set()
-    assert inside == {'hysteresis'}
-    assert screen(columns, fit(columns, fuller.effects, pair.sigma), laws, (1,)) == []
-    found = growth._tried(columns, plain, Block((built.effect,), (1,)), [fuller.effects[-1]])
-    assert [_keys(m) for m in found] == [_keys(fuller)]
+    assert one_of_each((*pair.effects, dry, built)) == (*pair.effects, built)
+    monkeypatch.setattr(joint_search, 'SWEEPS', 0)
+    model = fit(columns, (*pair.effects, dry, built), pair.sigma, is_free=True)
+    found, *_ = by_joint(columns, model)
+    assert _keys(found) == {*_keys(pair), ('hysteresis', 1)}
 
 
 def test_both_motors_of_a_differential_are_found(equations_for):
