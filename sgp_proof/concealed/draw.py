@@ -48,7 +48,6 @@ _PERFECT = Transport(log_latency_s=1e-4)
 _TRIES = 60
 _SECONDS = {'real': 33.0, 'real_test': 12.0, 'real_far': 12.0}
 _NUMBERS = {'real': 1, 'real_test': 2, 'real_far': 3}
-_TARGETS = {'A': (0.02, 0.2), 'B': (0.006, 0.1)}
 
 
 def main():
@@ -97,7 +96,7 @@ def _attempt(seed, rng, tier, wanted, out):
         for name in names
     ]  # fmt: skip
     for effect in concealed:
-        low, high = _TARGETS[tier]
+        low, high = sizes.targets(effect, tier)
         sizes.sized(world, effect, math.exp(rng.uniform(math.log(low), math.log(high))))
     recordings = run_all(world, concealed)
     _check(recordings['real'], world, concealed)
@@ -154,9 +153,10 @@ def draw_transport(rng, tier):
 
 
 def _check(real, world, concealed):
-    """Refuse a world in which a concealed effect is smaller than what counts as physics."""
-    for effect, share in zip(concealed, own_shares(real, world, concealed), strict=True):
-        if share < sizes.SMALLEST_SHARE:
+    """Refuse a world in which a concealed effect does not count as physics."""
+    for effect, alone in zip(concealed, _alone(real, world, concealed), strict=True):
+        if not sizes.is_suitable(alone, world, effect):
+            share = sizes.own_share(alone, world, effect)
             raise UnsuitableError(f'{effect.at.name} makes {share:.2e}')
     if not concealed and world.errors:
         error = max(x['nominal'] for x in balance.nominal_share(real, world).values())
@@ -165,11 +165,15 @@ def _check(real, world, concealed):
 
 
 def own_shares(real, world, concealed):
-    """Return the share of each concealed effect alone; each of several needs a run of its own."""
+    """Return the share of each concealed effect alone."""
+    runs = _alone(real, world, concealed)
+    return [sizes.own_share(x, world, e) for x, e in zip(runs, concealed, strict=True)]
+
+
+def _alone(real, world, concealed):
+    """Return a recording with each effect alone; each of several needs a run of its own."""
     return [
-        sizes.own_share(
-            real if len(concealed) == 1 else world.run('near', 12.0, 1, [effect]), world, effect
-        )
+        real if len(concealed) == 1 else world.run('near', 12.0, 1, [effect])
         for effect in concealed
     ]
 

@@ -19,6 +19,8 @@ LAG_S = 0.15
 HALF_PLAY = 0.25
 """Half the play of a spring, in halves of the width of the motion."""
 _STEP_S = 1e-3
+PARTS = 10
+"""Parts of a step in which a memory is followed, the motion being joined by lines."""
 _OPEN = 0.2
 """Least part of a chamber that a piston leaves."""
 
@@ -116,8 +118,10 @@ def remembering(start, rate, law):
 
 def memory_along(start, rate, q, v, step, p):
     """Return the memory (n,) along a motion of even steps [s], by the rate itself."""
+    at, parts = np.arange(len(q)), np.arange((len(q) - 1) * PARTS + 1) / PARTS
+    q, v = np.interp(parts, at, q), np.interp(parts, at, v)
     z = np.empty(len(q))
     z[0] = start(q[0], v[0])
     for i in range(1, len(q)):
-        z[i] = z[i - 1] + step * rate(q[i - 1], v[i - 1], z[i - 1], p)
-    return z
+        z[i] = z[i - 1] + step / PARTS * rate(q[i - 1], v[i - 1], z[i - 1], p)
+    return z[::PARTS]

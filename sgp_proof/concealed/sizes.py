@@ -6,12 +6,18 @@ import math
 
 import numpy as np
 
+from sgp_proof.concealed import fifth_families as fifth
 from sgp_proof.concealed.balance import Balance
+from sgp_proof.concealed.unknown import NAME
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
 from sgp_ros.physics.drawing import UnsuitableError
 from sgp_ros.physics.parts import PLACES
 
 SMALLEST_SHARE = 0.0042
+LEAST_BEYOND, MOST_BEYOND, MOST_OF_ALL = 0.05, 0.4, 0.6
+"""Shares of a law of the fifth set: beyond plain effects at least and at most, and in all."""
+_TARGETS = {'A': (0.02, 0.2), 'B': (0.006, 0.1)}
+_BEYOND = 0.07, 0.3
 _PILOT_S = 10.0
 _ROUNDS = 4
 
@@ -30,9 +36,44 @@ def shares(recording, world):
     return np.mean((balance.needed - balance.given) ** 2, axis=0) / scale
 
 
+def is_of_fifth_set(effect):
+    """Return whether an effect is measured by what plain effects cannot absorb of it."""
+    return effect.at.name == NAME and effect.at.parameters['kind'] in fifth.FAMILIES
+
+
+def targets(effect, tier):
+    """Return the ends of the range from which the share of an effect is drawn."""
+    return _BEYOND if is_of_fifth_set(effect) else _TARGETS[tier]
+
+
+def is_suitable(recording, world, effect):
+    """Return whether the share of an effect counts as physics, and as that of its set."""
+    share = own_share(recording, world, effect)
+    if not is_of_fifth_set(effect):
+        return share >= SMALLEST_SHARE
+    whole = float(shares(recording, world)[effect.index])
+    return LEAST_BEYOND <= share <= MOST_BEYOND and whole <= MOST_OF_ALL
+
+
+def beyond_plain(recording, world, j):
+    """Return the share that constant, spring, friction and inertia of the joint leave."""
+    balance = Balance.of(recording, world.true.mechanism)
+    v = recording.shown_velocity[:, j]
+    plain = np.column_stack([
+        np.ones_like(v), recording.shown_position[:, j], v, np.sign(v),
+        recording.true_acceleration[:, j],
+    ])  # fmt: skip
+    missing = (balance.needed - balance.given)[:, j]
+    missing = missing - plain @ np.linalg.lstsq(plain, missing, rcond=None)[0]
+    whole = balance.given if world.bodies[j].is_driven else balance.diagonal
+    return float(np.mean(missing**2) / np.mean(whole[:, j] ** 2))
+
+
 def own_share(recording, world, effect):
     """Return the share by which the size of an effect is measured."""
     at = effect.at
+    if is_of_fifth_set(effect):
+        return beyond_plain(recording, world, effect.index)
     if at.name == VELOCITY_FILTER_LAG.name:
         clean = recording.shown_velocity[:, effect.index]
         late = _late(recording, clean, at.parameters['time_constant'])

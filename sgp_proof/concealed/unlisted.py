@@ -23,6 +23,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from sgp_proof.concealed import fifth_families as fifth
 from sgp_proof.concealed import fourth_families as fourth
 from sgp_proof.concealed import second_families as second
 from sgp_proof.concealed import third_families as third
@@ -82,20 +83,22 @@ FAMILIES = {
     'walk': _walk,
 }
 """Name to force over its size. The last is no function of the motion: nothing is to be found."""
-SECOND_FROM, THIRD_FROM, FOURTH_FROM = 20_000, 40_000, 60_000
-"""Seeds from here on conceal a law of the second set, of the third, and of the fourth."""
+SECOND_FROM, THIRD_FROM, FOURTH_FROM, FIFTH_FROM = 20_000, 40_000, 60_000, 70_000
+"""Seeds from here on conceal a law of the second set, of the third, and so on."""
 _SETS = (
+    (FIFTH_FROM, fifth.FAMILIES, ''),
     (FOURTH_FROM, fourth.FAMILIES, ''),
     (THIRD_FROM, third.FAMILIES, ''),
     (SECOND_FROM, second.FAMILIES, 'air_spring'),
     (0, FAMILIES, 'gas_spring'),
 )
 """First seed, laws, and the law of robots of one joint in place of one of another joint."""
-_LAWS = FAMILIES | second.FAMILIES | third.FAMILIES | fourth.FAMILIES
-_REMEMBER = second.REMEMBER | third.REMEMBER | fourth.REMEMBER
-_LISTED_PARTS = third.LISTED_PARTS | fourth.LISTED_PARTS
+_LATER = third, fourth, fifth
+_LAWS = FAMILIES | second.FAMILIES | third.FAMILIES | fourth.FAMILIES | fifth.FAMILIES
+_REMEMBER = second.REMEMBER | third.REMEMBER | fourth.REMEMBER | fifth.REMEMBER
+_LISTED_PARTS = third.LISTED_PARTS | fourth.LISTED_PARTS | fifth.LISTED_PARTS
 BUILDERS = {name: force(law) for name, law in _LAWS.items()}
-BUILDERS |= {name: x.SET.builder(name) for x in (third, fourth) for name in x.FAMILIES}
+BUILDERS |= {name: x.SET.builder(name) for x in _LATER for name in x.FAMILIES}
 BUILDERS |= {name: second.remembering(*x, _LAWS[name]) for name, x in _REMEMBER.items()}
 
 
@@ -116,7 +119,7 @@ def family_of(seed, *, has_others):
 
 def constants(kind, rng, source_reach):
     """Return what is drawn for a world of a family, beside what all have."""
-    drawn = (x.SET.constants(kind, rng, source_reach) for x in (third, fourth))
+    drawn = (x.SET.constants(kind, rng, source_reach) for x in _LATER)
     return {name: value for some in drawn for name, value in some.items()}
 
 
@@ -132,7 +135,7 @@ def true_force(parameters, q, v):
     return np.array([
         parameters['a'] * law(q[0][i], v[0][i], SimpleNamespace(
             position={parameters['source']: q[1][i]}, velocity={parameters['source']: v[1][i]},
-            time_s=0.0, state=(memory[i],),
+            time_s=STEP_S * i, state=(memory[i],),
         ), parameters)
         for i in range(len(q[0]))
     ])  # fmt: skip
@@ -171,14 +174,14 @@ def law_error(effect, finding, beside=()):
     true = true_force(p, q, v)
     numbers = {name: x['value'] for name, x in finding['parameters'].items()}
     formula = read_formula(finding['formula'].partition('=')[2], is_law=True)
-    if not {j for _, j in formula.signals} <= set(names) or 't' in {k for k, _ in formula.signals}:
+    refused = {'tau'} if p['kind'] in fifth.OF_CLOCK else {'tau', 't'}
+    if any((j not in names and k != 't') or k in refused for k, j in formula.signals):
         return math.inf
 
     def signal(kind, joint):
         return lambda _at: {'q': q, 'dq': v}.get(kind, v)[names.index(joint)]
 
-    if 'tau' in {k for k, _ in formula.signals}:
-        return math.inf
+    numbers['t'] = STEP_S * np.arange(len(q[0]))
     special = {'lag': _lag, 'play': _play, 'delay': _delay}.get
     found = formula.compiled(
         lambda name: lambda _at: numbers[name], signal, lambda name, _signals: special(name)
@@ -190,10 +193,10 @@ def law_error(effect, finding, beside=()):
 
 
 def _lag(_at, x, time_constant):
-    z = np.array(x, dtype=np.float64)
-    keep = math.exp(-STEP_S / max(time_constant, 1e-9))
+    z, lag = np.array(x, dtype=np.float64), max(time_constant, 1e-9)
+    keep, behind = math.exp(-STEP_S / lag), np.diff(x) * lag / STEP_S  # joined by lines
     for i in range(1, len(z)):
-        z[i] = x[i] + (z[i - 1] - x[i]) * keep
+        z[i] = x[i] - behind[i - 1] + (z[i - 1] - x[i - 1] + behind[i - 1]) * keep
     return z
 
 

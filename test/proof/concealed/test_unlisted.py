@@ -10,13 +10,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sgp_proof.concealed import fifth_families as fifth
 from sgp_proof.concealed import fourth_families as fourth
 from sgp_proof.concealed import second_families as second
+from sgp_proof.concealed import sizes, unlisted
 from sgp_proof.concealed import third_families as third
-from sgp_proof.concealed import unlisted
 from sgp_proof.concealed.unknown import OF_TIME, UNKNOWN
 from sgp_proof.concealed.unlisted import (
     FAMILIES,
+    FIFTH_FROM,
     FOURTH_FROM,
     SECOND_FROM,
     THIRD_FROM,
@@ -80,8 +82,8 @@ def test_the_second_set_is_apart_from_all_others():
     assert set(second.KNOWN_SHAPES) <= set(second.FAMILIES)
 
 
-LATER = third.FAMILIES | fourth.FAMILIES
-REMEMBER = third.REMEMBER | fourth.REMEMBER
+LATER = third.FAMILIES | fourth.FAMILIES | fifth.FAMILIES
+REMEMBER = third.REMEMBER | fourth.REMEMBER | fifth.REMEMBER
 EARLIER = set(FAMILIES) | set(second.FAMILIES) | set(UNKNOWN)
 
 
@@ -94,6 +96,7 @@ def _drawn(kind):
     [
         (third.FAMILIES, THIRD_FROM, EARLIER),
         (fourth.FAMILIES, FOURTH_FROM, EARLIER | set(third.FAMILIES)),
+        (fifth.FAMILIES, FIFTH_FROM, EARLIER | set(third.FAMILIES) | set(fourth.FAMILIES)),
     ],
 )
 def test_a_later_set_is_apart_from_all_others(known, begin, earlier):
@@ -108,10 +111,11 @@ def test_a_later_set_is_apart_from_all_others(known, begin, earlier):
             family_of(seed, has_others=False)
 
 
-def test_the_fourth_set_has_its_seeds_in_order():
+@pytest.mark.parametrize(('known', 'begin'), [(fourth, FOURTH_FROM), (fifth, FIFTH_FROM)])
+def test_a_later_set_has_its_seeds_in_order(known, begin):
     """Twenty families, from its first seed on."""
-    kinds = [family_of(s, has_others=True) for s in range(FOURTH_FROM, FOURTH_FROM + 20)]
-    assert kinds == list(fourth.FAMILIES)
+    kinds = [family_of(s, has_others=True) for s in range(begin, begin + 20)]
+    assert kinds == list(known.FAMILIES)
 
 
 def test_other_sets_draw_no_constants():
@@ -122,7 +126,7 @@ def test_other_sets_draw_no_constants():
 @pytest.mark.parametrize('kind', LATER)
 def test_constants_are_drawn_within_their_ranges(kind):
     """And the reach of the source is kept with them."""
-    known = third if kind in third.FAMILIES else fourth
+    known = next(x for x in (third, fourth, fifth) if kind in x.FAMILIES)
     for seed in range(5):
         drawn = known.SET.constants(kind, np.random.default_rng(seed), 0.7)
         assert drawn.pop('source_reach') == 0.7
@@ -147,7 +151,7 @@ def test_a_law_of_a_later_set_is_finite(kind):
     (action,) = unlisted.BUILDERS[kind](0, p, ())
     for k, expected in enumerate(force):
         q, v = ({0: x[0, k], source: x[1, k]} for x in states)
-        moment = SimpleNamespace(position=q, velocity=v)
+        moment = SimpleNamespace(position=q, velocity=v, time_s=k * unlisted.STEP_S)
         exerted = action.force(moment) if action.force else 0.0
         if action.dry_level:
             direction = int(np.sign(v[0]))
@@ -158,20 +162,20 @@ def test_a_law_of_a_later_set_is_finite(kind):
 
 @pytest.mark.parametrize('kind', REMEMBER)
 def test_a_law_that_remembers_is_simulated_as_it_is_scored(kind):
-    """Along a motion in the steps of the score."""
-    p = _drawn(kind)
+    """Along a motion in parts of the steps of the score."""
+    p, step = _drawn(kind), unlisted.STEP_S / second.PARTS
     (action,) = unlisted.BUILDERS[kind](0, p, ())
-    t = unlisted.STEP_S * np.arange(400)
+    t = step * np.arange(4000)
     q, v = 0.9 * np.sin(2.0 * t), 1.8 * np.cos(2.0 * t)
-    expected = true_force(p, np.array([q, q]), np.array([v, v]))
-    state = action.start(q[0], v[0])
-    for at in zip(q, v, expected, strict=True):
+    expected = true_force(p, *(np.array([x, x])[:, :: second.PARTS] for x in (q, v)))
+    state, found = action.start(q[0], v[0]), []
+    for at in zip(q, v, strict=True):
         moment = SimpleNamespace(position={0: at[0]}, velocity={0: at[1]}, state=state)
-        assert action.force(moment) == pytest.approx(at[2])
+        found.append(action.force(moment))
         state = tuple(
-            z + unlisted.STEP_S * rate
-            for z, rate in zip(state, action.state_rate(moment), strict=True)
+            z + step * rate for z, rate in zip(state, action.state_rate(moment), strict=True)
         )
+    assert found[:: second.PARTS] == pytest.approx(expected, abs=1e-3)
 
 
 @pytest.mark.parametrize('is_apart', [True, False])
@@ -232,7 +236,7 @@ def test_a_listed_part_may_be_named_beside_the_rest(kind, rest, parameters):
 
 def test_every_listed_part_of_a_law_can_be_scored():
     """The scorer knows the force of each."""
-    parts = third.LISTED_PARTS | fourth.LISTED_PARTS
+    parts = third.LISTED_PARTS | fourth.LISTED_PARTS | fifth.LISTED_PARTS
     assert set(parts) <= set(LATER)
     assert set(parts.values()) <= set(unlisted.LISTED)
 
@@ -252,17 +256,61 @@ def test_every_listed_part_of_a_law_can_be_scored():
             'preload_behind_play', '-a*tanh(play(q[elbow], w)/d)',
             {'a': 0.5, 'w': 0.5, 'd': 0.3},
         ),
+        (
+            'leaky_air_cushion', 'a - a*max(1 - c*(q[elbow] - lag(q[elbow], T)), 0.1)**-1.4',
+            {'a': 0.5, 'c': 0.6, 'T': 0.4},
+        ),
+        (
+            'magnet_on_worn_key', '-a*sin(n*play(q[elbow], w) + x)',
+            {'a': 0.5, 'n': 3.0, 'w': 0.5, 'x': 0.2},
+        ),
+        ('one_way_pump', '-a*lag(max(dq[elbow], 0), T)', {'a': 1.0 / 1.5, 'T': 0.4}),
     ],
 )  # fmt: skip
 def test_laws_that_remember_are_compared_along_a_motion(kind, formula, numbers):
     """But for the steps of that motion; without its memory none of them is right."""
-    chosen = {'fill_s': 0.25, 'heat': 0.9, 'warm_s': 2.0, 'slack': 0.25, 'knee': 0.3}
+    chosen = {'fill_s': 0.25, 'heat': 0.9, 'warm_s': 2.0, 'slack': 0.25, 'knee': 0.3,
+              'stroke': 0.6, 'leak_s': 0.4, 'poles': 3.0, 'phase': 0.2}  # fmt: skip
     effect = {'joint': 'elbow', 'parameters': {**P, **chosen, 'kind': kind}}
     finding = {'formula': f'tau_x[elbow] = {formula}',
                'parameters': {name: {'value': x} for name, x in numbers.items()}}  # fmt: skip
     assert law_error(effect, finding) < 0.01
     forgets = {**finding, 'formula': 'tau_x[elbow] = -0.3*dq[elbow]'}
     assert law_error(effect, forgets) > 0.1
+
+
+def test_time_may_stand_in_the_formula_of_a_law_that_changes_with_it():
+    """Since the start; in that of another law it is wrong at any size."""
+    chosen = {'swing': 2.0, 'lean': 0.3, 'empty_s': 20.0}
+    law = '-a*(1 - t/T)*sin(n*q[elbow] + x)'
+    numbers = {'a': 0.75, 'T': 20.0, 'n': 2.0, 'x': 0.3}
+    finding = {'formula': f'tau_x[elbow] = {law}',
+               'parameters': {name: {'value': x} for name, x in numbers.items()}}  # fmt: skip
+    (kind,) = fifth.OF_CLOCK
+    effect = {**EFFECT, 'parameters': {**P, **chosen, 'kind': kind, 'source': 'wrist'}}
+    assert law_error(effect, finding) < 1e-12
+    constant = {**finding, 'formula': finding['formula'].replace('t/T', '0/T')}
+    assert law_error(effect, constant) > 0.1
+    right_but_for_time = {**RIGHT, 'formula': f'{RIGHT["formula"]} + 0*t'}
+    assert law_error(EFFECT, right_but_for_time) == math.inf
+
+
+@pytest.mark.parametrize(
+    ('formula', 'low', 'high'),
+    [(lambda q, v: 3.0 * q - v + np.sign(v) + 0.5, 0.0, 1e-9), (lambda q, _v: q**2, 0.1, 1.0)],
+)
+def test_the_fifth_set_is_measured_by_what_plain_effects_leave(monkeypatch, formula, low, high):
+    """Nothing of plain effects, most of another force."""
+    t = np.arange(4000) * 0.01
+    q, v, a = (x[:, np.newaxis] for x in (np.sin(t), np.cos(t), -np.sin(t)))
+    force = formula(q, v)
+    balance = SimpleNamespace(given=force, needed=np.zeros_like(force), diagonal=force)
+    monkeypatch.setattr(sizes.Balance, 'of', lambda *_: balance)
+    motion = SimpleNamespace(shown_position=q, shown_velocity=v, true_acceleration=a)
+    world = SimpleNamespace(
+        true=SimpleNamespace(mechanism=None), bodies=[SimpleNamespace(is_driven=True)]
+    )
+    assert low <= sizes.beyond_plain(motion, world, 0) <= high
 
 
 def test_another_answer_than_the_sealed_one_is_refused(tmp_path, monkeypatch):
