@@ -231,6 +231,7 @@ def score(answer, diagnosis):
     }  # fmt: skip
     return {
         'case': answer['case'], 'kind': effect['parameters']['kind'],
+        'share': answer.get('effect_share_of_torque', {}).get(effect['joint']),
         'verdict': diagnosis['verdict'], 'right_joint': said == effect['joint'],
         'formulas': [f['formula'] for f in laws],
         'law_error': [e if math.isfinite(e) else None for e in errors],
