@@ -7,11 +7,13 @@ import statistics
 from pathlib import Path
 
 from sgp_proof.concealed.baselines import library
+from sgp_proof.concealed.sizes import LEAST_BEYOND
 from sgp_proof.concealed.unlisted import SAME
 
 ROOT = Path(__file__).parents[1]
 TARGET = Path(__file__).parent / 'unlisted.md'
-RESULTS = ROOT / 'sgp_proof/results/unlisted_fourth.json'
+RESULTS = ROOT / 'sgp_proof/results/unlisted_fifth.json'
+FOURTH = ROOT / 'sgp_proof/results/unlisted_fourth.json'
 THIRD = ROOT / 'sgp_proof/results/unlisted_third.json'
 AGAIN = ROOT / 'sgp_proof/results/unlisted_third_again.json'
 FOURTH_AGAIN = ROOT / 'sgp_proof/results/unlisted_fourth_again.json'
@@ -30,7 +32,8 @@ def text():
 
     result = json.loads(RESULTS.read_text(encoding='utf-8'))
     rows, summary = result['cases'], result['summary']
-    earlier = {'first': FIRST, 'third': THIRD, 'again': AGAIN, 'fourth_again': FOURTH_AGAIN}
+    earlier = {'first': FIRST, 'third': THIRD, 'again': AGAIN, 'fourth': FOURTH,
+               'fourth_again': FOURTH_AGAIN}  # fmt: skip
     known = {f'{name}_{key}': value for name, path in earlier.items()
              for key, value in _rates(path).items()}  # fmt: skip
     numbers = sorted(int(r['case'].rpartition('_')[2]) for r in rows)
@@ -38,13 +41,27 @@ def text():
     return _HEAD.format(
         **_no_law(), **_resonance('elastic', ELASTIC), **_resonance('mount', MOUNT),
         **known,
-        terms=len(library(['a'])), baselines=_baselines(rows),
+        terms=len(library(['a'])), baselines=_baselines(_cases(FOURTH)), **_sizes(result),
         failures=_failures(rows), worlds=summary['worlds'],
         families=len({r['kind'] for r in rows}), found=_share(summary['found']),
         right=_share(summary['right_joint']), wrong=_share(summary['wrong_names']),
         sealed=result['sealed'], table=_table(rows), machines=_machines(), upper=100.0 * (1.0 - 0.05 ** (1.0 / summary['worlds'])),
         seeds=f'{numbers[0]}:{numbers[0] + result["sealed"]}', least=100.0 * LEAST_LAW,
     )  # fmt: skip
+
+
+def _cases(path):
+    return json.loads(path.read_text(encoding='utf-8'))['cases']
+
+
+def _sizes(result):
+    """Return the shares of the laws in the effort of their joints, and how many mislead."""
+    rows = result['cases']
+    found = [r['share'] for r in rows]
+    worse = statistics.fmean(r['far']['after'] > r['far']['before'] for r in rows)
+    return {'smallest': _share(min(found)), 'largest': _share(max(found)),
+            'median': _share(statistics.median(found)), 'beyond': _share(LEAST_BEYOND),
+            'far_worse': _share(worse)}  # fmt: skip
 
 
 def _rates(path):
