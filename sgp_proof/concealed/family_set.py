@@ -23,6 +23,16 @@ LISTED = {
 """Effects that may be named beside a law that contains them, to their force."""
 
 
+def other_u(m, p):
+    """Return the position of the source over half its width."""
+    return float(m.position[p['source']]) / p['source_reach']
+
+
+def other_w(m, p):
+    """Return the velocity of the source over its usual one."""
+    return float(m.velocity[p['source']]) / p['source_v']
+
+
 class FamilySet:
     """Families by name: smooth force and level of dry friction over the size, and constants.
 

@@ -10,20 +10,12 @@ from __future__ import annotations
 
 import math
 
-from sgp_proof.concealed.family_set import FamilySet
+from sgp_proof.concealed.family_set import FamilySet, other_u, other_w
 
 _CLOSED = 0.1
 """Least part that is left of a chamber or of a gap."""
 _GAS = 1.4
 """Exponent of air that is compressed too fast to lose heat."""
-
-
-def _other_u(m, p):
-    return float(m.position[p['source']]) / p['source_reach']
-
-
-def _other_w(m, p):
-    return float(m.velocity[p['source']]) / p['source_v']
 
 
 def _half_wave_cam(q, _v, _m, p):
@@ -79,13 +71,13 @@ def _ratchet_pawl(q, v, _m, p):
 
 
 def _carriage_on_other(q, _v, m, p):
-    out = 1.0 + p['travel'] * _other_u(m, p)
+    out = 1.0 + p['travel'] * other_u(m, p)
     return -out * math.sin(p['swing'] * q / p['reach'] + p['lean'])
 
 
 def _paddle_dipped_by_other(_q, v, m, p):
     w = v / p['v']
-    return -2.0 * max(_other_u(m, p) - p['level'], 0.0) * abs(w) * w
+    return -2.0 * max(other_u(m, p) - p['level'], 0.0) * abs(w) * w
 
 
 def _leaky_air_cushion(q, _v, m, p):
@@ -108,13 +100,13 @@ def _draining_weight(q, _v, m, p):
 
 def _mast_cord_over_other(q, _v, m, p):
     own = p['swing'] * q / p['reach']
-    both = own + p['swing_before'] * _other_u(m, p) + p['phase']
+    both = own + p['swing_before'] * other_u(m, p) + p['phase']
     return -math.sin(own) - p['mast'] * math.sin(both)
 
 
 def _towed_paddle_of_other(_q, v, m, p):
     w = v / p['v']
-    return -w * math.hypot(w, p['arm'] * _other_w(m, p))
+    return -w * math.hypot(w, p['arm'] * other_w(m, p))
 
 
 _SMOOTH = {

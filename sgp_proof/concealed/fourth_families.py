@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from sgp_proof.concealed.family_set import FamilySet
+from sgp_proof.concealed.family_set import FamilySet, other_u, other_w
 from sgp_ros.physics.catalogue import (
     COULOMB_FRICTION,
     QUADRATIC_DRAG,
@@ -26,14 +26,6 @@ _LIFT_WIDTH = 0.2
 """Speed over which a bearing is lifted by its film, as `w`."""
 _SHORTEST = 0.3
 """Least free length of a leaf whose pivot is moved, over the usual one."""
-
-
-def _other_u(m, p):
-    return float(m.position[p['source']]) / p['source_reach']
-
-
-def _other_w(m, p):
-    return float(m.velocity[p['source']]) / p['source_v']
 
 
 def _lever_on_slide(q, _v, _m, p):
@@ -92,29 +84,29 @@ def _preload_behind_play(_q, _v, m, p):
 
 
 def _leaf_set_by_other(q, _v, m, p):
-    free = max(1.0 - p['lever'] * _other_u(m, p), _SHORTEST)
+    free = max(1.0 - p['lever'] * other_u(m, p), _SHORTEST)
     return -q / p['reach'] / free**2
 
 
 def _brake_lever_of_other(_q, _v, m, p):
-    return 1.5 * min(max((_other_u(m, p) - p['begin']) / p['over'], 0.0), 1.0)
+    return 1.5 * min(max((other_u(m, p) - p['begin']) / p['over'], 0.0), 1.0)
 
 
 def _fluid_coupling_to_other(_q, v, m, p):
-    slip = v / p['v'] - p['ratio'] * _other_w(m, p)
+    slip = v / p['v'] - p['ratio'] * other_w(m, p)
     return -0.5 * abs(slip) * slip
 
 
 def _passing_magnet_of_other(_q, _v, m, p):
-    return 1.5 * math.exp(-(((_other_u(m, p) - p['at']) / p['width']) ** 2))
+    return 1.5 * math.exp(-(((other_u(m, p) - p['at']) / p['width']) ** 2))
 
 
 def _slack_tendon_over_other(q, _v, m, p):
-    return -2.0 * max(q / p['reach'] + p['ratio'] * _other_u(m, p) - p['slack'], 0.0)
+    return -2.0 * max(q / p['reach'] + p['ratio'] * other_u(m, p) - p['slack'], 0.0)
 
 
 def _hose_over_other(q, _v, m, p):
-    return (q / p['reach'] + p['ratio'] * _other_u(m, p)) ** 2
+    return (q / p['reach'] + p['ratio'] * other_u(m, p)) ** 2
 
 
 def _strut(q, v, _m, p):
