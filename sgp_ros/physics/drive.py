@@ -2,10 +2,9 @@
 
 Every effort is averaged with the hat of one step to either side of its grid point, and sharpened,
 as a second difference treats the position (Fornberg 1988). The averages are exact for any times of
-change: with V the twofold integral of the effort, the average is `(V(t + h) - 2 V(t) + V(t - h)) /
-h^2`, and V of a held command is piecewise quadratic. A lag `T y' + y = u` adds exponentials:
-`int y = int u - T (y - y0)`. Online the kernel of a window, linear between the samples, takes the
-place of the hat.
+change: of the mean A and the first moment B of the effort over every step, the average at t is
+`B(t - h) + A(t) - B(t)`. A lag `T y' + y = u` leaves an exponential behind each command. Online the
+kernel of a window, linear between the samples, takes the place of the hat.
 """
 
 from __future__ import annotations
@@ -157,35 +156,58 @@ def _averaged(
     knots: np.ndarray, u: np.ndarray, time_constant: float,
     grids: tuple[tuple[float, int], ...], step: float,
 ) -> np.ndarray:  # fmt: skip
-    """Return the averages on all grids, which have points beyond both ends while they are made."""
-    reach = len(_SHARPEN)
-    parts = [start + step * np.arange(-reach, n + reach) for start, n in grids]
-    t = np.concatenate(parts)
-    ends = np.cumsum([len(part) for part in parts])
-    origin = np.repeat([part[0] for part in parts], [len(part) for part in parts])
-    lengths = np.diff(knots)
-    U = np.concatenate([[0.0], np.cumsum(u[:-1] * lengths)])
-    V = np.concatenate([[0.0], np.cumsum(U[:-1] * lengths + 0.5 * u[:-1] * lengths**2)])
-    i = np.maximum(np.searchsorted(knots, t, side='right') - 1, 0)
-    since = t - knots[i]
-    single = U[i] + u[i] * since
-    double = V[i] + U[i] * since + 0.5 * u[i] * since**2
-    if time_constant > 0.0:
-        y = lagged(knots, u, time_constant)
-        now = u[i] + (y[i] - u[i]) * np.exp(-np.maximum(since, 0.0) / time_constant)
-        double = double - time_constant * (
-            single - time_constant * (now - y[0]) - y[0] * (t - origin)
-        )
-    mean = (double[2:] - 2.0 * double[1:-1] + double[:-2]) / step**2
-    inside = np.concatenate(
-        [np.arange(e - len(part) + reach, e - reach) for e, part in zip(ends, parts, strict=True)]
-    )
-    result = np.zeros(len(inside))
-    term = mean
-    for power, factor in enumerate(_SHARPEN):
-        result += factor * term[inside - 1 - power]
-        term = np.diff(term, 2)
-    return result
+    """Return the averages on all grids, one after the other."""
+    y = lagged(knots, u, time_constant) if time_constant > 0.0 else u
+    parts = []
+    for start, n in grids:
+        beyond = np.zeros((2, n + 2 * len(_SHARPEN) - 1))
+        _moments(knots, u, y, time_constant, start - step * len(_SHARPEN), step, beyond)
+        term = beyond[1, :-1] + beyond[0, 1:] - beyond[1, 1:]
+        found = np.zeros(n)
+        for power, factor in enumerate(_SHARPEN):
+            margin = len(_SHARPEN) - 1 - power
+            found += factor * term[margin : len(term) - margin]
+            term = term[2:] - 2.0 * term[1:-1] + term[:-2]
+        parts.append(found)
+    return np.concatenate(parts)
+
+
+@njit(cache=True)
+def _moments(
+    knots: np.ndarray, u: np.ndarray, y: np.ndarray, time_constant: float, start: float,
+    step: float, out: np.ndarray,
+) -> None:  # fmt: skip
+    """Add mean and first moment of the effort over the steps of a grid to `out` (2, n).
+
+    Args:
+        knots: times from which commands hold (c,) [s].
+        u: commands (c,).
+        y: the output of the lag at those times (c,).
+        time_constant: of the lag; none at 0 [s].
+        start: of the first step [s].
+        step: of the grid [s].
+    """
+    i = max(np.searchsorted(knots, start, side='right') - 1, 0)
+    for p in range(out.shape[1]):
+        t, a = start + step * p, 0.0
+        while a < 1.0:
+            b, is_last = 1.0, i + 1 == len(knots) or knots[i + 1] >= t + step
+            if not is_last:
+                b = max((knots[i + 1] - t) / step, a)
+            out[0, p] += u[i] * (b - a)
+            out[1, p] += 0.5 * u[i] * (b * b - a * a)
+            if time_constant > 0.0:
+                rate = step / time_constant
+                since = max(t + step * a - knots[i], 0.0)
+                behind = (y[i] - u[i]) * np.exp(-since / time_constant)
+                faded = -np.expm1(-rate * (b - a)) / rate
+                out[0, p] += behind * faded
+                out[1, p] += behind * (
+                    a * faded + (faded - (b - a) * np.exp(-rate * (b - a))) / rate
+                )
+            if is_last:
+                break
+            a, i = b, i + 1
 
 
 @njit(cache=True)

@@ -18,6 +18,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 
 _HARMONICS = 8
 """The m-th is smaller than the first by m^3."""
@@ -32,12 +33,12 @@ class Ripple:
     """The ripple of a drive's targets, by its harmonics.
 
     Attributes:
-        phase: (n,) part of h since the target in force, without a delay [1].
+        turns: (n,) `exp(i w_1 phi)` for the time since the target in force, without a delay [1].
         hold: h, the time for which a target holds [s].
         harmonics: (m, k, n) complex amplitudes [rad or m].
     """
 
-    phase: np.ndarray
+    turns: np.ndarray
     hold: float
     harmonics: np.ndarray
 
@@ -71,18 +72,28 @@ class Ripple:
             loop = np.diag(kp + 1j * w * kd) - w * w * mass
             answer = np.linalg.solve(loop, (kp * slope)[..., None])[..., 0]
             found.append(h / (np.pi * m) * answer.T)
-        return cls((rows - times[at]) / h, h, np.array(found))
+        return cls(np.exp(2j * np.pi * (rows - times[at]) / h), h, np.array(found))
 
     def on(self, pick: np.ndarray) -> Ripple:
         """Return the ripple at some of the samples, by their indices."""
-        return replace(self, phase=self.phase[pick], harmonics=self.harmonics[:, :, pick])
+        return replace(self, turns=self.turns[pick], harmonics=self.harmonics[:, :, pick])
 
     def at(self, joint: int, delay: float) -> np.ndarray:
         """Return what the samples show of one joint behind targets of a delay, (n,) [rad or m]."""
-        turns = np.exp(2j * np.pi * (self.phase - delay / self.hold))
-        before = np.arange(len(turns)) - math.ceil(delay / self.hold - 1e-6)
-        before = np.clip(before, 0, len(turns) - 1)
-        shown = np.zeros(len(turns), dtype=np.complex128)
-        for there in self.harmonics[::-1, joint]:
-            shown = (shown + there[before]) * turns
-        return np.asarray(shown.imag)
+        late = math.ceil(delay / self.hold - 1e-6)
+        turns = self.turns * np.exp(-2j * np.pi * delay / self.hold)
+        return _sum(turns, self.harmonics[:, joint], late)
+
+
+@njit(cache=True)
+def _sum(turns: np.ndarray, harmonics: np.ndarray, late: int) -> np.ndarray:
+    """Return the sum of all harmonics (m, n) of `late` rows before, at their phases (n,)."""
+    n = len(turns)
+    found = np.empty(n)
+    for row in range(n):
+        there = min(max(row - late, 0), n - 1)
+        shown = 0j
+        for m in range(len(harmonics) - 1, -1, -1):
+            shown = (shown + harmonics[m, there]) * turns[row]
+        found[row] = shown.imag
+    return found
