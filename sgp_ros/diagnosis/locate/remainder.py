@@ -106,8 +106,13 @@ class Remainder:
     posterior: Posterior
 
     def force(self, motion: ObservedMotion) -> np.ndarray:
-        """Return the mean of Z, (n,) [N m or N]."""
+        """Return the mean of Z, (n,) [N m or N].
+
+        A mean that follows its length scales out of the data grows there like a polynomial. So
+        beyond the range of an input it stays as at its end, and within what was left somewhere.
+        """
         U = process_inputs(motion, self.joint, sees_effort=self.sees_effort)[0] / self.scale
+        U = np.clip(U, self.seen.min(axis=0), self.seen.max(axis=0))
         rows = 2000
         n = len(U)
         F = np.zeros((rows, 1, 0))
@@ -115,7 +120,7 @@ class Remainder:
             self.posterior.predict(U[i : i + rows], F[: min(rows, n - i)]).mean[:, 0]
             for i in range(0, n, rows)
         ]
-        return np.concatenate(parts)
+        return np.clip(np.concatenate(parts), self.residual.min(), self.residual.max())
 
     def without(self, out: np.ndarray) -> Remainder:
         """Return the process as learned without some rows, (N,) of bool."""
