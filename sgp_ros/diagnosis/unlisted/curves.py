@@ -18,8 +18,9 @@ import numpy as np
 from sgp_ros.diagnosis.unlisted.sentences import COEFFICIENTS
 from sgp_ros.physics.formula import Formula
 
-_STARTS, _KEPT, _STEPS = 5, 3, 9
-"""Starts between the ends of each parameter's range, those that are improved, and their steps."""
+_STARTS, _WAVES, _KEPT, _STEPS = 5, 13, 3, 9
+"""Starts between the ends of each parameter's range, and of a wave number, of which one that is a
+third off says nothing; those that are improved, and their steps."""
 _RIDGE, _MOVE, _LONGEST, _GREATEST, _BLOCK = 1e-10, 1e-4, 0.25, 1e100, 16
 
 Columns = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -123,24 +124,14 @@ def follow(
         ranges: ends of its parameters but coefficients, equal where one is known.
     """
     free = [n for n in sorted(formula.parameters) if n not in COEFFICIENTS]
-    low, high = np.array([ranges[n] for n in free]).reshape(-1, 2).T
+    axes = _Axes(*np.array([ranges[n] for n in free]).reshape(-1, 2).T)
     columns = _columns(formula, curve.x, free)
-    is_ratio = low > 0.0
-
-    def at(u: np.ndarray) -> np.ndarray:
-        even = low + u * (high - low)
-        if not is_ratio.any():
-            return even
-        safe = np.where(is_ratio, low, 1.0)
-        return np.where(is_ratio, safe * (np.where(is_ratio, high, 1.0) / safe) ** u, even)
 
     def left(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return _left(columns(at(u)), curve)
+        return _left(columns(axes.at(u)), curve)
 
-    known = high <= low
-    ladder = (np.arange(_STARTS) + 0.5) / _STARTS
-    grid = list(itertools.product(*(np.zeros(1) if k else ladder for k in known)))
-    u = np.array(grid, dtype=np.float64).reshape(len(grid), len(free))
+    known = axes.high <= axes.low
+    u = _starts(free, axes)
     _, cost = left(u)
     u = u[np.argsort(cost)[:_KEPT]]
     if len(free) > known.sum():
@@ -149,7 +140,55 @@ def follow(
     best = int(np.argmin(cost))
     if not np.isfinite(cost[best]):
         return None
-    return Followed(dict(zip(free, at(u)[best].tolist(), strict=True)), float(cost[best]))
+    return Followed(dict(zip(free, axes.at(u)[best].tolist(), strict=True)), float(cost[best]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Axes:
+    """Ends (k,) of parameters; those that are positive are searched by their logarithm."""
+
+    low: np.ndarray
+    high: np.ndarray
+
+    def at(self, u: np.ndarray) -> np.ndarray:
+        """Return the parameters at parts u (..., k) of the ways between their ends."""
+        is_ratio, safe, ratio = self._ratios
+        even = self.low + u * (self.high - self.low)
+        return np.where(is_ratio, safe * ratio**u, even)
+
+    def parts(self, x: np.ndarray) -> np.ndarray:
+        """Return where parameters (..., k) lie between their ends, 0 to 1."""
+        is_ratio, safe, ratio = self._ratios
+        even = (x - self.low) / np.maximum(self.high - self.low, 1e-300)
+        log = np.log(np.where(is_ratio, x, 1.0) / safe) / np.maximum(np.log(ratio), 1e-300)
+        return np.asarray(np.clip(np.where(is_ratio, log, even), 0.0, 1.0))
+
+    @property
+    def _ratios(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        is_ratio = self.low > 0.0
+        safe = np.where(is_ratio, self.low, 1.0)
+        return is_ratio, safe, np.where(is_ratio, self.high, 1.0) / safe
+
+
+def _starts(free: Sequence[str], axes: _Axes) -> np.ndarray:
+    """Return the starts of a search, (s, k) parts of the ways between the ends.
+
+    A place that belongs to a wave starts within one of its turns around the middle.
+    """
+    known = axes.high <= axes.low
+    waves = {f'x{n[1:]}': i for i, n in enumerate(free) if n[0] == 'n'}
+    counts = [
+        1 if is_known else _WAVES if n[0] == 'n' else _STARTS
+        for n, is_known in zip(free, known, strict=True)
+    ]
+    grid = list(itertools.product(*((np.arange(m) + 0.5) / m for m in counts)))
+    u = np.array(grid, dtype=np.float64).reshape(len(grid), len(free))
+    at = axes.at(u)
+    for i, name in enumerate(free):
+        if name in waves:
+            middle, turn = 0.5 * (axes.low[i] + axes.high[i]), 2.0 * np.pi / at[:, waves[name]]
+            at[:, i] = middle + (u[:, i] - 0.5) * turn
+    return axes.parts(at)
 
 
 def _columns(formula: Formula, x: np.ndarray, free: Sequence[str]) -> Callable[..., np.ndarray]:

@@ -20,6 +20,7 @@ COEFFICIENTS = ('a', 'b', 'c', 'd')
 """Parameters that are factors."""
 POLYNOMIALS = ('X', 'X**2', 'X**3', 'abs(X)*X')
 _U = '((X - x0)/w0)'
+_WAVE = 'sin(n0*(X - x0))'
 OF_POSITION = (
     *POLYNOMIALS, 'abs(X)', 'abs(X - x0)', '(X - x0)**2', '(X - x0)**3', 'abs(X - x0)*(X - x0)',
     '(abs(X - x0)/r)**p0*sign(X - x0)', '((o0 - X)/r)**(-p0)', '((X - u0)/r)**(-p0)',
@@ -30,11 +31,13 @@ OF_POSITION = (
     f'max(1 - {_U}**2, 0)', 'max(1 - abs(X - x0)/w0, 0)', 'min(max((X - x0)/w0, -1), 1)',
     'sin(n0*min(max(X - x0, -3.14159/n0), 3.14159/n0))', '1/(1 + e0*cos(n0*(X - x0)))',
     'a*sin(n0*(X - x0)) + b*sin(2*n0*(X - x0))',
+    f'(1 + {_U}**2)**(-p0)', f'(X - x0)*(1 + {_U}**2)**(-p0)',
     f'(X - x0)/sqrt(1 + {_U}**2)', '(X - x0)/(1 + abs(X - x0)/w0)', 'log(1 + exp((X - x0)/w0))',
     'max(X - x0, 0)*exp(-(X - x0)/w0)', 'max(x0 - X, 0)*exp((X - x0)/w0)',
-    'sin(n0*(X - x0))', 'a*sin(n0*X) + b*cos(n0*X)', 'sin(n0*(X - x0))/(1 + e0*cos(n0*(X - x0)))',
-    'sin(n0*(X - x0))/sqrt(1 + e0*cos(n0*(X - x0)))',
-    'a*sin(n0*(X - x0)) + b*sin(n0*(X - x0))/sqrt(1 + e0*cos(n0*(X - x0)))',
+    _WAVE, 'a*sin(n0*X) + b*cos(n0*X)', f'max({_WAVE}, 0)', f'abs({_WAVE})', f'abs({_WAVE})*{_WAVE}',
+    f'{_WAVE}*exp(p0*cos(n0*(X - x0)))', f'{_WAVE}/(1 + e0*cos(n0*(X - x0)))',
+    f'{_WAVE}/sqrt(1 + e0*cos(n0*(X - x0)))',
+    f'a*{_WAVE} + b*{_WAVE}/sqrt(1 + e0*cos(n0*(X - x0)))',
 )  # fmt: skip
 """Terms of a position; those with coefficients of their own are whole sums."""
 OF_VELOCITY = (
@@ -45,7 +48,8 @@ OF_VELOCITY = (
     'max(abs(X) - v0, 0)*sign(X)', 'max(abs(X) - v0, 0)**2*sign(X)',
     '(exp(abs(X)/v0) - 1)*sign(X)', 'X**2', 'max(X, 0)', 'min(X, 0)', 'max(X, 0)**2',
     'min(X, 0)**2', 'a*max(X, 0)**2 + b*min(X, 0)**2', 'exp(X/v0)', 'exp(-X/v0)',
-    'tanh((X - x0)/w0)',
+    'tanh((X - x0)/w0)', 'max(X - x0, 0)', 'max(x0 - X, 0)', 'X**2/(1 + (X/v0)**2)',
+    'max(tanh(X/v0), 0)', 'min(tanh(X/v0), 0)',
 )  # fmt: skip
 """Terms of a velocity."""
 OF_SPEED = ('abs(X)', '(abs(X)/r)**p0', 'tanh(abs(X)/v0)', 'exp(-abs(X)/v0)', 'exp(-(X/v0)**2)',

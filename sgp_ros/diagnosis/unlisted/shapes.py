@@ -39,15 +39,15 @@ RATIO = 'R'
 """Parameter of a sum of two joints."""
 GATES = ('', 'sign', 'soft', 'speed', 'square', 'effort')
 """Factors: 1, sign(v), tanh(v/v_s), v, |v| v, motor torque."""
-MORE_GATES = ('ahead', 'back', 'place')
-"""Factors that are tried where these leave something: v ahead, v back, q."""
+MORE_GATES = ('ahead', 'back', 'spin', 'place')
+"""Factors that are tried where these leave something: v ahead, v back, v squared, q."""
 _TEXTS = {
     '': '', 'sign': 'sign({v})', 'soft': f'tanh({{v}}/{SMOOTHED})', 'speed': '{v}',
     'square': 'abs({v})*{v}', 'effort': '{u}', 'ahead': 'max({v}, 0)', 'back': 'min({v}, 0)',
-    'place': '{q}',
+    'spin': '{v}**2', 'place': '{q}',
 }  # fmt: skip
 UNITS = {'': '1', 'sign': '1', 'soft': '1', 'speed': '{l}/s', 'square': '{l}2/s2', 'effort': '{f}',
-         'ahead': '{l}/s', 'back': '{l}/s', 'place': '{l}'}  # fmt: skip
+         'ahead': '{l}/s', 'back': '{l}/s', 'spin': '{l}2/s2', 'place': '{l}'}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,7 +253,7 @@ class SmoothForce(Effect):
             return np.asarray(motion.effort[:, self.joint])
         return np.asarray({
             '': np.ones(len(v)), 'speed': v, 'square': np.abs(v) * v, 'ahead': np.maximum(v, 0.0),
-            'back': np.minimum(v, 0.0), 'place': motion.position[:, self.joint],
+            'back': np.minimum(v, 0.0), 'spin': v**2, 'place': motion.position[:, self.joint],
         }[self.gate])  # fmt: skip
 
 

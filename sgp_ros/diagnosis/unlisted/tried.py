@@ -74,7 +74,7 @@ def promises(columns: Columns, listed: Model, joint: int) -> bool:
 def more_forces(motion: ObservedMotion, joint: int) -> Iterator[SmoothForce]:
     """Yield those that are tried where all of these leave something.
 
-    With a factor that acts one way, or is the joint's own position; and of the joint's motion plus
+    With a factor that acts one way, is the joint's squared speed, or its own position; and of the joint's motion plus
     a part of another's, as a tendon or a hose over both sees it.
     """
     names, own = motion.tree.moving_names, {'q': motion.position, 'dq': motion.velocity}
@@ -82,7 +82,7 @@ def more_forces(motion: ObservedMotion, joint: int) -> Iterator[SmoothForce]:
         if (i, kind) != (joint, 'dq'):
             variable = Variable(kind, i, names[i])
             knots = variable.knots(motion, PIECES)
-            for gate in MORE_GATES if i != joint else MORE_GATES[:2]:
+            for gate in MORE_GATES if i != joint else MORE_GATES[:-1]:
                 yield SmoothForce(joint, variable, gate, knots, names[joint])
         if i != joint:
             size = np.ptp(own[kind][:, joint]) / np.ptp(own[kind][:, i])

@@ -56,6 +56,10 @@ def _cushion(_t, q, v):
     return (-1.5 * max(q[0] - 0.3, 0.0) * max(v[0], 0.0),)
 
 
+def _unbalanced(_t, q, v):
+    return (0.3 * v[0] ** 2 * math.sin(4.0 * (q[0] - 0.2)),)
+
+
 def _valve(_t, q, v):
     return (-0.8 * (1.0 + math.tanh((q[1] - 0.1) / 0.03)) * v[0], 0.0)
 
@@ -105,9 +109,13 @@ def _found(equations_for, links, **what):
             _cushion, 1, 'a*max(q[joint0] - x0, 0)*max(dq[joint0], 0)', {'a': -1.5, 'x0': 0.3},
             marks=pytest.mark.long,
         ),
+        pytest.param(
+            _unbalanced, 1, 'a*sin(n0*(q[joint0] - x0))*dq[joint0]**2', {'n0': 4.0},
+            marks=pytest.mark.long,
+        ),
     ],
     ids=['log friction', 'brake and friction', 'valve', 'contact', 'play', 'spring between',
-         'hose', 'cushion'],
+         'hose', 'cushion', 'unbalanced'],
 )  # fmt: skip
 def test_laws_are_found_with_their_numbers(equations_for, force, links, formula, numbers):
     """Of one joint, of what it did before, of two joints; alone and in a sum."""
@@ -161,6 +169,40 @@ def test_a_gate_of_a_fiftieth_of_the_range_has_a_width():
     found = follow(read, curve, {name: seen.ends(name)[:2] for name in ('x0', 'w0')})
     assert found is not None
     assert found.numbers['w0'] == pytest.approx(0.04, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ('text', 'numbers'),
+    [
+        ('a*max(sin(n0*(X - x0)), 0)', {'n0': 5.0, 'x0': 0.2}),
+        ('a*abs(sin(n0*(X - x0)))', {'n0': 5.0, 'x0': 0.2}),
+        ('a*abs(sin(n0*(X - x0)))*sin(n0*(X - x0))', {'n0': 5.0, 'x0': 0.2}),
+        ('a*sin(n0*(X - x0))*exp(p0*cos(n0*(X - x0)))', {'n0': 5.0, 'x0': 0.2, 'p0': 1.5}),
+        ('a*(1 + ((X - x0)/w0)**2)**(-p0)', {'x0': 0.1, 'w0': 0.4, 'p0': 1.5}),
+        ('a*(X - x0)*(1 + ((X - x0)/w0)**2)**(-p0)', {'x0': 0.1, 'w0': 0.4, 'p0': 2.5}),
+        ('a*max(X - x0, 0)', {'x0': 0.3}),
+        ('a*max(x0 - X, 0)', {'x0': 0.3}),
+        ('a*X**2/(1 + (X/v0)**2)', {'v0': 0.6}),
+        ('a*max(tanh(X/v0), 0)', {'v0': 0.15}),
+        ('a*min(tanh(X/v0), 0)', {'v0': 0.15}),
+    ],
+)
+def test_a_text_follows_its_own_curve(text, numbers):
+    """Half waves, poles of magnets, fields of coils, thresholds and saturated squares of speed."""
+    seen, nodes = Range(-1.0, 1.0, 'rad'), np.linspace(-1.0, 1.0, 101)
+    is_speed = 'v0' in numbers
+    assert text in set(of_velocity(is_own=True) if is_speed else of_position())
+    formula = read_formula(text.replace('X', 'q[X]'), is_law=True)
+    force = read_formula(text.replace('X', 'x_'), is_law=True)
+    y = np.array([force.value({**numbers, 'a': -0.7, 'x_': x}) for x in nodes.tolist()])
+    found = follow(formula, Curve(nodes, np.eye(101), y, 0.0),
+                   {name: seen.ends(name)[:2] for name in numbers})  # fmt: skip
+    assert found is not None
+    assert found.left < 1e-4 * (y @ y)
+    turn = 2.0 * math.pi / numbers.get('n0', 1e-9)
+    for name, value in numbers.items():
+        off = found.numbers[name] - value
+        assert abs((off + turn / 2) % turn - turn / 2 if name == 'x0' else off) < 0.02, name
 
 
 def test_a_force_between_nodes_is_judged_on_parts_left_out():
