@@ -3,8 +3,8 @@
 Every effort is averaged with the hat of one step to either side of its grid point, and sharpened,
 as a second difference treats the position (Fornberg 1988). The averages are exact for any times of
 change: of the mean A and the first moment B of the effort over every step, the average at t is
-`B(t - h) + A(t) - B(t)`. A lag `T y' + y = u` leaves an exponential behind each command. Online the
-kernel of a window, linear between the samples, takes the place of the hat.
+`B(t - h) + A(t) - B(t)`. A lag `T y' + y = u` leaves an exponential behind each command. Online
+the kernel of a window, linear between the samples, takes the place of the hat.
 """
 
 from __future__ import annotations
@@ -186,6 +186,7 @@ def _moments(
         time_constant: of the lag; none at 0 [s].
         start: of the first step [s].
         step: of the grid [s].
+        out: what is added to, zeros at first.
     """
     i = max(np.searchsorted(knots, start, side='right') - 1, 0)
     for p in range(out.shape[1]):

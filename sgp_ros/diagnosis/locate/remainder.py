@@ -77,6 +77,10 @@ def confined(x: np.ndarray, r: np.ndarray) -> tuple[float, float, float]:
     return float(x[order[start]]), float(x[order[stop - 1]]), (stop - start) / len(x)
 
 
+EDGE = 0.25
+"""Way beyond the data over which Z becomes what it is there [standard deviations]."""
+SHELL = 0.2
+"""Rows at the edges of the data that say how much of Z holds beyond them, a share of all."""
 SIZE = 400
 CONDITIONED = 500
 """Rows that a prediction of a part left out is conditioned on."""
@@ -95,6 +99,8 @@ class Remainder:
         seen: candidates over the scale on the rows of the recording, (N, d).
         residual: that Z was learned from, (N,) [N m or N].
         posterior: of Z.
+        used: indices of the inputs among the candidates.
+        beyond: part of Z at the edge of the data that holds beyond it, 0 to 1.
     """
 
     joint: int
@@ -104,23 +110,22 @@ class Remainder:
     seen: np.ndarray
     residual: np.ndarray
     posterior: Posterior
+    used: tuple[int, ...]
+    beyond: float = 1.0
 
     def force(self, motion: ObservedMotion) -> np.ndarray:
         """Return the mean of Z, (n,) [N m or N].
 
         A mean that follows its length scales out of the data grows there like a polynomial. So
-        beyond the range of an input it stays as at its end, and within what was left somewhere.
+        beyond the range of an input it becomes a part of what it is at its end, see `_beyond`.
         """
         U = process_inputs(motion, self.joint, sees_effort=self.sees_effort)[0] / self.scale
-        U = np.clip(U, self.seen.min(axis=0), self.seen.max(axis=0))
+        low, high = (end(self.seen, axis=0) for end in (np.min, np.max))
+        inside = np.clip(U, low, high)
+        way = np.abs(U - inside)[:, list(self.used)].sum(axis=1)
         rows = 2000
-        n = len(U)
-        F = np.zeros((rows, 1, 0))
-        parts = [
-            self.posterior.predict(U[i : i + rows], F[: min(rows, n - i)]).mean[:, 0]
-            for i in range(0, n, rows)
-        ]
-        return np.clip(np.concatenate(parts), self.residual.min(), self.residual.max())
+        parts = [_mean(self.posterior, inside[i : i + rows]) for i in range(0, len(U), rows)]
+        return np.concatenate(parts) * (self.beyond + (1.0 - self.beyond) * np.exp(-way / EDGE))
 
     def without(self, out: np.ndarray) -> Remainder:
         """Return the process as learned without some rows, (N,) of bool."""
@@ -173,9 +178,31 @@ def learn_remainder(equations: Equations, residual: np.ndarray, joint: int) -> R
         return None
     rows = spread(np.arange(len(y)), SIZE)
     posterior = Posterior(model, observations(U, y[:, 0], rows), prior)
+    used = tuple(chosen.inputs)
     return Remainder(
-        joint, tuple(names[i] for i in chosen.inputs), sees_effort, scale, U, y[:, 0], posterior
-    )
+        joint, tuple(names[i] for i in used), sees_effort, scale, U, y[:, 0], posterior, used,
+        _beyond(model, U, y[:, 0], used),
+    )  # fmt: skip
+
+
+def _beyond(model: Hyperparameters, U: np.ndarray, r: np.ndarray, used: tuple[int, ...]) -> float:
+    """Return the part of Z at the edge of the data that holds beyond it, 0 to 1.
+
+    It is learned once more without the rows whose inputs are largest or smallest. Of what it is at
+    the edge of the others, that part leaves least of r (N,) there: none, where they differ.
+    """
+    rank = np.argsort(np.argsort(U[:, list(used)], axis=0), axis=0) / len(U)
+    outer = np.abs(rank - 0.5).max(axis=1, initial=0.0)
+    out = outer > np.quantile(outer, 1.0 - SHELL)
+    known = observations(U, r, spread(np.flatnonzero(~out), CONDITIONED))
+    edge = np.clip(U[out], known.U.min(axis=0), known.U.max(axis=0))
+    z = _mean(Posterior(model, known, CoefficientPrior.flat(0)), edge)
+    return float(np.clip(z @ r[out] / max(float(z @ z), 1e-300), 0.0, 1.0))
+
+
+def _mean(posterior: Posterior, U: np.ndarray) -> np.ndarray:
+    """Return the mean of Z at inputs (n, d), (n,) [N m or N]."""
+    return np.asarray(posterior.predict(U, np.zeros((len(U), 1, 0))).mean[:, 0])
 
 
 def explained_share(
@@ -198,8 +225,7 @@ def _error(model: Hyperparameters, U: np.ndarray, r: np.ndarray, out: np.ndarray
     known = observations(U, r, spread(np.flatnonzero(~out), CONDITIONED))
     there = U[out]
     found = Posterior(model, known, CoefficientPrior.flat(0))
-    mean = found.predict(there, np.zeros((len(there), 1, 0))).mean[:, 0]
-    return float(((r[out] - mean) ** 2).sum())
+    return float(((r[out] - _mean(found, there)) ** 2).sum())
 
 
 def spread(rows: np.ndarray, count: int) -> np.ndarray:

@@ -34,9 +34,9 @@ OF_POSITION = (
     f'(1 + {_U}**2)**(-p0)', f'(X - x0)*(1 + {_U}**2)**(-p0)',
     f'(X - x0)/sqrt(1 + {_U}**2)', '(X - x0)/(1 + abs(X - x0)/w0)', 'log(1 + exp((X - x0)/w0))',
     'max(X - x0, 0)*exp(-(X - x0)/w0)', 'max(x0 - X, 0)*exp((X - x0)/w0)',
-    _WAVE, 'a*sin(n0*X) + b*cos(n0*X)', f'max({_WAVE}, 0)', f'abs({_WAVE})', f'abs({_WAVE})*{_WAVE}',
-    f'{_WAVE}*exp(p0*cos(n0*(X - x0)))', f'{_WAVE}/(1 + e0*cos(n0*(X - x0)))',
-    f'{_WAVE}/sqrt(1 + e0*cos(n0*(X - x0)))',
+    _WAVE, 'a*sin(n0*X) + b*cos(n0*X)', f'max({_WAVE}, 0)', f'abs({_WAVE})',
+    f'abs({_WAVE})*{_WAVE}', f'{_WAVE}*exp(p0*cos(n0*(X - x0)))',
+    f'{_WAVE}/(1 + e0*cos(n0*(X - x0)))', f'{_WAVE}/sqrt(1 + e0*cos(n0*(X - x0)))',
     f'a*{_WAVE} + b*{_WAVE}/sqrt(1 + e0*cos(n0*(X - x0)))',
 )  # fmt: skip
 """Terms of a position; those with coefficients of their own are whole sums."""

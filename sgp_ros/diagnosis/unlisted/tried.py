@@ -74,8 +74,8 @@ def promises(columns: Columns, listed: Model, joint: int) -> bool:
 def more_forces(motion: ObservedMotion, joint: int) -> Iterator[SmoothForce]:
     """Yield those that are tried where all of these leave something.
 
-    With a factor that acts one way, is the joint's squared speed, or its own position; and of the joint's motion plus
-    a part of another's, as a tendon or a hose over both sees it.
+    With a factor that acts one way, is the joint's squared speed, or its own position; and of the
+    joint's motion plus a part of another's, as a tendon or a hose over both sees it.
     """
     names, own = motion.tree.moving_names, {'q': motion.position, 'dq': motion.velocity}
     for i, kind in itertools.product(motion.moving_joints, own):

@@ -185,3 +185,29 @@ def test_a_process_without_noise_explains_nothing_where_states_repeat():
     found = select_inputs(data, CoefficientPrior.flat(0), 0, (0,), 100)
     model = Hyperparameters((found.kernel,), (1e-300,))
     assert explained_share(model, U, r, parts_of(300)) == -np.inf
+
+
+def _wider(equations, factor):
+    motion = equations.motion
+    return replace(motion, position=factor * motion.position, velocity=factor * motion.velocity)
+
+
+@pytest.mark.parametrize(
+    ('of', 'beyond', 'error'),
+    [
+        (lambda m: np.tanh(4.0 * m.position[:, 1]), 1.0, 0.01),
+        (lambda m: np.sin(9.0 * m.position[:, 1]), 0.14, 0.5),
+        (lambda m: np.cos(9.0 * m.position[:, 1]) * m.velocity[:, 1], 1.0, 1.0),
+    ],
+    ids=['stays', 'turns', 'grows'],
+)
+def test_a_process_beyond_its_data_is_no_worse_than_none(
+    equations_for, perfect, of, beyond, error
+):
+    """A mean that grows like a polynomial would be; what holds at the edges may hold beyond."""
+    _, equations = equations_for(perfect[2])
+    found = learn_remainder(equations, _planted(equations, of), 1)
+    assert found.beyond == pytest.approx(beyond, abs=0.1)
+    wide = _wider(equations, 2.0)
+    true = of(wide)
+    assert np.mean((found.force(wide) - true) ** 2) < error * np.mean(true**2)
