@@ -74,7 +74,7 @@ def twist_of(
     share = float(shape[3]) if is_on_motor(place) else 1.0
     a, effort = motion.acceleration[:, j], motion.effort[:, j] - J * motion.acceleration[:, j]
     damping = _on_motor(motion, place, shape)
-    link = motion.nominal_effort[:, j] - damping * motion.velocity[:, j]
+    link = motion.nominal_effort[:, j] + motion.rotors[j] * a - damping * motion.velocity[:, j]
     given = share * (link - inside * a) + (1.0 - share) * effort
     torque = smooth(motion, given)
     if place.kind == 'link' or share * softness <= 0.0:

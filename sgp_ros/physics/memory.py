@@ -200,7 +200,7 @@ class Backlash(Effect):
         j, (share, gap, coulomb, viscous) = place.joint, shape
         inertia, v = _whole(motion, place, shape), motion.velocity[:, j]
         damped = motion.tree.damping[j] * v
-        nominal = motion.mass_diagonal[:, j] * motion.acceleration[:, j]
+        nominal = (motion.mass_diagonal[:, j] - motion.rotors[j]) * motion.acceleration[:, j]
         link = motion.nominal_effort[:, j] - nominal - damped
         lost = damped + coulomb * motion.direction[:, j] + viscous * v
         pressed = (1.0 - share) * (motion.effort[:, j] - lost) + share * link

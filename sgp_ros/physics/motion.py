@@ -176,7 +176,11 @@ class SeenMotion(Protocol):
 
     @property
     def mass_diagonal(self) -> np.ndarray:
-        """Diagonal of the nominal mass matrix, (n, k) [kg m^2 or kg]."""
+        """Diagonal of the nominal mass matrix, rotors included, (n, k) [kg m^2 or kg]."""
+
+    @property
+    def rotors(self) -> np.ndarray:
+        """Inertia that the nominal robot states beside its bodies, (k,) [kg m^2 or kg]."""
 
     @property
     def nominal_effort(self) -> np.ndarray:

@@ -22,8 +22,8 @@ from sgp_ros.rigid.tree import Tree
 
 _BLOCK = 8000
 """Rows whose regressor is held at a time: that of a long recording would not fit in memory."""
-_DAMPING = 'damping'
-"""Number of a joint that is part of the tree."""
+_DAMPING, _ROTOR = 'damping', 'armature'
+"""Numbers of a joint: that which is part of the tree, and its inertia beside the bodies."""
 STILL = 1e-9
 """Range of the position within which a joint does not move [rad or m]."""
 
@@ -119,10 +119,15 @@ class ObservedMotion:
         return ~self.tree.is_prismatic[:k] & ~np.isfinite(self.tree.lower[:k])
 
     @cached_property
+    def rotors(self) -> np.ndarray:
+        """Inertia that the nominal robot states beside its bodies, (k,) [kg m^2 or kg]."""
+        return np.array([self.stated_number(_ROTOR, j) for j in range(self.tree.size)])
+
+    @cached_property
     def mass_diagonal(self) -> np.ndarray:
-        """Diagonal of the nominal mass matrix, (n, k) [kg m^2 or kg]."""
+        """Diagonal of the nominal mass matrix, rotors included, (n, k) [kg m^2 or kg]."""
         M = mass_matrix(self.tree, self.tree.parameters, self.position)
-        return np.einsum('njj->nj', M).copy()
+        return np.einsum('njj->nj', M) + self.rotors
 
     @cached_property
     def nominal_effort(self) -> np.ndarray:
@@ -198,7 +203,8 @@ class ObservedMotion:
         """Return the slopes of the nominal efforts, (n, k) each.
 
         They are the derivatives by position, velocity and acceleration of one joint: differences,
-        exact for the last two; that by the acceleration is a column of the mass matrix.
+        exact for the last two; that by the acceleration is a column of the mass matrix, its rotor
+        included.
         """
         if joint not in self._slopes:
             found = []
@@ -212,6 +218,7 @@ class ObservedMotion:
                 found.append((ends[0] - ends[1]) / 2e-4)
             pushed = self.acceleration + np.eye(self.tree.size)[joint]
             by_a = self.effort_for(self.position, self.velocity, pushed) - self.nominal_effort
+            by_a[:, joint] += self.rotors[joint]
             self._slopes[joint] = found[0], found[1], by_a
         return self._slopes[joint]
 
@@ -264,6 +271,7 @@ class ObservedMotion:
             rows: those that are looked at.
         """
         M = mass_matrix(self.tree, self.tree.parameters, self.position[rows])
+        M += np.diag(self.rotors)
         try:
             return 1.0 / float(np.linalg.inv(M)[:, joint, joint].max())
         except np.linalg.LinAlgError:

@@ -797,3 +797,30 @@ def test_numbers_that_any_recording_allows_have_a_price():
     assert price(tilt, [0.3, 0.0], [1.0]) > 4.0
     assert price(drift, [30.0], [0.1, 0.3]) == 0.0
     assert price(drift, [0.1], [0.1, 0.3]) > 10.0
+
+
+@pytest.mark.parametrize(
+    ('name', 'shape', 'kind'),
+    [
+        ('joint_elasticity', (0.05, 1e-3, 1e-3, 0.0), 'motor'),
+        ('joint_elasticity', (0.05, 1e-3, 1e-3, 1.0), 'motor'),
+        ('joint_elasticity', (0.05, 1e-3, 1e-3), 'link'),
+        ('backlash', (0.3, 0.02, 0.1, 0.05), ''),
+    ],
+)
+def test_a_rotor_counts_alike_in_a_body_and_beside_the_bodies(name, shape, kind):
+    """Models of MuJoCo state it as the armature of a joint, others as part of a body."""
+    rotor, parameters = 0.2, TREE.parameters.copy()
+    axis = TREE.axes[0]
+    full = rotor * np.outer(axis, axis)
+    parameters[0, 4:] += full[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]
+    inside = replace(MOTION, tree=replace(TREE, parameters=parameters))
+    stated = EffectAt(EFFECTS['armature'], Place(0), coefficients=np.array([rotor]))
+    beside = replace(MOTION, stated=(stated,))
+    np.testing.assert_allclose(beside.mass_diagonal, inside.mass_diagonal, atol=1e-12)
+    few = slice(0, 400, 50)
+    assert beside.free_inertia(0, few) == pytest.approx(inside.free_inertia(0, few))
+    np.testing.assert_allclose(
+        columns(name, 0, shape, motion=beside, kind=kind),
+        columns(name, 0, shape, motion=inside, kind=kind), rtol=1e-6, atol=1e-9,
+    )  # fmt: skip
