@@ -3,7 +3,8 @@
 A joint that no model describes may still have the friction that every joint has. It stands where
 it does not lean on the rest: fitted in each half of each variable alone, beside bodies of any
 kind, it is nearly the force that it is in the whole. Where much of the rest is a friction, of
-another form or one that another variable changes, what is unknown is the friction itself.
+another form or one that another variable changes, what is unknown is the friction itself. The
+larger the rest is beside it, the nearer the halves must be: it may be a part of the unknown.
 The intervals of its numbers hold those of all halves, for the rest that bends them is not noise.
 """
 
@@ -110,8 +111,9 @@ def _standing(equations: Equations, model: Model, joint: int) -> dict[EffectAt, 
         spread, apart = _in_halves(equations, joint, y, F, numbers)
         is_there = numbers > spread
         if is_there.all():
-            size = float((F.sum(axis=1) ** 2).mean()) / equations.power[joint]
-            is_steady = apart < NEARLY and size > COUNTED_SHARE
+            size = float((F.sum(axis=1) ** 2).mean())
+            part = min(size / trial.mean_square[joint], 1.0)
+            is_steady = apart < NEARLY * part and size > COUNTED_SHARE * equations.power[joint]
             return dict(zip(laws, spread / INTERVAL, strict=True)) if is_steady else {}
         laws = [s for s, kept in zip(laws, is_there, strict=True) if kept]
     return {}

@@ -33,6 +33,18 @@ def _wave(size, damping=DAMPING):
     return lambda t, q, v: (size * math.sin(7.0 * q[0]) * math.sin(1.3 * t) - damping * v[0],)
 
 
+class _Cushion:
+    """A cushion of air that leaks: it pushes back, and forgets; of no law of the list."""
+
+    def __init__(self, leak_s):
+        self.leak_s, self.z, self.t = leak_s, 0.0, 0.0
+
+    def __call__(self, t, q, v):
+        self.z += (q[0] - self.z) * min((t - self.t) / self.leak_s, 1.0)
+        self.t = t
+        return (1.0 - max(1.0 - 0.6 * (q[0] - self.z), 0.1) ** -1.4,)
+
+
 def _unexplained(equations):
     """Return a comparison in which nothing describes the joint, and the decision on it."""
     base = fitted(equations)
@@ -66,6 +78,13 @@ def test_a_law_that_has_another_sign_in_some_half_is_left_out(equations_for):
     """A joint without any damping beside the unknown has dry friction alone."""
     found = _decided(equations_for, force=_wave(0.5, damping=0.0), dry=lambda t, q, s: LEVEL)[2]
     assert [s.name for s in found.model.effects] == ['coulomb_friction']
+
+
+@pytest.mark.parametrize('leak_s', [0.14, 0.16, 0.4])
+def test_what_leaks_has_no_friction_beside_it(equations_for, leak_s):
+    """It takes energy as friction does, which leans on a rest that is larger than itself."""
+    found = _decided(equations_for, force=_Cushion(leak_s))[2]
+    assert not found.standing
 
 
 def test_findings_have_its_probability_and_interval(rubbed):
