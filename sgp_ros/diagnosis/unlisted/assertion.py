@@ -26,7 +26,8 @@ from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.unlisted.beside import PLAIN, acts_as_bodies, law_of, own_effects, says_less
-from sgp_ros.diagnosis.unlisted.search import Searched, search
+from sgp_ros.diagnosis.unlisted.search import search
+from sgp_ros.diagnosis.unlisted.searched import Searched
 from sgp_ros.diagnosis.unlisted.tried import promises
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place

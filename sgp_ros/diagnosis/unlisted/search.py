@@ -8,15 +8,12 @@ with the bodies and all other effects, as every other model is.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import stats
 
-from sgp_ros.batch.least_squares import correlation_factor
-from sgp_ros.diagnosis.criteria import ALIKE, CLEARER, NEARLY, PER_PARAMETER
+from sgp_ros.diagnosis.criteria import ALIKE, CLEARER, PER_PARAMETER
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model
@@ -27,8 +24,6 @@ from sgp_ros.diagnosis.unlisted.beside import (
     beside,
     earned,
     far_and_near,
-    is_bent,
-    is_creep,
     is_slight,
     law_of,
     own_effects,
@@ -37,6 +32,7 @@ from sgp_ros.diagnosis.unlisted.beside import (
 )
 from sgp_ros.diagnosis.unlisted.curves import left_out
 from sgp_ros.diagnosis.unlisted.formulas import FoundLaw, curve_of, formulas, nodes_of
+from sgp_ros.diagnosis.unlisted.searched import Searched
 from sgp_ros.diagnosis.unlisted.shapes import (
     FINE,
     SMOOTHED,
@@ -47,7 +43,15 @@ from sgp_ros.diagnosis.unlisted.shapes import (
     smooth_of,
     unlike,
 )
-from sgp_ros.diagnosis.unlisted.tried import more_forces, smooth_forces, weighted
+from sgp_ros.diagnosis.unlisted.tried import (
+    is_beaten,
+    is_series,
+    is_wanted,
+    leaves_less,
+    more_forces,
+    smooth_forces,
+    weighted,
+)
 from sgp_ros.physics.effect_at import EffectAt
 
 SMOOTH, SHAPES, FIRST, FITTED = 3, 4, 12, 5
@@ -57,45 +61,6 @@ WEIGHT_STEPS = (0.25, 0.12, 0.06, 0.03, 0.015)
 """By which the weight of a joint that is added is refined, in parts of itself."""
 EARNED = 3
 """Best models with a formula in which every listed effect must earn its price again."""
-
-
-@dataclass(frozen=True, eq=False)
-class Searched:
-    """Result of a search at one joint.
-
-    Attributes:
-        joint: index.
-        listed: best model of listed effects.
-        smooth: best model with a smooth force at the joint.
-        laws: models with a formula there, best first.
-        free: what a force of any form beside the first formula leaves of parts that were left out
-            of its fit (N,).
-        floor: mean square that errors of signals and filters leave.
-        is_slight: whether listed effects keep their names where no formula is asserted.
-    """
-
-    joint: int
-    listed: Model
-    smooth: Model
-    laws: tuple[Model, ...]
-    free: np.ndarray
-    floor: float
-    is_slight: bool = False
-
-    @property
-    def lack_of_fit(self) -> tuple[float, float]:
-        """Ratio of what the first formula leaves to what any form beside it does, and its chance.
-
-        A form that follows rests at some positions, or noise, predicts no other part. The chance
-        is that of a mean difference of squares that is not positive, with rows as independent as
-        these differences are.
-        """
-        law = self.laws[0].residual[:, self.joint] ** 2
-        gain = law - self.free**2
-        rows = len(gain) / correlation_factor(gain)
-        spread = max(float(gain.std()), 1e-300) / math.sqrt(rows)
-        ratio = (law.mean() + self.floor) / ((self.free**2).mean() + self.floor)
-        return float(ratio), float(stats.norm.sf(gain.mean() / spread))
 
 
 def search(
@@ -113,18 +78,12 @@ def search(
     scale = scale.of_forms()
     look = _Look(columns, scale, listed, joint, is_open)
     smooth = look.ranked()
-    if not smooth or scale.worth(smooth[0]) < scale.worth(listed) + ALIKE:
+    if not smooth or not is_wanted(columns, scale, listed, smooth[0], joint):
         return None
-    is_near = smooth[0].mean_square[joint] > NEARLY * listed.mean_square[joint]
-    if is_near and not is_bent(listed, smooth[0], joint):
-        return None
-    if is_creep(look.columns, scale, listed, smooth[0], joint):
-        return None
-    slight = is_slight(listed, smooth[0], joint)
-    if slight and smooth[0].mean_square[joint] > NEARLY**2 * listed.mean_square[joint]:
-        return None
+    is_better = is_beaten(scale, listed, smooth[0], joint)
+    slight = not is_better or is_slight(listed, smooth[0], joint)
     laws: dict[object, Model] = {}
-    for number, model in enumerate(unlike(smooth, joint)[:SHAPES]):
+    for number, model in enumerate(look.shapes(smooth)):
         best = max(map(scale.worth, laws.values()), default=-np.inf)
         if scale.worth(model) + look.most_spared(model) < best:
             continue
@@ -140,6 +99,8 @@ def search(
     ranked[:1] = [refined(look.columns, scale, m, joint) for m in ranked[:1]]
     free = look.free(ranked[0]) if ranked else np.zeros(0)
     floor = float(scale.power[joint] * scale.floor[joint])
+    if not (is_better or any(leaves_less(m, listed, joint) for m in ranked[:1])):
+        return None
     if any(scale.worth(m) > scale.worth(listed) + ALIKE for m in ranked[:1]):
         slight = slight and is_slight(listed, ranked[0], joint)
     return Searched(joint, listed, smooth[0], tuple(ranked), free, floor, slight)
@@ -234,6 +195,23 @@ class _Look:
         assert isinstance(law.effect, FoundLaw)
         r = model.residual[:, self.joint]
         return left_out(nodes_of(law.effect.smooth, model)[1], r, parts_of(len(r)))
+
+    def shapes(self, smooth: list[Model]) -> list[Model]:
+        """Return the models with a smooth force for which formulas are tried.
+
+        Waves in whole ratios may have more periods than a spline has pieces: a force of their
+        position in their place is tried first, however little it explains.
+        """
+        found, own = unlike(smooth, self.joint), own_effects(self.listed, self.joint)
+        motion = self.columns.equations(frozenset()).motion
+        waves = [s for s in own if s.effect.wave(motion, s.place) is not None]
+        first = [
+            m for m in found
+            if is_series(waves, motion) and not m.key & {s.key for s in waves}
+            and self._variable(m).is_of(waves[0]) and not smooth_of(m, self.joint)[1].gate
+        ]  # fmt: skip
+        others = [m for m in found if m not in first[:1]]
+        return [*first[:1], *others[:SHAPES]]
 
     def _finer(self, model: Model, coarse: SmoothForce) -> Model:
         """Return a model with a fine spline in the place of the law or smooth force it has."""

@@ -16,7 +16,7 @@ from sgp_ros.diagnosis.shown import LawSearch, TriedFormula
 from sgp_ros.diagnosis.unlisted.assertion import Explained, with_laws
 from sgp_ros.diagnosis.unlisted.beside import law_of
 from sgp_ros.diagnosis.unlisted.formulas import FoundLaw
-from sgp_ros.diagnosis.unlisted.search import Searched
+from sgp_ros.diagnosis.unlisted.searched import Searched
 from sgp_ros.diagnosis.unlisted.shapes import SmoothForce, force_unit, smooth_of
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.grammar import MEMORY

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from sgp_ros.diagnosis.criteria import NEARLY
+from sgp_ros.diagnosis.criteria import ALIKE, NEARLY
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
-from sgp_ros.diagnosis.unlisted.beside import exceeds, own_effects
+from sgp_ros.diagnosis.unlisted.beside import (
+    exceeds,
+    is_bent,
+    is_creep,
+    is_slight,
+    own_effects,
+)
 from sgp_ros.diagnosis.unlisted.shapes import (
     GATES,
     LEAST_PLAY,
@@ -21,6 +28,7 @@ from sgp_ros.diagnosis.unlisted.shapes import (
     SmoothForce,
     Variable,
 )
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 SPARED = 2.0
@@ -55,6 +63,7 @@ def promises(columns: Columns, listed: Model, joint: int) -> bool:
 
     A force in their place seldom explains more than one beside all of them; where even `SPARED`
     times what the best one explains would not decide, no fit is needed to know that none will.
+    Waves of one position with whole ratios are one periodic force, which may have a shorter form.
 
     Args:
         columns: of the recording.
@@ -62,6 +71,8 @@ def promises(columns: Columns, listed: Model, joint: int) -> bool:
         joint: index.
     """
     rows, motion = columns.rows, columns.equations(frozenset()).motion
+    if is_series(own_effects(listed, joint), motion):
+        return True
     gains = [
         gain + 0.5 * (len(s.effect.coefficient_quantities(s.kind)) + len(s.shape)) * np.log(rows)
         for gain, s in screen(columns, listed, smooth_forces(motion, joint), (joint,))
@@ -69,6 +80,44 @@ def promises(columns: Columns, listed: Model, joint: int) -> bool:
     left = np.exp(-2.0 * SPARED * max(gains, default=0.0) / rows)
     apart = float((1.0 - left) * listed.mean_square[joint])
     return bool(left <= NEARLY) or exceeds(listed, own_effects(listed, joint), apart, joint)
+
+
+def is_wanted(
+    columns: Columns, scale: Scale, listed: Model, smooth: Model, joint: int
+) -> bool:  # fmt: skip
+    """Return whether a formula is looked for in place of listed effects of a joint.
+
+    It is where a smooth force beats them by more than a trifle, and for waves in whole ratios.
+    """
+    if is_creep(columns, scale, listed, smooth, joint):
+        return False
+    if is_series(own_effects(listed, joint), columns.equations(frozenset()).motion):
+        return True
+    is_trifle = smooth.mean_square[joint] > NEARLY**2 * listed.mean_square[joint]
+    is_trifle = is_trifle and is_slight(listed, smooth, joint)
+    return is_beaten(scale, listed, smooth, joint) and not is_trifle
+
+
+def is_beaten(scale: Scale, listed: Model, smooth: Model, joint: int) -> bool:
+    """Return whether a smooth force is worth more than listed effects, and not for a trifle.
+
+    It leaves clearly less, or one of them was distorted to imitate it.
+    """
+    is_worth = scale.worth(smooth) > scale.worth(listed) + ALIKE
+    return is_worth and (leaves_less(smooth, listed, joint) or is_bent(listed, smooth, joint))
+
+
+def leaves_less(model: Model, listed: Model, joint: int) -> bool:
+    """Return whether a model leaves clearly less of a joint than another one."""
+    return bool(model.mean_square[joint] <= NEARLY * listed.mean_square[joint])
+
+
+def is_series(effects: Sequence[EffectAt], motion: ObservedMotion) -> bool:
+    """Return whether some waves of one joint have as many periods as others times a number."""
+    known = ((s.effect.wave(motion, s.place), s) for s in effects)
+    waves = [(wave.width, float(s.shape[0])) for wave, s in known if wave is not None]
+    pairs = itertools.permutations(waves, 2)
+    return any(a > 1.5 * b and abs(a - round(a / b) * b) < width for (width, a), (_, b) in pairs)
 
 
 def more_forces(motion: ObservedMotion, joint: int) -> Iterator[SmoothForce]:

@@ -24,7 +24,8 @@ from sgp_ros.diagnosis.unlisted.assertion import _in_plain_laws, with_laws
 from sgp_ros.diagnosis.unlisted.beside import earned, is_bent, law_of, refined
 from sgp_ros.diagnosis.unlisted.formulas import Range, texts
 from sgp_ros.diagnosis.unlisted.formulas import law as a_law
-from sgp_ros.diagnosis.unlisted.search import Searched, search
+from sgp_ros.diagnosis.unlisted.search import search
+from sgp_ros.diagnosis.unlisted.searched import Searched
 from sgp_ros.diagnosis.unlisted.sentences import COEFFICIENTS
 from sgp_ros.diagnosis.unlisted.shapes import (
     FINE,
@@ -34,7 +35,12 @@ from sgp_ros.diagnosis.unlisted.shapes import (
     SmoothForce,
     Variable,
 )
-from sgp_ros.diagnosis.unlisted.tried import more_forces, promises, smooth_forces
+from sgp_ros.diagnosis.unlisted.tried import (
+    is_series,
+    more_forces,
+    promises,
+    smooth_forces,
+)
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.formula import read_formula
@@ -395,6 +401,42 @@ def test_a_law_is_looked_for_where_a_force_of_any_form_promises_one(
     _, equations = equations_for(simulate(CHAINS[1], 5, 8.0, force=force))
     listed = fitted(equations, 'viscous_friction')
     assert promises(Columns(equations), listed, 0) is is_promised
+
+
+def _waves(*periods):
+    return [EffectAt(EFFECTS['cogging'], Place(0), np.array([n]), np.ones(2)) for n in periods]
+
+
+@pytest.mark.parametrize(
+    ('periods', 'is_one'),
+    [((7.0, 21.1), True), ((21.1, 7.0), True), ((7.0, 17.5), False), ((7.0, 7.6), False),
+     ((7.0,), False), ((), False)],
+)  # fmt: skip
+def test_waves_in_whole_ratios_are_one_periodic_force(equations_for, periods, is_one):
+    """Of one gear, or of a shorter law; neighbours are two."""
+    motion = equations_for(simulate(CHAINS[1], 5, 8.0, force=_brake))[1].motion
+    wave = EFFECTS['cogging'].wave(motion, Place(0))
+    assert 0.2 < wave.width < 3.0
+    assert is_series(_waves(*periods), motion) is is_one
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('is_flap', [True, False])
+def test_a_series_of_waves_gives_way_to_a_law_that_says_all_of_it(equations_for, is_flap):
+    """A pressure on a flap that turns is nearly two waves; two that are waves stay."""
+
+    def force(_t, q, v):
+        wave = math.sin(6.0 * q[0] + 0.7)
+        return (-0.6 * (abs(wave) * wave if is_flap else wave + 0.3 * math.sin(12.0 * q[0])),)
+
+    _, equations = equations_for(simulate(CHAINS[1], 5, 20.0, force=force))
+    comparison = compare_models(equations, lambda _share: None)
+    found = with_laws(equations, comparison, decide(equations, comparison)).decision.model
+    names = [s.name for s in found.effects]
+    assert (names == ['cogging', 'cogging']) is not is_flap
+    law = law_of(found, 0)
+    if is_flap:
+        assert law.effect.formula.partition(' = ')[2].startswith('a*abs(sin(')
 
 
 @pytest.mark.parametrize(('share', 'joints'), [(0.9, [1]), (0.1, [])])
