@@ -18,7 +18,7 @@ import numpy as np
 from sgp_ros.diagnosis.unlisted.sentences import COEFFICIENTS
 from sgp_ros.physics.formula import Formula
 
-_STARTS, _WAVES, _KEPT, _STEPS = 5, 13, 3, 9
+_STARTS, _WAVES, _KEPT, _STEPS = 5, 13, 8, 9
 """Starts between the ends of each parameter's range, and of a wave number, of which one that is a
 third off says nothing; those that are improved, and their steps."""
 _RIDGE, _MOVE, _LONGEST, _GREATEST, _BLOCK = 1e-10, 1e-4, 0.25, 1e100, 16
@@ -157,11 +157,12 @@ class _Axes:
         return np.where(is_ratio, safe * ratio**u, even)
 
     def parts(self, x: np.ndarray) -> np.ndarray:
-        """Return where parameters (..., k) lie between their ends, 0 to 1."""
+        """Return where parameters (..., k) lie between their ends, 0 to 1; at them beyond."""
         is_ratio, safe, ratio = self._ratios
+        x = np.clip(x, self.low, self.high)
         even = (x - self.low) / np.maximum(self.high - self.low, 1e-300)
         log = np.log(np.where(is_ratio, x, 1.0) / safe) / np.maximum(np.log(ratio), 1e-300)
-        return np.asarray(np.clip(np.where(is_ratio, log, even), 0.0, 1.0))
+        return np.where(is_ratio, log, even)
 
     @property
     def _ratios(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

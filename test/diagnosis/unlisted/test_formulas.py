@@ -205,6 +205,25 @@ def test_a_text_follows_its_own_curve(text, numbers):
         assert abs((off + turn / 2) % turn - turn / 2 if name == 'x0' else off) < 0.02, name
 
 
+@pytest.mark.parametrize('text', ['a*sin(n0*(X - x0))', 'a*max(sin(n0*(X - x0)), 0)'])
+def test_waves_are_followed_from_any_phase(text):
+    """Of a third of a period to three and a half, wherever the joint moves."""
+    rng = np.random.default_rng(0)
+    formula = read_formula(text.replace('X', 'q[X]'), is_law=True)
+    force = read_formula(text.replace('X', 'x_'), is_law=True)
+    for _ in range(60):
+        middle, half = rng.uniform(-2.0, 2.0), rng.uniform(0.5, 3.0)
+        seen = Range(middle - half, middle + half, 'rad')
+        nodes = np.linspace(seen.low, seen.high, 101)
+        n0 = math.exp(rng.uniform(math.log(0.3), math.log(3.5))) * math.pi / half
+        numbers = {'a': 1.0, 'n0': n0, 'x0': rng.uniform(seen.low, seen.high)}
+        y = np.array([force.value({**numbers, 'x_': x}) for x in nodes.tolist()])
+        ends = {name: seen.ends(name)[:2] for name in ('n0', 'x0')}
+        found = follow(formula, Curve(nodes, np.eye(101), y, 0.0), ends)
+        assert found is not None
+        assert found.left < 1e-4 * (y @ y)
+
+
 def test_a_force_between_nodes_is_judged_on_parts_left_out():
     """Stiction in poses that come once follows them, and says nothing of others; a wave does."""
     rng = np.random.default_rng(3)
