@@ -17,6 +17,7 @@ FOURTH = ROOT / 'sgp_proof/results/unlisted_fourth.json'
 THIRD = ROOT / 'sgp_proof/results/unlisted_third.json'
 AGAIN = ROOT / 'sgp_proof/results/unlisted_third_again.json'
 FOURTH_AGAIN = ROOT / 'sgp_proof/results/unlisted_fourth_again.json'
+FIFTH_AGAIN = ROOT / 'sgp_proof/results/unlisted_fifth_again.json'
 FIRST = ROOT / 'sgp_proof/results/unlisted.json'
 BASELINES = ROOT / 'sgp_proof/results/unlisted_baselines.json'
 WITHHELD = ROOT / 'sgp_proof/results/withheld.json'
@@ -33,7 +34,7 @@ def text():
     result = json.loads(RESULTS.read_text(encoding='utf-8'))
     rows, summary = result['cases'], result['summary']
     earlier = {'first': FIRST, 'third': THIRD, 'again': AGAIN, 'fourth': FOURTH,
-               'fourth_again': FOURTH_AGAIN}  # fmt: skip
+               'fourth_again': FOURTH_AGAIN, 'fifth_again': FIFTH_AGAIN}  # fmt: skip
     known = {f'{name}_{key}': value for name, path in earlier.items()
              for key, value in _rates(path).items()}  # fmt: skip
     numbers = sorted(int(r['case'].rpartition('_')[2]) for r in rows)
@@ -58,17 +59,24 @@ def _sizes(result):
     """Return the shares of the laws in the effort of their joints, and how many mislead."""
     rows = result['cases']
     found = [r['share'] for r in rows]
-    worse = statistics.fmean(r['far']['after'] > r['far']['before'] for r in rows)
     return {'smallest': _share(min(found)), 'largest': _share(max(found)),
             'median': _share(statistics.median(found)), 'beyond': _share(LEAST_BEYOND),
-            'far_worse': _share(worse)}  # fmt: skip
+            'far_worse': _far_worse(rows)}  # fmt: skip
+
+
+def _far_worse(rows):
+    """Return the share of worlds whose wider motion is predicted worse than by the nominal."""
+    known = [r['far'] for r in rows if r['far'].get('after') is not None]
+    return _share(sum(far['after'] > far['before'] for far in known) / len(rows))
 
 
 def _rates(path):
     """Return how many worlds of a set there are, and what was found and named wrongly."""
-    summary = json.loads(path.read_text(encoding='utf-8'))['summary']
+    result = json.loads(path.read_text(encoding='utf-8'))
+    summary = result['summary']
     return {'worlds': summary['worlds'], 'found': _share(summary['found']),
-            'wrong': _share(summary['wrong_names'])}  # fmt: skip
+            'wrong': _share(summary['wrong_names']),
+            'far_worse': _far_worse(result['cases'])}  # fmt: skip
 
 
 def _baselines(rows):

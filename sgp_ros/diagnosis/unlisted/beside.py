@@ -162,11 +162,12 @@ def is_slight(listed: Model, smooth: Model, joint: int) -> bool:
 
     Friction that creeps a little near rest is friction, a spring that hardens a little a spring.
     A law with a shape of its own could be distorted to imitate another one, and so could several,
-    if the smooth force takes their place.
+    if the smooth force takes their place; and friction that is less than the robot file states.
     """
     own = own_effects(listed, joint)
-    rare = [s for s in _replaced(listed, smooth, joint)
-            if not (s.effect.is_usual or s.effect in PLAIN or _is_plain_sum(s))]  # fmt: skip
+    rare = [s for s in _replaced(listed, smooth, joint) if not (
+        (s.effect.is_usual and (s.coefficients >= 0.0).all())
+        or s.effect is CONSTANT_LOAD or _is_plain_sum(s))]  # fmt: skip
     if rare and (len(own) > 1 or len(rare[0].shape)):
         return False
     apart = listed.residual[:, joint] - smooth.residual[:, joint]

@@ -43,6 +43,17 @@ def test_only_laws_whose_place_a_smooth_force_takes_are_in_question(damped):
     assert not is_bent(listed, smooth, 0)
 
 
+@pytest.mark.parametrize('sign', [1.0, -1.0])
+def test_friction_less_than_the_file_states_is_in_question_too(damped, sign):
+    """With dry friction beside it, it imitates friction of another form."""
+    both = fitted(damped, 'coulomb_friction', 'viscous_friction')
+    effects = tuple(replace(s, coefficients=x * np.ones(1))
+                    for s, x in zip(both.effects, (0.1, 0.3 * sign), strict=True))  # fmt: skip
+    smooth = replace(fitted(damped), residual=both.residual)
+    listed = _with_rest(replace(both, effects=effects), 0.5 * COUNTED_SHARE)
+    assert is_slight(listed, smooth, 0) is (sign > 0.0)
+
+
 def _brake(_t, _q, v):
     return (-0.4 * v[0] / (1.0 + (v[0] / 1.5) ** 2),)
 
