@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.catalogue import ARMATURE, EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.motion import Commands, RecordedCommands
@@ -22,7 +22,7 @@ from sgp_ros.rigid.tree import Tree
 
 _BLOCK = 8000
 """Rows whose regressor is held at a time: that of a long recording would not fit in memory."""
-_DAMPING, _ROTOR = 'damping', 'armature'
+_DAMPING, _ROTOR = 'damping', ARMATURE.quantities[0].joint_number
 """Numbers of a joint: that which is part of the tree, and its inertia beside the bodies."""
 STILL = 1e-9
 """Range of the position within which a joint does not move [rad or m]."""
