@@ -420,7 +420,6 @@ def test_waves_in_whole_ratios_are_one_periodic_force(equations_for, periods, is
     assert is_series(_waves(*periods), motion) is is_one
 
 
-@pytest.mark.long
 @pytest.mark.parametrize('is_flap', [True, False])
 def test_a_series_of_waves_gives_way_to_a_law_that_says_all_of_it(equations_for, is_flap):
     """A pressure on a flap that turns is nearly two waves; two that are waves stay."""
