@@ -205,9 +205,11 @@ class _Look:
         found, own = unlike(smooth, self.joint), own_effects(self.listed, self.joint)
         motion = self.columns.equations(frozenset()).motion
         waves = [s for s in own if s.effect.wave(motion, s.place) is not None]
+        if not is_series(waves, motion):
+            return found[:SHAPES]
         first = [
             m for m in found
-            if is_series(waves, motion) and not m.key & {s.key for s in waves}
+            if not m.key & {s.key for s in waves}
             and self._variable(m).is_of(waves[0]) and not smooth_of(m, self.joint)[1].gate
         ]  # fmt: skip
         others = [m for m in found if m not in first[:1]]

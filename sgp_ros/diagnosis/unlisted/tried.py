@@ -89,13 +89,12 @@ def is_wanted(
 
     It is where a smooth force beats them by more than a trifle, and for waves in whole ratios.
     """
-    if is_creep(columns, scale, listed, smooth, joint):
-        return False
-    if is_series(own_effects(listed, joint), columns.equations(frozenset()).motion):
-        return True
     is_trifle = smooth.mean_square[joint] > NEARLY**2 * listed.mean_square[joint]
     is_trifle = is_trifle and is_slight(listed, smooth, joint)
-    return is_beaten(scale, listed, smooth, joint) and not is_trifle
+    is_better = is_beaten(scale, listed, smooth, joint) and not is_trifle
+    motion = columns.equations(frozenset()).motion
+    is_asked = is_better or is_series(own_effects(listed, joint), motion)
+    return is_asked and not is_creep(columns, scale, listed, smooth, joint)
 
 
 def is_beaten(scale: Scale, listed: Model, smooth: Model, joint: int) -> bool:
