@@ -207,7 +207,7 @@ def test_friction_of_the_motor_does_not_reach_the_spring(damping):
         velocity=v[begun, None], acceleration=a[begun, None], effort=effort[begun, None],
         nominal_effort=nominal[begun, None],
         step=step, starts=(0, 2500), bandwidth=50.0,
-        tree=SimpleNamespace(damping=np.array([damping])),
+        tree=SimpleNamespace(damping=np.array([damping])), rotors=np.zeros(1),
         effort_slopes=lambda _j: [np.full((5500, 1), x) for x in (G, damping, link + J)],
     )  # fmt: skip
     place, shape = Place(0, 'motor'), np.array([J, 1.0 / K, D / K, 1.0])
