@@ -34,6 +34,7 @@ from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.decide.cross_validation import structure
 from sgp_ros.diagnosis.decide.decision import decide
 from sgp_ros.diagnosis.decide.scale import Scale
+from sgp_ros.diagnosis.decide.visibility import hides_friction
 from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
 from sgp_ros.physics.drawing import UnsuitableError
@@ -138,6 +139,8 @@ def statistics(folder, truth=None):
         'said': [_key(equations, s) for s in decision.model.effects],
         'cutoff_hz': equations.filter.cutoff,
         'left': float(comparison.parameters.left.max()),
+        'hides_friction': decision.verdict in ('no_mismatch', 'parameters_only')
+        and bool(hides_friction(equations, comparison, decision)),
         'base': _terms(scale, base),
         'models': [_terms(scale, model) for model in ranked[:_KEPT]],
         'structured_rest': None if best is None else _structured(equations, scale, best),

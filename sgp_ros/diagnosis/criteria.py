@@ -142,6 +142,10 @@ CLEARER = 2.0
 """Ratio of mean squared differences from which another motion separates models [1]. Convention."""
 CALM_SHARE = 0.002
 """Share left at which "no mismatch" is as likely wrong as right [1]. Half of `LEAST_SHARE`."""
+MOST_UNSEEN = 0.1
+"""Share of the mean squared effort at which friction must show in a recording that is said to miss
+nothing [1]. Convention.
+"""
 STANDING = 0.7
 """Probability of friction that stands at a joint with something unknown [1]. Convention."""
 LEAST_ASSERTED = 0.5

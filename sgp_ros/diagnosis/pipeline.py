@@ -25,7 +25,7 @@ from sgp_ros.diagnosis.decide.certainty import (
 )
 from sgp_ros.diagnosis.decide.differences import Several, without_laws_of
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, equivalents
-from sgp_ros.diagnosis.decide.visibility import visibility
+from sgp_ros.diagnosis.decide.visibility import hides_friction, visibility
 from sgp_ros.diagnosis.disturbed import undisturbed
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
@@ -144,9 +144,8 @@ def _diagnosed(
     raw, tree, names = recordings.learned, whole.motion.tree, recordings.names
     parts = {'train': raw, **recordings.kept, **recordings.held}
     several, sides, chances, final, learned, on_z, proofs = _proven(connected, parts)
-    equations, model = several.equations, several.model
-    comparison, decision = several.comparison, several.decision
-    depends = dependences(equations, comparison.base.residual)
+    equations, model, comparison = several.equations, several.model, several.comparison
+    decision, depends = several.decision, dependences(equations, comparison.base.residual)
     lags = [lag for lag in sensor_lags(raw, equations) if lag.is_physics]
     on_z += _harm(final, {k: x for k, x in parts.items() if k != 'train'}, proofs)
     doubts, on_all = reasons_to_doubt(proofs, recordings.still), replace(decision, model=model)
@@ -157,13 +156,15 @@ def _diagnosed(
     certainty = certainty_of((*findings, *differ), comparison, connected.trust, decision.verdict)
     vain = reasons_to_doubt({'train': proofs['train']}, recordings.still)
     findings = doubted(findings, vain, tree.moving_names)
-    is_doubted = rests_on(doubts, findings, tree.moving_names)
-    remarks = (*bound_remarks(decision), *on_z, *chain(*doubts.values()))
+    verdict = verdict_of(decision, wrong, connected.findings, *connected.left, lags or differ)
+    hidden = hides_friction(equations, comparison, decision) if verdict in _CALM else ()
+    remarks = (*bound_remarks(decision), *on_z, *chain(*doubts.values()), *hidden)
+    is_doubted = bool(hidden) or rests_on(doubts, findings, tree.moving_names)
     return Diagnosis(
         robot=robot,
         joints=tree.moving_names,
         units=tuple('N' if p else 'N m' for p in tree.is_prismatic[: tree.size]),
-        verdict=verdict_of(decision, wrong, connected.findings, *connected.left, lags or differ),
+        verdict=verdict,
         certainty=None if is_doubted else _certainty(certainty, connected),
         findings=findings,
         alternatives=alternatives(decision, chances),

@@ -44,9 +44,11 @@ def verdict_sentence(found: Diagnosis) -> str:
     if found.verdict == 'missing_physics':
         return _missing(found)
     if found.verdict == 'parameters_only':
+        head = 'No physics is missing, only inertial parameters are wrong'
+        if found.certainty is None:
+            head = 'Inertial parameters are wrong, and no missing physics shows'
         return (
-            'No physics is missing, only inertial parameters are wrong: '
-            f'{parameter_errors_text(found.parameter_errors)} '
+            f'{head}: {parameter_errors_text(found.parameter_errors)} '
             f'({certainty_text(found.certainty)}); '
             f'{gain_text("correcting them explains", found)}.'
         )
@@ -56,7 +58,7 @@ def verdict_sentence(found: Diagnosis) -> str:
 
 
 def certainty_text(certainty: float | None) -> str:
-    """Return a certainty [1] in words; None is none, of a model no better than a constant."""
+    """Return a certainty [1] in words; None is none, as remarks say."""
     return 'no certainty, see the remarks' if certainty is None else f'certainty {certainty:.2f}'
 
 

@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations, joint_name
 from sgp_ros.diagnosis.compare.settled import shows as may_show
-from sgp_ros.diagnosis.criteria import COUNTED_SHARE, PER_EFFECT, PER_PARAMETER
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, MOST_UNSEEN, PER_EFFECT, PER_PARAMETER
 from sgp_ros.diagnosis.decide.decision import Decision
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import split
@@ -27,7 +27,7 @@ from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.regression import Columns, on_all_joints
 from sgp_ros.diagnosis.result import Parameter
-from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.catalogue import COULOMB_FRICTION, EFFECTS, VISCOUS_FRICTION
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place, Quantity
@@ -35,6 +35,10 @@ from sgp_ros.physics.parts import Place, Quantity
 _FINEST = 1e-3
 """Least size that is tried, relative to the least start of a search."""
 _HALVINGS = 10
+_HIDDEN = (
+    'Friction of {} that makes a tenth of the mean squared effort would not show here, so it is '
+    'not certain that nothing is missing: record for longer, at more speeds, or with less noise.'
+)
 _SAME = 1e-3
 """Part of a force that an effect may leave which gives the same force."""
 
@@ -66,6 +70,30 @@ def visibility(
             key = joint_name(motion, place.joint), effect.name, quantity.name
             found[key] = Parameter(value, None, unit)
     return found
+
+
+def hides_friction(
+    equations: Equations, comparison: Comparison, decision: Decision
+) -> tuple[str, ...]:
+    """Say where friction of a tenth of the mean squared effort would not show.
+
+    Args:
+        equations: of the recording.
+        comparison: its models.
+        decision: that no physics is missing.
+    """
+    scale, motion = Scale.of(equations, comparison), equations.motion
+    beside = _Beside(Columns(equations), scale, decision.model)
+    found: dict[str, None] = {}
+    for j, power in enumerate(scale.power):
+        for effect in (COULOMB_FRICTION, VISCOUS_FRICTION):
+            unit = EffectAt(effect, Place(j), coefficients=np.ones(1))
+            mean = float((unit.columns(motion) ** 2).mean())
+            if mean > 0.0 and may_show(effect, unit.place, motion):
+                size = math.sqrt(MOST_UNSEEN * float(power) / mean)
+                if beside.clearness(replace(unit, coefficients=np.array([size]))) < 1.0:
+                    found[joint_name(motion, j)] = None
+    return (_HIDDEN.format(', '.join(found)),) if found else ()
 
 
 def _sought() -> Iterator[tuple[Effect, Quantity]]:

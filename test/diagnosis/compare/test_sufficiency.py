@@ -170,3 +170,15 @@ def test_no_connection_is_searched_where_the_filters_leave_too_few_rows(robots, 
     world.position[40] += jump
     known = Knowledge(robot, (), EngineConfig())
     assert setup_remarks(events_of(world), tree, known) == ()
+
+
+@pytest.mark.parametrize(('noise', 'is_certain'), [(0.5, True), (4.0, False)])
+def test_nothing_is_certain_where_friction_would_not_show(robots, noise, is_certain):
+    """Noise of several times the effort hides a friction that a robot may not lack in silence."""
+    world = simulate(CHAINS[1], 11, 4.0)
+    size = noise * np.sqrt((world.command**2).mean())
+    acts = world.command + size * np.random.default_rng(0).standard_normal(world.command.shape)
+    found = diagnose(events_of(world, effort=acts, commands=False), *robots[1], {})
+    assert found.verdict == 'no_mismatch'
+    assert (found.certainty is not None) == is_certain
+    assert any('would not show' in remark for remark in found.remarks) != is_certain
