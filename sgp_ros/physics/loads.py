@@ -51,7 +51,7 @@ class Spring(Effect):
     term = TermForm('spring', ('stiffness',))
 
     def coefficient_quantities(self, kind: str = '') -> tuple[Quantity, ...]:
-        return Quantity('stiffness', 'N m/rad'), Quantity('preload', 'N m')
+        return self.quantities[0], Quantity('preload', 'N m')
 
     def model(self, numbers: Numbers, kind: str = '') -> tuple[np.ndarray, np.ndarray]:
         stiffness = numbers['stiffness']
@@ -62,7 +62,7 @@ class Spring(Effect):
         return {'stiffness': stiffness, 'rest': force / stiffness}
 
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
-        return bool(at.coefficients[0] > 0.0)
+        return leaves_some(self.quantities[0], at, motion)
 
     def local(self, x: OwnMotion, shape: np.ndarray) -> tuple[np.ndarray, ...]:
         return -x.q, np.ones_like(x.q)

@@ -82,9 +82,11 @@ def phrase(finding: Finding | Difference) -> str:
 def taken_off(finding: Finding | Difference) -> float:
     """Return how much less of a law there is than the robot file states; 0 of any other."""
     law = EFFECTS.get(finding.effect)
-    if law is None or not law.is_usual or isinstance(finding, Difference):
+    if law is None or not law.linear or isinstance(finding, Difference):
         return 0.0
-    return max(-float(finding.parameters[law.linear[0]].value), 0.0)
+    first = next(q for q in law.quantities if q.name == law.linear[0])
+    is_stated = law.is_usual or bool(first.joint_number)
+    return max(-float(finding.parameters[first.name].value), 0.0) if is_stated else 0.0
 
 
 def _mixed_up(finding: Finding | Difference) -> list[str]:

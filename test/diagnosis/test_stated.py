@@ -142,12 +142,13 @@ def test_roll_outs_of_the_nominal_robot_have_what_it_states(named, robots):
 
 
 @pytest.mark.parametrize(
-    'name', [pytest.param('viscous_friction', marks=pytest.mark.long), 'coulomb_friction']
+    'name',
+    [pytest.param('viscous_friction', marks=pytest.mark.long), 'coulomb_friction', 'spring'],
 )
 def test_what_the_robot_states_too_much_of_is_taken_off(robots, name):
     """The sentence says so."""
     robot, tree = robots[1]
-    ((number, size),) = EFFECTS[name].items()
+    number, size = next(iter(EFFECTS[name].items()))
     stated = _stated(name, tree, **{number: 1.6 * size})
     found = diagnose(events_of(_world(name)), robot, tree, {}, stated=stated)
     assert found.verdict == 'missing_physics'
