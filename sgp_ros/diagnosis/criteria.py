@@ -19,6 +19,10 @@ COUNTED_SHARE = SHARE_TOLERANCE * LEAST_SHARE
 EVIDENCE = 10.0
 """Evidence that an effect must have, on the recording and on parts left out [nats]. Nulls."""
 
+LOST_ENERGY = 0.1
+"""Part of a joint's greatest kinetic energy that dry friction takes on the whole way, from which
+it counts as physics where no joint has a motor [1]. Convention.
+"""
 MOST_MISSED = 0.2
 """Part of the inertial force that a robot without any effort may miss where nothing drives it [1].
 

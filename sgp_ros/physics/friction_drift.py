@@ -36,6 +36,11 @@ class FrictionDrift(Effect):
     is_dry = True
     is_online = False
 
+    def places(self, motion: SeenMotion) -> list[Place]:
+        """Return the joints; none of a free swing, whose size tells the time as it decays."""
+        is_driven = motion.tree.is_actuated[: motion.tree.size].any()
+        return super().places(motion) if is_driven else []
+
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         """Return friction that comes, and friction that goes."""
         fade = np.exp(-motion.time / shape[0])

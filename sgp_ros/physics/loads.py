@@ -106,6 +106,10 @@ class Armature(Effect):
     sees_acceleration = True
     is_usual = True
 
+    def places(self, motion: SeenMotion) -> list[Place]:
+        """Return the joints that have a motor."""
+        return [x for x in super().places(motion) if motion.tree.is_actuated[x.joint]]
+
     def is_possible(self, at: Placed, motion: SeenMotion) -> bool:
         return leaves_some(self.quantities[0], at, motion)
 

@@ -23,6 +23,7 @@ from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, events_of, shown, simulate, urdf
 
 LEVEL = 0.08
+UNDAMPED = (replace(CHAINS[1][0], damping=0.0),)
 MAP = {
     'time': {'column': 't', 'unit': 's'},
     'joints': {'joint0': {'position': {'column': 'q', 'unit': 'rad'}}},
@@ -75,6 +76,41 @@ def test_a_driven_link_without_efforts_is_refused(robots):
     events = events_of(_swing(), commands=False)
     with pytest.raises(RecordingError, match=r'has an effort, .* passive: \[joint0\]'):
         diagnose(events, *robots[1], {})
+
+
+@pytest.fixture(scope='module')
+def light(tmp_path_factory):
+    """Robot and nominal tree of one link without a motor that nothing damps."""
+    folder = tmp_path_factory.mktemp('light')
+    (folder / 'chain.urdf').write_text(urdf(UNDAMPED))
+    (folder / 'robot.yaml').write_text('schema: 1\nurdf: chain.urdf\npassive: [joint0]\n')
+    robot = load_robot(str(folder / 'robot.yaml'))
+    return robot, nominal_tree(robot)
+
+
+@pytest.mark.parametrize(
+    ('level', 'c', 'longer', 'named'),
+    [
+        (0.0, 0.0, 1.0, []),
+        (0.004, 0.0, 1.0, ['coulomb_friction']),
+        (0.004, 0.012, 1.01, ['coulomb_friction', 'quadratic_drag']),
+    ],
+)  # fmt: skip
+def test_what_a_free_swing_loses_is_named(light, level, c, longer, named):
+    """However small it is beside the weight; friction that fades with the swing is no drift."""
+    link = replace(UNDAMPED[0], centre=longer * UNDAMPED[0].centre)
+    world = simulate(
+        (link,), 1, 25.0, motor=lambda _commands, _t: (0.0,), dry=lambda _t, _q, _s: level,
+        force=lambda _t, _q, v: (-c * abs(v[0]) * v[0],),
+    )  # fmt: skip
+    found = diagnose(events_of(world, commands=False), *light, {})
+    assert found.verdict == ('missing_physics' if named else 'no_mismatch')
+    assert sorted(f.effect for f in found.findings) == named
+    for finding in found.findings:
+        (number,) = finding.parameters.values()
+        wanted = level if finding.effect == 'coulomb_friction' else c
+        assert number.value == pytest.approx(wanted, rel=0.15)
+        assert abs(number.value - wanted) < 3.0 * number.std
 
 
 def test_of_two_joints_the_one_without_efforts_is_named(robots):

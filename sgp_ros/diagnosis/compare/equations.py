@@ -24,6 +24,7 @@ from sgp_ros.diagnosis.compare.bodies import Factor, body_directions
 from sgp_ros.diagnosis.compare.effort_noise import measured_noise, noise_beside_laws
 from sgp_ros.diagnosis.compare.grid import effort_change
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
+from sgp_ros.diagnosis.compare.power import at_one_scale, reference_power
 from sgp_ros.diagnosis.compare.rest import resting
 from sgp_ros.diagnosis.compare.trajectory import (
     Bandwidth,
@@ -270,7 +271,7 @@ def make_equations(
     low = parallel_filter(raw, bandwidth)
     k = tree.size
     d = low(motion.nominal_effort - motion.effort - motion.stated_force) * motion.moves
-    directions = body_directions(tree, unstated)
+    directions = at_one_scale(body_directions(tree, unstated), motion)
     m = k if motion.drive is None and not motion.is_static else 0
     bases = tuple(np.zeros((len(d), m + len(directions))) for _ in range(k))
     for rows, out in low.blocks(_BLOCK):
@@ -283,15 +284,13 @@ def make_equations(
         for j in range(k):
             bases[j][:, j] = late[:, j]
     inertial = low(motion.mass_diagonal * motion.acceleration)
-    squares = (motion.effort**2).mean(axis=0), (inertial**2).mean(axis=0)
-    power = np.where(tree.is_actuated[:k], *squares)
-    power = np.where(motion.moves & (power > 0.0), power, 1.0)
     inertia = motion.mass_diagonal.mean(axis=0)
     variance = inertia**2 * (2 * np.pi) ** 4 * raw.noise_density * bandwidth.cutoff**5 / 5.0
     noise = noise_beside_laws(measured_noise(raw, motion, bandwidth), d, bases, motion, low)
     loop = Loop.of(motion, bandwidth.cutoff)
     carried = loop.volume(carried_inertia(motion, low, inertial, d))
-    error = np.exp(2.0 * carried) * smoothing_error(raw, motion, low, bandwidth)
+    power, error = reference_power(motion, inertial)
+    error += np.exp(2.0 * carried) * smoothing_error(raw, motion, low, bandwidth)
     equations = Equations(
         motion, low, motion.time[low.rows], d, bases, directions, power, np.sqrt(variance),
         np.ones(motion.position.shape), resting(raw, motion, bandwidth),

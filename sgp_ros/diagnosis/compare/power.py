@@ -1,0 +1,82 @@
+"""What forces are compared with: mean squared efforts, or in a free swing the bodies' inertia.
+
+Where no joint has a motor, the motion is that of bodies, springs and friction of any common scale:
+forces are told for the inertia that the robot file states.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, FLOOR_SHARE, LOST_ENERGY
+from sgp_ros.rigid.rigid_body import torque_regressor
+from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.observed_motion import ObservedMotion
+
+_POSES = 200
+_HELD = 0.01
+"""Part of the prior standard deviation of its inertia that is left to a robot without motors."""
+
+
+def reference_power(motion: ObservedMotion, inertial: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the mean squares that shares refer to, and errors of signals beyond those of shares.
+
+    That is the mean squared efforts; at joints without a motor, inertial forces of their own
+    acceleration. Where no joint has a motor nothing is lost but to friction, and it adds up over
+    the way `s`: one of level F counts from `F s = LOST_ENERGY max(m v^2 / 2)`, however small it is
+    beside the weight. Errors of the signals are still relative to the inertial forces.
+
+    Args:
+        motion: that was seen, n rows.
+        inertial: (N, k) low-passed inertial forces of each joint's own acceleration [N m or N].
+
+    Returns:
+        Powers, 1 where nothing moves, and errors, (k,) each [N^2 m^2 or N^2].
+    """
+    driven = motion.tree.is_actuated[: motion.tree.size]
+    own = (inertial**2).mean(axis=0)
+    counted = own
+    if not driven.any():
+        v = motion.velocity
+        energy = (0.5 * motion.mass_diagonal * v**2).max(axis=0)
+        way = motion.step * np.abs(v).sum(axis=0) / _recordings(motion)
+        level = LOST_ENERGY * energy / np.maximum(way, 1e-300)
+        counted = np.minimum(own, level**2 / COUNTED_SHARE)
+    power = np.where(driven, (motion.effort**2).mean(axis=0), counted)
+    power = np.where(motion.moves & (power > 0.0), power, 1.0)
+    return power, FLOOR_SHARE * (own - counted)
+
+
+def _recordings(motion: ObservedMotion) -> int:
+    return 1 if motion.recording is None else len(np.unique(motion.recording))
+
+
+def at_one_scale(directions: np.ndarray, motion: ObservedMotion) -> np.ndarray:
+    """Return changes of bodies that keep the inertia of a robot none of whose joints has a motor.
+
+    Args:
+        directions: (p, 10 b) changes, each with the prior N(0, 1).
+        motion: that was seen.
+
+    Returns:
+        (p, 10 b), that of all inertia nearly none; as given where a joint has a motor.
+    """
+    tree = motion.tree
+    if tree.is_actuated[: tree.size].any():
+        return directions
+    q = motion.position[:: max(1, len(motion.position) // _POSES)]
+    slope = np.zeros(len(directions))
+    for j in np.flatnonzero(motion.moves).tolist():
+        Y = _accelerated(tree, q, j)
+        slope += ((Y @ directions.T) / (Y @ tree.parameters.ravel())[:, None]).mean(axis=0)
+    n = slope / np.linalg.norm(slope)
+    return np.asarray(directions - (1.0 - _HELD) * np.outer(n, n @ directions))
+
+
+def _accelerated(tree: Tree, q: np.ndarray, joint: int) -> np.ndarray:
+    """Return the regressor of what a unit of a joint's acceleration takes there, (n, 10 b)."""
+    still = np.zeros_like(q)
+    a = still + np.eye(q.shape[1])[joint]
+    return np.asarray(
+        (torque_regressor(tree, q, still, a) - torque_regressor(tree, q, still, still))[:, joint]
+    )
