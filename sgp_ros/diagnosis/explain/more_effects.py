@@ -71,7 +71,7 @@ def more(columns: Columns, nominal: Model, base: Model, compared: Sequence[Model
         starts += _late(columns, best.sigma)
     ends = [stated, loaded, *(by_joint(columns, start) for start in starts)]
     models = _crossed(columns, [end for end in ends if end])
-    models += [*_carrying(columns, models), *_freed(columns, models)]
+    models += [*_carrying(columns, [best, *models]), *_freed(columns, models)]
     models += _richer(columns, models)
     single = (m for m in models if one_of_each(m.effects) == m.effects)
     return ranked(m for m in single if len(m.effects) > 2)
@@ -91,9 +91,10 @@ def _everyday(columns: Columns, best: Model, sigma: np.ndarray) -> Iterator[Mode
 
 
 def _carrying(columns: Columns, models: list[Model]) -> list[Model]:
-    """Return the best models with other bodies, with a load in place of these."""
+    """Return the best models with other bodies, with a load or a tilt in place of these."""
     free = sorted((m for m in models if m.is_free), key=lambda m: -gain(m, models[0]))
-    loads = [(x,) for x in _loads(columns.equations(frozenset()).motion)]
+    motion = columns.equations(frozenset()).motion
+    loads = [(x,) for x in (*_loads(motion), *_tilts(motion))]
     return [
         fit(columns, (*model.effects, *load), model.sigma, is_free=False)
         for model in free[:_CARRYING]
@@ -111,6 +112,15 @@ def _freed(columns: Columns, models: list[Model]) -> Iterator[Model]:
         laws = tuple(s for s in best.effects if not s.effect.is_body)
         free = without_vain(columns, fit(columns, laws, best.sigma, is_free=True))
         yield from filter(is_credible, (free, large(columns, free)))
+
+
+def _tilts(motion: ObservedMotion) -> list[EffectAt]:
+    """Return laws of the frame of all bodies, each from one start: they are nearly linear."""
+    return [
+        EffectAt(law, place, law.starts(motion, place)[0])
+        for law in motion.catalogue.values() if law.is_on_tree
+        for place in law.places(motion)
+    ]  # fmt: skip
 
 
 def _loads(motion: ObservedMotion) -> list[EffectAt]:
